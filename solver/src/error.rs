@@ -1,0 +1,72 @@
+//! What can be wrong with a problem, and what can stop a solution.
+//!
+//! Not converging is neither: it is an [`Outcome`](crate::solution::Outcome) with its history.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// One thing that is wrong with a problem, said so that its author can mend it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Violation {
+    /// JSON Pointer (RFC 6901) into the problem, e.g. `/contacts/0/friction/elastic_slip`.
+    pub pointer: String,
+    /// A short name of the kind of violation, e.g. `out_of_range`, stable for programs.
+    pub reason: String,
+    /// What was found there.
+    pub got: String,
+    /// What would have been right.
+    pub expected: String,
+    /// What to do about it.
+    pub hint: String,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let pointer = if self.pointer.is_empty() { "(the whole problem)" } else { &self.pointer };
+        write!(f, "{pointer}: expected {}, got {}. {}", self.expected, self.got, self.hint)
+    }
+}
+
+/// Why a solution could not be had at all.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SolveError {
+    /// The problem is not one that can be solved; every violation found.
+    Invalid(Vec<Violation>),
+    /// The stiffness matrix has no Cholesky factor although the supports looked sufficient.
+    SingularSystem {
+        /// The pivot (in factor order) at which the factorisation stopped.
+        pivot: usize,
+    },
+    /// A number that is not finite came up in the named phase.
+    NonFinite {
+        /// What was being computed.
+        phase: &'static str,
+    },
+    /// The observer asked to stop before there was a state worth keeping.
+    Stopped,
+}
+
+impl fmt::Display for SolveError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SolveError::Invalid(violations) => {
+                write!(f, "the problem has {} violation(s)", violations.len())?;
+                violations.iter().try_for_each(|v| write!(f, "\n  {v}"))
+            }
+            SolveError::SingularSystem { pivot } => write!(
+                f,
+                "the stiffness matrix is singular to working precision (pivot {pivot}): \
+                 check the supports, and the ratio of the largest to the smallest element"
+            ),
+            SolveError::NonFinite { phase } => write!(
+                f,
+                "a number that is not finite came up in {phase}: check the magnitudes of moduli, lengths and loads"
+            ),
+            SolveError::Stopped => write!(f, "stopped on request"),
+        }
+    }
+}
+
+impl std::error::Error for SolveError {}

@@ -1,0 +1,299 @@
+//! What comes back: plain data, the JSON of the API word for word.
+//!
+//! Signs: stresses are negative in compression; forces are those on the body; `t` is the outward
+//! normal turned clockwise. Forces are of the modelled part: a half model gives half, plane stress
+//! includes the thickness, axisymmetric totals include 2π.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// A solved problem, converged or not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Solution {
+    /// Scalars, extents and warnings.
+    pub summary: Summary,
+    /// One row per iteration.
+    pub history: Vec<Iteration>,
+    /// Columns along each contact boundary, by its name.
+    pub profiles: BTreeMap<String, ContactProfile>,
+    /// Displacements and stresses at all nodes.
+    pub fields: Fields,
+}
+
+/// How an iteration ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Contact set unchanged, every residual below the tolerance.
+    Converged,
+    /// `max_iterations` reached, or no further progress.
+    NotConverged,
+    /// The contact set repeats itself without settling.
+    ContactCycling,
+    /// The observer asked to stop; the last state is kept.
+    Canceled,
+}
+
+/// The scalars of a solution.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// True for `converged` only.
+    pub converged: bool,
+    /// Y = ∫p ≥ 0 over all contacts (force).
+    pub normal_force: f64,
+    /// T = ∫σ_t, positive along t, over all contacts (force).
+    pub tangential_force: f64,
+    /// ∫|σ_t| over all contacts (force).
+    pub friction_force: f64,
+    /// The same and more for each contact boundary.
+    pub contacts: BTreeMap<String, ContactSummary>,
+    /// Rows of the history.
+    pub iterations: u32,
+    /// The stage that produced the final state.
+    pub stage: Stage,
+    /// Last contraction number q = |Δτ_k|/|Δτ_{k−1}| of the outer sweeps; absent below two sweeps.
+    pub contraction: Option<f64>,
+    /// Dimensionless residuals of the final state.
+    pub residuals: Residuals,
+    /// Potential energy (1.21) of the final state with its own friction bound (force × length).
+    pub energy: f64,
+    /// Work done against friction in the total law, ∫τ φ |u_t − d| ≥ 0 (force × length).
+    pub friction_work: f64,
+    /// What the user should know before trusting the result.
+    pub warnings: Vec<Warning>,
+    /// Unknowns of the body after supports.
+    pub dofs: u64,
+    /// Unknowns on the contact boundaries.
+    pub contact_dofs: u64,
+}
+
+/// Scalars of one contact boundary.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContactSummary {
+    /// ∫p ≥ 0 (force).
+    pub normal_force: f64,
+    /// ∫σ_t, positive along t (force).
+    pub tangential_force: f64,
+    /// ∫|σ_t| (force).
+    pub friction_force: f64,
+    /// Intervals `[s0, s1]` of arc length between the outermost nodes in contact.
+    pub contact: Vec<[f64; 2]>,
+    /// Parts of them with |u_t − d| < ε.
+    pub stick: Vec<[f64; 2]>,
+    /// The rest of them; the whole contact when it is frictionless.
+    pub slip: Vec<[f64; 2]>,
+    /// Largest pressure, as a stress (≤ 0), over the continuous profile; absent without contact.
+    pub peak_normal_stress: Option<Peak>,
+    /// Largest |σ_t|, with its sign, over the continuous profile; absent without friction.
+    pub peak_tangential_stress: Option<Peak>,
+}
+
+/// A value and where it occurs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Peak {
+    /// The stress, with its sign.
+    pub value: f64,
+    /// Arc length from the first node of Γ_C.
+    pub s: f64,
+    /// Position.
+    pub x: f64,
+    /// Position.
+    pub y: f64,
+}
+
+/// Dimensionless residuals.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Residuals {
+    /// Largest force or complementarity defect for the friction bound in use / largest nodal reaction.
+    pub kkt: f64,
+    /// max|τ − μ max(S_ρ(p), 0)| / max τ.
+    pub friction: f64,
+    /// As `kkt`, with the friction bound that the state itself implies.
+    pub monolithic: f64,
+    /// |Σ forces| / Σ|forces|, from the stresses in the body.
+    pub equilibrium: f64,
+}
+
+/// Something the user should know.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Warning {
+    /// A short name, stable for programs.
+    pub code: String,
+    /// JSON Pointer to what it is about.
+    pub pointer: String,
+    /// The finding with its figures, and what to do.
+    pub message: String,
+}
+
+/// Where in the method an iteration belongs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// The first solution, without friction.
+    Frictionless,
+    /// A sweep over the friction bound.
+    Outer,
+}
+
+/// One line of history.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Iteration {
+    /// Number of the row, from 1.
+    pub k: u32,
+    /// Where in the method.
+    pub stage: Stage,
+    /// Load step, from 0.
+    pub step: u32,
+    /// `Residuals::kkt` of the convex problem just solved.
+    pub residual: f64,
+    /// `Residuals::friction`.
+    pub friction_residual: f64,
+    /// R_F of thesis 3.5: relative change of the nodal normal stress; absent in the first row.
+    pub r_f: Option<f64>,
+    /// The tolerance in force.
+    pub tolerance: f64,
+    /// The contact set.
+    pub contact: ContactCount,
+    /// The friction points.
+    pub friction: FrictionCount,
+    /// Forces of this state.
+    pub force: ForcePair,
+    /// q = |Δτ_k|/|Δτ_{k−1}|; absent in the first sweeps.
+    pub contraction: Option<f64>,
+    /// Newton steps of the convex problem.
+    pub inner: u32,
+    /// Seconds since the start, stamped by the caller; the solver has no clock and writes 0.
+    pub wall_s: f64,
+}
+
+/// Nodes in contact and their changes since the row before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ContactCount {
+    /// Nodes in contact.
+    pub active: u32,
+    /// Nodes that came into contact.
+    pub entered: u32,
+    /// Nodes that left contact.
+    pub left: u32,
+}
+
+/// Friction points with a positive bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FrictionCount {
+    /// |u_t − d| ≥ ε.
+    pub slip: u32,
+    /// |u_t − d| < ε.
+    pub stick: u32,
+}
+
+/// Total forces over all contacts.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ForcePair {
+    /// ∫p.
+    pub normal: f64,
+    /// ∫σ_t.
+    pub tangential: f64,
+}
+
+/// Columns along a contact boundary, one entry per node of Γ_C in order of arc length.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ContactProfile {
+    /// Arc length from the first node of Γ_C.
+    pub s: Vec<f64>,
+    /// Position before deformation.
+    pub x: Vec<f64>,
+    /// Position before deformation.
+    pub y: Vec<f64>,
+    /// Gap before deformation, obstacle profile − indentation, along the outward normal.
+    pub gap: Vec<f64>,
+    /// u_n ≤ gap, along the outward normal.
+    pub normal_displacement: Vec<f64>,
+    /// u_t, along t.
+    pub tangential_displacement: Vec<f64>,
+    /// σ_n ≤ 0 in compression.
+    pub normal_stress: Vec<f64>,
+    /// σ_t on the body, along t.
+    pub tangential_stress: Vec<f64>,
+    /// S_ρ(p), the averaged pressure.
+    pub nonlocal_pressure: Vec<f64>,
+    /// τ = μ max(S_ρ, 0).
+    pub friction_bound: Vec<f64>,
+    /// φ_ε(|u_t − d|), between 0 and 1.
+    pub friction_ratio: Vec<f64>,
+    /// The node's state.
+    pub state: Vec<NodeState>,
+}
+
+/// State of a contact node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NodeState {
+    /// Not in contact.
+    Open,
+    /// In contact, |u_t − d| < ε.
+    Stick,
+    /// In contact and sliding, or in contact without friction.
+    Slip,
+}
+
+/// Values at all nodes of the mesh, in its order.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Fields {
+    /// Position before deformation.
+    pub x: Vec<f64>,
+    /// Position before deformation.
+    pub y: Vec<f64>,
+    /// Displacement along x.
+    pub ux: Vec<f64>,
+    /// Displacement along y.
+    pub uy: Vec<f64>,
+    /// Recovered stress σ_xx (σ_rr).
+    pub stress_xx: Vec<f64>,
+    /// Recovered stress σ_yy (σ_zz in axisymmetry).
+    pub stress_yy: Vec<f64>,
+    /// Recovered shear stress σ_xy (σ_rz).
+    pub stress_xy: Vec<f64>,
+    /// Recovered out-of-plane stress σ_zz (the hoop stress σ_θθ in axisymmetry).
+    pub stress_zz: Vec<f64>,
+    /// Eight node numbers per element: corners counter-clockwise, then midsides.
+    pub elements: Vec<[u32; 8]>,
+}
+
+/// Phases of a solution, in their order; the caller times them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// Reading the JSON (the caller's own).
+    Parse,
+    /// Meshing and checking.
+    Mesh,
+    /// Element stiffnesses and loads.
+    Assemble,
+    /// Fill-reducing ordering and symbolic factorisation.
+    Order,
+    /// Numerical factorisation.
+    Factor,
+    /// Stiffness and load seen from the contact boundary.
+    Condense,
+    /// Contact and friction.
+    Iterate,
+    /// Back-substitution, stresses, profiles.
+    Recover,
+}
+
+/// What the solver tells its observer.
+#[derive(Debug)]
+pub enum Progress<'a> {
+    /// A phase begins.
+    Phase(Phase),
+    /// An iteration is done; the observer may stamp `wall_s`.
+    Iteration(&'a mut Iteration),
+    /// A finding, as soon as it is known; all stand in the summary again.
+    Warning(&'a Warning),
+}
+
+/// The observer of a solution: called at every phase and iteration, it may break off.
+pub type Observer<'a> = dyn FnMut(Progress<'_>) -> std::ops::ControlFlow<()> + 'a;
