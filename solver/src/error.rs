@@ -22,10 +22,23 @@ pub struct Violation {
     pub hint: String,
 }
 
+/// A name as a token of a JSON Pointer (RFC 6901).
+pub fn escape(name: &str) -> String {
+    name.replace('~', "~0").replace('/', "~1")
+}
+
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let pointer = if self.pointer.is_empty() { "(the whole problem)" } else { &self.pointer };
-        write!(f, "{pointer}: expected {}, got {}. {}", self.expected, self.got, self.hint)
+        let pointer = if self.pointer.is_empty() {
+            "(the whole problem)"
+        } else {
+            &self.pointer
+        };
+        write!(
+            f,
+            "{pointer}: expected {}, got {}. {}",
+            self.expected, self.got, self.hint
+        )
     }
 }
 
@@ -39,6 +52,8 @@ pub enum SolveError {
         /// The pivot (in factor order) at which the factorisation stopped.
         pivot: usize,
     },
+    /// The factor of the stiffness matrix has more entries than can be addressed or held.
+    ResourceExhausted,
     /// A number that is not finite came up in the named phase.
     NonFinite {
         /// What was being computed.
@@ -60,6 +75,12 @@ impl fmt::Display for SolveError {
                 "the stiffness matrix is singular to working precision (pivot {pivot}): \
                  check the supports, and the ratio of the largest to the smallest element"
             ),
+            SolveError::ResourceExhausted => {
+                write!(
+                    f,
+                    "the factor of the stiffness matrix does not fit: refine less"
+                )
+            }
             SolveError::NonFinite { phase } => write!(
                 f,
                 "a number that is not finite came up in {phase}: check the magnitudes of moduli, lengths and loads"

@@ -1,5 +1,67 @@
-//! Frictional contact in linear elasticity with the nonlocal, nonlinear law of Oden and Pires.
+//! Frictional contact in linear elasticity by finite elements, with the nonlocal, nonlinear law of
+//! Oden and Pires (A.C. Bolt, MSc thesis, University of Cape Town, 1983).
+//!
+//! A library of pure functions: no clock, thread, file or network; the same problem gives the same
+//! bits. From the ground up, each room uses only rooms above it in this list:
 
-pub mod error;
-pub mod problem;
-pub mod solution;
+pub mod algorithm;
+pub mod body; //       the body as felt from the contact boundary
+pub mod contact; //    the geometry of the contact boundary
+pub mod elasticity; // a standard elastic program
+pub mod element; //    master elements and integration rules
+pub mod error; //      violations and errors
+pub mod friction; //   the law, along arc length only
+pub mod io; //         problems in, plots out
+pub mod linear; //     matrices; the one room that names faer
+pub mod mesh; //       nodes, elements, named boundaries
+pub mod model; //      every check: the only door to a problem that can be solved
+pub mod problem; //    what a client asks for: plain data
+pub mod solution; //   what comes back: plain data //  contact and friction
+
+use error::{SolveError, Violation};
+use model::Model;
+use problem::Problem;
+use solution::{Observer, Phase, Progress, Solution, Warning};
+
+/// Solves a problem: the whole flow on one screen.
+///
+/// `observe` is told every phase and iteration and may break off: then the last state comes back
+/// as `Outcome::Canceled`, or `SolveError::Stopped` when there is none yet.
+pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
+    begin(observe, Phase::Mesh)?;
+    let model = Model::new(problem).map_err(SolveError::Invalid)?;
+    for warning in &model.warnings {
+        begin_warning(observe, warning)?;
+    }
+    let body = body::ElasticBody::new(&model, observe)?;
+    begin(observe, Phase::Iterate)?;
+    let system = algorithm::System::new(&model, &body);
+    let finished = algorithm::run(&system, &model.controls, observe);
+    // the last state is kept also when the observer broke off: its answer no longer matters
+    let _ = observe(Progress::Phase(Phase::Recover));
+    algorithm::report(&model, &body, &system, finished)
+}
+
+/// Checks a problem without solving it: its warnings, or everything that is wrong with it.
+pub fn check(problem: &Problem) -> Result<Vec<Warning>, Vec<Violation>> {
+    Model::new(problem).map(|model| model.warnings)
+}
+
+fn begin(observe: &mut Observer<'_>, phase: Phase) -> Result<(), SolveError> {
+    if observe(Progress::Phase(phase)).is_break() {
+        Err(SolveError::Stopped)
+    } else {
+        Ok(())
+    }
+}
+
+fn begin_warning(observe: &mut Observer<'_>, warning: &Warning) -> Result<(), SolveError> {
+    if observe(Progress::Warning(warning)).is_break() {
+        Err(SolveError::Stopped)
+    } else {
+        Ok(())
+    }
+}
+
+pub use io::json::{parse, schema};
+pub use model::estimate::{Estimate, estimate};

@@ -348,6 +348,10 @@ fn default_max_iterations() -> u32 {
 
 impl Default for SolverControls {
     fn default() -> Self {
-        Self { algorithm: Algorithm::Auto, tolerance: default_tolerance(), max_iterations: default_max_iterations() }
+        Self {
+            algorithm: Algorithm::Auto,
+            tolerance: default_tolerance(),
+            max_iterations: default_max_iterations(),
+        }
     }
 }

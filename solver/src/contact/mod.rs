@@ -1,0 +1,198 @@
+//! The geometry of Γ_C, thesis 1.3(c) and 3.3.1: a chain of edges in order of arc length, with
+//! normals, weights and the points where friction is evaluated.
+
+pub mod obstacle;
+
+use crate::element::edge3;
+use crate::element::gauss::GAUSS_3;
+use crate::mesh::{Edge, Mesh};
+
+/// Γ_C as points in arc-length order.
+///
+/// ```text
+///        body on the right of the direction of s
+///   0 ---1--- 2 ---3--- 4        even: corners, odd: midsides; edge k has nodes 2k, 2k+2, 2k+1
+///   s = 0 at node 0; t along growing s; n = t turned counter-clockwise, out of the body
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactBoundary {
+    /// Mesh nodes.
+    pub nodes: Vec<u32>,
+    /// Positions.
+    pub positions: Vec<[f64; 2]>,
+    /// Arc length from the first node.
+    pub s: Vec<f64>,
+    /// Unit outward normal; at a corner between two edges the mean of theirs.
+    pub normals: Vec<[f64; 2]>,
+    /// ∫ h_i, with the depth of the section: from a nodal force to a pressure.
+    pub weights: Vec<f64>,
+    /// Three Gauss points per edge.
+    pub friction_points: Vec<FrictionPoint>,
+}
+
+/// A point where friction acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionPoint {
+    /// Arc length.
+    pub s: f64,
+    /// The three chain nodes of its edge.
+    pub nodes: [usize; 3],
+    /// Their shape functions here.
+    pub shape: [f64; 3],
+    /// Weight of the point in an integral along Γ_C, with the depth of the section.
+    pub weight: f64,
+}
+
+impl ContactBoundary {
+    /// From edges that follow one another; `depth` as in `elasticity::Section`.
+    pub fn new(mesh: &Mesh, chain: &[Edge], depth: impl Fn(f64) -> f64) -> Self {
+        let count = 2 * chain.len() + 1;
+        let mut boundary = ContactBoundary {
+            nodes: vec![0; count],
+            positions: vec![[0.0; 2]; count],
+            s: arc_lengths(mesh, chain),
+            normals: vec![[0.0; 2]; count],
+            weights: vec![0.0; count],
+            friction_points: Vec::with_capacity(3 * chain.len()),
+        };
+        for (k, edge) in chain.iter().enumerate() {
+            let local = edge_nodes(k);
+            let positions = mesh.edge_nodes(edge);
+            for (i, xi) in [-1.0, 1.0, 0.0].into_iter().enumerate() {
+                let [dx, dy] = edge3::map(&positions, xi).1;
+                let length = dx.hypot(dy);
+                boundary.nodes[local[i]] = edge[i];
+                boundary.positions[local[i]] = positions[i];
+                boundary.normals[local[i]][0] -= dy / length;
+                boundary.normals[local[i]][1] += dx / length;
+            }
+            for (xi, w) in GAUSS_3 {
+                let shape = edge3::shape(xi);
+                let ([x, _], [dx, dy]) = edge3::map(&positions, xi);
+                let weight = w * dx.hypot(dy) * depth(x);
+                (0..3).for_each(|i| boundary.weights[local[i]] += weight * shape[i]);
+                let s = edge3::interpolate(&shape, &local.map(|i| boundary.s[i]));
+                boundary.friction_points.push(FrictionPoint {
+                    s,
+                    nodes: local,
+                    shape,
+                    weight,
+                });
+            }
+        }
+        for [x, y] in &mut boundary.normals {
+            let length = x.hypot(*y);
+            // + 0.0 turns −0 into 0, so that an axis-parallel normal is exactly that
+            (*x, *y) = (*x / length + 0.0, *y / length + 0.0);
+        }
+        boundary
+    }
+
+    /// Number of edges.
+    pub fn edge_count(&self) -> usize {
+        self.nodes.len() / 2
+    }
+
+    /// Tangent: the normal turned clockwise.
+    pub fn tangent(&self, node: usize) -> [f64; 2] {
+        let [x, y] = self.normals[node];
+        [y, -x]
+    }
+
+    /// Arc lengths of an edge's nodes (start, end, midside).
+    pub fn edge_arc(&self, edge: usize) -> [f64; 3] {
+        edge_nodes(edge).map(|i| self.s[i])
+    }
+}
+
+/// Chain nodes (start, end, midside) of an edge.
+pub fn edge_nodes(edge: usize) -> [usize; 3] {
+    [2 * edge, 2 * edge + 2, 2 * edge + 1]
+}
+
+/// Arc length at the nodes of a chain of edges, from its first node.
+pub fn arc_lengths(mesh: &Mesh, chain: &[Edge]) -> Vec<f64> {
+    let mut s = vec![0.0];
+    for edge in chain {
+        let positions = mesh.edge_nodes(edge);
+        // each half by three points: exact for a straight edge, enough for a gently curved one
+        for centre in [-0.5, 0.5] {
+            let half: f64 = GAUSS_3
+                .iter()
+                .map(|(xi, w)| {
+                    let [dx, dy] = edge3::map(&positions, centre + 0.5 * xi).1;
+                    0.5 * w * dx.hypot(dy)
+                })
+                .sum();
+            s.push(s[s.len() - 1] + half);
+        }
+    }
+    s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn top(points: &[[f64; 2]]) -> (Mesh, Vec<Edge>) {
+        let chain = (0..points.len() / 2)
+            .map(|k| edge_nodes(k).map(|n| n as u32))
+            .collect();
+        (
+            Mesh {
+                nodes: points.to_vec(),
+                ..Mesh::default()
+            },
+            chain,
+        )
+    }
+
+    #[test]
+    fn a_top_edge_has_its_normal_up_and_its_tangent_along_x() {
+        let (mesh, chain) = top(&[[0.0, 1.0], [1.0, 1.0], [2.0, 1.0], [2.5, 1.0], [3.0, 1.0]]);
+        let boundary = ContactBoundary::new(&mesh, &chain, |_| 1.0);
+        assert_eq!(boundary.s, [0.0, 1.0, 2.0, 2.5, 3.0]);
+        for i in 0..5 {
+            assert_eq!(
+                (boundary.normals[i], boundary.tangent(i)),
+                ([0.0, 1.0], [1.0, 0.0])
+            );
+        }
+        let exact = [
+            2.0 / 6.0,
+            8.0 / 6.0,
+            2.0 / 6.0 + 1.0 / 6.0,
+            4.0 / 6.0,
+            1.0 / 6.0,
+        ];
+        assert!(
+            boundary
+                .weights
+                .iter()
+                .zip(exact)
+                .all(|(w, e)| (w - e).abs() < 1e-15)
+        );
+    }
+
+    #[test]
+    fn a_node_on_the_axis_has_no_weight() {
+        let (mesh, chain) = top(&[[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]);
+        let boundary = ContactBoundary::new(&mesh, &chain, |r| r);
+        assert!(boundary.weights[0].abs() < 1e-16);
+        assert!((boundary.weights.iter().sum::<f64>() - 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn arc_length_of_a_quarter_circle_of_two_edges_is_close_to_the_arc() {
+        let at = |k: usize| (std::f64::consts::FRAC_PI_2 * (1.0 - k as f64 / 4.0)).sin_cos();
+        let points: Vec<_> = (0..5)
+            .map(|k| {
+                let (s, c) = at(k);
+                [c, s]
+            })
+            .collect();
+        let (mesh, chain) = top(&points);
+        let s = arc_lengths(&mesh, &chain);
+        assert!((s[4] - std::f64::consts::FRAC_PI_2).abs() < 2e-3);
+    }
+}

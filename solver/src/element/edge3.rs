@@ -1,0 +1,70 @@
+//! The 3-node edge: the side of an 8-node element.
+//!
+//! ```text
+//!   1-------3-------2      ξ = −1, 0, +1 at nodes 1, 3, 2: corners first, then the midside
+//! ```
+//!
+//! The thesis has straight edges only (3.3); the quadratic map here is a superset.
+
+/// h_i(ξ).
+#[rustfmt::skip]
+pub fn shape(xi: f64) -> [f64; 3] {
+    [
+        0.5 * xi * (xi - 1.0),
+        0.5 * xi * (xi + 1.0),
+        1.0 - xi * xi,
+    ]
+}
+
+/// dh_i/dξ.
+pub fn derivative(xi: f64) -> [f64; 3] {
+    [xi - 0.5, xi + 0.5, -2.0 * xi]
+}
+
+/// Σ h_i v_i.
+pub fn interpolate(h: &[f64; 3], v: &[f64; 3]) -> f64 {
+    h[0] * v[0] + h[1] * v[1] + h[2] * v[2]
+}
+
+/// Position and dx/dξ at ξ of the edge through the points `x`.
+pub fn map(x: &[[f64; 2]; 3], xi: f64) -> ([f64; 2], [f64; 2]) {
+    let (h, dh) = (shape(xi), derivative(xi));
+    let at = |f: &[f64; 3], a: usize| f[0] * x[0][a] + f[1] * x[1][a] + f[2] * x[2][a];
+    ([at(&h, 0), at(&h, 1)], [at(&dh, 0), at(&dh, 1)])
+}
+
+/// ξ in [−1, 1] with Σ h_i(ξ) v_i = `value`, for v that grow along the edge; ends are clamped.
+pub fn invert(v: &[f64; 3], value: f64) -> f64 {
+    // a ξ² + b ξ + c = 0; b > 0, and the root nearest to the edge is the one without cancellation
+    let a = 0.5 * (v[0] + v[1]) - v[2];
+    let b = 0.5 * (v[1] - v[0]);
+    let c = v[2] - value;
+    let xi = -2.0 * c / (b + (b * b - 4.0 * a * c).max(0.0).sqrt());
+    xi.clamp(-1.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shapes_are_one_at_their_own_node_and_sum_to_one() {
+        for (i, xi) in [-1.0, 1.0, 0.0].into_iter().enumerate() {
+            for (j, h) in shape(xi).into_iter().enumerate() {
+                assert_eq!(h, if i == j { 1.0 } else { 0.0 });
+            }
+        }
+        assert!((shape(0.3).iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        assert!(derivative(0.3).iter().sum::<f64>().abs() < 1e-15);
+    }
+
+    #[test]
+    fn inversion_finds_the_place_also_on_an_uneven_edge() {
+        for v in [[0.0, 2.0, 1.0], [1.0, 3.0, 1.8], [-1.0, 1.0, 0.3]] {
+            for xi in [-1.0, -0.4, 0.0, 0.7, 1.0] {
+                let value = interpolate(&shape(xi), &v);
+                assert!((invert(&v, value) - xi).abs() < 1e-14);
+            }
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! Gauss–Legendre integration on [−1, 1], thesis 2.3.
+
+/// Points and weights of the 3-point rule, exact for polynomials of degree 5.
+#[rustfmt::skip]
+pub const GAUSS_3: [(f64, f64); 3] = [
+    (-0.774_596_669_241_483_4, 5.0 / 9.0),
+    ( 0.0,                     8.0 / 9.0),
+    ( 0.774_596_669_241_483_4, 5.0 / 9.0),
+];
+
+/// Points of the 2-point rule: the superconvergent stress points of the 8-node element.
+pub const GAUSS_2: [f64; 2] = [-0.577_350_269_189_625_7, 0.577_350_269_189_625_7];
+
+/// Points and weights of the n-point rule.
+///
+/// The points are the roots of the Legendre polynomial P_n, by Newton's method from the usual
+/// cosine guess; the weights are 2/((1 − x²) P_n′²). Written by hand: it is a dozen lines, and a
+/// crate for it would bring a hundred kinds of rules.
+pub fn rule(n: usize) -> Vec<(f64, f64)> {
+    let root = |i: usize| {
+        let mut x = -(std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
+        let mut slope = 1.0;
+        for _ in 0..20 {
+            let (value, derivative) = legendre(n, x);
+            slope = derivative;
+            let dx = value / derivative;
+            x -= dx;
+            if dx.abs() < 1e-16 {
+                break;
+            }
+        }
+        (x, 2.0 / ((1.0 - x * x) * slope * slope))
+    };
+    (0..n).map(root).collect()
+}
+
+/// P_n(x) and its derivative, by the three-term recurrence.
+fn legendre(n: usize, x: f64) -> (f64, f64) {
+    let (mut previous, mut current) = (1.0, x);
+    for k in 2..=n {
+        let k = k as f64;
+        let next = ((2.0 * k - 1.0) * x * current - (k - 1.0) * previous) / k;
+        (previous, current) = (current, next);
+    }
+    (current, n as f64 * (x * current - previous) / (x * x - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rule_of_n_points_integrates_degree_2n_minus_1_exactly() {
+        for n in [2, 3, 12, 40] {
+            for degree in 0..2 * n {
+                let sum: f64 = rule(n).iter().map(|(x, w)| w * x.powi(degree as i32)).sum();
+                let exact = if degree % 2 == 0 {
+                    2.0 / (degree as f64 + 1.0)
+                } else {
+                    0.0
+                };
+                assert!(
+                    (sum - exact).abs() < 1e-14,
+                    "n = {n}, degree {degree}: {sum}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_written_rules_are_the_computed_ones() {
+        for ((x, w), (x3, w3)) in rule(3).into_iter().zip(GAUSS_3) {
+            assert!((x - x3).abs() < 1e-15 && (w - w3).abs() < 1e-15);
+        }
+        assert!((rule(2)[1].0 - GAUSS_2[1]).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,325 @@
+//! ω_ρ and the averaged pressure S_ρ, thesis (1.2)–(1.4).
+//!
+//!   S(s) = ∫ ω_ρ(|s − y|) p(y) dy = Σ_j W_j(s) p_j,   p quadratic on each edge
+//!
+//! Mesh-free: the kernel is integrated over its exact support, split at the ends of edges and at
+//! its own centre, whatever the number of edges under it (the thesis's limit of two, 3.4.2, is
+//! gone).
+
+use std::sync::LazyLock;
+
+use crate::element::{edge3, gauss};
+use crate::problem::{Friction, Kernel, Normalization};
+
+/// ∫ exp(1/(x² − 1)) dx over (−1, 1).
+const BUMP_INTEGRAL: f64 = 0.443_993_816_168_079;
+
+/// Points per piece; a piece much shorter than ρ sees almost a constant kernel and needs fewer.
+static FULL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(40));
+static SHORT_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(12));
+const SHORT: f64 = 0.1;
+
+/// Γ_C as arc length alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain {
+    /// Arc length at the nodes (corner, midside, corner, …).
+    pub s: Vec<f64>,
+    /// The pressure goes on as an even function beyond the first node: a line of symmetry.
+    pub mirror_start: bool,
+    /// Likewise beyond the last node.
+    pub mirror_end: bool,
+}
+
+/// The averaging operator of one chain.
+#[derive(Clone, Debug)]
+pub struct Averaging {
+    chain: Chain,
+    radius: f64,
+    kernel: Kernel,
+    /// C of (1.2).
+    scale: f64,
+}
+
+/// One row of W: weights of the nodes from `first` on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// First node with a weight.
+    pub first: usize,
+    /// Weights of it and the nodes after it.
+    pub weights: Vec<f64>,
+}
+
+impl Row {
+    /// Σ W_j p_j.
+    pub fn apply(&self, pressure: &[f64]) -> f64 {
+        self.weights
+            .iter()
+            .zip(&pressure[self.first..])
+            .map(|(w, p)| w * p)
+            .sum()
+    }
+}
+
+impl Averaging {
+    /// The operator with the radius, kernel and normalization of `friction`.
+    pub fn new(friction: &Friction, chain: Chain) -> Self {
+        let radius = friction.nonlocal_radius;
+        let scale = match (friction.normalization, friction.kernel) {
+            (Normalization::UnitIntegral, Kernel::Bump) => 1.0 / (BUMP_INTEGRAL * radius),
+            (Normalization::UnitIntegral, Kernel::Parabola) => 0.75 / radius,
+            (Normalization::PeakOne, Kernel::Bump) => std::f64::consts::E,
+            (Normalization::PeakOne, Kernel::Parabola) => 1.0,
+        };
+        Averaging {
+            chain,
+            radius,
+            kernel: friction.kernel,
+            scale,
+        }
+    }
+
+    /// ω_ρ at a distance.
+    fn omega(&self, distance: f64) -> f64 {
+        let r = distance / self.radius;
+        let rest = 1.0 - r * r;
+        if rest <= 0.0 {
+            return 0.0;
+        }
+        // exp(ρ²/(x² − ρ²)): the exponent's sign as FORMULATION 2 reads (1.2)
+        let shape = match self.kernel {
+            Kernel::Bump => (-1.0 / rest).exp(),
+            Kernel::Parabola => rest,
+        };
+        self.scale * shape
+    }
+
+    /// The row of W at arc length s. ρ = 0 is interpolation: Coulomb's law.
+    pub fn row(&self, s: f64) -> Row {
+        let nodes = self.chain.s.len();
+        let mut weights = vec![0.0; nodes];
+        let (mut first, mut last) = (nodes, 0);
+        let mut add = |edge: usize, h: &[f64; 3], factor: f64| {
+            for (i, node) in [2 * edge, 2 * edge + 2, 2 * edge + 1]
+                .into_iter()
+                .enumerate()
+            {
+                weights[node] += factor * h[i];
+            }
+            (first, last) = (first.min(2 * edge), last.max(2 * edge + 2));
+        };
+        if self.radius == 0.0 {
+            let edge = self.edge_at(s);
+            add(edge, &edge3::shape(edge3::invert(&self.arc(edge), s)), 1.0);
+        } else {
+            for centre in self.images(s) {
+                self.integrate(centre, &mut add);
+            }
+        }
+        if first > last {
+            return Row {
+                first: 0,
+                weights: Vec::new(),
+            };
+        }
+        Row {
+            first,
+            weights: weights[first..=last].to_vec(),
+        }
+    }
+
+    /// Integrates the kernel centred at `centre` (also outside the chain) edge by edge.
+    fn integrate(&self, centre: f64, add: &mut impl FnMut(usize, &[f64; 3], f64)) {
+        let (low, high) = (centre - self.radius, centre + self.radius);
+        for edge in self.edge_at(low)..self.chain.s.len() / 2 {
+            let arc = self.arc(edge);
+            if arc[0] >= high {
+                break;
+            }
+            let (a, b) = (arc[0].max(low), arc[1].min(high));
+            let middle = centre.clamp(a, b.max(a));
+            for (a, b) in [(a, middle), (middle, b)] {
+                let length = b - a;
+                if length <= 0.0 {
+                    continue;
+                }
+                let rule = if length < SHORT * self.radius {
+                    &SHORT_RULE
+                } else {
+                    &FULL_RULE
+                };
+                for (xi, w) in rule.iter() {
+                    let y = a + 0.5 * length * (1.0 + xi);
+                    let factor = 0.5 * length * w * self.omega(y - centre);
+                    add(edge, &edge3::shape(edge3::invert(&arc, y)), factor);
+                }
+            }
+        }
+    }
+
+    /// Kernel centres that stand for s on the chain continued evenly at its mirrors: a kernel over
+    /// the mirrored pressure equals the mirrored kernel over the pressure.
+    fn images(&self, s: f64) -> Vec<f64> {
+        let (start, end) = (self.chain.s[0], self.chain.s[self.chain.s.len() - 1]);
+        let reaches = |c: &f64| *c > start - self.radius && *c < end + self.radius;
+        let mirrored = match (self.chain.mirror_start, self.chain.mirror_end) {
+            (false, false) => vec![],
+            (true, false) => vec![2.0 * start - s],
+            (false, true) => vec![2.0 * end - s],
+            (true, true) => {
+                let period = 2.0 * (end - start);
+                let most = (self.radius / period).ceil() as i64 + 1;
+                let shifted = (-most..=most)
+                    .filter(|k| *k != 0)
+                    .map(|k| s + k as f64 * period);
+                shifted
+                    .chain((-most..=most).map(|k| 2.0 * start - s + k as f64 * period))
+                    .collect()
+            }
+        };
+        std::iter::once(s).chain(mirrored).filter(reaches).collect()
+    }
+
+    fn arc(&self, edge: usize) -> [f64; 3] {
+        let s = &self.chain.s;
+        [s[2 * edge], s[2 * edge + 2], s[2 * edge + 1]]
+    }
+
+    /// The edge at arc length s; the first or last one beyond the ends.
+    fn edge_at(&self, s: f64) -> usize {
+        let after = self.chain.s.partition_point(|&node| node <= s);
+        (after.max(1) - 1).min(self.chain.s.len() - 2) / 2
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::{History, Transition};
+
+    fn averaging(
+        radius: f64,
+        kernel: Kernel,
+        s: Vec<f64>,
+        mirror_start: bool,
+        mirror_end: bool,
+    ) -> Averaging {
+        let friction = Friction {
+            coefficient: 0.3,
+            nonlocal_radius: radius,
+            elastic_slip: 1e-4,
+            kernel,
+            normalization: Normalization::UnitIntegral,
+            transition: Transition::Linear,
+            history: History::Total,
+        };
+        Averaging::new(
+            &friction,
+            Chain {
+                s,
+                mirror_start,
+                mirror_end,
+            },
+        )
+    }
+
+    fn with_midsides(corners: &[f64]) -> Vec<f64> {
+        let mut s = vec![corners[0]];
+        for pair in corners.windows(2) {
+            s.extend([0.5 * (pair[0] + pair[1]), pair[1]]);
+        }
+        s
+    }
+
+    fn even(edges: usize, length: f64) -> Vec<f64> {
+        with_midsides(
+            &(0..=edges)
+                .map(|k| length * k as f64 / edges as f64)
+                .collect::<Vec<_>>(),
+        )
+    }
+
+    /// Forty points leave 1.4e-11 of the bump's integral: hence 1e-10 here and below. The average
+    /// of a piecewise quadratic interpolant is exact to degree 2; degree 4 is interpolated on fine
+    /// edges, with an error of the fourth power of their length.
+    #[test]
+    fn moments_of_the_bump_are_exact_on_any_mesh() {
+        let (rho, x) = (0.3, 1.03);
+        for s in [
+            even(1, 2.0),
+            even(3, 2.0),
+            even(400, 2.0),
+            with_midsides(&[0.0, 0.9, 1.02, 1.0201, 1.3, 2.0]),
+        ] {
+            let row = averaging(rho, Kernel::Bump, s.clone(), false, false).row(x);
+            let moment =
+                |f: fn(f64) -> f64| row.apply(&s.iter().map(|&y| f(y)).collect::<Vec<_>>());
+            assert!((moment(|_| 1.0) - 1.0).abs() < 1e-10);
+            assert!((moment(|y| y) - x).abs() < 1e-10);
+            assert!((moment(|y| y * y) - (x * x + 0.1581136363 * rho * rho)).abs() < 1e-10);
+        }
+        let s = even(400, 2.0);
+        let row = averaging(rho, Kernel::Bump, s.clone(), false, false).row(x);
+        let fourth = row.apply(&s.iter().map(|y| y.powi(4)).collect::<Vec<_>>());
+        let exact = x.powi(4) + 0.9486818178 * x * x * rho * rho + 0.0529818180 * rho.powi(4);
+        assert!((fourth - exact).abs() < 1e-9, "{}", fourth - exact);
+    }
+
+    #[test]
+    fn the_parabola_has_unit_integral_and_second_moment_a_fifth() {
+        let (rho, x, s) = (0.2, 0.8, even(7, 2.0));
+        let row = averaging(rho, Kernel::Parabola, s.clone(), false, false).row(x);
+        assert!((row.apply(&vec![1.0; s.len()]) - 1.0).abs() < 1e-14);
+        let second = row.apply(&s.iter().map(|y| y * y).collect::<Vec<_>>());
+        assert!((second - (x * x + rho * rho / 5.0)).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_mirror_continues_the_pressure_evenly_even_when_the_radius_exceeds_the_first_edges() {
+        // p = 1 + s² is even: averaged at s near 0 it must know nothing of the end of the chain
+        let (rho, s) = (0.5, with_midsides(&[0.0, 0.1, 0.3, 2.0]));
+        let p: Vec<f64> = s.iter().map(|y| 1.0 + y * y).collect();
+        for x in [0.0, 0.05, 0.2, 0.45] {
+            let mean = averaging(rho, Kernel::Bump, s.clone(), true, false)
+                .row(x)
+                .apply(&p);
+            assert!((mean - (1.0 + x * x + 0.1581136363 * rho * rho)).abs() < 1e-10);
+            let mirrored: Vec<f64> = s.iter().rev().map(|y| 2.0 - y).collect();
+            let q: Vec<f64> = p.iter().rev().copied().collect();
+            let other = averaging(rho, Kernel::Bump, mirrored, false, true)
+                .row(2.0 - x)
+                .apply(&q);
+            assert!((mean - other).abs() < 1e-10);
+        }
+        let cut = averaging(rho, Kernel::Bump, s.clone(), false, false)
+            .row(0.0)
+            .apply(&vec![1.0; s.len()]);
+        assert!(
+            (cut - 0.5).abs() < 1e-10,
+            "without a mirror S is halved at the end"
+        );
+    }
+
+    #[test]
+    fn between_two_mirrors_a_constant_stays_one_for_any_radius() {
+        for rho in [0.1, 1.0, 3.7, 25.0] {
+            let s = even(5, 1.0);
+            for x in [0.0, 0.37, 1.0] {
+                let row = averaging(rho, Kernel::Bump, s.clone(), true, true).row(x);
+                assert!(
+                    (row.apply(&vec![1.0; s.len()]) - 1.0).abs() < 1e-10,
+                    "ρ = {rho}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn radius_zero_interpolates() {
+        let s = even(4, 1.0);
+        let p: Vec<f64> = s.iter().map(|y| y * y).collect();
+        let mean = averaging(0.0, Kernel::Bump, s, false, false)
+            .row(0.33)
+            .apply(&p);
+        assert!((mean - 0.33 * 0.33).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,396 @@
+//! Problems from JSON: strict, and with every structural fault named at once.
+//!
+//! serde is the judge; it stops at the first fault, and inside an enum it forgets where it was. So
+//! when it refuses a text, our own JSON Schema is asked for all the reasons.
+
+use std::sync::LazyLock;
+
+use jsonschema::error::{TypeKind, ValidationErrorKind};
+use jsonschema::{ValidationError, Validator};
+use serde_json::Value;
+
+use crate::error::{Violation, escape};
+use crate::problem::Problem;
+
+/// The JSON Schema of a problem (draft 2020-12).
+pub fn schema() -> Value {
+    schemars::schema_for!(Problem).to_value()
+}
+
+static VALIDATOR: LazyLock<Option<Validator>> =
+    LazyLock::new(|| jsonschema::validator_for(&schema()).ok());
+
+/// Reads a problem, or says everything that is wrong with its structure. Pointers are relative to
+/// the problem.
+pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
+    serde_json::from_str(text).map_err(|first| explain(text, &first))
+}
+
+fn explain(text: &str, first: &serde_json::Error) -> Vec<Violation> {
+    let value: Value = match serde_json::from_str(text) {
+        Ok(value) => value,
+        Err(error) => {
+            return vec![violation(
+                "",
+                "malformed_json",
+                format!("{error}"),
+                "a JSON document (RFC 8259), numbers within double precision",
+                "Check the text at that line and column.",
+            )];
+        }
+    };
+    let mut found = Vec::new();
+    if let Some(validator) = &*VALIDATOR {
+        validator
+            .iter_errors(&value)
+            .for_each(|error| collect(&error, &mut found));
+    }
+    if found.is_empty() {
+        // a fault that the schema cannot express, such as a repeated name or a number out of its type
+        let path = serde_path_to_error::deserialize::<_, Problem>(
+            &mut serde_json::Deserializer::from_str(text),
+        )
+        .err()
+        .map_or_else(String::new, |error| pointer_of(error.path()));
+        found.push(violation(
+            &path,
+            "malformed_problem",
+            first.to_string(),
+            "a value as the schema describes it",
+            "See /v1/schema/problem.json.",
+        ));
+    }
+    found
+}
+
+fn pointer_of(path: &serde_path_to_error::Path) -> String {
+    path.iter()
+        .map(|segment| match segment {
+            serde_path_to_error::Segment::Seq { index } => format!("/{index}"),
+            serde_path_to_error::Segment::Map { key } => format!("/{}", escape(key)),
+            _ => String::new(),
+        })
+        .collect()
+}
+
+fn violation(pointer: &str, reason: &str, got: String, expected: &str, hint: &str) -> Violation {
+    Violation {
+        pointer: pointer.to_owned(),
+        reason: reason.to_owned(),
+        got,
+        expected: expected.to_owned(),
+        hint: hint.to_owned(),
+    }
+}
+
+/// One schema error as one violation or more.
+fn collect(error: &ValidationError<'_>, found: &mut Vec<Violation>) {
+    let pointer = error.instance_path().as_str();
+    let got = || shortened(error.instance());
+    match error.kind() {
+        ValidationErrorKind::AdditionalProperties { unexpected } => {
+            let known = known_names(error);
+            for name in unexpected {
+                found.push(violation(
+                    &format!("{pointer}/{}", escape(name)),
+                    "unknown_name",
+                    format!("`{name}`"),
+                    &if known.is_empty() {
+                        "a name that the schema has".to_owned()
+                    } else {
+                        format!("one of {}", known.join(", "))
+                    },
+                    "Check the spelling; names that mean nothing here are refused.",
+                ));
+            }
+        }
+        ValidationErrorKind::Required { property } => {
+            let name = property.as_str().unwrap_or_default();
+            found.push(violation(
+                &format!("{pointer}/{name}"),
+                "missing",
+                "nothing".to_owned(),
+                &format!("a value for `{name}`"),
+                "It has no default.",
+            ));
+        }
+        ValidationErrorKind::AnyOf { context } | ValidationErrorKind::OneOfNotValid { context } => {
+            alternatives(error, context, found);
+        }
+        ValidationErrorKind::Type { kind } => {
+            found.push(violation(
+                pointer,
+                "wrong_type",
+                got(),
+                &type_names(kind),
+                "Write the value in that form.",
+            ));
+        }
+        _ => found.push(violation(
+            pointer,
+            "malformed",
+            got(),
+            &error.to_string(),
+            "See /v1/schema/problem.json.",
+        )),
+    }
+}
+
+/// The branch that was meant, judged by its `kind` and its type; or, when none was, what all offer.
+fn alternatives(
+    error: &ValidationError<'_>,
+    branches: &[Vec<ValidationError<'static>>],
+    found: &mut Vec<Violation>,
+) {
+    let pointer = error.instance_path().as_str();
+    let kind = format!("{pointer}/kind");
+    let excludes = |e: &ValidationError<'_>| {
+        let place = e.instance_path().as_str();
+        match e.kind() {
+            ValidationErrorKind::Type { .. } => place == pointer,
+            ValidationErrorKind::Constant { .. } | ValidationErrorKind::Enum { .. } => {
+                place == pointer || place == kind
+            }
+            ValidationErrorKind::Required { property } => place == pointer && property == "kind",
+            _ => false,
+        }
+    };
+    let meant: Vec<_> = branches
+        .iter()
+        .filter(|errors| !errors.iter().any(excludes))
+        .collect();
+    if let [errors] = meant[..] {
+        errors.iter().for_each(|e| collect(e, found));
+        return;
+    }
+    let mut offers = Vec::new();
+    let mut tagged = false;
+    for e in branches.iter().flatten() {
+        match e.kind() {
+            ValidationErrorKind::Constant { expected_value } => {
+                tagged |= e.instance_path().as_str() == kind;
+                offers.push(expected_value.to_string());
+            }
+            ValidationErrorKind::Enum { options } => offers.push(options.to_string()),
+            ValidationErrorKind::Type { kind } if e.instance_path().as_str() == pointer => {
+                offers.push(type_names(kind))
+            }
+            ValidationErrorKind::Required { property } if property == "kind" => tagged = true,
+            _ => {}
+        }
+    }
+    offers.dedup();
+    offers.retain(|offer| offer != "null");
+    let (place, got) = if tagged {
+        (
+            kind,
+            error
+                .instance()
+                .get("kind")
+                .map_or_else(|| "nothing".to_owned(), shortened),
+        )
+    } else {
+        (pointer.to_owned(), shortened(error.instance()))
+    };
+    let expected = if offers.is_empty() {
+        kinds(error)
+    } else {
+        format!("one of {}", offers.join(", "))
+    };
+    found.push(violation(
+        &place,
+        "unknown_alternative",
+        got,
+        &expected,
+        "Choose one of the alternatives.",
+    ));
+}
+
+/// The `kind`s that the schema offers where `error` stands.
+fn kinds(error: &ValidationError<'_>) -> String {
+    let schema = schema();
+    let branches = schema
+        .pointer(error.schema_path().as_str())
+        .and_then(Value::as_array);
+    let names: Vec<String> = branches
+        .into_iter()
+        .flatten()
+        .filter_map(|branch| {
+            branch
+                .pointer("/properties/kind/const")
+                .map(Value::to_string)
+        })
+        .collect();
+    if names.is_empty() {
+        "one of the alternatives of the schema".to_owned()
+    } else {
+        format!("one of {}", names.join(", "))
+    }
+}
+
+/// The names that the schema has where an unknown one was found.
+fn known_names(error: &ValidationError<'_>) -> Vec<String> {
+    let schema = schema();
+    let path = error.schema_path().as_str();
+    let object = path
+        .strip_suffix("/additionalProperties")
+        .and_then(|parent| schema.pointer(parent));
+    let properties = object
+        .and_then(|o| o.get("properties"))
+        .and_then(Value::as_object);
+    properties
+        .into_iter()
+        .flat_map(|p| p.keys().map(|name| format!("`{name}`")))
+        .collect()
+}
+
+fn type_names(kind: &TypeKind) -> String {
+    match kind {
+        TypeKind::Single(one) => one.to_string(),
+        TypeKind::Multiple(many) => {
+            let names: Vec<String> = many
+                .iter()
+                .map(|t| t.to_string())
+                .filter(|name| name != "null")
+                .collect();
+            names.join(" or ")
+        }
+    }
+}
+
+/// A value as text, cut where it would fill the page.
+fn shortened(value: &Value) -> String {
+    const MOST: usize = 80;
+    let text = value.to_string();
+    match text.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = r#"{
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [0, 1], "y": [0, 1]}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "contacts": [{"boundary": "top", "obstacle": {"kind": "flat"},
+            "friction": {"coefficient": 0.3, "nonlocal_radius": 0.01, "elastic_slip": 1e-4}}]
+    }"#;
+
+    fn faults(from: &str, to: &str) -> Vec<(String, String, String)> {
+        assert!(GOOD.contains(from), "{from}");
+        let list = parse(&GOOD.replacen(from, to, 1)).expect_err("a faulty problem was accepted");
+        list.into_iter()
+            .map(|v| (v.pointer, v.reason, v.expected))
+            .collect()
+    }
+
+    #[test]
+    fn a_good_problem_is_read_with_its_defaults() {
+        let problem = parse(GOOD).unwrap();
+        assert_eq!(problem.solver.tolerance, 1e-10);
+        assert_eq!(
+            parse(&serde_json::to_string(&problem).unwrap()).unwrap(),
+            problem
+        );
+    }
+
+    #[test]
+    fn every_structural_fault_is_named_with_its_pointer() {
+        let text = GOOD
+            .replace("\"plane_strain\"", "\"plain_strain\"")
+            .replace("[0, 1], \"y\"", "[0, \"one\"], \"y\"")
+            .replace("\"youngs_modulus\"", "\"young\"")
+            .replace("\"elastic_slip\": 1e-4", "\"kernel\": \"bell\"");
+        let mut pointers: Vec<_> = parse(&text)
+            .unwrap_err()
+            .into_iter()
+            .map(|v| v.pointer)
+            .collect();
+        pointers.sort();
+        assert_eq!(
+            pointers,
+            [
+                "/analysis/kind",
+                "/contacts/0/friction/elastic_slip",
+                "/contacts/0/friction/kernel",
+                "/materials/0/young",
+                "/materials/0/youngs_modulus",
+                "/mesh/grid/x/1",
+            ]
+        );
+    }
+
+    #[test]
+    fn unknown_names_are_refused_everywhere_with_the_known_ones() {
+        let found = faults(
+            r#""boundary": "top","#,
+            r#""boundary": "top", "bounce": 1,"#,
+        );
+        assert_eq!(
+            (&found[0].0[..], &found[0].1[..]),
+            ("/contacts/0/bounce", "unknown_name")
+        );
+        assert!(found[0].2.contains("`indentation`"), "{}", found[0].2);
+        for (from, to, pointer) in [
+            (
+                r#"{"kind": "plane_strain"}"#,
+                r#"{"kind": "plane_strain", "thickness": 1}"#,
+                "/analysis/thickness",
+            ),
+            (
+                r#"{"kind": "flat"}"#,
+                r#"{"kind": "flat", "radius": 1}"#,
+                "/contacts/0/obstacle/radius",
+            ),
+            (
+                r#""coefficient": 0.3"#,
+                r#""coefficient": 0.3, "mu": 1"#,
+                "/contacts/0/friction/mu",
+            ),
+        ] {
+            let found = faults(from, to);
+            assert_eq!(found.len(), 1, "{found:?}");
+            assert_eq!(found[0].0, pointer);
+        }
+    }
+
+    #[test]
+    fn a_wrong_kind_is_answered_with_those_that_exist() {
+        let found = faults(r#"{"kind": "flat"}"#, r#"{"kind": "sphere", "radius": 1}"#);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].0, "/contacts/0/obstacle/kind");
+        assert!(
+            found[0].2.contains("circle") && found[0].2.contains("parabola"),
+            "{}",
+            found[0].2
+        );
+        let found = faults(r#"{"kind": "flat"}"#, r#"{"from": 0}"#);
+        assert_eq!(found[0].0, "/contacts/0/obstacle/kind");
+        let found = faults(r#"{"kind": "flat"}"#, r#"{"kind": "circle"}"#);
+        assert_eq!(
+            (found.len(), &found[0].0[..]),
+            (1, "/contacts/0/obstacle/radius")
+        );
+    }
+
+    #[test]
+    fn text_that_is_no_json_and_numbers_beyond_double_precision_are_named() {
+        assert_eq!(parse("{").unwrap_err()[0].reason, "malformed_json");
+        assert_eq!(faults("1000", "1e999")[0].1, "malformed_json");
+    }
+
+    #[test]
+    fn what_the_schema_cannot_express_still_has_its_place() {
+        let found = faults(r#""grid": {"x""#, r#""refine": 1e3, "grid": {"x""#);
+        assert_eq!(found[0].0, "/mesh/refine");
+        let found = faults(
+            r#""youngs_modulus": 1000"#,
+            r#""youngs_modulus": 1000, "youngs_modulus": 2000"#,
+        );
+        assert_eq!(found.len(), 1);
+    }
+}

@@ -1,0 +1,320 @@
+//! One sparse Cholesky factorisation, with a chosen block of unknowns last.
+//!
+//! With the contact unknowns c last, A = L Lᵀ holds the Schur complement for free:
+//!
+//!   A = | A_ii  A_ic |     Ŝ = A_cc − A_ci A_ii⁻¹ A_ic = L_cc L_ccᵀ
+//!       | A_ci  A_cc |
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltError;
+use faer::perm::PermRef;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::amd;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par, Side};
+
+use crate::linear::{Dense, Graph, SparseSymmetric};
+
+/// Parallelism of one job: none. Two jobs use the two cores, and a second thread gained nothing.
+const PAR: Par = Par::Seq;
+
+/// Why there is no factor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FactorError {
+    /// The matrix has none: elimination met a pivot that is not positive.
+    NotPositiveDefinite {
+        /// Its place in the order of elimination.
+        pivot: usize,
+    },
+    /// The factor has more entries than can be addressed or held.
+    TooLarge,
+}
+
+/// An order of elimination and the structure of the factor it leads to.
+pub struct Ordering {
+    symbolic: SymbolicCholesky<usize>,
+    trailing: usize,
+}
+
+impl Ordering {
+    /// Plans the factorisation of `matrix`: unknowns in `order`, the last `trailing` of which stay
+    /// last. `order[new] = old`.
+    pub fn new(
+        matrix: &SparseSymmetric,
+        order: &[usize],
+        trailing: usize,
+    ) -> Result<Self, FactorError> {
+        let n = matrix.size();
+        let mut inverse = vec![0; n];
+        order
+            .iter()
+            .enumerate()
+            .for_each(|(new, &old)| inverse[old] = new);
+        let pattern =
+            SymbolicSparseColMatRef::new_checked(n, n, &matrix.column_starts, None, &matrix.rows);
+        let mut parameters = CholeskySymbolicParams::default();
+        // Only the supernodal factor offers its dense trailing block.
+        parameters.supernodal_flop_ratio_threshold = SupernodalThreshold::FORCE_SUPERNODAL;
+        let ordering = SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, n));
+        let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, parameters)
+            .map_err(|_| FactorError::TooLarge)?; // its only errors: index range and memory
+        Ok(Ordering { symbolic, trailing })
+    }
+
+    /// A fill-reducing order of the vertices of a graph (approximate minimum degree).
+    /// `result[new] = old`.
+    pub fn minimum_degree(graph: &Graph) -> Result<Vec<usize>, FactorError> {
+        let n = graph.len();
+        let mut starts = vec![0; n + 1];
+        let mut rows = Vec::new();
+        for v in 0..n {
+            rows.extend(
+                graph
+                    .neighbours(v)
+                    .iter()
+                    .map(|&w| w as usize)
+                    .filter(|&w| w > v),
+            );
+            starts[v + 1] = rows.len();
+        }
+        let (mut order, mut inverse) = (vec![0usize; n], vec![0usize; n]);
+        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows);
+        let mut memory = MemBuffer::new(amd::order_scratch::<usize>(n, rows.len()));
+        let control = amd::Control::default();
+        amd::order(
+            &mut order,
+            &mut inverse,
+            pattern,
+            control,
+            MemStack::new(&mut memory),
+        )
+        .map_err(|_| FactorError::TooLarge)?;
+        Ok(order)
+    }
+}
+
+/// L of A = L Lᵀ.
+pub struct Factor {
+    ordering: Ordering,
+    values: Vec<f64>,
+}
+
+impl Factor {
+    /// Factors `matrix`, which has the pattern that `ordering` was made for.
+    pub fn new(matrix: &SparseSymmetric, ordering: Ordering) -> Result<Self, FactorError> {
+        let n = matrix.size();
+        let symbolic = &ordering.symbolic;
+        let pattern =
+            SymbolicSparseColMatRef::new_checked(n, n, &matrix.column_starts, None, &matrix.rows);
+        let a = SparseColMatRef::new(pattern, &matrix.values[..]);
+        let mut values = vec![0.0; symbolic.len_val()];
+        let mut memory =
+            MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(PAR, Default::default()));
+        let stack = MemStack::new(&mut memory);
+        symbolic
+            .factorize_numeric_llt(
+                &mut values,
+                a,
+                Side::Lower,
+                Default::default(),
+                PAR,
+                stack,
+                Default::default(),
+            )
+            .map_err(|error| match error {
+                LltError::NonPositivePivot { index } => {
+                    FactorError::NotPositiveDefinite { pivot: index }
+                }
+            })?;
+        Ok(Factor { ordering, values })
+    }
+
+    /// Solves A x = b in place.
+    pub fn solve(&self, b: &mut [f64]) {
+        let symbolic = &self.ordering.symbolic;
+        let n = b.len();
+        let mut memory = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(1, PAR));
+        let rhs = MatMut::from_column_major_slice_mut(b, n, 1);
+        LltRef::new(symbolic, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            rhs,
+            PAR,
+            MemStack::new(&mut memory),
+        );
+    }
+
+    /// Ŝ = L_cc L_ccᵀ, the Schur complement of the trailing unknowns, in their order.
+    pub fn trailing_schur_complement(&self) -> Dense {
+        let l = self.trailing_factor();
+        let m = l.len();
+        let mut schur = Dense::zero(m);
+        for i in 0..m {
+            for j in 0..=i {
+                schur.set(i, j, l[i][..=j].iter().zip(&l[j]).map(|(a, b)| a * b).sum());
+            }
+        }
+        schur
+    }
+
+    /// L_cc by rows: row i holds its entries 0..=i.
+    fn trailing_factor(&self) -> Vec<Vec<f64>> {
+        let m = self.ordering.trailing;
+        let n = self.ordering.symbolic.nrows();
+        let first = n - m;
+        let mut l: Vec<Vec<f64>> = (0..m).map(|i| vec![0.0; i + 1]).collect();
+        let SymbolicCholeskyRaw::Supernodal(structure) = self.ordering.symbolic.raw() else {
+            unreachable!("Ordering::new forces the supernodal factor");
+        };
+        let factor = SupernodalLltRef::<usize, f64>::new(structure, &self.values);
+        // Relaxation may merge the trailing columns into a larger supernode, or leave them in
+        // several: walk the supernodes from the end.
+        for s in (0..structure.n_supernodes()).rev() {
+            if structure.supernode_end()[s] <= first {
+                break;
+            }
+            let node = factor.supernode(s);
+            let (start, block) = (node.start(), node.val());
+            let columns = block.ncols();
+            for j in 0..columns {
+                if start + j < first {
+                    continue;
+                }
+                let column = start + j - first;
+                for i in j..columns {
+                    l[start + i - first][column] = block[(i, j)];
+                }
+                for (r, &row) in node.pattern().iter().enumerate() {
+                    l[row - first][column] = block[(columns + r, j)];
+                }
+            }
+        }
+        l
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A 9-point grid operator with a varying diagonal: connected, positive definite, not tidy.
+    fn grid_matrix(side: usize) -> (SparseSymmetric, Graph) {
+        let n = side * side;
+        let cells: Vec<[u32; 4]> = (0..side - 1)
+            .flat_map(|j| {
+                (0..side - 1).map(move |i| {
+                    let a = (j * side + i) as u32;
+                    let s = side as u32;
+                    [a, a + 1, a + s, a + s + 1]
+                })
+            })
+            .collect();
+        let graph = Graph::from_cliques(n, cells.iter().map(|c| &c[..]));
+        let mut matrix = SparseSymmetric::zero(n, |j, rows| {
+            rows.push(j);
+            rows.extend(
+                graph
+                    .neighbours(j)
+                    .iter()
+                    .map(|&i| i as usize)
+                    .filter(|&i| i > j),
+            );
+        });
+        for j in 0..n {
+            matrix.add(j, j, 9.0 + (j % 7) as f64);
+            for &i in graph.neighbours(j) {
+                if (i as usize) > j {
+                    matrix.add(i as usize, j, -1.0 - 0.1 * ((i as usize + j) % 3) as f64);
+                }
+            }
+        }
+        (matrix, graph)
+    }
+
+    /// Minimum degree on all but the trailing unknowns, which follow in their own order.
+    fn order_with_trailing(graph: &Graph, trailing: &[usize]) -> Vec<usize> {
+        let mut order = Ordering::minimum_degree(graph).unwrap();
+        order.retain(|v| !trailing.contains(v));
+        order.extend(trailing);
+        order
+    }
+
+    #[test]
+    fn the_trailing_block_is_the_dense_schur_complement() {
+        let (matrix, graph) = grid_matrix(23);
+        let n = matrix.size();
+        // scattered, and not in ascending order: a permutation inside the block would show
+        let trailing: Vec<usize> = (0..40).map(|k| (k * 211 + 17) % n).collect();
+        let order = order_with_trailing(&graph, &trailing);
+        let schur = Factor::new(
+            &matrix,
+            Ordering::new(&matrix, &order, trailing.len()).unwrap(),
+        )
+        .unwrap()
+        .trailing_schur_complement();
+        // dense: column c of Ŝ⁻¹ is the trailing part of A⁻¹ e_c
+        let column = |k: usize| {
+            let mut unit = vec![0.0; n];
+            unit[k] = 1.0;
+            matrix.times(&unit)
+        };
+        let dense: Vec<Vec<f64>> = (0..n).map(column).collect();
+        let mut largest: f64 = 0.0;
+        for (c, &dof) in trailing.iter().enumerate() {
+            let mut unit = vec![0.0; n];
+            unit[dof] = 1.0;
+            let x = solve_dense(&dense, &unit);
+            let trailing_part: Vec<f64> = trailing.iter().map(|&d| x[d]).collect();
+            for (r, value) in schur.times(&trailing_part).into_iter().enumerate() {
+                largest = largest.max((value - f64::from(u8::from(r == c))).abs());
+            }
+        }
+        assert!(largest < 1e-13, "Ŝ (A⁻¹)_cc differs from 1 by {largest}");
+    }
+
+    /// Gaussian elimination, independent of faer.
+    fn solve_dense(a: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
+        let (mut a, mut b, n) = (a.to_vec(), b.to_vec(), b.len());
+        for k in 0..n {
+            for i in k + 1..n {
+                let factor = a[i][k] / a[k][k];
+                if factor != 0.0 {
+                    for j in k..n {
+                        a[i][j] -= factor * a[k][j];
+                    }
+                    b[i] -= factor * b[k];
+                }
+            }
+        }
+        for k in (0..n).rev() {
+            let sum: f64 = (k + 1..n).map(|j| a[k][j] * b[j]).sum();
+            b[k] = (b[k] - sum) / a[k][k];
+        }
+        b
+    }
+
+    #[test]
+    fn the_factor_solves_the_system() {
+        let (matrix, graph) = grid_matrix(12);
+        let exact: Vec<f64> = (0..144).map(|i| f64::from(i % 5) - 2.0).collect();
+        let mut x = matrix.times(&exact);
+        let order = order_with_trailing(&graph, &[]);
+        Factor::new(&matrix, Ordering::new(&matrix, &order, 0).unwrap())
+            .unwrap()
+            .solve(&mut x);
+        assert!(x.iter().zip(&exact).all(|(a, b)| (a - b).abs() < 1e-13));
+    }
+
+    #[test]
+    fn a_singular_matrix_is_refused() {
+        let mut matrix = SparseSymmetric::zero(2, |j, rows| rows.extend(j..2));
+        matrix.add(0, 0, 1.0);
+        matrix.add(1, 0, -2.0);
+        matrix.add(1, 1, 1.0);
+        assert!(Factor::new(&matrix, Ordering::new(&matrix, &[0, 1], 1).unwrap()).is_err());
+    }
+}

@@ -1,0 +1,9 @@
+//! Matrices and index sets only; the one room that names faer.
+
+mod dense;
+mod factor;
+mod sparse;
+
+pub use dense::{Dense, solve_positive_definite};
+pub use factor::{Factor, FactorError, Ordering};
+pub use sparse::{Graph, SparseSymmetric};

@@ -1,0 +1,278 @@
+//! Meshes written out in the problem.
+
+use std::collections::HashMap;
+
+use crate::element::quad8;
+use crate::error::{Violation, escape};
+use crate::mesh::Mesh;
+use crate::problem::InlineMesh;
+
+/// More violations of one kind than this are counted, not listed.
+const MOST_LISTED: usize = 20;
+
+/// The mesh, or everything that is wrong with its numbering; `pointer` is the inline mesh's own.
+pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violation>> {
+    let mut found = Findings {
+        pointer,
+        list: Vec::new(),
+        unlisted: HashMap::new(),
+    };
+    let count = input.nodes.len() as u32;
+    if input.elements.is_empty() {
+        found.say(
+            "/elements",
+            "too_few",
+            "no element",
+            "at least one",
+            "Give the elements as lists of eight nodes.",
+        );
+    }
+    let mut used = vec![false; input.nodes.len()];
+    for (e, element) in input.elements.iter().enumerate() {
+        for (i, &node) in element.iter().enumerate() {
+            let place = || format!("/elements/{e}/{i}");
+            if node >= count {
+                found.say(
+                    &place(),
+                    "unknown_node",
+                    node,
+                    &format!("a node below {count}"),
+                    "Nodes are numbered from 0.",
+                );
+            } else if element[..i].contains(&node) {
+                found.say(
+                    &place(),
+                    "repeated_node",
+                    node,
+                    "eight different nodes",
+                    "Collapsed elements are not supported.",
+                );
+            } else {
+                used[node as usize] = true;
+            }
+        }
+    }
+    for (name, edges) in &input.boundaries {
+        if edges.is_empty() {
+            found.say(
+                &format!("/boundaries/{}", escape(name)),
+                "too_few",
+                "no edge",
+                "at least one edge",
+                "Remove the name or list its edges.",
+            );
+        }
+    }
+    // the rest needs sound numbers
+    if !found.list.is_empty() {
+        return Err(found.into_list());
+    }
+    for node in (0..input.nodes.len()).filter(|&n| !used[n]) {
+        found.say(
+            &format!("/nodes/{node}"),
+            "unused_node",
+            "a node of no element",
+            "every node in an element",
+            "Remove the node.",
+        );
+    }
+    let sides = surface(input, &mut found);
+    let mut boundaries = HashMap::new();
+    for (name, edges) in &input.boundaries {
+        let mut directed = Vec::with_capacity(edges.len());
+        for (i, &[a, b, mid]) in edges.iter().enumerate() {
+            let place = format!("/boundaries/{}/{i}", escape(name));
+            match sides.get(&key(a, b)) {
+                Some(side) if side.elements == 1 && side.mid == mid => directed.push(side.directed),
+                Some(side) if side.elements == 1 => found.say(
+                    &place,
+                    "wrong_midside",
+                    format!("midside {mid}"),
+                    &format!("{}", side.mid),
+                    "An edge is [corner, corner, midside].",
+                ),
+                Some(_) => found.say(
+                    &place,
+                    "inner_edge",
+                    format!("{a}–{b}, between two elements"),
+                    "an edge of the surface",
+                    "Boundaries lie on the surface of the body.",
+                ),
+                None => found.say(
+                    &place,
+                    "unknown_edge",
+                    format!("{a}–{b}"),
+                    "the two corners of an element's side",
+                    "An edge is [corner, corner, midside].",
+                ),
+            }
+        }
+        boundaries.insert(name.clone(), directed);
+    }
+    if found.list.is_empty() {
+        let boundaries = boundaries.into_iter().collect();
+        Ok(Mesh {
+            nodes: input.nodes.clone(),
+            elements: input.elements.clone(),
+            boundaries,
+        })
+    } else {
+        Err(found.into_list())
+    }
+}
+
+struct Side {
+    elements: u32,
+    mid: u32,
+    /// With the body on the right.
+    directed: [u32; 3],
+}
+
+/// All sides by their corners; says where neighbours do not share a midside.
+fn surface(input: &InlineMesh, found: &mut Findings) -> HashMap<(u32, u32), Side> {
+    let mut sides: HashMap<(u32, u32), Side> = HashMap::with_capacity(2 * input.elements.len());
+    for (e, element) in input.elements.iter().enumerate() {
+        for (k, [a, b, m]) in quad8::SIDES.into_iter().enumerate() {
+            let (a, b, mid) = (element[a], element[b], element[m]);
+            let side = sides.entry(key(a, b)).or_insert(Side {
+                elements: 0,
+                mid,
+                directed: [b, a, mid],
+            });
+            side.elements += 1;
+            if side.mid != mid {
+                found.say(
+                    &format!("/elements/{e}/{}", 4 + k),
+                    "nonconforming",
+                    format!("midside {mid}"),
+                    &format!("midside {}, as the neighbour has it", side.mid),
+                    "Neighbours share all three nodes of a side.",
+                );
+            } else if side.elements > 2 {
+                found.say(
+                    &format!("/elements/{e}"),
+                    "nonconforming",
+                    format!("a third element on the side {a}–{b}"),
+                    "at most two elements on a side",
+                    "Remove the overlapping element.",
+                );
+            }
+        }
+    }
+    sides
+}
+
+fn key(a: u32, b: u32) -> (u32, u32) {
+    (a.min(b), a.max(b))
+}
+
+struct Findings<'a> {
+    pointer: &'a str,
+    list: Vec<Violation>,
+    unlisted: HashMap<&'static str, usize>,
+}
+
+impl Findings<'_> {
+    fn say(
+        &mut self,
+        place: &str,
+        reason: &'static str,
+        got: impl ToString,
+        expected: &str,
+        hint: &str,
+    ) {
+        if self.list.iter().filter(|v| v.reason == reason).count() == MOST_LISTED {
+            *self.unlisted.entry(reason).or_default() += 1;
+            return;
+        }
+        self.list.push(Violation {
+            pointer: format!("{}{place}", self.pointer),
+            reason: reason.to_owned(),
+            got: got.to_string(),
+            expected: expected.to_owned(),
+            hint: hint.to_owned(),
+        });
+    }
+
+    fn into_list(mut self) -> Vec<Violation> {
+        for (reason, count) in self.unlisted {
+            if let Some(last) = self.list.iter_mut().rfind(|v| v.reason == reason) {
+                last.hint
+                    .push_str(&format!(" ({count} more of this kind.)"));
+            }
+        }
+        self.list
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    fn square() -> InlineMesh {
+        InlineMesh {
+            nodes: vec![
+                [0.0, 0.0],
+                [1.0, 0.0],
+                [1.0, 1.0],
+                [0.0, 1.0],
+                [0.5, 0.0],
+                [1.0, 0.5],
+                [0.5, 1.0],
+                [0.0, 0.5],
+            ],
+            elements: vec![[0, 1, 2, 3, 4, 5, 6, 7]],
+            boundaries: BTreeMap::from([("top".to_owned(), vec![[3, 2, 6]])]),
+        }
+    }
+
+    #[test]
+    fn a_boundary_edge_is_directed_with_the_body_on_its_right_whichever_way_it_was_written() {
+        for edge in [[3, 2, 6], [2, 3, 6]] {
+            let mut input = square();
+            input.boundaries.insert("top".to_owned(), vec![edge]);
+            assert_eq!(
+                inline_mesh(&input, "").unwrap().boundaries["top"],
+                [[3, 2, 6]]
+            );
+        }
+    }
+
+    #[test]
+    fn unknown_and_repeated_nodes_and_foreign_edges_are_named() {
+        let mut input = square();
+        input.elements[0][2] = 99;
+        input.elements[0][3] = 1;
+        let pointers: Vec<_> = inline_mesh(&input, "/mesh/inline")
+            .unwrap_err()
+            .into_iter()
+            .map(|v| v.pointer)
+            .collect();
+        assert_eq!(
+            pointers,
+            ["/mesh/inline/elements/0/2", "/mesh/inline/elements/0/3"]
+        );
+
+        let mut input = square();
+        input.nodes.push([5.0, 5.0]);
+        input
+            .boundaries
+            .insert("top".to_owned(), vec![[3, 1, 6], [3, 2, 5]]);
+        let reasons: Vec<_> = inline_mesh(&input, "")
+            .unwrap_err()
+            .into_iter()
+            .map(|v| v.reason)
+            .collect();
+        assert_eq!(reasons, ["unused_node", "unknown_edge", "wrong_midside"]);
+    }
+
+    #[test]
+    fn a_long_list_of_the_same_fault_is_counted() {
+        let mut input = square();
+        input.nodes.extend((0..100).map(|i| [f64::from(i), 9.0]));
+        let list = inline_mesh(&input, "").unwrap_err();
+        assert_eq!(list.len(), MOST_LISTED);
+        assert!(list[MOST_LISTED - 1].hint.contains("80 more"));
+    }
+}

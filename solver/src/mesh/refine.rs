@@ -1,0 +1,110 @@
+//! Splitting every element in two in each direction.
+
+use crate::element::{edge3, quad8};
+use crate::mesh::{Edge, Mesh};
+
+/// New nodes lie half-way between the old ones, in master coordinates.
+const STEP: f64 = 0.5;
+
+/// Every element becomes four, every edge two; new nodes lie on the parent's own map, so that
+/// curved sides stay the curves they are.
+pub fn refine(mesh: &Mesh) -> Mesh {
+    let mut nodes = mesh.nodes.clone();
+    // An edge is known by its midside node: halves[mid] = (start corner, first half's midside, second's).
+    let mut halves: Vec<Option<(u32, u32, u32)>> = vec![None; mesh.nodes.len()];
+    let mut split = |nodes: &mut Vec<[f64; 2]>, [a, b, mid]: Edge| -> (u32, u32) {
+        let (start, first, second) = *halves[mid as usize].get_or_insert_with(|| {
+            let ends = [a, b, mid].map(|n| nodes[n as usize]);
+            let number = nodes.len() as u32;
+            nodes.push(edge3::map(&ends, -STEP).0);
+            nodes.push(edge3::map(&ends, STEP).0);
+            (a, number, number + 1)
+        });
+        if start == a {
+            (first, second)
+        } else {
+            (second, first)
+        }
+    };
+    let mut elements = Vec::with_capacity(4 * mesh.elements.len());
+    for parent in &mesh.elements {
+        let positions = parent.map(|n| nodes[n as usize]);
+        let inside = |nodes: &mut Vec<[f64; 2]>, xi: f64, eta: f64| {
+            let h = quad8::shape(xi, eta);
+            let at = |a: usize| (0..8).map(|i| h[i] * positions[i][a]).sum();
+            nodes.push([at(0), at(1)]);
+            nodes.len() as u32 - 1
+        };
+        let [south, east, north, west] =
+            quad8::SIDES.map(|[a, b, m]| split(&mut nodes, [parent[a], parent[b], parent[m]]));
+        let centre = inside(&mut nodes, 0.0, 0.0);
+        let [to_south, to_east, to_north, to_west] =
+            [(0.0, -STEP), (STEP, 0.0), (0.0, STEP), (-STEP, 0.0)]
+                .map(|(xi, eta)| inside(&mut nodes, xi, eta));
+        let p = parent;
+        elements.push([p[0], p[4], centre, p[7], south.0, to_south, to_west, west.1]);
+        elements.push([p[4], p[1], p[5], centre, south.1, east.0, to_east, to_south]);
+        elements.push([centre, p[5], p[2], p[6], to_east, east.1, north.0, to_north]);
+        elements.push([p[7], centre, p[6], p[3], to_west, to_north, north.1, west.0]);
+    }
+    let boundaries = mesh
+        .boundaries
+        .iter()
+        .map(|(name, edges)| {
+            let children = edges.iter().flat_map(|&[a, b, mid]| {
+                let (first, second) = split(&mut nodes, [a, b, mid]);
+                [[a, mid, first], [mid, b, second]]
+            });
+            (name.clone(), children.collect())
+        })
+        .collect();
+    Mesh {
+        nodes,
+        elements,
+        boundaries,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::grid_mesh;
+    use crate::problem::Grid;
+
+    #[test]
+    fn refining_a_grid_is_the_grid_with_halved_lines() {
+        let coarse = Grid {
+            x: vec![0.0, 1.0, 4.0],
+            y: vec![-2.0, 0.0],
+            top: None,
+            bottom: None,
+        };
+        let fine = Grid {
+            x: vec![0.0, 0.5, 1.0, 2.5, 4.0],
+            y: vec![-2.0, -1.0, 0.0],
+            top: None,
+            bottom: None,
+        };
+        let (refined, direct) = (refine(&grid_mesh(&coarse)), grid_mesh(&fine));
+        let sorted = |mesh: &Mesh| {
+            let mut nodes = mesh.nodes.clone();
+            nodes.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            nodes
+        };
+        assert_eq!(sorted(&refined), sorted(&direct));
+        assert_eq!(refined.elements.len(), direct.elements.len());
+        assert!(refined.inverted_elements().is_empty());
+        for (name, edges) in &refined.boundaries {
+            let place = |mesh: &Mesh, e: &Edge| mesh.edge_nodes(e);
+            let expected: Vec<_> = direct.boundaries[name]
+                .iter()
+                .map(|e| place(&direct, e))
+                .collect();
+            assert_eq!(
+                edges.iter().map(|e| place(&refined, e)).collect::<Vec<_>>(),
+                expected,
+                "{name}"
+            );
+        }
+    }
+}

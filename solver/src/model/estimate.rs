@@ -1,0 +1,70 @@
+//! What a problem will cost, before anything is built.
+
+use serde::Serialize;
+
+use crate::problem::Problem;
+
+/// The cost of solving a problem on one core.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Displacements, supported ones included.
+    pub dofs: u64,
+    /// Peak memory (bytes), rather too high than too low.
+    pub memory_bytes: u64,
+    /// Time (seconds).
+    pub run_s: f64,
+}
+
+/// Estimates from the numbers of elements alone; the constants are measured in `docs/performance.md`.
+pub fn estimate(problem: &Problem) -> Estimate {
+    let mesh = &problem.mesh;
+    let split = 4f64.powi(mesh.refine.min(64) as i32);
+    let elements = match (&mesh.grid, &mesh.inline) {
+        (Some(grid), _) => {
+            grid.x.len().saturating_sub(1) as f64 * grid.y.len().saturating_sub(1) as f64
+        }
+        (None, Some(inline)) => inline.elements.len() as f64,
+        (None, None) => 0.0,
+    };
+    // A large mesh has three nodes an element, a small one up to eight.
+    let n = split * elements;
+    let nodes = (3.0 * n + 4.0 * n.sqrt() + 1.0).min(8.0 * n);
+    let dofs = 2.0 * nodes;
+    // fill of a minimum-degree factor in the plane grows like n log n
+    let fill = dofs * dofs.max(2.0).log2();
+    let contact = contact_dofs(problem, n.sqrt());
+    let memory = 1500.0 * dofs + 95.0 * fill + 24.0 * contact * contact;
+    let time = 4e-6 * dofs + 2.5e-9 * dofs.powf(1.5) + 1e-9 * contact.powi(3);
+    // floats saturate when cast: a hopeless problem gets the largest number there is
+    Estimate {
+        dofs: dofs as u64,
+        memory_bytes: memory as u64,
+        run_s: time,
+    }
+}
+
+/// Unknowns on the contact boundaries: two for each of two nodes per edge, taken from the sides of
+/// the mesh.
+fn contact_dofs(problem: &Problem, side: f64) -> f64 {
+    let mesh = &problem.mesh;
+    let split = 2f64.powi(mesh.refine.min(64) as i32);
+    let edges = |name: &str| match (&mesh.grid, &mesh.inline) {
+        (Some(grid), _) if name == "left" || name == "right" => grid.y.len() as f64 * split,
+        (Some(grid), _) => grid.x.len() as f64 * split,
+        (None, Some(inline)) => inline
+            .boundaries
+            .get(name)
+            .map_or(side, |edges| edges.len() as f64 * split),
+        (None, None) => 0.0,
+    };
+    let name = |boundary: &str| {
+        mesh.boundaries
+            .get(boundary)
+            .map_or_else(|| boundary.to_owned(), |part| part.side.clone())
+    };
+    problem
+        .contacts
+        .iter()
+        .map(|contact| 4.0 * edges(&name(&contact.boundary)))
+        .sum()
+}
