@@ -11,4 +11,4 @@ mod system;
 pub use convex::{Minimum, minimise};
 pub use fixed_point::{Finished, run};
 pub use report::report;
-pub use system::{State, System};
+pub use system::{ContactNode, Patch, Point, State, System};

@@ -72,10 +72,10 @@ fn strain_at(section: &Section, m: &Mapped, u: &[[f64; 2]; 8]) -> [f64; COMPONEN
 
 /// One element's stresses at its nodes: bilinear through the four superconvergent points.
 fn at_nodes(section: &Section, nodes: &[[f64; 2]; 8], u: &[[f64; 2]; 8]) -> [[f64; COMPONENTS]; 8] {
-    let g = GAUSS_2[1];
+    let g = GAUSS_2[1].0;
     let points: [[[f64; COMPONENTS]; 2]; 2] = std::array::from_fn(|b| {
         std::array::from_fn(|a| {
-            let m = quad8::map(nodes, GAUSS_2[a], GAUSS_2[b]);
+            let m = quad8::map(nodes, GAUSS_2[a].0, GAUSS_2[b].0);
             section.stress(&strain_at(section, &m, u))
         })
     });

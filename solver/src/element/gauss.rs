@@ -8,8 +8,13 @@ pub const GAUSS_3: [(f64, f64); 3] = [
     ( 0.774_596_669_241_483_4, 5.0 / 9.0),
 ];
 
-/// Points of the 2-point rule: the superconvergent stress points of the 8-node element.
-pub const GAUSS_2: [f64; 2] = [-0.577_350_269_189_625_7, 0.577_350_269_189_625_7];
+/// Points and weights of the 2-point rule; its points are the superconvergent stress points of the
+/// 8-node element.
+#[rustfmt::skip]
+pub const GAUSS_2: [(f64, f64); 2] = [
+    (-0.577_350_269_189_625_7, 1.0),
+    ( 0.577_350_269_189_625_7, 1.0),
+];
 
 /// Points and weights of the n-point rule.
 ///
@@ -72,6 +77,6 @@ mod tests {
         for ((x, w), (x3, w3)) in rule(3).into_iter().zip(GAUSS_3) {
             assert!((x - x3).abs() < 1e-15 && (w - w3).abs() < 1e-15);
         }
-        assert!((rule(2)[1].0 - GAUSS_2[1]).abs() < 1e-15);
+        assert!((rule(2)[1].0 - GAUSS_2[1].0).abs() < 1e-15);
     }
 }

@@ -1,0 +1,163 @@
+//! The five examples of thesis chapter 4, FORMULATION 5: discrete values on the thesis-size meshes
+//! to 1e-6, and mesh-converged values on graded ones.
+
+use solver::problem::Problem;
+use solver::solution::Solution;
+
+use crate::support::{close, example, graded, solve, union};
+
+fn frictionless(problem: &Problem) -> Solution {
+    let mut problem = problem.clone();
+    problem
+        .contacts
+        .iter_mut()
+        .for_each(|contact| contact.friction = None);
+    solve(&problem)
+}
+
+/// Values of exactly this discretisation, printed with six decimals: 1e-6 relative covers the
+/// rounding of their last digit.
+#[test]
+fn the_thesis_size_examples_have_their_discrete_values() {
+    for (name, normal, tangential) in [
+        ("rectangular_punch", 96.650513, 14.169464),
+        ("cylinder", 313.363150, 39.187802),
+        ("annular_punch", 551.444080, 71.774590),
+        ("cylinder_on_end", 258.266978, 44.771350),
+    ] {
+        let problem = example(name);
+        let summary = solve(&problem).summary;
+        close(summary.normal_force, normal, 1e-6);
+        close(summary.tangential_force, tangential, 1e-6);
+        // friction must matter, or the test says nothing of it
+        let without = frictionless(&problem).summary.normal_force;
+        assert!(
+            (without / normal - 1.0).abs() > 1e-3,
+            "{name}: {without} without friction"
+        );
+    }
+    close(
+        solve(&example("annular_punch")).summary.friction_force,
+        95.335710,
+        1e-6,
+    );
+    close(
+        frictionless(&example("rectangular_punch"))
+            .summary
+            .normal_force,
+        95.235708,
+        1e-6,
+    );
+}
+
+/// One contact node at pull .2, three at .4 on the thesis-size mesh; the sheet resists the pull.
+#[test]
+fn the_sheet_touches_with_one_node_and_then_with_three() {
+    for (pull, nodes) in [(0.2, 1), (0.4, 3)] {
+        let mut sheet = example("sheet");
+        sheet.supports[1].ux = Some(solver::problem::BoundaryValue::Constant(pull));
+        let solution = solve(&sheet);
+        let active = solution.history[solution.history.len() - 1].contact.active;
+        assert_eq!(active, nodes, "pull {pull}");
+        assert!(
+            solution.summary.tangential_force < 0.0,
+            "friction acts against the motion along t"
+        );
+        let codes: Vec<_> = solution
+            .summary
+            .warnings
+            .iter()
+            .map(|w| &w.code[..])
+            .collect();
+        assert!(codes.contains(&"mesh_too_coarse_for_contact"), "{codes:?}");
+        let without = frictionless(&sheet).summary.normal_force;
+        assert!((without / solution.summary.normal_force - 1.0).abs() > 1e-2);
+    }
+}
+
+/// Grid lines of example 1, graded to h = 1e-4 at the punch's edge and to .01 at the clamped corner.
+fn graded_punch() -> Problem {
+    let mut problem = example("rectangular_punch");
+    let grid = problem.mesh.grid.as_mut().unwrap();
+    let (edge, growth) = (1e-4, 1.2);
+    grid.x = union(&[
+        graded(0.5, 0.0, edge, growth),
+        graded(0.5, 2.25, edge, growth),
+        graded(4.0, 2.25, 0.01, growth),
+    ]);
+    grid.y = union(&[
+        graded(0.0, -2.0, edge, growth),
+        graded(-4.0, -2.0, 0.01, growth),
+    ]);
+    problem
+}
+
+#[test]
+fn example_1_on_a_graded_grid_has_the_mesh_converged_values() {
+    let problem = graded_punch();
+    let summary = solve(&problem).summary;
+    close(summary.normal_force, 95.267, 1e-3);
+    close(summary.tangential_force, 14.231, 1e-3);
+    let peak = summary.contacts["top"].peak_tangential_stress.unwrap();
+    close(peak.value, 249.6, 5e-3);
+    close(peak.x, 0.4952, 1e-3);
+    close(frictionless(&problem).summary.normal_force, 93.866, 1e-3);
+}
+
+#[test]
+fn example_2_refined_once_is_near_its_mesh_converged_value() {
+    let mut problem = example("cylinder");
+    problem.mesh.refine = 1;
+    close(solve(&problem).summary.normal_force, 312.870, 1e-3);
+}
+
+#[test]
+fn uniform_refinement_of_example_1_gives_the_published_sequence() {
+    for (refine, normal, tangential) in [
+        (0, 96.651, 14.169),
+        (1, 95.665, 14.114),
+        (2, 95.405, 14.124),
+        (3, 95.327, 14.174),
+    ] {
+        let mut problem = example("rectangular_punch");
+        problem.mesh.refine = refine;
+        let summary = solve(&problem).summary;
+        // three decimals are published
+        assert!(
+            (summary.normal_force - normal).abs() < 6e-4,
+            "{refine}: Y = {}",
+            summary.normal_force
+        );
+        assert!(
+            (summary.tangential_force - tangential).abs() < 6e-4,
+            "{refine}: T = {}",
+            summary.tangential_force
+        );
+    }
+}
+
+#[test]
+fn the_same_input_twice_gives_the_same_bits() {
+    let problem = example("annular_punch");
+    assert_eq!(solve(&problem), solve(&problem));
+}
+
+/// FORMULATION 6: T = 11.46, 13.86, 14.124, 14.152 for ε = 1e-2 … 1e-5 after two refinements.
+#[test]
+fn the_elastic_slip_matters_as_published() {
+    for (elastic_slip, tangential, digits) in [
+        (1e-2, 11.46, 5e-3),
+        (1e-3, 13.86, 5e-3),
+        (1e-4, 14.124, 5e-4),
+        (1e-5, 14.152, 5e-4),
+    ] {
+        let mut problem = example("rectangular_punch");
+        problem.mesh.refine = 2;
+        problem.contacts[0].friction.as_mut().unwrap().elastic_slip = elastic_slip;
+        let found = solve(&problem).summary.tangential_force;
+        assert!(
+            (found - tangential).abs() <= 1.2 * digits,
+            "ε = {elastic_slip}: T = {found}"
+        );
+    }
+}

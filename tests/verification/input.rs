@@ -1,0 +1,209 @@
+//! What `Model::new` refuses, all at once, and what the solver says of what it accepts.
+
+use solver::error::Violation;
+use solver::problem::Problem;
+
+use crate::support::{example, problem, solve};
+
+fn violations(problem: &Problem) -> Vec<(String, String)> {
+    let list = solver::check(problem).expect_err("a faulty problem was accepted");
+    list.iter().for_each(|Violation { expected, hint, .. }| {
+        assert!(!expected.is_empty() && !hint.is_empty())
+    });
+    list.into_iter().map(|v| (v.pointer, v.reason)).collect()
+}
+
+fn pair(pointer: &str, reason: &str) -> (String, String) {
+    (pointer.to_owned(), reason.to_owned())
+}
+
+#[test]
+fn every_number_out_of_range_is_named_at_once() {
+    let mut p = example("rectangular_punch");
+    p.materials[0].youngs_modulus = -1.0;
+    p.materials[0].poissons_ratio = 0.5;
+    p.solver.tolerance = 2.0;
+    p.solver.max_iterations = 0;
+    let friction = p.contacts[0].friction.as_mut().unwrap();
+    (
+        friction.coefficient,
+        friction.nonlocal_radius,
+        friction.elastic_slip,
+    ) = (-0.1, -1.0, 0.0);
+    p.supports[0].boundary = "lfet".to_owned();
+    let found = violations(&p);
+    for pointer in [
+        "/materials/0/youngs_modulus",
+        "/materials/0/poissons_ratio",
+        "/solver/tolerance",
+        "/solver/max_iterations",
+        "/contacts/0/friction/coefficient",
+        "/contacts/0/friction/nonlocal_radius",
+        "/contacts/0/friction/elastic_slip",
+    ] {
+        assert!(
+            found.contains(&pair(pointer, "out_of_range")),
+            "{pointer} in {found:?}"
+        );
+    }
+    assert!(found.contains(&pair("/supports/0/boundary", "unknown_boundary")));
+    assert_eq!(found.len(), 8, "{found:?}");
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_refused_wherever_they_stand() {
+    let mut p = example("cylinder");
+    p.contacts[0].indentation = f64::NAN;
+    p.mesh.grid.as_mut().unwrap().x[3] = f64::INFINITY;
+    assert_eq!(
+        violations(&p),
+        [
+            pair("/contacts/0/indentation", "not_finite"),
+            pair("/mesh/grid/x/3", "not_finite")
+        ]
+    );
+}
+
+#[test]
+fn a_body_free_to_move_is_refused_with_node_and_direction() {
+    let mut p = example("rectangular_punch");
+    p.supports.remove(1); // the base: now only ux at the side
+    let list = solver::check(&p).unwrap_err();
+    assert_eq!(list.len(), 1);
+    assert!(
+        list[0].got.contains("along y") && list[0].got.contains("node"),
+        "{}",
+        list[0].got
+    );
+    let mut round = example("cylinder_on_end");
+    round.supports.remove(1);
+    assert!(
+        solver::check(&round).unwrap_err()[0]
+            .got
+            .contains("along the axis")
+    );
+    let mut pinned = example("rectangular_punch");
+    pinned.supports.clear();
+    assert!(
+        solver::check(&pinned).unwrap_err()[0]
+            .got
+            .contains("along x")
+    );
+}
+
+#[test]
+fn an_obstacle_that_covers_no_node_is_refused_and_one_that_cuts_an_edge_is_warned_of() {
+    let mut p = example("rectangular_punch");
+    let obstacle = |json: &str| serde_json::from_str(json).unwrap();
+    p.contacts[0].obstacle = obstacle(r#"{"kind": "flat", "from": 10, "to": 11}"#);
+    assert_eq!(
+        violations(&p),
+        [pair("/contacts/0/obstacle", "covers_nothing")]
+    );
+    p.contacts[0].obstacle = obstacle(r#"{"kind": "flat", "from": 0, "to": 0.55}"#);
+    let codes: Vec<_> = solver::check(&p)
+        .unwrap()
+        .into_iter()
+        .map(|w| w.code)
+        .collect();
+    assert!(
+        codes.contains(&"obstacle_cuts_edge".to_owned()),
+        "{codes:?}"
+    );
+    p.contacts[0].obstacle = obstacle(r#"{"kind": "circle", "radius": -8}"#);
+    assert!(violations(&p).contains(&pair("/contacts/0/obstacle/radius", "out_of_range")));
+}
+
+#[test]
+fn inverted_elements_are_named_with_their_gauss_point() {
+    let p = problem(
+        r#"{"analysis": {"kind": "plane_strain"}, "materials": [{"youngs_modulus": 1, "poissons_ratio": 0}],
+            "mesh": {"inline": {
+                "nodes": [[0,0],[1,0],[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]],
+                "elements": [[0,3,2,1,7,6,5,4]], "boundaries": {"b": [[0,1,4]]}}},
+            "supports": [{"boundary": "b", "ux": 0, "uy": 0}]}"#,
+    );
+    let list = solver::check(&p).unwrap_err();
+    assert_eq!(
+        (&list[0].pointer[..], &list[0].reason[..]),
+        ("/mesh/inline/elements/0", "inverted_element")
+    );
+    assert!(list[0].got.contains("Gauss point 0"), "{}", list[0].got);
+}
+
+#[test]
+fn supports_that_contradict_each_other_or_hold_the_body_inside_the_obstacle_are_refused() {
+    let mut p = example("rectangular_punch");
+    p.supports[0].ux = Some(solver::problem::BoundaryValue::Constant(0.1));
+    assert_eq!(violations(&p), [pair("/supports/1/ux", "conflict")]);
+    let mut p = example("rectangular_punch");
+    p.supports
+        .push(serde_json::from_str(r#"{"boundary": "top", "uy": 0}"#).unwrap());
+    assert_eq!(
+        violations(&p),
+        [pair("/contacts/0/indentation", "impossible")]
+    );
+}
+
+#[test]
+fn a_contact_that_never_engages_is_said_with_its_smallest_gap() {
+    let mut p = example("cylinder");
+    p.contacts[0].indentation = -0.125;
+    let solution = solve(&p);
+    assert_eq!(solution.summary.normal_force, 0.0);
+    let warning = solution
+        .summary
+        .warnings
+        .iter()
+        .find(|w| w.code == "no_contact")
+        .expect("no warning");
+    assert!(warning.message.contains("0.125"), "{}", warning.message);
+    assert!(solution.summary.contacts["top"].contact.is_empty());
+}
+
+#[test]
+fn an_iteration_limit_is_an_outcome_with_its_history() {
+    let mut p = example("cylinder");
+    p.solver.max_iterations = 2;
+    let solution = solver::solve(&p, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
+    assert_eq!(
+        solution.summary.outcome,
+        solver::solution::Outcome::NotConverged
+    );
+    assert_eq!(
+        solution.history.len(),
+        3,
+        "one frictionless row and two sweeps"
+    );
+    assert!(
+        !solution.summary.converged && solution.summary.residuals.friction > p.solver.tolerance
+    );
+}
+
+#[test]
+fn an_observer_that_stops_gets_the_state_it_has_seen() {
+    let mut rows = 0;
+    let solution = solver::solve(&example("cylinder"), &mut |progress| {
+        if matches!(progress, solver::solution::Progress::Iteration(_)) {
+            rows += 1;
+        }
+        if rows == 3 {
+            std::ops::ControlFlow::Break(())
+        } else {
+            std::ops::ControlFlow::Continue(())
+        }
+    })
+    .unwrap();
+    assert_eq!(
+        (solution.summary.outcome, solution.history.len()),
+        (solver::solution::Outcome::Canceled, 3)
+    );
+}
+
+#[test]
+fn an_observer_that_stops_before_the_first_state_gets_none() {
+    let end = solver::solve(&example("cylinder"), &mut |_| {
+        std::ops::ControlFlow::Break(())
+    });
+    assert_eq!(end, Err(solver::error::SolveError::Stopped));
+}

@@ -1,0 +1,204 @@
+//! VERIFICATION rows 1 and 2: the element.
+
+use faer::Side;
+use solver::elasticity::{Section, assemble_element};
+use solver::element::gauss::{GAUSS_2, GAUSS_3};
+use solver::problem::{Analysis, Problem};
+
+use crate::support::{problem, solve};
+
+/// Row 1. Nine distorted elements on a unit square at r ≥ 1, its boundary driven by a linear
+/// displacement: every node must follow, and the stress be one and the same.
+///
+/// ```text
+///   +---+----+--+      inner corners are displaced at random-looking amounts; midsides lie on the
+///   |   \    |  |      middle of straight sides: constant strain is then reproduced exactly
+///   +----+--+---+
+///   |   /    \  |
+///   +---+----+--+
+/// ```
+fn distorted_patch(analysis: &str, ux: [f64; 3], uy: [f64; 3]) -> Problem {
+    // displacement c0 + c1 x + c2 y, linear along each side
+    let shift = |i: usize, j: usize| match (i, j) {
+        (1, 1) => [0.06, -0.05],
+        (2, 1) => [-0.04, 0.07],
+        (1, 2) => [0.05, 0.04],
+        (2, 2) => [-0.07, -0.06],
+        _ => [0.0, 0.0],
+    };
+    let corner = |i: usize, j: usize| {
+        let [dx, dy] = shift(i, j);
+        [1.0 + i as f64 / 3.0 + dx, j as f64 / 3.0 + dy]
+    };
+    let mut nodes = Vec::new();
+    let mut number = std::collections::BTreeMap::new();
+    for j in 0..=6 {
+        for i in 0..=6 {
+            if i % 2 == 1 && j % 2 == 1 {
+                continue;
+            }
+            let (a, b) = (corner(i / 2, j / 2), corner(i.div_ceil(2), j.div_ceil(2)));
+            number.insert((i, j), nodes.len());
+            nodes.push([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]);
+        }
+    }
+    let n = |i: usize, j: usize| number[&(i, j)];
+    let elements: Vec<[usize; 8]> = (0..6)
+        .step_by(2)
+        .flat_map(|j| (0..6).step_by(2).map(move |i| (i, j)))
+        .map(|(i, j)| {
+            [
+                n(i, j),
+                n(i + 2, j),
+                n(i + 2, j + 2),
+                n(i, j + 2),
+                n(i + 1, j),
+                n(i + 2, j + 1),
+                n(i + 1, j + 2),
+                n(i, j + 1),
+            ]
+        })
+        .collect();
+    let side = |at: &dyn Fn(usize) -> (usize, usize)| {
+        [0, 2, 4].map(|k| {
+            let p = |k| {
+                let (i, j) = at(k);
+                n(i, j)
+            };
+            [p(k), p(k + 2), p(k + 1)]
+        })
+    };
+    let u = |c: [f64; 3], x: f64, y: f64| c[0] + c[1] * x + c[2] * y;
+    // a boundary runs with the body on its right: bottom from right to left, and so on round
+    let ends = [
+        ("bottom", [2.0, 0.0], [1.0, 0.0]),
+        ("left", [1.0, 0.0], [1.0, 1.0]),
+        ("top", [1.0, 1.0], [2.0, 1.0]),
+        ("right", [2.0, 1.0], [2.0, 0.0]),
+    ];
+    let supports: Vec<_> = ends
+        .iter()
+        .map(|(name, a, b)| {
+            let value = |c| [u(c, a[0], a[1]), u(c, b[0], b[1])];
+            serde_json::json!({"boundary": name, "ux": value(ux), "uy": value(uy)})
+        })
+        .collect();
+    let json = serde_json::json!({
+        "analysis": serde_json::from_str::<serde_json::Value>(analysis).unwrap(),
+        "mesh": {"inline": {"nodes": nodes, "elements": elements, "boundaries": {
+            "bottom": side(&|k| (k, 0)), "top": side(&|k| (k, 6)), "left": side(&|k| (0, k)), "right": side(&|k| (6, k)),
+        }}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": supports,
+    });
+    problem(&json.to_string())
+}
+
+/// Largest errors of displacement and of stress against a linear field with constant stress.
+fn errors(analysis: &str, ux: [f64; 3], uy: [f64; 3], stress: [f64; 4]) -> (f64, f64) {
+    let fields = solve(&distorted_patch(analysis, ux, uy)).fields;
+    let (mut of_u, mut of_stress): (f64, f64) = (0.0, 0.0);
+    for k in 0..fields.x.len() {
+        let (x, y) = (fields.x[k], fields.y[k]);
+        of_u = of_u.max((fields.ux[k] - (ux[0] + ux[1] * x + ux[2] * y)).abs());
+        of_u = of_u.max((fields.uy[k] - (uy[0] + uy[1] * x + uy[2] * y)).abs());
+        let found = [
+            fields.stress_xx[k],
+            fields.stress_yy[k],
+            fields.stress_xy[k],
+            fields.stress_zz[k],
+        ];
+        found
+            .iter()
+            .zip(stress)
+            .for_each(|(a, b)| of_stress = of_stress.max((a - b).abs() / 1000.0));
+    }
+    (of_u, of_stress)
+}
+
+/// To 1e-12 of the strain's size: rounding of a well-conditioned system, and nothing else.
+#[test]
+fn a_distorted_patch_reproduces_constant_strain() {
+    let (e, nu) = (1000.0, 0.3);
+    // ε_xx = .01, ε_yy = −.02, γ_xy = .03
+    let (ux, uy) = ([0.005, 0.01, 0.02], [0.003, 0.01, -0.02]);
+    let (shear, lambda) = (
+        e / (2.0 * (1.0 + nu)),
+        e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
+    );
+    let dilation = lambda * (0.01 - 0.02);
+    let plane_strain = [
+        dilation + 2.0 * shear * 0.01,
+        dilation - 2.0 * shear * 0.02,
+        shear * 0.03,
+        dilation,
+    ];
+    let a = e / (1.0 - nu * nu);
+    let plane_stress = [
+        a * (0.01 - nu * 0.02),
+        a * (nu * 0.01 - 0.02),
+        shear * 0.03,
+        0.0,
+    ];
+    // u_r = r, u_z = z: ε_rr = ε_θθ = ε_zz = 1
+    let volume = 3.0 * lambda + 2.0 * shear;
+    let cases: [(_, _, _, _, f64); 3] = [
+        (r#"{"kind": "plane_strain"}"#, ux, uy, plane_strain, 0.03),
+        (
+            r#"{"kind": "plane_stress", "thickness": 0.02}"#,
+            ux,
+            uy,
+            plane_stress,
+            0.03,
+        ),
+        (
+            r#"{"kind": "axisymmetric"}"#,
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [volume, volume, 0.0, volume],
+            1.0,
+        ),
+    ];
+    for (analysis, ux, uy, stress, size) in cases {
+        let (of_u, of_stress) = errors(analysis, ux, uy, stress);
+        assert!(
+            of_u <= 1e-12 && of_stress <= 1e-12 * size,
+            "{analysis}: u {of_u:.1e}, σ/E {of_stress:.1e}"
+        );
+    }
+}
+
+/// Row 2. Eigenvalues of one element's stiffness that are zero to rounding.
+#[test]
+fn an_element_has_its_rigid_modes_and_no_others() {
+    let distorted = [
+        [1.0, 0.0],
+        [2.0, 0.1],
+        [2.2, 1.0],
+        [1.0, 0.9],
+        [1.5, 0.05],
+        [2.1, 0.55],
+        [1.6, 0.95],
+        [1.0, 0.45],
+    ];
+    let zero_modes = |analysis: Analysis, rule: &[(f64, f64)]| {
+        let k = assemble_element(&distorted, &Section::new(analysis, 1000.0, 0.3), rule);
+        let values = faer::Mat::from_fn(16, 16, |i, j| k[i][j])
+            .self_adjoint_eigenvalues(Side::Lower)
+            .unwrap();
+        let largest = values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+        values.iter().filter(|v| v.abs() < 1e-12 * largest).count()
+    };
+    let (strain, round) = (Analysis::PlaneStrain {}, Analysis::Axisymmetric {});
+    assert_eq!(zero_modes(strain, &GAUSS_3), 3);
+    assert_eq!(
+        zero_modes(Analysis::PlaneStress { thickness: 0.5 }, &GAUSS_3),
+        3
+    );
+    assert_eq!(zero_modes(round, &GAUSS_3), 1);
+    assert_eq!(
+        zero_modes(strain, &GAUSS_2),
+        4,
+        "the 2 × 2 rule leaves one more"
+    );
+}

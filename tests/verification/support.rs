@@ -1,0 +1,55 @@
+//! What the verification tests share.
+
+use std::ops::ControlFlow;
+
+use solver::problem::Problem;
+use solver::solution::Solution;
+
+/// One of `examples/*.json`.
+pub(crate) fn example(name: &str) -> Problem {
+    let path = format!("{}/../examples/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    problem(&std::fs::read_to_string(path).unwrap())
+}
+
+/// A problem from JSON.
+pub(crate) fn problem(json: &str) -> Problem {
+    solver::parse(json).unwrap_or_else(|violations| panic!("{violations:#?}"))
+}
+
+/// Solves a problem that must converge.
+pub(crate) fn solve(problem: &Problem) -> Solution {
+    let solution = solver::solve(problem, &mut |_| ControlFlow::Continue(())).unwrap();
+    assert!(solution.summary.converged, "{:#?}", solution.summary);
+    solution
+}
+
+/// Asserts |got − expected| ≤ tolerance · |expected|.
+#[track_caller]
+pub(crate) fn close(got: f64, expected: f64, tolerance: f64) {
+    let error = ((got - expected) / expected).abs();
+    assert!(
+        error <= tolerance,
+        "got {got}, expected {expected}: off by {error:.2e}, allowed {tolerance:.0e}"
+    );
+}
+
+/// Grid lines from `from` to `to`: the first step is `first`, each next one `growth` times the one
+/// before, the last one what remains.
+pub(crate) fn graded(from: f64, to: f64, first: f64, growth: f64) -> Vec<f64> {
+    let direction = (to - from).signum();
+    let (mut lines, mut step) = (vec![from], first);
+    while (to - lines[lines.len() - 1]).abs() > 1.5 * step {
+        lines.push(lines[lines.len() - 1] + direction * step);
+        step *= growth;
+    }
+    lines.push(to);
+    lines
+}
+
+/// Sorted union of grid lines; lines that are equal to rounding count once.
+pub(crate) fn union(parts: &[Vec<f64>]) -> Vec<f64> {
+    let mut lines: Vec<f64> = parts.concat();
+    lines.sort_by(f64::total_cmp);
+    lines.dedup_by(|a, b| (*a - *b).abs() < 1e-12);
+    lines
+}

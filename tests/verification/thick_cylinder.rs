@@ -1,0 +1,153 @@
+//! VERIFICATION row 3. Thick cylinder, Lamé's solution: a = 1, b = 2, inner pressure 1, E = 1000,
+//! ν = .3; once as a quarter ring in plane strain with curved elements, once axisymmetric.
+
+use serde_json::json;
+use solver::problem::Problem;
+use solver::solution::Fields;
+
+use crate::support::{close, problem, solve};
+
+const MATERIAL: &str = r#"[{"youngs_modulus": 1000, "poissons_ratio": 0.3}]"#;
+
+/// Quarter ring of `radial` × `round` elements, midsides on their circles, refined `refine` times.
+fn ring(radial: usize, round: usize) -> Problem {
+    let mut nodes = Vec::new();
+    let mut number = std::collections::BTreeMap::new();
+    for j in 0..=2 * round {
+        for i in 0..=2 * radial {
+            if i % 2 == 1 && j % 2 == 1 {
+                continue;
+            }
+            let (sin, cos) =
+                (std::f64::consts::FRAC_PI_2 * j as f64 / (2 * round) as f64).sin_cos();
+            let r = 1.0 + i as f64 / (2 * radial) as f64;
+            number.insert((i, j), nodes.len());
+            nodes.push([r * cos, r * sin]);
+        }
+    }
+    let n = |i: usize, j: usize| number[&(i, j)];
+    let elements: Vec<_> = (0..round)
+        .flat_map(|j| (0..radial).map(move |i| (2 * i, 2 * j)))
+        .map(|(i, j)| {
+            [
+                n(i, j),
+                n(i + 2, j),
+                n(i + 2, j + 2),
+                n(i, j + 2),
+                n(i + 1, j),
+                n(i + 2, j + 1),
+                n(i + 1, j + 2),
+                n(i, j + 1),
+            ]
+        })
+        .collect();
+    let across = |j: usize| {
+        (0..radial)
+            .map(|k| [n(2 * k, j), n(2 * k + 2, j), n(2 * k + 1, j)])
+            .collect::<Vec<_>>()
+    };
+    let inner: Vec<_> = (0..round)
+        .map(|k| [n(0, 2 * k), n(0, 2 * k + 2), n(0, 2 * k + 1)])
+        .collect();
+    problem(
+        &json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"inline": {"nodes": nodes, "elements": elements,
+                "boundaries": {"inner": inner, "below": across(0), "side": across(2 * round)}}},
+            "materials": serde_json::from_str::<serde_json::Value>(MATERIAL).unwrap(),
+            "supports": [{"boundary": "below", "uy": 0}, {"boundary": "side", "ux": 0}],
+            "loads": [{"boundary": "inner", "pressure": 1}],
+        })
+        .to_string(),
+    )
+}
+
+/// A slice of the wall, held in z.
+fn wall(radial: usize) -> Problem {
+    let x: Vec<f64> = (0..=radial)
+        .map(|i| 1.0 + i as f64 / radial as f64)
+        .collect();
+    problem(
+        &json!({
+            "analysis": {"kind": "axisymmetric"},
+            "mesh": {"grid": {"x": x, "y": [0, 0.25]}},
+            "materials": serde_json::from_str::<serde_json::Value>(MATERIAL).unwrap(),
+            "supports": [{"boundary": "bottom", "uy": 0}, {"boundary": "top", "uy": 0}],
+            "loads": [{"boundary": "left", "pressure": 1}],
+        })
+        .to_string(),
+    )
+}
+
+/// The node nearest to (x, y).
+fn node(fields: &Fields, x: f64, y: f64) -> usize {
+    let distance = |k: &usize| (fields.x[*k] - x).hypot(fields.y[*k] - y);
+    (0..fields.x.len())
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap()
+}
+
+/// Displacements converge with the third power of h or better and are within 1e-5 at eight
+/// elements; recovered stresses at a surface are a one-sided extrapolation: 1 % there.
+fn hold(fields: &Fields, hoop: &[f64]) {
+    let (a, b) = (node(fields, 1.0, 0.0), node(fields, 2.0, 0.0));
+    close(fields.ux[a], 1.906667e-3, 1e-5);
+    close(fields.ux[b], 1.213333e-3, 1e-5);
+    close(hoop[a], 5.0 / 3.0, 0.01);
+    close(hoop[b], 2.0 / 3.0, 0.01);
+}
+
+#[test]
+fn a_pressurised_ring_in_plane_strain_is_lames() {
+    let fields = solve(&ring(8, 8)).fields;
+    hold(&fields, &fields.stress_yy); // on y = 0 the hoop direction is y
+}
+
+#[test]
+fn a_pressurised_wall_in_axisymmetry_is_lames() {
+    let fields = solve(&wall(8)).fields;
+    hold(&fields, &fields.stress_zz);
+}
+
+/// The exact displacement is 1.3/1000 · (a²/(b² − a²)) · ((1 − 2ν) r + b²/r).
+#[test]
+fn the_error_of_displacement_falls_with_the_third_power_of_the_element_or_better() {
+    let exact = |r: f64| 1.3e-3 / 3.0 * (0.4 * r + 4.0 / r);
+    let error = |problem: &Problem| {
+        let f = solve(problem).fields;
+        let at = |k: usize| (f.ux[k].hypot(f.uy[k]), f.x[k].hypot(f.y[k]));
+        (0..f.x.len())
+            .map(|k| {
+                let (u, r) = at(k);
+                (u - exact(r)).abs()
+            })
+            .fold(0.0, f64::max)
+    };
+    let rate = (error(&ring(2, 2)) / error(&ring(4, 4))).log2();
+    assert!(rate > 3.0, "plane strain: rate {rate:.2}");
+    let radial = |n: usize| {
+        let f = solve(&wall(n)).fields;
+        (0..f.x.len())
+            .map(|k| (f.ux[k] - exact(f.x[k])).abs())
+            .fold(0.0, f64::max)
+    };
+    let rate = (radial(4) / radial(8)).log2();
+    assert!(rate > 3.0, "axisymmetric: rate {rate:.2}");
+}
+
+/// `refine` of an inline mesh keeps curved sides curved. What remains is the distance of the
+/// coarse mesh's parabolas from the circle, which falls with the fourth power of their length.
+#[test]
+fn refining_a_curved_mesh_converges_to_its_curve() {
+    let error = |n: usize, refine: u32| {
+        let mut ring = ring(n, n);
+        ring.mesh.refine = refine;
+        let fields = solve(&ring).fields;
+        (fields.ux[node(&fields, 1.0, 0.0)] / 1.906667e-3 - 1.0).abs()
+    };
+    let errors = [2, 4, 8].map(|n| error(n, 2));
+    assert!(errors[0] < 7e-4, "{errors:?}");
+    for pair in errors.windows(2) {
+        assert!(pair[1] < pair[0] / 12.0, "{errors:?}");
+    }
+}
