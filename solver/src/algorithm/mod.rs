@@ -5,6 +5,7 @@
 
 mod convex;
 mod fixed_point;
+mod profile;
 mod report;
 mod system;
 

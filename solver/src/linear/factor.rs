@@ -57,9 +57,11 @@ impl Ordering {
             .for_each(|(new, &old)| inverse[old] = new);
         let pattern =
             SymbolicSparseColMatRef::new_checked(n, n, &matrix.column_starts, None, &matrix.rows);
-        let mut parameters = CholeskySymbolicParams::default();
-        // Only the supernodal factor offers its dense trailing block.
-        parameters.supernodal_flop_ratio_threshold = SupernodalThreshold::FORCE_SUPERNODAL;
+        let parameters = CholeskySymbolicParams {
+            // only the supernodal factor offers its dense trailing block
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
         let ordering = SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, n));
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, parameters)
             .map_err(|_| FactorError::TooLarge)?; // its only errors: index range and memory

@@ -1,0 +1,206 @@
+//! The mesh with all its names, and values along named boundaries.
+
+use std::collections::BTreeMap;
+
+use super::findings::{ALIGNED, Findings};
+use crate::error::escape;
+use crate::mesh::{self, Edge, Mesh};
+use crate::problem::{Analysis, BoundaryValue, MeshInput};
+
+/// More refinements than this overflow any machine; the size itself is bounded by the caller.
+const MOST_REFINEMENTS: u32 = 20;
+
+impl Findings {
+    /// The refined mesh with all its names, or `None` after saying why not.
+    pub(super) fn mesh(&mut self, input: &MeshInput, analysis: &Analysis) -> Option<Mesh> {
+        let before = self.violations.len();
+        let mut mesh = match (&input.grid, &input.inline) {
+            (Some(grid), None) => {
+                self.violations
+                    .extend(mesh::grid_violations(grid, "/mesh/grid"));
+                (self.violations.len() == before).then(|| mesh::grid_mesh(grid))
+            }
+            (None, Some(inline)) => mesh::inline_mesh(inline, "/mesh/inline")
+                .map_err(|v| self.violations.extend(v))
+                .ok(),
+            (grid, _) => {
+                let got = if grid.is_some() {
+                    "both `grid` and `inline`"
+                } else {
+                    "neither `grid` nor `inline`"
+                };
+                self.say(
+                    "/mesh",
+                    "wrong_count",
+                    got,
+                    "exactly one of `grid` and `inline`",
+                    "Give the mesh in one of the two forms.",
+                );
+                None
+            }
+        };
+        if input.refine > MOST_REFINEMENTS {
+            self.say(
+                "/mesh/refine",
+                "out_of_range",
+                input.refine,
+                format!("0 … {MOST_REFINEMENTS}"),
+                "Each refinement makes four elements of one.",
+            );
+            mesh = None;
+        }
+        let mut mesh = mesh?;
+        for (e, g, det) in mesh.inverted_elements().into_iter().take(20) {
+            self.say(
+                if input.inline.is_some() {
+                    format!("/mesh/inline/elements/{e}")
+                } else {
+                    "/mesh/grid".to_owned()
+                },
+                "inverted_element",
+                format!("element {e} with det J = {det:.3e} at Gauss point {g}"),
+                "det J > 0 at all nine Gauss points",
+                "List corners counter-clockwise, and keep midsides near the middle of their sides.",
+            );
+        }
+        if matches!(analysis, Analysis::Axisymmetric {})
+            && let Some(node) = mesh.nodes.iter().position(|[r, _]| *r < 0.0)
+        {
+            self.say(
+                if input.inline.is_some() {
+                    format!("/mesh/inline/nodes/{node}")
+                } else {
+                    "/mesh/grid/x".to_owned()
+                },
+                "out_of_range",
+                format!("r = {}", mesh.nodes[node][0]),
+                "r ≥ 0",
+                "In an axisymmetric body x is the radius.",
+            );
+        }
+        if self.violations.len() > before {
+            return None;
+        }
+        for _ in 0..input.refine {
+            mesh = mesh::refine(&mesh);
+        }
+        self.parts(&mut mesh, input);
+        Some(mesh)
+    }
+
+    /// Names for parts of boundaries.
+    pub(super) fn parts(&mut self, mesh: &mut Mesh, input: &MeshInput) {
+        let original = mesh.boundaries.clone();
+        for (name, part) in &input.boundaries {
+            let pointer = format!("/mesh/boundaries/{}", escape(name));
+            if original.contains_key(name) {
+                self.say(
+                    &pointer,
+                    "name_taken",
+                    name,
+                    "a name that the mesh does not have yet",
+                    format!("It has {}.", names(&original)),
+                );
+                continue;
+            }
+            let Some(edges) = original.get(&part.side) else {
+                self.say(
+                    format!("{pointer}/side"),
+                    "unknown_boundary",
+                    &part.side,
+                    format!("one of {}", names(&original)),
+                    "Check the spelling.",
+                );
+                continue;
+            };
+            let size = mesh
+                .nodes
+                .iter()
+                .flatten()
+                .fold(0.0f64, |a, b| a.max(b.abs()));
+            let within = |edge: &&Edge| {
+                mesh.edge_nodes(edge).iter().all(|position| {
+                    [part.x, part.y].iter().zip(position).all(|(range, c)| {
+                        range.is_none_or(|[low, high]| {
+                            *c >= low - ALIGNED * size && *c <= high + ALIGNED * size
+                        })
+                    })
+                })
+            };
+            let part: Vec<Edge> = edges.iter().filter(within).copied().collect();
+            if part.is_empty() {
+                self.say(
+                    &pointer,
+                    "empty_boundary",
+                    "no edge",
+                    "at least one edge whose three nodes lie in the range",
+                    "Put grid lines on the ends of the part.",
+                );
+            }
+            mesh.boundaries.insert(name.clone(), part);
+        }
+    }
+
+    /// The edges of a named boundary.
+    pub(super) fn boundary<'a>(
+        &mut self,
+        mesh: &'a Mesh,
+        name: &str,
+        pointer: String,
+    ) -> Option<&'a [Edge]> {
+        let found = mesh.boundaries.get(name);
+        if found.is_none() {
+            self.say(
+                pointer,
+                "unknown_boundary",
+                name,
+                format!("one of {}", names(&mesh.boundaries)),
+                "Check the spelling, or name a part under /mesh/boundaries.",
+            );
+        }
+        found.map(|edges| &edges[..])
+    }
+
+    /// A boundary value at start, end and midside of every edge.
+    pub(super) fn along(
+        &mut self,
+        mesh: &Mesh,
+        edges: &[Edge],
+        value: BoundaryValue,
+        pointer: String,
+    ) -> Vec<(Edge, [f64; 3])> {
+        match value {
+            BoundaryValue::Constant(value) => {
+                edges.iter().map(|edge| (*edge, [value; 3])).collect()
+            }
+            BoundaryValue::Linear([start, end]) => {
+                let runs = mesh::runs(edges);
+                let [run] = &runs[..] else {
+                    self.say(
+                        pointer,
+                        "not_a_chain",
+                        format!("a boundary of {} pieces", runs.len()),
+                        "one chain of edges",
+                        "A value from start to end needs a boundary that hangs together.",
+                    );
+                    return Vec::new();
+                };
+                let s = crate::contact::arc_lengths(mesh, run);
+                let length = s[s.len() - 1];
+                let at = |node: usize| start + (end - start) * s[node] / length;
+                run.iter()
+                    .enumerate()
+                    .map(|(k, edge)| (*edge, [at(2 * k), at(2 * k + 2), at(2 * k + 1)]))
+                    .collect()
+            }
+        }
+    }
+}
+
+fn names(boundaries: &BTreeMap<String, Vec<Edge>>) -> String {
+    boundaries
+        .keys()
+        .map(|name| format!("`{name}`"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}

@@ -1,0 +1,214 @@
+//! Contact boundaries and the obstacles they face.
+
+use std::collections::BTreeMap;
+
+use super::ContactModel;
+use super::findings::{ALIGNED, Findings};
+use crate::contact::ContactBoundary;
+use crate::contact::obstacle::{self, FacingRun};
+use crate::elasticity::Section;
+use crate::mesh::{self, Edge, Mesh};
+use crate::problem::Contact;
+
+impl Findings {
+    pub(super) fn contacts(
+        &mut self,
+        mesh: &Mesh,
+        section: &Section,
+        contacts: &[Contact],
+        fixed: &BTreeMap<u32, [Option<f64>; 2]>,
+    ) -> Vec<ContactModel> {
+        let mut models: Vec<ContactModel> = Vec::new();
+        for (i, contact) in contacts.iter().enumerate() {
+            let pointer = format!("/contacts/{i}");
+            if contacts[..i]
+                .iter()
+                .any(|other| other.boundary == contact.boundary)
+            {
+                self.say(
+                    format!("{pointer}/boundary"),
+                    "name_taken",
+                    &contact.boundary,
+                    "a boundary of its own for each contact",
+                    "Name parts of it under /mesh/boundaries.",
+                );
+                continue;
+            }
+            let Some(edges) = self.boundary(mesh, &contact.boundary, format!("{pointer}/boundary"))
+            else {
+                continue;
+            };
+            let Some(run) = self.facing_run(mesh, edges, contact, &pointer) else {
+                continue;
+            };
+            let boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
+            if let Some((other, node)) = models.iter().find_map(|m| {
+                m.boundary
+                    .nodes
+                    .iter()
+                    .find(|n| boundary.nodes.contains(n))
+                    .map(|n| (m.name.clone(), *n))
+            }) {
+                self.say(
+                    format!("{pointer}/boundary"),
+                    "shared_node",
+                    format!("node {node}, also in contact `{other}`"),
+                    "contacts without common nodes",
+                    "End one of them an edge earlier with `from` or `to`.",
+                );
+            }
+            let gap: Vec<f64> = run
+                .profile
+                .iter()
+                .map(|profile| profile - contact.indentation)
+                .collect();
+            self.supported_contact_nodes(&boundary, &gap, fixed, &pointer);
+            models.push(ContactModel {
+                name: contact.boundary.clone(),
+                pointer,
+                boundary,
+                gap,
+                tangential_displacement: contact.tangential_displacement,
+                friction: contact.friction,
+            });
+        }
+        models
+    }
+
+    /// The part of the boundary that faces the obstacle: one chain.
+    pub(super) fn facing_run(
+        &mut self,
+        mesh: &Mesh,
+        edges: &[Edge],
+        contact: &Contact,
+        pointer: &str,
+    ) -> Option<FacingRun> {
+        let runs = mesh::runs(edges);
+        let [run] = &runs[..] else {
+            self.say(
+                format!("{pointer}/boundary"),
+                "not_a_chain",
+                format!("{} pieces", runs.len()),
+                "one chain of edges",
+                "Name each piece under /mesh/boundaries and give it a contact of its own.",
+            );
+            return None;
+        };
+        if run[0][0] == run[run.len() - 1][1] {
+            self.say(
+                format!("{pointer}/boundary"),
+                "not_a_chain",
+                "a closed loop",
+                "a chain of edges with two ends",
+                "Name a part of it.",
+            );
+            return None;
+        }
+        let mut facing = obstacle::facing(mesh, run, &contact.obstacle);
+        for [low, high] in &facing.cut {
+            self.warn(
+                "obstacle_cuts_edge",
+                &format!("{pointer}/obstacle"),
+                format!("The obstacle ends inside the edge from {low} to {high}, which is left out of the contact. Put a grid line on the obstacle's end."),
+            );
+        }
+        if facing.runs.len() == 1 {
+            return facing.runs.pop();
+        }
+        let s = crate::contact::arc_lengths(mesh, run);
+        let ([x0, y0], [x1, y1]) = (
+            mesh.nodes[run[0][0] as usize],
+            mesh.nodes[run[run.len() - 1][1] as usize],
+        );
+        let place = format!("{pointer}/obstacle");
+        let extent = format!(
+            "The boundary goes from ({x0}, {y0}) to ({x1}, {y1}) and is {} long.",
+            s[s.len() - 1]
+        );
+        if facing.runs.is_empty() {
+            self.say(
+                place,
+                "covers_nothing",
+                "an obstacle that covers no edge of the boundary",
+                "one that covers all three nodes of an edge at least",
+                extent,
+            );
+        } else {
+            self.say(
+                place,
+                "not_a_chain",
+                format!(
+                    "an obstacle that covers {} separate pieces",
+                    facing.runs.len()
+                ),
+                "one piece",
+                extent,
+            );
+        }
+        None
+    }
+
+    /// A supported contact node keeps its two unknowns apart only where a support acts along the
+    /// normal or along the tangent.
+    pub(super) fn supported_contact_nodes(
+        &mut self,
+        boundary: &ContactBoundary,
+        gap: &[f64],
+        fixed: &BTreeMap<u32, [Option<f64>; 2]>,
+        pointer: &str,
+    ) {
+        for (i, node) in boundary.nodes.iter().enumerate() {
+            let Some(values) = fixed.get(node) else {
+                continue;
+            };
+            let ([nx, ny], [x, y]) = (boundary.normals[i], boundary.positions[i]);
+            if values.iter().any(Option::is_none) && nx.abs().min(ny.abs()) > ALIGNED {
+                self.say(
+                    format!("{pointer}/boundary"), "oblique_support", format!("node {node} at ({x}, {y}), normal ({nx:.4}, {ny:.4}), supported along one axis"),
+                    "a support along the contact's normal or tangent, or along both axes", "End the contact an edge before the support with `from` or `to`.",
+                );
+            }
+            let normal_displacement = match *values {
+                [Some(ux), Some(uy)] => Some(nx * ux + ny * uy),
+                [Some(ux), None] if ny.abs() <= ALIGNED => Some(nx * ux),
+                [None, Some(uy)] if nx.abs() <= ALIGNED => Some(ny * uy),
+                _ => None,
+            };
+            if let Some(u_n) = normal_displacement
+                && u_n > gap[i] + ALIGNED * gap[i].abs()
+            {
+                self.say(
+                    format!("{pointer}/indentation"), "impossible", format!("node {node} at ({x}, {y}) held at u_n = {u_n} by a support, {} inside the obstacle", u_n - gap[i]),
+                    "supports that leave the body outside the obstacle", "End the obstacle before the support with `from` or `to`.",
+                );
+                return;
+            }
+        }
+    }
+
+    /// Too few elements for the contact or for ρ is a warning, not an error.
+    pub(super) fn coarseness(&mut self, contacts: &[ContactModel]) {
+        for contact in contacts {
+            let Some(friction) = contact
+                .friction
+                .filter(|f| f.nonlocal_radius > 0.0 && f.coefficient > 0.0)
+            else {
+                continue;
+            };
+            let boundary = &contact.boundary;
+            let shortest = (0..boundary.edge_count())
+                .map(|k| {
+                    let [a, b, _] = boundary.edge_arc(k);
+                    b - a
+                })
+                .fold(f64::INFINITY, f64::min);
+            if shortest > friction.nonlocal_radius {
+                self.warn(
+                    "mesh_too_coarse_for_radius",
+                    &format!("{}/friction/nonlocal_radius", contact.pointer),
+                    format!("The shortest contact edge ({shortest:.4}) is longer than the nonlocal radius ({}): the averaging is not resolved. Refine the mesh towards the ends of the contact.", friction.nonlocal_radius),
+                );
+            }
+        }
+    }
+}

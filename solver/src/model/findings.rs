@@ -1,0 +1,54 @@
+//! What the checks have found so far.
+
+use crate::error::Violation;
+use crate::solution::Warning;
+
+/// Directions count as equal to an axis, and prescribed values as equal, to this.
+pub(super) const ALIGNED: f64 = 1e-9;
+
+/// Violations and warnings, gathered by every check.
+#[derive(Default)]
+pub(super) struct Findings {
+    pub(super) violations: Vec<Violation>,
+    pub(super) warnings: Vec<Warning>,
+}
+
+impl Findings {
+    pub(super) fn say(
+        &mut self,
+        pointer: impl Into<String>,
+        reason: &str,
+        got: impl ToString,
+        expected: impl Into<String>,
+        hint: impl Into<String>,
+    ) {
+        self.violations.push(Violation {
+            pointer: pointer.into(),
+            reason: reason.to_owned(),
+            got: got.to_string(),
+            expected: expected.into(),
+            hint: hint.into(),
+        });
+    }
+
+    pub(super) fn warn(&mut self, code: &str, pointer: &str, message: String) {
+        self.warnings.push(Warning {
+            code: code.to_owned(),
+            pointer: pointer.to_owned(),
+            message,
+        });
+    }
+
+    pub(super) fn require(
+        &mut self,
+        holds: bool,
+        pointer: String,
+        got: f64,
+        expected: &str,
+        hint: &str,
+    ) {
+        if !holds {
+            self.say(pointer, "out_of_range", got, expected, hint);
+        }
+    }
+}
