@@ -161,3 +161,28 @@ fn the_elastic_slip_matters_as_published() {
         );
     }
 }
+
+/// Where the active set alone does not settle, projected Newton takes over: hard cases, some of
+/// which must be seen to need it (more inner steps than the active set is allowed).
+#[test]
+fn hard_cases_converge_by_the_fallback() {
+    let mut fallbacks = 0;
+    for (name, refine, coefficient, elastic_slip, radius) in [
+        ("cylinder", 2, 4.0, 1e-8, 0.0),
+        ("annular_punch", 2, 0.3, 1e-8, 0.0),
+        ("annular_punch", 2, 0.3, 1e-8, 0.05),
+        ("cylinder_on_end", 2, 4.0, 1e-8, 0.1),
+        ("rectangular_punch", 2, 4.0, 1e-8, 0.1),
+        ("sheet", 1, 0.6, 1e-6, 0.05),
+    ] {
+        let mut problem = example(name);
+        problem.mesh.refine = refine;
+        let friction = problem.contacts[0].friction.as_mut().unwrap();
+        friction.coefficient = coefficient;
+        friction.elastic_slip = elastic_slip;
+        friction.nonlocal_radius = radius;
+        let solution = solve(&problem);
+        fallbacks += u32::from(solution.history.iter().any(|row| row.inner > 30));
+    }
+    assert!(fallbacks >= 2, "the fallback was taken {fallbacks} times");
+}

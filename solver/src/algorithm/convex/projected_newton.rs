@@ -1,191 +1,19 @@
-//! The inner problem, thesis (1.18)–(1.21): for a frozen friction bound τ, minimise the convex
-//!
-//!   J(v) = ½ vᵀŜv − f̂ᵀv + Σ_g w_g τ_g ψ_ε(u_t(g) − d)     subject to u_n ≤ gap
-//!
-//! First a primal–dual active set with semi-smooth Newton steps, which mostly needs one to five;
-//! where that does not settle, projected Newton with a line search, which always does.
+//! Projected Newton (Bertsekas 1982) with a line search: slower, and it always arrives.
 
+use super::{Minimum, follow, free_dofs, gradient, newton_direction};
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::elasticity::Dof;
 use crate::friction::FrictionLaw;
-use crate::linear::solve_positive_definite;
-
-/// Steps of the active set before falling back.
-const ACTIVE_SET_STEPS: u32 = 30;
 
 /// Steps of projected Newton; a dozen are usual.
 const PROJECTED_STEPS: u32 = 300;
-
-/// The minimiser, as near as it was reached.
-pub struct Minimum {
-    /// The state.
-    pub state: State,
-    /// Newton steps taken.
-    pub steps: u32,
-    /// Its KKT residual.
-    pub residual: f64,
-}
-
-/// Minimises J from `start` until the KKT residual is below `tolerance`.
-pub fn minimise(system: &System<'_>, bound: &[f64], start: &State, tolerance: f64) -> Minimum {
-    let by_active_set = active_set(system, bound, start, tolerance);
-    if by_active_set.residual <= tolerance {
-        return by_active_set;
-    }
-    let mut fallback = projected_newton(system, bound, &by_active_set.state, tolerance);
-    fallback.steps += by_active_set.steps;
-    if fallback.residual <= by_active_set.residual {
-        fallback
-    } else {
-        by_active_set
-    }
-}
-
-/// Guess the active set, solve for it with one Newton step, correct the guess.
-fn active_set(system: &System<'_>, bound: &[f64], start: &State, tolerance: f64) -> Minimum {
-    let mut state = start.clone();
-    let mut best: Option<Minimum> = None;
-    for step in 1..=ACTIVE_SET_STEPS {
-        close(system, &mut state);
-        let free: Vec<usize> = free_dofs(system, |i| state.active[i]);
-        let force = gradient(system, &state.v, bound);
-        let Some(delta) = newton_direction(system, bound, &state.v, &force, &free) else {
-            break;
-        };
-        free.iter()
-            .zip(&delta)
-            .for_each(|(&dof, d)| state.v[dof] += d);
-        let changed = update_active(system, bound, &mut state);
-        let residual = system.kkt_residual(&state, bound);
-        if best.as_ref().is_none_or(|b| residual < b.residual) {
-            best = Some(Minimum {
-                state: state.clone(),
-                steps: step,
-                residual,
-            });
-        }
-        if !changed && residual <= tolerance {
-            break;
-        }
-    }
-    let steps = best.as_ref().map_or(0, |b| b.steps);
-    best.unwrap_or(Minimum {
-        state,
-        steps,
-        residual: f64::INFINITY,
-    })
-}
-
-/// Puts active nodes onto the obstacle.
-fn close(system: &System<'_>, state: &mut State) {
-    for (node, active) in system.nodes.iter().zip(&state.active) {
-        if let (true, Dof::Free(dof)) = (active, node.normal) {
-            state.v[dof] = node.gap;
-        }
-    }
-}
-
-/// Keeps nodes that are pressed, adds nodes that have passed the obstacle; true on any change.
-fn update_active(system: &System<'_>, bound: &[f64], state: &mut State) -> bool {
-    let force = gradient(system, &state.v, bound);
-    let mut changed = false;
-    for (i, node) in system.nodes.iter().enumerate() {
-        let Dof::Free(dof) = node.normal else {
-            continue;
-        };
-        if node.follows.is_some() {
-            continue;
-        }
-        let active = if state.active[i] {
-            -force[dof] >= 0.0
-        } else {
-            state.v[dof] > node.gap
-        };
-        changed |= active != state.active[i];
-        state.active[i] = active;
-    }
-    changed | follow(system, &mut state.active)
-}
-
-/// Nodes on the axis take the state of their neighbours; true on any change.
-fn follow(system: &System<'_>, active: &mut [bool]) -> bool {
-    let mut changed = false;
-    for (i, node) in system.nodes.iter().enumerate() {
-        if let Some([next, _]) = node.follows {
-            changed |= active[i] != active[next];
-            active[i] = active[next];
-        }
-    }
-    changed
-}
-
-/// ∇J.
-fn gradient(system: &System<'_>, v: &[f64], bound: &[f64]) -> Vec<f64> {
-    let mut force = system.elastic_force(v);
-    system.add_friction_force(v, bound, &mut force);
-    force
-}
-
-/// Unknowns that are not held: all tangential ones, and the normal ones of nodes not `held`.
-fn free_dofs(system: &System<'_>, held: impl Fn(usize) -> bool) -> Vec<usize> {
-    let mut free = Vec::with_capacity(system.load.len());
-    for (i, node) in system.nodes.iter().enumerate() {
-        if let (Dof::Free(dof), false) = (node.normal, held(i)) {
-            free.push(dof);
-        }
-        if let Dof::Free(dof) = node.tangent {
-            free.push(dof);
-        }
-    }
-    free
-}
-
-/// −H⁻¹ ∇J on the free unknowns, H = Ŝ + Σ w τ φ′ h hᵀ.
-fn newton_direction(
-    system: &System<'_>,
-    bound: &[f64],
-    v: &[f64],
-    force: &[f64],
-    free: &[usize],
-) -> Option<Vec<f64>> {
-    let mut place = vec![usize::MAX; system.load.len()];
-    free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
-    // friction couples the nodes of one edge only: a short list of additions to a dense matrix
-    let mut tangents = vec![Vec::<(usize, f64)>::new(); free.len()];
-    for (point, tau) in system.points.iter().zip(bound) {
-        let slope = point.weight * tau * system.law(point).phi_slope(system.slip(v, point));
-        if slope == 0.0 {
-            continue;
-        }
-        let dofs = point.nodes.map(|n| system.nodes[n].tangent);
-        for a in 0..3 {
-            for b in 0..3 {
-                if let (Dof::Free(row), Dof::Free(column)) = (dofs[a], dofs[b]) {
-                    tangents[place[row]]
-                        .push((place[column], slope * point.shape[a] * point.shape[b]));
-                }
-            }
-        }
-    }
-    let entry = |i: usize, j: usize| {
-        let friction: f64 = tangents[i]
-            .iter()
-            .filter(|(column, _)| *column == j)
-            .map(|(_, value)| value)
-            .sum();
-        system.stiffness.at(free[i], free[j]) + friction
-    };
-    let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
-    let direction = solve_positive_definite(free.len(), entry, &rhs)?;
-    direction.iter().all(|d| d.is_finite()).then_some(direction)
-}
 
 /// Projected Newton (Bertsekas): hold the nodes that press against the obstacle, step in the
 /// others, and let the step end on the obstacle where it would pass it.
 ///
 /// A node on the axis is no inequality: it is locked to its neighbour's state, and the whole is
 /// solved again when that state turns out different.
-fn projected_newton(system: &System<'_>, bound: &[f64], start: &State, tolerance: f64) -> Minimum {
+pub(super) fn run(system: &System<'_>, bound: &[f64], start: &State, tolerance: f64) -> Minimum {
     let mut best = Minimum {
         state: start.clone(),
         steps: 0,

@@ -1,0 +1,74 @@
+//! Primal–dual active set with semi-smooth Newton steps.
+
+use super::{Minimum, follow, free_dofs, gradient, newton_direction};
+use crate::algorithm::system::{State, System};
+use crate::elasticity::Dof;
+
+/// Steps of the active set before falling back.
+const ACTIVE_SET_STEPS: u32 = 30;
+
+/// Guess the active set, solve for it with one Newton step, correct the guess.
+pub(super) fn run(system: &System<'_>, bound: &[f64], start: &State, tolerance: f64) -> Minimum {
+    let mut state = start.clone();
+    let mut best: Option<Minimum> = None;
+    for step in 1..=ACTIVE_SET_STEPS {
+        close(system, &mut state);
+        let free: Vec<usize> = free_dofs(system, |i| state.active[i]);
+        let force = gradient(system, &state.v, bound);
+        let Some(delta) = newton_direction(system, bound, &state.v, &force, &free) else {
+            break;
+        };
+        free.iter()
+            .zip(&delta)
+            .for_each(|(&dof, d)| state.v[dof] += d);
+        let changed = update_active(system, bound, &mut state);
+        let residual = system.kkt_residual(&state, bound);
+        if best.as_ref().is_none_or(|b| residual < b.residual) {
+            best = Some(Minimum {
+                state: state.clone(),
+                steps: step,
+                residual,
+            });
+        }
+        if !changed && residual <= tolerance {
+            break;
+        }
+    }
+    let steps = best.as_ref().map_or(0, |b| b.steps);
+    best.unwrap_or(Minimum {
+        state,
+        steps,
+        residual: f64::INFINITY,
+    })
+}
+
+/// Puts active nodes onto the obstacle.
+fn close(system: &System<'_>, state: &mut State) {
+    for (node, active) in system.nodes.iter().zip(&state.active) {
+        if let (true, Dof::Free(dof)) = (active, node.normal) {
+            state.v[dof] = node.gap;
+        }
+    }
+}
+
+/// Keeps nodes that are pressed, adds nodes that have passed the obstacle; true on any change.
+fn update_active(system: &System<'_>, bound: &[f64], state: &mut State) -> bool {
+    let force = gradient(system, &state.v, bound);
+    let mut changed = false;
+    for (i, node) in system.nodes.iter().enumerate() {
+        let Dof::Free(dof) = node.normal else {
+            continue;
+        };
+        if node.follows.is_some() {
+            continue;
+        }
+        let active = if state.active[i] {
+            -force[dof] >= 0.0
+        } else {
+            state.v[dof] > node.gap
+        };
+        changed |= active != state.active[i];
+        state.active[i] = active;
+    }
+    changed | follow(system, &mut state.active)
+}
