@@ -1,1 +1,44 @@
-//! x
+//! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms above it.
+
+// What everybody may know: points in time, a job and its moves, what its watchers are told.
+pub mod event;
+pub mod job;
+pub mod time;
+
+// What a request can be told went wrong, and what can be set.
+pub mod config;
+pub mod error;
+
+// Solve one problem and measure it; fingerprints of problem and result.
+pub mod digest;
+pub mod run;
+
+// Remember: everything durable, and the only SQL.
+pub mod store;
+
+// Take, solve, record, end, cancel.
+pub mod queue;
+
+// What the service does, once.
+pub mod verbs;
+
+// Two skins that only translate; `convert` is between the types of proto and ours.
+pub mod convert;
+pub mod grpc;
+pub mod rest;
+
+// Open, recover, listen, stop; and the commands.
+pub mod app;
+pub mod cli;
+
+/// The gRPC contract, as generated from `proto/signorini/v1/signorini.proto`.
+#[allow(missing_docs, unreachable_pub, clippy::all)]
+pub mod pb {
+    tonic::include_proto!("signorini.v1");
+
+    /// The contract in binary form, served by reflection.
+    pub const DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/descriptors.bin"));
+}
+
+#[cfg(test)]
+mod fake;

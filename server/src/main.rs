@@ -1,2 +1,7 @@
-//! x
-fn main() {}
+//! Arguments, logging, hand over.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    service::cli::main()
+}

@@ -1,0 +1,101 @@
+//! The running service: open the store, take care of what a crash left, start the queue, listen;
+//! and the same backwards.
+
+use std::{net::SocketAddr, sync::Arc, time::Duration};
+
+use anyhow::Context;
+use axum::serve::ListenerExt;
+use tokio::{net::TcpListener, task::JoinHandle, time::timeout};
+use tokio_util::sync::CancellationToken;
+use tonic_health::server::HealthReporter;
+use tracing::{info, warn};
+
+use crate::{config::Config, grpc, queue::Queue, rest, store::Store, verbs::Service};
+
+/// The service, listening.
+#[derive(Debug)]
+pub struct App {
+    address: SocketAddr,
+    store: Arc<Store>,
+    queue: Arc<Queue>,
+    health: HealthReporter,
+    /// Closes the listener and, one by one, the connections.
+    closing: CancellationToken,
+    server: JoinHandle<std::io::Result<()>>,
+    grace: Duration,
+}
+
+impl App {
+    /// Starts everything. When this returns, the address answers.
+    pub async fn start(config: &Config) -> anyhow::Result<App> {
+        let store = Arc::new(Store::open(&config.data).await?);
+        // Before the listener opens: nobody sees a job running that nobody runs.
+        let interrupted = store.requeue_interrupted().await?;
+        if interrupted > 0 {
+            info!(
+                interrupted,
+                "{interrupted} jobs were interrupted by the last end of the service"
+            );
+        }
+        let queue = Queue::new(store.clone(), solver::solve);
+        let service = Arc::new(Service::new(config, store.clone(), queue.clone()));
+        let (grpc, health) = grpc::router(service.clone()).await?;
+        let router = rest::router(service, config.max_body_bytes, grpc);
+
+        let listener = TcpListener::bind(config.listen)
+            .await
+            .with_context(|| format!("cannot listen on {}", config.listen))?;
+        let address = listener.local_addr()?;
+        // Events are small and should not wait for company.
+        let listener = listener.tap_io(|connection| {
+            if let Err(error) = connection.set_nodelay(true) {
+                tracing::debug!(%error, "TCP_NODELAY: {error}");
+            }
+        });
+        let closing = CancellationToken::new();
+        let closed = closing.clone().cancelled_owned();
+        let server = tokio::spawn(
+            axum::serve(listener, router)
+                .with_graceful_shutdown(closed)
+                .into_future(),
+        );
+        queue.start(config.workers);
+        info!(%address, workers = config.workers, "listening on {address}");
+        Ok(App {
+            address,
+            store,
+            queue,
+            health,
+            closing,
+            server,
+            grace: Duration::from_secs(config.grace_s),
+        })
+    }
+
+    /// Where the service answers.
+    pub fn url(&self) -> String {
+        format!("http://{}", self.address)
+    }
+
+    /// Stops in the order that loses nothing: no new jobs, running ones back to the queue, streams
+    /// ended, open requests answered, store closed. Solvers may still be at work on their threads
+    /// when this returns; nobody waits for what they find.
+    pub async fn stop(self) {
+        grpc::report_draining(&self.health).await;
+        self.queue.drain().await;
+        self.closing.cancel();
+        match timeout(self.grace, self.server).await {
+            Ok(Ok(Ok(()))) => {}
+            Ok(ended) => warn!(?ended, "the listener ended badly"),
+            Err(_) => warn!("connections still open after the grace time are cut"),
+        }
+        // The recorder of a deaf solver may hold a statement; what it writes no longer counts.
+        if timeout(Duration::from_millis(500), self.store.close())
+            .await
+            .is_err()
+        {
+            warn!("the store was left open");
+        }
+        info!("stopped");
+    }
+}

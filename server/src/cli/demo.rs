@@ -1,0 +1,286 @@
+//! `signorini demo`: the main job on real input. A service on a free port with a store of its own;
+//! five examples over both protocols; everything through the front door, as any client would.
+
+use std::io::{IsTerminal, Write};
+
+use anyhow::{Context, bail, ensure};
+use eventsource_stream::Eventsource;
+use futures_util::StreamExt;
+use reqwest::Client;
+use serde_json::{Value, json};
+use solver::solution::{ContactProfile, Iteration};
+use tonic::transport::Channel;
+
+use super::{Exit, examples, report};
+use crate::{
+    app::App,
+    config::Config,
+    convert::problem_to_pb,
+    event::{Event, Payload},
+    job::{Job, Status},
+    pb::{self, job_service_client::JobServiceClient},
+};
+
+pub(super) async fn run() -> anyhow::Result<Exit> {
+    let folder = tempfile::tempdir()?;
+    let config = Config {
+        listen: ([127, 0, 0, 1], 0).into(),
+        data: folder.path().to_path_buf(),
+        workers: 2,
+        max_queued: 100,
+        memory_budget_bytes: None,
+        max_body_bytes: 16 << 20,
+        grace_s: 5,
+    };
+    let app = App::start(&config).await?;
+    let shown = show(&app.url()).await;
+    app.stop().await;
+    shown
+}
+
+async fn show(url: &str) -> anyhow::Result<Exit> {
+    println!("Service at {url}, REST and gRPC on one port, its store in a temporary folder.\n");
+    let rest = Rest {
+        client: Client::new(),
+        url: url.to_string(),
+    };
+    let mut grpc = JobServiceClient::connect(url.to_string()).await?;
+
+    // All ten jobs at once; two run at a time, the rest waits in the queue.
+    let mut jobs = vec![];
+    for (name, text) in examples::ALL {
+        jobs.push((
+            name,
+            rest.submit(name, text).await?,
+            submit_grpc(&mut grpc, name, text).await?,
+        ));
+    }
+    let mut first = None;
+    for (name, by_rest, by_grpc) in &jobs {
+        rest.watch(by_rest, name)
+            .await
+            .with_context(|| format!("{name} over REST"))?;
+        watch_grpc(&mut grpc, by_grpc, name)
+            .await
+            .with_context(|| format!("{name} over gRPC"))?;
+        let summary = rest.get(&format!("/v1/jobs/{by_rest}/result")).await?["summary"].take();
+        let result = grpc
+            .get_result(pb::GetResultRequest {
+                id: by_grpc.clone(),
+            })
+            .await?
+            .into_inner();
+        let digest = result.summary.unwrap_or_default().digest;
+        ensure!(
+            summary["digest"] == digest,
+            "{name}: REST and gRPC differ: {} and {digest}",
+            summary["digest"]
+        );
+        println!("  {name:<18} both    same bits: {digest}\n");
+        first.get_or_insert((by_rest.clone(), summary));
+    }
+
+    let (name, _) = examples::ALL[0];
+    let (id, summary) = first.context("there are no examples")?;
+    for boundary in summary["contacts"]
+        .as_object()
+        .into_iter()
+        .flat_map(|contacts| contacts.keys())
+    {
+        let profile = rest
+            .get(&format!("/v1/jobs/{id}/profiles/{boundary}"))
+            .await?;
+        let profile: ContactProfile = serde_json::from_value(profile)?;
+        println!(
+            "Stresses of {name} along {boundary:?}:\n\n{}",
+            report::profile(&profile)
+        );
+    }
+    println!(
+        "normal force {:.4}, tangential force {:.4}",
+        summary["normal_force"], summary["tangential_force"]
+    );
+    Ok(Exit::Ok)
+}
+
+/// A REST client, as simple as can be.
+struct Rest {
+    client: Client,
+    url: String,
+}
+
+impl Rest {
+    async fn get(&self, path: &str) -> anyhow::Result<Value> {
+        let response = self
+            .client
+            .get(format!("{}{path}", self.url))
+            .send()
+            .await?;
+        let status = response.status();
+        let body = response.json().await?;
+        ensure!(status.is_success(), "GET {path}: {status}: {body}");
+        Ok(body)
+    }
+
+    /// Hands a problem in; gives the job's id.
+    async fn submit(&self, name: &str, text: &str) -> anyhow::Result<String> {
+        let problem: Value = serde_json::from_str(text)?;
+        let body = json!({ "problem": problem, "name": name, "labels": { "by": "rest" } });
+        let response = self
+            .client
+            .post(format!("{}/v1/jobs", self.url))
+            .json(&body)
+            .send()
+            .await?;
+        let status = response.status();
+        let job: Value = response.json().await?;
+        ensure!(status.is_success(), "{name} was refused: {status}: {job:#}");
+        Ok(job["id"].as_str().unwrap_or_default().to_string())
+    }
+
+    /// Follows a job to its end over server-sent events.
+    async fn watch(&self, id: &str, name: &str) -> anyhow::Result<()> {
+        let response = self
+            .client
+            .get(format!("{}/v1/jobs/{id}/events", self.url))
+            .send()
+            .await?;
+        let mut events = response.error_for_status()?.bytes_stream().eventsource();
+        let mut line = Line::new("REST", name);
+        while let Some(event) = events.next().await {
+            let event: Event = serde_json::from_str(&event?.data)?;
+            match event.payload {
+                Payload::Iteration(row) => line.step(&row)?,
+                Payload::Done { job } => {
+                    let Job {
+                        status,
+                        run_s,
+                        failure,
+                        ..
+                    } = *job;
+                    let failure = failure.map(|failure| failure.detail);
+                    return line.end(status == Status::Succeeded, run_s, failure);
+                }
+                Payload::Status { .. } | Payload::Stage { .. } | Payload::Warning(_) => {}
+            }
+        }
+        bail!("the stream ended before the job")
+    }
+}
+
+/// Hands a problem in; gives the job's id.
+async fn submit_grpc(
+    grpc: &mut JobServiceClient<Channel>,
+    name: &str,
+    text: &str,
+) -> anyhow::Result<String> {
+    let problem = match solver::parse(text) {
+        Ok(problem) => problem_to_pb(&problem),
+        Err(violations) => bail!("{name}: {violations:?}"),
+    };
+    let labels = [("by".to_string(), "grpc".to_string())].into();
+    let request = pb::CreateJobRequest {
+        problem: Some(problem),
+        name: Some(name.into()),
+        labels,
+        ..Default::default()
+    };
+    Ok(grpc.create_job(request).await?.into_inner().id)
+}
+
+/// Follows a job to its end over WatchJob.
+async fn watch_grpc(
+    grpc: &mut JobServiceClient<Channel>,
+    id: &str,
+    name: &str,
+) -> anyhow::Result<()> {
+    use pb::event::Payload;
+    let mut events = grpc
+        .watch_job(pb::WatchJobRequest {
+            id: id.into(),
+            after_seq: 0,
+        })
+        .await?
+        .into_inner();
+    let mut line = Line::new("gRPC", name);
+    while let Some(event) = events.message().await? {
+        match event.payload {
+            Some(Payload::Iteration(row)) => {
+                line.step_by(row.k, &row.stage, row.residual, row.friction_residual)?
+            }
+            Some(Payload::Done(pb::DoneEvent { job })) => {
+                let job = job.unwrap_or_default();
+                let detail = job.failure.clone().map(|failure| failure.detail);
+                return line.end(job.status() == pb::Status::Succeeded, job.run_s, detail);
+            }
+            _ => {}
+        }
+    }
+    bail!("the stream ended before the job")
+}
+
+/// The progress of one job: on a terminal one line that changes, else a line per iteration.
+struct Line {
+    head: String,
+    last: String,
+    iterations: u32,
+    terminal: bool,
+}
+
+impl Line {
+    fn new(protocol: &str, name: &str) -> Line {
+        let terminal = std::io::stdout().is_terminal();
+        Line {
+            head: format!("  {name:<18} {protocol}"),
+            last: String::new(),
+            iterations: 0,
+            terminal,
+        }
+    }
+
+    fn step(&mut self, row: &Iteration) -> anyhow::Result<()> {
+        let stage = match row.stage {
+            solver::solution::Stage::Frictionless => "frictionless",
+            solver::solution::Stage::Outer => "outer",
+        };
+        self.step_by(row.k, stage, row.residual, row.friction_residual)
+    }
+
+    fn step_by(&mut self, k: u32, stage: &str, residual: f64, friction: f64) -> anyhow::Result<()> {
+        self.iterations = k;
+        self.last =
+            format!("{k:>4} {stage:<12} residual {residual:8.2e}  friction {friction:8.2e}");
+        let mut out = std::io::stdout().lock();
+        if self.terminal {
+            // Back to the start of the line, write, clear what is left of it.
+            write!(out, "\r{}{}\x1b[K", self.head, self.last)?;
+        } else {
+            writeln!(out, "{}{}", self.head, self.last)?;
+        }
+        out.flush()?;
+        Ok(())
+    }
+
+    fn end(
+        self,
+        succeeded: bool,
+        run_s: Option<f64>,
+        failure: Option<String>,
+    ) -> anyhow::Result<()> {
+        let Line {
+            head,
+            last,
+            iterations,
+            terminal,
+        } = self;
+        if terminal {
+            println!("\r{head}{last}\x1b[K");
+        }
+        ensure!(succeeded, "the job failed: {}", failure.unwrap_or_default());
+        println!(
+            "{head}    converged after {iterations} iterations, {:.3} s",
+            run_s.unwrap_or_default()
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,131 @@
+//! Results for people: a line per iteration, a summary, a table of stresses.
+
+use std::fmt::Write;
+
+use solver::solution::{
+    ContactProfile, ContactSummary, Iteration, NodeState, Outcome, Peak, Stage,
+};
+
+use crate::run::Document;
+
+/// One row of history on one line.
+pub(super) fn iteration(row: &Iteration) -> String {
+    let stage = match row.stage {
+        Stage::Frictionless => "frictionless",
+        Stage::Outer => "outer",
+    };
+    let mut line = format!(
+        "{:>4}  {stage:<12}  residual {:8.2e}  friction {:8.2e}  contact {:>3} (+{} -{})",
+        row.k,
+        row.residual,
+        row.friction_residual,
+        row.contact.active,
+        row.contact.entered,
+        row.contact.left
+    );
+    if let Some(q) = row.contraction {
+        let _ = write!(line, "  q {q:.3}");
+    }
+    line
+}
+
+/// The summary of a document.
+pub(super) fn document(title: Option<&str>, document: &Document) -> String {
+    let s = &document.summary.solution;
+    let ended = match s.outcome {
+        Outcome::Converged => "converged",
+        Outcome::NotConverged => "NOT CONVERGED",
+        Outcome::ContactCycling => "NOT CONVERGED: the contact set repeats itself",
+        Outcome::Canceled => "CANCELED",
+    };
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<20}{value}");
+    };
+    if let Some(title) = title {
+        line("title", title.into());
+    }
+    let seconds: f64 = document.summary.timings.values().sum();
+    line(
+        "outcome",
+        format!("{ended} after {} iterations, {seconds:.3} s", s.iterations),
+    );
+    line(
+        "unknowns",
+        format!(
+            "{}, {} of them on contact boundaries",
+            s.dofs, s.contact_dofs
+        ),
+    );
+    line("normal force", format!("{:.6e}", s.normal_force));
+    line("tangential force", format!("{:.6e}", s.tangential_force));
+    line(
+        "residuals",
+        format!(
+            "{:.1e}, friction {:.1e}",
+            s.residuals.kkt, s.residuals.friction
+        ),
+    );
+    for (name, contact) in &s.contacts {
+        contact_lines(name, contact, &mut line);
+    }
+    for warning in &s.warnings {
+        line(
+            "warning",
+            format!("{}: {}", warning.pointer, warning.message),
+        );
+    }
+    line("digest", document.summary.digest.clone());
+    text
+}
+
+fn contact_lines(name: &str, contact: &ContactSummary, line: &mut impl FnMut(&str, String)) {
+    let ranges = |ranges: &[[f64; 2]]| {
+        let ranges: Vec<String> = ranges
+            .iter()
+            .map(|[start, end]| format!("{start:.4} … {end:.4}"))
+            .collect();
+        if ranges.is_empty() {
+            "nowhere".to_string()
+        } else {
+            ranges.join(", ")
+        }
+    };
+    let peak = |peak: &Peak| format!("{:.4} at s = {:.4}", peak.value, peak.s);
+    line(&format!("contact {name:?}"), String::new());
+    line("  touches, s", ranges(&contact.contact));
+    line("  sticks, s", ranges(&contact.stick));
+    if let Some(value) = &contact.peak_normal_stress {
+        line("  peak σ_n", peak(value));
+    }
+    if let Some(value) = &contact.peak_tangential_stress {
+        line("  peak σ_t", peak(value));
+    }
+}
+
+/// The stresses along a contact boundary as a table.
+pub(super) fn profile(profile: &ContactProfile) -> String {
+    let p = profile;
+    let mut text = format!(
+        "{:>10} {:>14} {:>14} {:>14}  state\n",
+        "s", "σ_n", "σ_t", "bound"
+    );
+    let columns =
+        p.s.iter()
+            .zip(&p.normal_stress)
+            .zip(&p.tangential_stress)
+            .zip(&p.friction_bound)
+            .zip(&p.state);
+    for ((((s, normal), tangential), bound), state) in columns {
+        let state = match state {
+            NodeState::Open => "open",
+            NodeState::Stick => "stick",
+            NodeState::Slip => "slip",
+        };
+        let _ = writeln!(
+            text,
+            "{s:>10.4} {normal:>14.5} {tangential:>14.5} {bound:>14.5}  {state}"
+        );
+    }
+    text
+}

@@ -1,0 +1,83 @@
+//! What can be set. One struct: its doc comments are the help text, its order the order of help.
+
+use std::{net::SocketAddr, path::PathBuf};
+
+use clap::Args;
+
+/// Settings of the service. A flag wins over its environment variable.
+#[derive(Clone, Debug, Args)]
+pub struct Config {
+    /// Address and port for REST and gRPC alike; port 0 takes a free one
+    #[arg(
+        long,
+        env = "SIGNORINI_LISTEN",
+        default_value = "127.0.0.1:8080",
+        value_name = "ADDRESS"
+    )]
+    pub listen: SocketAddr,
+
+    /// Folder that holds everything durable
+    #[arg(
+        long,
+        env = "SIGNORINI_DATA",
+        default_value = "./signorini-data",
+        value_name = "FOLDER"
+    )]
+    pub data: PathBuf,
+
+    /// Jobs solved at the same time, each on one core
+    #[arg(long, env = "SIGNORINI_WORKERS", default_value_t = 2, value_name = "N",
+          value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub workers: u16,
+
+    /// Most jobs that may wait; more are refused until some have run
+    #[arg(
+        long,
+        env = "SIGNORINI_MAX_QUEUED",
+        default_value_t = 100_000,
+        value_name = "N"
+    )]
+    pub max_queued: u32,
+
+    /// Most memory that one job may need, by the estimate made before it is accepted
+    /// [default: half of the machine's]
+    #[arg(long, env = "SIGNORINI_MEMORY_BUDGET_BYTES", value_name = "BYTES")]
+    pub memory_budget_bytes: Option<u64>,
+
+    /// Largest request body over REST
+    #[arg(long, env = "SIGNORINI_MAX_BODY_BYTES", default_value_t = 16 << 20, value_name = "BYTES")]
+    pub max_body_bytes: usize,
+
+    /// After SIGTERM, open requests get this long to end; running jobs go back to the queue at once
+    #[arg(
+        long,
+        env = "SIGNORINI_GRACE_S",
+        default_value_t = 10,
+        value_name = "SECONDS"
+    )]
+    pub grace_s: u64,
+}
+
+impl Config {
+    /// The memory budget of one job in bytes.
+    pub fn memory_budget(&self) -> u64 {
+        self.memory_budget_bytes
+            .unwrap_or_else(|| machine_memory() / 2)
+    }
+}
+
+/// Memory of this machine, or of the container that we are confined to.
+fn machine_memory() -> u64 {
+    // Unknown is no reason to refuse everything; 8 GiB is a common small machine.
+    const UNKNOWN: u64 = 8 << 30;
+    let total = std::fs::read_to_string("/proc/meminfo")
+        .ok()
+        .and_then(|text| {
+            let line = text.lines().find(|line| line.starts_with("MemTotal:"))?;
+            Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+        });
+    let container = std::fs::read_to_string("/sys/fs/cgroup/memory.max")
+        .ok()
+        .and_then(|text| text.trim().parse().ok());
+    total.unwrap_or(UNKNOWN).min(container.unwrap_or(u64::MAX))
+}

@@ -1,0 +1,359 @@
+//! Our answers as messages.
+
+use std::collections::BTreeMap;
+
+use prost_types::Timestamp;
+use solver::{
+    error::Violation,
+    solution::{
+        ContactProfile, ContactSummary, Iteration, NodeState, Outcome, Peak, Residuals, Stage,
+        Warning,
+    },
+};
+
+use crate::{
+    event::{Event, Payload},
+    job::{Failure, Job, Progress, QueuePosition, Reason, ResultAvailable, Status},
+    pb,
+    run::{Summary, phase_name},
+    time::Time,
+    verbs::{jobs::Cancellation, problems::Judgement},
+};
+
+/// A status as the contract numbers it.
+pub fn pb_status(status: Status) -> pb::Status {
+    match status {
+        Status::Queued => pb::Status::Queued,
+        Status::Running => pb::Status::Running,
+        Status::Succeeded => pb::Status::Succeeded,
+        Status::Failed => pb::Status::Failed,
+        Status::Canceled => pb::Status::Canceled,
+    }
+}
+
+/// The status of that number, if there is one.
+pub fn status(number: i32) -> Option<Status> {
+    Status::ALL
+        .into_iter()
+        .find(|status| pb_status(*status) as i32 == number)
+}
+
+impl From<Time> for Timestamp {
+    fn from(time: Time) -> Self {
+        let (seconds, micros) = (
+            time.micros().div_euclid(1_000_000),
+            time.micros().rem_euclid(1_000_000),
+        );
+        Timestamp {
+            seconds,
+            nanos: micros as i32 * 1000,
+        }
+    }
+}
+
+impl From<Job> for pb::Job {
+    fn from(job: Job) -> Self {
+        pb::Job {
+            id: job.id.to_string(),
+            status: pb_status(job.status).into(),
+            reason: job.reason.map(|reason| Reason::as_str(reason).into()),
+            cancel_requested: job.cancel_requested,
+            version: job.version,
+            name: job.name,
+            labels: job.labels,
+            owner: job.owner,
+            priority: job.priority,
+            attempt: job.attempt,
+            max_attempts: job.max_attempts,
+            input_hash: job.input_hash,
+            created_at: Some(job.created_at.into()),
+            started_at: job.started_at.map(Into::into),
+            finished_at: job.finished_at.map(Into::into),
+            queue_wait_s: job.queue_wait_s,
+            run_s: job.run_s,
+            queue: job.queue.map(
+                |QueuePosition {
+                     position,
+                     ahead,
+                     reason,
+                 }| pb::QueuePosition {
+                    position,
+                    ahead,
+                    reason,
+                },
+            ),
+            progress: job.progress.map(
+                |Progress {
+                     stage,
+                     iteration,
+                     residual,
+                     tolerance,
+                     ..
+                 }| pb::JobProgress {
+                    stage,
+                    iteration,
+                    residual,
+                    tolerance,
+                },
+            ),
+            failure: job.failure.map(
+                |Failure {
+                     code,
+                     title,
+                     detail,
+                     ..
+                 }| pb::Failure {
+                    code,
+                    title,
+                    detail,
+                },
+            ),
+            result_available: match job.result_available {
+                ResultAvailable::None => pb::ResultAvailable::None.into(),
+                ResultAvailable::Partial => pb::ResultAvailable::Partial.into(),
+                ResultAvailable::Final => pb::ResultAvailable::Final.into(),
+            },
+        }
+    }
+}
+
+impl From<Cancellation> for pb::cancel_job_response::Outcome {
+    fn from(outcome: Cancellation) -> Self {
+        match outcome {
+            Cancellation::Canceled => Self::Canceled,
+            Cancellation::CancelRequested => Self::CancelRequested,
+            Cancellation::AlreadyTerminal => Self::AlreadyTerminal,
+        }
+    }
+}
+
+impl From<Event> for pb::Event {
+    fn from(event: Event) -> Self {
+        use pb::event::Payload as Out;
+        let payload = match event.payload {
+            Payload::Status { status, reason } => Out::Status(pb::StatusEvent {
+                status: pb_status(status).into(),
+                reason,
+            }),
+            Payload::Stage { stage } => Out::Stage(pb::StageEvent {
+                stage: phase_name(stage).into(),
+            }),
+            Payload::Iteration(row) => Out::Iteration(row.into()),
+            Payload::Warning(warning) => Out::Warning(warning.into()),
+            Payload::Done { job } => Out::Done(pb::DoneEvent {
+                job: Some((*job).into()),
+            }),
+        };
+        pb::Event {
+            seq: event.seq,
+            attempt: event.attempt,
+            t: Some(event.t.into()),
+            payload: Some(payload),
+        }
+    }
+}
+
+fn stage_name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Frictionless => "frictionless",
+        Stage::Outer => "outer",
+    }
+}
+
+impl From<Iteration> for pb::Iteration {
+    fn from(row: Iteration) -> Self {
+        pb::Iteration {
+            k: row.k,
+            stage: stage_name(row.stage).into(),
+            step: row.step,
+            residual: row.residual,
+            friction_residual: row.friction_residual,
+            r_f: row.r_f,
+            tolerance: row.tolerance,
+            active: row.contact.active,
+            entered: row.contact.entered,
+            left: row.contact.left,
+            slip: row.friction.slip,
+            stick: row.friction.stick,
+            normal_force: row.force.normal,
+            tangential_force: row.force.tangential,
+            contraction: row.contraction,
+            inner: row.inner,
+            wall_s: row.wall_s,
+        }
+    }
+}
+
+impl From<Warning> for pb::Warning {
+    fn from(
+        Warning {
+            code,
+            pointer,
+            message,
+        }: Warning,
+    ) -> Self {
+        pb::Warning {
+            code,
+            pointer,
+            message,
+        }
+    }
+}
+
+impl From<Violation> for pb::Violation {
+    fn from(
+        Violation {
+            pointer,
+            reason,
+            got,
+            expected,
+            hint,
+        }: Violation,
+    ) -> Self {
+        pb::Violation {
+            pointer,
+            reason,
+            got,
+            expected,
+            hint,
+        }
+    }
+}
+
+/// What there is to say about a problem.
+pub fn judgement(judgement: Judgement) -> pb::ValidateProblemResponse {
+    pb::ValidateProblemResponse {
+        valid: judgement.valid,
+        violations: judgement.violations.into_iter().map(Into::into).collect(),
+        warnings: judgement.warnings.into_iter().map(Into::into).collect(),
+        estimate: judgement.estimate.map(|estimate| pb::Estimate {
+            dofs: estimate.dofs,
+            memory_bytes: estimate.memory_bytes,
+            run_s: estimate.run_s,
+        }),
+        input_hash: judgement.input_hash,
+    }
+}
+
+impl From<Summary> for pb::Summary {
+    fn from(summary: Summary) -> Self {
+        let Summary {
+            solution,
+            timings,
+            solver_version,
+            input_hash,
+            digest,
+        } = summary;
+        let outcome = match solution.outcome {
+            Outcome::Converged => pb::Outcome::Converged,
+            Outcome::NotConverged => pb::Outcome::NotConverged,
+            Outcome::ContactCycling => pb::Outcome::ContactCycling,
+            Outcome::Canceled => pb::Outcome::Canceled,
+        };
+        let contacts: BTreeMap<String, pb::ContactSummary> = solution
+            .contacts
+            .into_iter()
+            .map(|(name, contact)| (name, contact.into()))
+            .collect();
+        let Residuals {
+            kkt,
+            friction,
+            monolithic,
+            equilibrium,
+        } = solution.residuals;
+        pb::Summary {
+            outcome: outcome.into(),
+            converged: solution.converged,
+            normal_force: solution.normal_force,
+            tangential_force: solution.tangential_force,
+            friction_force: solution.friction_force,
+            contacts,
+            iterations: solution.iterations,
+            stage: stage_name(solution.stage).into(),
+            contraction: solution.contraction,
+            residuals: Some(pb::Residuals {
+                kkt,
+                friction,
+                monolithic,
+                equilibrium,
+            }),
+            energy: solution.energy,
+            friction_work: solution.friction_work,
+            warnings: solution.warnings.into_iter().map(Into::into).collect(),
+            dofs: solution.dofs,
+            contact_dofs: solution.contact_dofs,
+            timings,
+            solver_version,
+            input_hash,
+            digest,
+        }
+    }
+}
+
+impl From<ContactSummary> for pb::ContactSummary {
+    fn from(contact: ContactSummary) -> Self {
+        let ranges = |ranges: Vec<[f64; 2]>| {
+            ranges
+                .into_iter()
+                .map(|[start, end]| pb::Range { start, end })
+                .collect()
+        };
+        let peak = |Peak { value, s, x, y }: Peak| pb::Peak { value, s, x, y };
+        pb::ContactSummary {
+            normal_force: contact.normal_force,
+            tangential_force: contact.tangential_force,
+            friction_force: contact.friction_force,
+            contact: ranges(contact.contact),
+            stick: ranges(contact.stick),
+            slip: ranges(contact.slip),
+            peak_normal_stress: contact.peak_normal_stress.map(peak),
+            peak_tangential_stress: contact.peak_tangential_stress.map(peak),
+        }
+    }
+}
+
+impl From<ContactProfile> for pb::ContactProfile {
+    fn from(profile: ContactProfile) -> Self {
+        let state = |state: NodeState| match state {
+            NodeState::Open => pb::NodeState::Open as i32,
+            NodeState::Stick => pb::NodeState::Stick as i32,
+            NodeState::Slip => pb::NodeState::Slip as i32,
+        };
+        pb::ContactProfile {
+            s: profile.s,
+            x: profile.x,
+            y: profile.y,
+            gap: profile.gap,
+            normal_displacement: profile.normal_displacement,
+            tangential_displacement: profile.tangential_displacement,
+            normal_stress: profile.normal_stress,
+            tangential_stress: profile.tangential_stress,
+            nonlocal_pressure: profile.nonlocal_pressure,
+            friction_bound: profile.friction_bound,
+            friction_ratio: profile.friction_ratio,
+            state: profile.state.into_iter().map(state).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn statuses_keep_their_numbers_and_zero_is_none() {
+        assert!(
+            Status::ALL
+                .into_iter()
+                .all(|s| status(pb_status(s) as i32) == Some(s))
+        );
+        assert_eq!(status(0), None);
+        assert_eq!(status(17), None);
+    }
+
+    #[test]
+    fn a_time_before_1970_keeps_its_nanoseconds_positive() {
+        let stamp = Timestamp::from(Time::from_micros(-1));
+        assert_eq!((stamp.seconds, stamp.nanos), (-1, 999_999_000));
+    }
+}

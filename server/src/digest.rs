@@ -1,0 +1,153 @@
+//! The two fingerprints: of a problem (`input_hash`) and of a result (`digest`). Both are the
+//! SHA-256 of canonical JSON (RFC 8785), so that any client in any language can check them.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use solver::{problem::Problem, solution::Solution};
+
+/// Fingerprint of a problem with its defaults filled in. The title is for people and has no part.
+pub fn input_hash(problem: &Problem) -> serde_json::Result<String> {
+    let untitled = Problem {
+        title: None,
+        ..problem.clone()
+    };
+    let mut hash = Hash::default();
+    hash.json(&untitled)?;
+    Ok(hash.text())
+}
+
+/// Fingerprint of a result: equal digests mean equal bits. Times and the program's version have
+/// no part. A number that is not finite has no canonical form and is an error.
+pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<String> {
+    // As a `Value`, NaN would silently become null; the canonical writer refuses it.
+    serde_json_canonicalizer::to_writer(&(&solution.summary, &solution.history), &mut io::sink())?;
+    let mut summary = serde_json::to_value(&solution.summary)?;
+    summary["input_hash"] = json!(input_hash);
+    let mut history = serde_json::to_value(&solution.history)?;
+    for row in history
+        .as_array_mut()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_object_mut)
+    {
+        row.remove("wall_s");
+    }
+    // The outermost object is written by hand, its keys in canonical order: the canonical writer
+    // holds every object it is inside of in memory, and fields can be large.
+    let mut hash = Hash::default();
+    hash.text_of(r#"{"fields":"#).json(&solution.fields)?;
+    hash.text_of(r#","history":"#).json(&history)?;
+    hash.text_of(r#","profiles":"#).json(&solution.profiles)?;
+    hash.text_of(r#","steps":[],"summary":"#).json(&summary)?;
+    hash.text_of("}");
+    Ok(hash.text())
+}
+
+/// SHA-256 as something to write canonical JSON to.
+#[derive(Default)]
+struct Hash(Sha256);
+
+impl Hash {
+    fn text_of(&mut self, text: &str) -> &mut Self {
+        self.0.update(text);
+        self
+    }
+
+    fn json(&mut self, value: &impl Serialize) -> serde_json::Result<()> {
+        let mut buffered = io::BufWriter::with_capacity(1 << 16, &mut *self);
+        serde_json_canonicalizer::to_writer(value, &mut buffered)?;
+        buffered.flush().map_err(serde_json::Error::io)
+    }
+
+    fn text(self) -> String {
+        let hex: String = self
+            .0
+            .finalize()
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect();
+        format!("sha256:{hex}")
+    }
+}
+
+impl Write for Hash {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.update(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::fake;
+
+    #[test]
+    fn a_title_does_not_change_the_input() {
+        let problem = fake::problem();
+        let titled = Problem {
+            title: Some("other".into()),
+            ..problem.clone()
+        };
+        assert_eq!(input_hash(&problem).unwrap(), input_hash(&titled).unwrap());
+        let mut other = problem.clone();
+        other.materials[0].youngs_modulus = 1001.0;
+        assert_ne!(input_hash(&problem).unwrap(), input_hash(&other).unwrap());
+    }
+
+    #[test]
+    fn wall_time_does_not_change_a_digest_but_the_last_bit_of_a_field_does() {
+        let solution = fake::solution();
+        let mut later = solution.clone();
+        later.history[0].wall_s = 7.0;
+        assert_eq!(
+            digest(&solution, "h").unwrap(),
+            digest(&later, "h").unwrap()
+        );
+        let mut other = solution.clone();
+        other.fields.ux[0] = f64::from_bits(other.fields.ux[0].to_bits() + 1);
+        assert_ne!(
+            digest(&solution, "h").unwrap(),
+            digest(&other, "h").unwrap()
+        );
+        assert_ne!(
+            digest(&solution, "h").unwrap(),
+            digest(&solution, "i").unwrap()
+        );
+    }
+
+    #[test]
+    fn a_digest_is_the_hash_of_one_canonical_document() {
+        let solution = fake::solution();
+        let mut document = serde_json::to_value(&solution).unwrap();
+        document["steps"] = json!([]);
+        document["summary"]["input_hash"] = json!("h");
+        for row in document["history"].as_array_mut().unwrap() {
+            row.as_object_mut().unwrap().remove("wall_s");
+        }
+        let mut whole = Hash::default();
+        whole.json(&document).unwrap();
+        assert_eq!(digest(&solution, "h").unwrap(), whole.text());
+    }
+
+    #[test]
+    fn a_number_that_is_not_finite_has_no_digest() {
+        for spoil in [
+            |s: &mut Solution| s.summary.energy = f64::NAN,
+            |s: &mut Solution| s.history[0].residual = f64::INFINITY,
+            |s: &mut Solution| s.fields.ux[0] = f64::NAN,
+        ] {
+            let mut solution = fake::solution();
+            spoil(&mut solution);
+            assert!(digest(&solution, "h").is_err());
+        }
+    }
+}

@@ -1,0 +1,382 @@
+//! A job: its identity, its status and the moves it may make. No I/O.
+
+use std::{collections::BTreeMap, fmt};
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use uuid::Uuid;
+
+use crate::time::Time;
+
+/// A problem on its way through the service, as clients see it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Job {
+    /// The store's own number, in order of arrival; never shown.
+    #[serde(skip)]
+    pub key: i64,
+    /// The public name.
+    pub id: JobId,
+    /// Where it stands.
+    pub status: Status,
+    /// Why it failed or was canceled.
+    pub reason: Option<Reason>,
+    /// Somebody asked a running job to stop.
+    pub cancel_requested: bool,
+    /// Counts status changes and edits, not progress.
+    pub version: i64,
+    /// A name for people.
+    pub name: Option<String>,
+    /// Labels for programs.
+    pub labels: BTreeMap<String, String>,
+    /// Whose job it is.
+    pub owner: String,
+    /// −10 … 10, higher first.
+    pub priority: i32,
+    /// Number of the current or last start, 0 before the first.
+    pub attempt: i32,
+    /// A worker lost in the last of these fails the job.
+    pub max_attempts: i32,
+    /// SHA-256 of the problem with its defaults, without its title.
+    pub input_hash: String,
+    /// When it was accepted.
+    pub created_at: Time,
+    /// When it was last started.
+    pub started_at: Option<Time>,
+    /// When it became terminal.
+    pub finished_at: Option<Time>,
+    /// Seconds from acceptance to the last start.
+    pub queue_wait_s: Option<f64>,
+    /// Seconds from the last start to the end.
+    pub run_s: Option<f64>,
+    /// Its place, while queued.
+    pub queue: Option<QueuePosition>,
+    /// How far it has come, once started.
+    pub progress: Option<Progress>,
+    /// What went wrong.
+    pub failure: Option<Failure>,
+    /// Whether there is something to fetch.
+    pub result_available: ResultAvailable,
+    /// Where to go from here.
+    pub links: BTreeMap<String, String>,
+}
+
+/// The public name of a job, `job_<uuidv7>`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct JobId(pub Uuid);
+
+impl JobId {
+    /// A new name, later than all before it.
+    pub fn new() -> Self {
+        JobId(Uuid::now_v7())
+    }
+
+    /// Reads the canonical form and no other: one job has one name.
+    pub fn parse(text: &str) -> Option<Self> {
+        let id = JobId(Uuid::try_parse(text.strip_prefix("job_")?).ok()?);
+        (id.to_string() == text).then_some(id)
+    }
+}
+
+impl Default for JobId {
+    fn default() -> Self {
+        JobId::new()
+    }
+}
+
+impl fmt::Display for JobId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "job_{}", self.0)
+    }
+}
+
+impl Serialize for JobId {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for JobId {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        JobId::parse(&text).ok_or_else(|| serde::de::Error::custom("not a job id"))
+    }
+}
+
+/// Where a job stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Accepted and waiting.
+    Queued,
+    /// In the hands of a worker.
+    Running,
+    /// Solved.
+    Succeeded,
+    /// Ended without a converged solution.
+    Failed,
+    /// Ended on request.
+    Canceled,
+}
+
+impl Status {
+    /// All of them, in the order of a job's life.
+    pub const ALL: [Status; 5] = [
+        Status::Queued,
+        Status::Running,
+        Status::Succeeded,
+        Status::Failed,
+        Status::Canceled,
+    ];
+
+    /// The word used in JSON and in the store.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Status::Queued => "queued",
+            Status::Running => "running",
+            Status::Succeeded => "succeeded",
+            Status::Failed => "failed",
+            Status::Canceled => "canceled",
+        }
+    }
+
+    /// The status of that name.
+    pub fn parse(word: &str) -> Option<Self> {
+        Status::ALL
+            .into_iter()
+            .find(|status| status.as_str() == word)
+    }
+
+    /// No move leads away from here.
+    pub fn is_terminal(self) -> bool {
+        matches!(self, Status::Succeeded | Status::Failed | Status::Canceled)
+    }
+
+    /// The legal moves:
+    ///
+    /// ```text
+    /// queued ──► running ──► succeeded | failed | canceled
+    ///   ▲  │        │
+    ///   │  └────────┼──────► canceled | failed
+    ///   └───────────┘  only by recovery after a crash, or a drain
+    /// ```
+    pub fn may_become(self, next: Status) -> bool {
+        match self {
+            Status::Queued => matches!(next, Status::Running | Status::Canceled | Status::Failed),
+            Status::Running => next != Status::Running,
+            Status::Succeeded | Status::Failed | Status::Canceled => false,
+        }
+    }
+}
+
+/// Why a job failed or was canceled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reason {
+    /// `max_iterations` reached, or no further progress.
+    NotConverged,
+    /// The contact set repeats itself.
+    ContactCycling,
+    /// The stiffness matrix has no factor.
+    SingularSystem,
+    /// A number that is not finite came up.
+    NonFinite,
+    /// The process died under it once too often.
+    WorkerLost,
+    /// Our fault.
+    Internal,
+    /// The client's wish.
+    UserCancel,
+}
+
+impl Reason {
+    /// All of them.
+    pub const ALL: [Reason; 7] = [
+        Reason::NotConverged,
+        Reason::ContactCycling,
+        Reason::SingularSystem,
+        Reason::NonFinite,
+        Reason::WorkerLost,
+        Reason::Internal,
+        Reason::UserCancel,
+    ];
+
+    /// The word used in JSON and in the store.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Reason::NotConverged => "not_converged",
+            Reason::ContactCycling => "contact_cycling",
+            Reason::SingularSystem => "singular_system",
+            Reason::NonFinite => "non_finite",
+            Reason::WorkerLost => "worker_lost",
+            Reason::Internal => "internal",
+            Reason::UserCancel => "user_cancel",
+        }
+    }
+
+    /// The reason of that name.
+    pub fn parse(word: &str) -> Option<Self> {
+        Reason::ALL
+            .into_iter()
+            .find(|reason| reason.as_str() == word)
+    }
+}
+
+/// Whether a job has something to fetch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ResultAvailable {
+    /// Nothing.
+    None,
+    /// The last state of a job that did not converge or was canceled.
+    Partial,
+    /// A converged result.
+    Final,
+}
+
+impl ResultAvailable {
+    /// The word used in JSON and in the store.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            ResultAvailable::None => "none",
+            ResultAvailable::Partial => "partial",
+            ResultAvailable::Final => "final",
+        }
+    }
+
+    /// The value of that name.
+    pub fn parse(word: &str) -> Option<Self> {
+        [Self::None, Self::Partial, Self::Final]
+            .into_iter()
+            .find(|value| value.as_str() == word)
+    }
+}
+
+/// The place of a queued job.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct QueuePosition {
+    /// From 1.
+    pub position: i64,
+    /// Jobs before this one.
+    pub ahead: i64,
+    /// What it waits for.
+    pub reason: String,
+}
+
+/// How far a job has come.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Progress {
+    /// The phase, and once it iterates the stage of the iteration.
+    pub stage: String,
+    /// Rows of history so far.
+    pub iteration: u32,
+    /// The larger of the two residuals of the last row (dimensionless).
+    pub residual: Option<f64>,
+    /// What both must fall below.
+    pub tolerance: Option<f64>,
+    /// Nodes that entered or left contact in the last row.
+    pub contact_changes: Option<u32>,
+    /// Contraction number of the sweeps.
+    pub rate: Option<f64>,
+    /// Seconds to the end, extrapolated from the rate.
+    pub eta_s: Option<f64>,
+}
+
+/// Why a job failed, in the form of a problem document.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failure {
+    /// Address of the explanation.
+    pub r#type: String,
+    /// One line, the same for every failure of its kind.
+    pub title: String,
+    /// The kind, stable for programs.
+    pub code: String,
+    /// What happened this time.
+    pub detail: String,
+}
+
+impl Failure {
+    /// A failure of this kind.
+    pub fn new(reason: Reason, detail: impl Into<String>) -> Self {
+        let title = match reason {
+            Reason::NotConverged => "The iteration did not converge",
+            Reason::ContactCycling => "The contact set repeats itself without settling",
+            Reason::SingularSystem => "The stiffness matrix is singular",
+            Reason::NonFinite => "A number that is not finite came up",
+            Reason::WorkerLost => "The worker was lost once too often",
+            Reason::Internal => "The service failed",
+            Reason::UserCancel => "The job was canceled",
+        };
+        let code = reason.as_str().replace('_', "-");
+        Failure {
+            r#type: format!("/v1/errors/{code}"),
+            title: title.into(),
+            code,
+            detail: detail.into(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_terminal_job_never_moves_again() {
+        for from in Status::ALL
+            .into_iter()
+            .filter(|status| status.is_terminal())
+        {
+            assert!(
+                Status::ALL.into_iter().all(|to| !from.may_become(to)),
+                "{from:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn only_a_running_job_goes_back_to_the_queue() {
+        let back: Vec<_> = Status::ALL
+            .into_iter()
+            .filter(|from| from.may_become(Status::Queued))
+            .collect();
+        assert_eq!(back, [Status::Running]);
+    }
+
+    #[test]
+    fn success_comes_only_from_running() {
+        let from: Vec<_> = Status::ALL
+            .into_iter()
+            .filter(|from| from.may_become(Status::Succeeded))
+            .collect();
+        assert_eq!(from, [Status::Running]);
+    }
+
+    #[test]
+    fn words_are_read_back_as_they_were_written() {
+        assert!(
+            Status::ALL
+                .into_iter()
+                .all(|status| Status::parse(status.as_str()) == Some(status))
+        );
+        assert!(
+            Reason::ALL
+                .into_iter()
+                .all(|reason| Reason::parse(reason.as_str()) == Some(reason))
+        );
+    }
+
+    #[test]
+    fn a_job_id_has_one_spelling() {
+        let id = JobId::new();
+        let text = id.to_string();
+        assert_eq!(JobId::parse(&text), Some(id));
+        for other in [
+            text.to_uppercase(),
+            text.replace('-', ""),
+            text[4..].to_string(),
+            format!("{text} "),
+        ] {
+            assert_eq!(JobId::parse(&other), None, "{other}");
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! The queue with stand-ins for the solver: what a real one does only on its worst days.
+#![allow(clippy::unwrap_used)]
+
+use std::time::Instant;
+
+use solver::{error::SolveError, problem::Problem, solution::Observer, solution::Solution};
+
+use super::*;
+use crate::{
+    digest,
+    event::{Event, Payload},
+    fake,
+    job::{Reason, ResultAvailable, Status},
+    store::NewJob,
+};
+
+struct Rig {
+    store: Arc<Store>,
+    queue: Arc<Queue>,
+    folder: tempfile::TempDir,
+}
+
+async fn rig(solve: Solve) -> Rig {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Arc::new(Store::open(folder.path()).await.unwrap());
+    let queue = Queue::new(store.clone(), solve);
+    Rig {
+        store,
+        queue,
+        folder,
+    }
+}
+
+impl Rig {
+    async fn submit(&self) -> Job {
+        let problem = fake::problem();
+        let new = NewJob {
+            name: None,
+            labels: Default::default(),
+            priority: 0,
+            title: problem.title.clone(),
+            input_hash: digest::input_hash(&problem).unwrap(),
+            problem: serde_json::to_string(&problem).unwrap(),
+        };
+        let job = self.store.insert_job(&new, 10).await.unwrap();
+        self.queue.wake();
+        job
+    }
+
+    async fn until(&self, job: &Job, done: impl Fn(&Event) -> bool) -> Vec<Event> {
+        let mut news = self.queue.subscribe(job.key);
+        loop {
+            let events = self.store.events_after(job.key, 0, 100_000).await.unwrap();
+            if events.iter().any(&done) {
+                return events;
+            }
+            news.news().await;
+        }
+    }
+
+    async fn until_done(&self, job: &Job) -> Job {
+        let events = self
+            .until(job, |event| matches!(event.payload, Payload::Done { .. }))
+            .await;
+        assert!(
+            events
+                .iter()
+                .map(|event| event.seq)
+                .eq(1..=events.len() as i64),
+            "seq is dense from 1"
+        );
+        match events.into_iter().next_back().unwrap().payload {
+            Payload::Done { job } => *job,
+            other => unreachable!("{other:?} after done"),
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_job_runs_to_its_end_and_its_result_is_stored() {
+    let rig = rig(fake::solve).await;
+    rig.queue.start(1);
+    let job = rig.submit().await;
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.result_available, done.attempt),
+        (Status::Succeeded, ResultAvailable::Final, 1)
+    );
+    assert!(rig.store.part(job.key, "fields").await.unwrap().is_some());
+    assert_eq!(
+        rig.store.profiled_boundaries(job.key).await.unwrap(),
+        ["top"]
+    );
+}
+
+#[tokio::test]
+async fn a_panicking_solver_fails_its_job_and_not_its_worker() {
+    let rig = rig(fake::solve_with_a_panic).await;
+    rig.queue.start(1);
+    for _ in 0..2 {
+        let job = rig.submit().await;
+        let done = rig.until_done(&job).await;
+        assert_eq!(
+            (done.status, done.reason),
+            (Status::Failed, Some(Reason::Internal))
+        );
+        let detail = done.failure.unwrap().detail;
+        assert!(
+            detail.contains("incident") && !detail.contains("on purpose"),
+            "{detail}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_canceled_running_job_keeps_its_last_state() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start(1);
+    let job = rig.submit().await;
+    rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
+        .await;
+    assert_eq!(
+        rig.queue.cancel(job.key).await.unwrap(),
+        CancelOutcome::Requested
+    );
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.result_available),
+        (Status::Canceled, ResultAvailable::Partial)
+    );
+    assert!(
+        rig.store.part(job.key, "fields").await.unwrap().is_none(),
+        "a canceled job has no fields"
+    );
+}
+
+/// As one long factorisation: deaf for a second.
+fn deaf(
+    problem: &Problem,
+    observe: &mut Observer<'_>,
+) -> std::result::Result<Solution, SolveError> {
+    std::thread::sleep(Duration::from_secs(1));
+    fake::solve(problem, observe)
+}
+
+#[tokio::test]
+async fn a_deaf_solver_delays_only_its_slot_and_not_the_cancel() {
+    let rig = rig(deaf).await;
+    rig.queue.start(1);
+    let job = rig.submit().await;
+    rig.until(&job, |event| {
+        matches!(
+            event.payload,
+            Payload::Status {
+                status: Status::Running,
+                ..
+            }
+        )
+    })
+    .await;
+    let start = Instant::now();
+    rig.queue.cancel(job.key).await.unwrap();
+    let done = rig.until_done(&job).await;
+    assert!(
+        start.elapsed() < Duration::from_millis(500),
+        "{:?}",
+        start.elapsed()
+    );
+    assert_eq!(
+        (done.status, done.result_available),
+        (Status::Canceled, ResultAvailable::None)
+    );
+    // The slot comes back, and the late result changes nothing.
+    let next = rig.submit().await;
+    assert_eq!(rig.until_done(&next).await.status, Status::Succeeded);
+    assert_eq!(rig.store.job(job.id).await.unwrap().unwrap(), done);
+}
+
+#[tokio::test]
+async fn a_drain_puts_a_running_job_back_without_using_up_a_start() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start(1);
+    let job = rig.submit().await;
+    rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
+        .await;
+    rig.queue.drain().await;
+    let drained = rig.store.job(job.id).await.unwrap().unwrap();
+    assert_eq!(
+        (drained.status, drained.attempt, drained.max_attempts),
+        (Status::Queued, 1, 4)
+    );
+}
+
+#[tokio::test]
+async fn a_job_that_loses_three_workers_fails() {
+    let rig = rig(fake::solve).await; // its workers never start: we claim, and die, in their place
+    let job = rig.submit().await;
+    for attempt in 1..=3 {
+        let claim = rig.store.claim_next().await.unwrap().unwrap();
+        assert_eq!((claim.job.id, claim.job.attempt), (job.id, attempt));
+        assert_eq!(rig.store.requeue_interrupted().await.unwrap(), 1);
+    }
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.reason),
+        (Status::Failed, Some(Reason::WorkerLost))
+    );
+}
+
+#[tokio::test]
+async fn a_running_job_with_a_cancel_request_is_canceled_at_the_next_start() {
+    let rig = rig(fake::solve).await;
+    let job = rig.submit().await;
+    rig.store.claim_next().await.unwrap().unwrap();
+    rig.store.request_cancel(job.key).await.unwrap();
+    rig.store.requeue_interrupted().await.unwrap();
+    assert_eq!(rig.until_done(&job).await.status, Status::Canceled);
+}
+
+#[tokio::test]
+async fn what_an_overtaken_start_says_is_not_recorded() {
+    let rig = rig(fake::solve).await;
+    let job = rig.submit().await;
+    rig.store.claim_next().await.unwrap().unwrap();
+    rig.store.requeue_interrupted().await.unwrap();
+    let again = rig.store.claim_next().await.unwrap().unwrap();
+    let line = [(
+        crate::time::Time::now(),
+        Payload::Iteration(fake::iteration(1)),
+    )];
+    assert_eq!(
+        rig.store
+            .append_events(job.key, 1, &line, &Default::default())
+            .await
+            .unwrap(),
+        None
+    );
+    assert_eq!(
+        rig.store
+            .finish(job.key, 1, &Ending::canceled())
+            .await
+            .unwrap(),
+        None
+    );
+    assert!(
+        rig.store
+            .append_events(job.key, again.job.attempt, &line, &Default::default())
+            .await
+            .unwrap()
+            .is_some()
+    );
+}
+
+#[tokio::test]
+async fn the_queue_is_ordered_by_priority_then_by_arrival() {
+    let rig = rig(fake::solve).await;
+    let problem = fake::problem();
+    let new = |priority| NewJob {
+        name: None,
+        labels: Default::default(),
+        priority,
+        title: None,
+        input_hash: digest::input_hash(&problem).unwrap(),
+        problem: serde_json::to_string(&problem).unwrap(),
+    };
+    let mut jobs = vec![];
+    for priority in [0, 5, 0, -1] {
+        jobs.push(rig.store.insert_job(&new(priority), 10).await.unwrap());
+    }
+    let places: Vec<i64> = jobs
+        .iter()
+        .map(|job| job.queue.as_ref().unwrap().position)
+        .collect();
+    assert_eq!(places, [1, 1, 3, 4], "as they were when each arrived");
+    let mut claimed = vec![];
+    while let Some(claim) = rig.store.claim_next().await.unwrap() {
+        claimed.push(claim.job.id);
+    }
+    assert_eq!(claimed, [jobs[1].id, jobs[0].id, jobs[2].id, jobs[3].id]);
+}
+
+#[tokio::test]
+async fn a_second_server_on_the_same_folder_is_refused() {
+    let rig = rig(fake::solve).await;
+    let refused = Store::open(rig.folder.path()).await.unwrap_err();
+    assert!(refused.to_string().contains("another server"), "{refused}");
+}

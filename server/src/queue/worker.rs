@@ -1,0 +1,226 @@
+//! A worker: takes a job, has it solved, ends it.
+
+use std::{
+    any::Any, ops::ControlFlow, sync::Arc, sync::atomic::Ordering, time::Duration, time::Instant,
+};
+
+use solver::{
+    error::SolveError,
+    problem::Problem,
+    solution::{Outcome, Progress},
+};
+use tokio::{sync::mpsc, task::JoinError};
+use tracing::{error, info, warn};
+use uuid::Uuid;
+
+use super::{Queue, Running, recorder};
+use crate::{
+    event::Payload,
+    job::{Failure, Job, Reason, ResultAvailable, Status},
+    run::{self, Document, Solve},
+    store::{Claim, Ending, Parts},
+    time::Time,
+};
+
+/// Lines that a solver may be ahead of its recorder; then it waits.
+const AHEAD: usize = 256;
+
+/// Works until the drain.
+pub(super) async fn work(queue: Arc<Queue>) {
+    while !queue.stopping.is_cancelled() {
+        // First subscribe, then look: a job accepted after the look wakes us.
+        let woken = queue.wake.notified();
+        tokio::pin!(woken);
+        woken.as_mut().enable();
+        match queue.claim().await {
+            Ok(Some((claim, running))) => attempt(&queue, claim, running).await,
+            Ok(None) => {
+                tokio::select! {
+                    () = woken => {}
+                    () = queue.stopping.cancelled() => {}
+                }
+            }
+            Err(cause) => {
+                error!(%cause, "no job could be claimed: {cause}");
+                tokio::time::sleep(Duration::from_secs(1)).await; // a full disk may pass
+            }
+        }
+    }
+}
+
+/// One start of a job, from claim to end.
+async fn attempt(queue: &Arc<Queue>, Claim { job, problem, .. }: Claim, running: Running) {
+    info!(job.id = %job.id, job.attempt, "job {} started", job.id);
+    let (say, lines) = mpsc::channel(AHEAD);
+    let stop = running.stop.clone();
+    let solve = queue.solve;
+    let solving = tokio::task::spawn_blocking(move || {
+        solve_aloud(&problem, solve, |payload| {
+            // An error means that the recorder is gone, and with it everybody who would listen.
+            let heard = say.blocking_send((Time::now(), payload)).is_ok();
+            if heard && !stop.load(Ordering::Relaxed) {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        })
+    });
+    let recorded = recorder::record(queue, &job, &running, lines).await;
+    let solved = solving.await;
+    let (ending, parts) = match recorded {
+        Ok(()) => judge(&job, solved),
+        Err(cause) => (internal(&job, &cause), None),
+    };
+    end(queue, &job, ending, parts).await;
+    queue.release(&job);
+}
+
+/// Reads the problem and solves it, telling everything on the way. On a blocking thread.
+fn solve_aloud(
+    problem: &str,
+    solve: Solve,
+    mut say: impl FnMut(Payload) -> ControlFlow<()>,
+) -> Result<Solved, SolveError> {
+    let start = Instant::now();
+    let problem: Problem = solver::parse(problem).map_err(SolveError::Invalid)?;
+    let parse_s = start.elapsed().as_secs_f64();
+    let document = run::run(&problem, parse_s, solve, &mut |progress| {
+        say(match progress {
+            Progress::Phase(stage) => Payload::Stage { stage },
+            Progress::Iteration(row) => Payload::Iteration(row.clone()),
+            Progress::Warning(warning) => Payload::Warning(warning.clone()),
+        })
+    })?;
+    let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite { phase: "recover" })?;
+    Ok(Solved {
+        ending: ending_of(&document),
+        iterations: document.history.len(),
+        parts,
+    })
+}
+
+/// A solution ready to be stored.
+struct Solved {
+    ending: Ending,
+    iterations: usize,
+    parts: Parts,
+}
+
+/// What the outcome of a solution means for its job.
+fn ending_of(document: &Document) -> Ending {
+    let (summary, partial) = (&document.summary.solution, ResultAvailable::Partial);
+    let failed = |reason| {
+        let detail = format!(
+            "after {} iterations the residual is {:.3e} and the friction residual {:.3e}; \
+             the last state and the history are kept",
+            summary.iterations, summary.residuals.kkt, summary.residuals.friction
+        );
+        Ending {
+            result: partial,
+            ..Ending::failed(reason, detail)
+        }
+    };
+    match summary.outcome {
+        Outcome::Converged => Ending {
+            status: Status::Succeeded,
+            reason: None,
+            failure: None,
+            result: ResultAvailable::Final,
+        },
+        Outcome::NotConverged => failed(Reason::NotConverged),
+        Outcome::ContactCycling => failed(Reason::ContactCycling),
+        Outcome::Canceled => Ending {
+            result: partial,
+            ..Ending::canceled()
+        },
+    }
+}
+
+/// What a solver's answer, or its panic, means for the job.
+fn judge(
+    job: &Job,
+    solved: Result<Result<Solved, SolveError>, JoinError>,
+) -> (Ending, Option<Parts>) {
+    match solved {
+        Ok(Ok(Solved {
+            ending,
+            iterations,
+            parts,
+        })) => {
+            let status = ending.status.as_str();
+            info!(job.id = %job.id, status, iterations, "job {} solved: {status} after {iterations} iterations", job.id);
+            (ending, Some(parts))
+        }
+        Ok(Err(SolveError::Stopped)) => (Ending::canceled(), None),
+        Ok(Err(error @ SolveError::SingularSystem { .. })) => (
+            Ending::failed(Reason::SingularSystem, error.to_string()),
+            None,
+        ),
+        Ok(Err(error @ SolveError::NonFinite { .. })) => {
+            (Ending::failed(Reason::NonFinite, error.to_string()), None)
+        }
+        // It was checked before it was accepted: ours to explain, not the client's.
+        Ok(Err(error @ SolveError::Invalid(_))) => (internal(job, &error), None),
+        Err(panic) => (internal(job, &panicked(panic)), None),
+    }
+}
+
+/// Logs the cause under an incident number, which is all that the client is told.
+fn internal(job: &Job, cause: &dyn std::fmt::Display) -> Ending {
+    let incident = Uuid::now_v7();
+    error!(job.id = %job.id, %incident, %cause, "job {} failed, incident {incident}: {cause}", job.id);
+    let detail = format!("an unexpected error, logged as incident {incident}");
+    let failure = Failure::new(Reason::Internal, detail);
+    Ending {
+        failure: Some(failure),
+        ..Ending::failed(Reason::Internal, "")
+    }
+}
+
+fn panicked(error: JoinError) -> String {
+    let Ok(panic) = error.try_into_panic() else {
+        return "the solver's thread was lost".into();
+    };
+    let text = |panic: &(dyn Any + Send)| {
+        panic
+            .downcast_ref::<String>()
+            .cloned()
+            .or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()))
+    };
+    format!("the solver panicked: {}", text(&*panic).unwrap_or_default())
+}
+
+/// Stores the result, then the end. What fails is tried again, since a job must not stay running;
+/// if the store stays broken, the next start of the service puts the job back.
+async fn end(queue: &Queue, job: &Job, ending: Ending, parts: Option<Parts>) {
+    for pause_ms in [100, 1000, 5000, 0] {
+        let cause = match try_to_end(queue, job, &ending, parts.as_ref()).await {
+            Ok(()) => return,
+            Err(cause) => cause,
+        };
+        warn!(job.id = %job.id, %cause, "job {} could not be ended: {cause}", job.id);
+        tokio::time::sleep(Duration::from_millis(pause_ms)).await;
+    }
+    error!(job.id = %job.id, "job {} stays running until the service is restarted", job.id);
+}
+
+async fn try_to_end(
+    queue: &Queue,
+    job: &Job,
+    ending: &Ending,
+    parts: Option<&Parts>,
+) -> crate::store::Result<()> {
+    let stored = match parts {
+        Some(parts) => {
+            queue
+                .store
+                .write_result(job.key, job.attempt, parts)
+                .await?
+        }
+        None => true,
+    };
+    if stored && let Some(seq) = queue.store.finish(job.key, job.attempt, ending).await? {
+        queue.live.announce(job.key, seq);
+    }
+    Ok(())
+}

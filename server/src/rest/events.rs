@@ -1,0 +1,68 @@
+//! `/v1/jobs/{id}/events`: server-sent events, replayed and then live.
+
+use std::time::Duration;
+
+use axum::{
+    extract::{RawQuery, State},
+    http::{HeaderMap, StatusCode},
+    response::{
+        IntoResponse, Response,
+        sse::{self, KeepAlive, Sse},
+    },
+};
+use futures_util::{StreamExt, TryStreamExt};
+
+use super::{
+    Rest,
+    request::{JobPath, Params},
+};
+use crate::{error::ApiError, event::Event, verbs::jobs};
+
+/// Tells proxies and clients that the line still stands.
+const PING: Duration = Duration::from_secs(15);
+
+pub(super) async fn watch(
+    State(rest): State<Rest>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+    path: JobPath,
+) -> Result<Response, ApiError> {
+    const SEQ: &str = "a whole number, 0 or more";
+    let params = Params::parse(query.as_deref(), &["after_seq"])?;
+    let asked = params.number("after_seq", 0..=i64::MAX, SEQ)?;
+    // The header wins: a browser reconnects to the same address, and knows better than that.
+    let seen = match headers.get("last-event-id") {
+        Some(value) => {
+            let text = String::from_utf8_lossy(value.as_bytes());
+            let seq = text.trim().parse::<i64>().ok().filter(|seq| *seq >= 0);
+            let bad = ApiError::BadParameter {
+                name: "Last-Event-ID",
+                got: text.to_string(),
+                expected: SEQ,
+            };
+            Some(seq.ok_or(bad)?)
+        }
+        None => None,
+    };
+    let after = seen.or(asked).unwrap_or(0);
+    let job = jobs::get(&rest.service, path.id).await?;
+    if jobs::is_silent(&rest.service, &job, after).await? {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    // An error just ends the stream: without `done` the client knows that there is more to come.
+    let events = jobs::watch(rest.service, job.key, after)
+        .map(|event| event.and_then(|event| told(&event)))
+        .inspect_err(|error| tracing::debug!(%error, "event stream ended: {error}"))
+        .take_while(|event| std::future::ready(event.is_ok()));
+    Ok(Sse::new(events)
+        .keep_alive(KeepAlive::new().interval(PING).text("ping"))
+        .into_response())
+}
+
+fn told(event: &Event) -> Result<sse::Event, ApiError> {
+    let data = serde_json::to_string(event).map_err(ApiError::internal)?;
+    Ok(sse::Event::default()
+        .id(event.seq.to_string())
+        .event(event.payload.kind())
+        .data(data))
+}

@@ -1,0 +1,80 @@
+//! How errors leave over REST: always as `application/problem+json`.
+
+use std::any::Any;
+
+use axum::{
+    body::Body,
+    extract::Request,
+    http::{HeaderValue, StatusCode, header},
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+
+use crate::error::ApiError;
+
+impl IntoResponse for ApiError {
+    /// Only the status and the error itself; `errors_as_documents` writes it out, knowing the path.
+    fn into_response(self) -> Response {
+        let mut response = self.http_status().into_response();
+        if let Some(seconds) = self.retry_after_s() {
+            response
+                .headers_mut()
+                .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        response.extensions_mut().insert(self);
+        response
+    }
+}
+
+/// Writes errors out as documents whose `instance` is the path that was asked for.
+pub(super) async fn errors_as_documents(request: Request, next: Next) -> Response {
+    let path = request.uri().path().to_string();
+    let method = request.method().clone();
+    let response = next.run(request).await;
+    let status = response.status();
+    tracing::debug!(http.method = %method, http.path = path, http.status = status.as_u16(), "{method} {path}: {status}");
+    let Some(error) = response.extensions().get::<ApiError>() else {
+        return response;
+    };
+    let document = error.document(&path).to_string();
+    let (mut parts, _) = response.into_parts();
+    parts.headers.insert(
+        header::CONTENT_TYPE,
+        HeaderValue::from_static("application/problem+json"),
+    );
+    parts.headers.remove(header::CONTENT_LENGTH);
+    Response::from_parts(parts, Body::from(document))
+}
+
+/// What nobody knows: a gRPC status for a gRPC caller, a document for everybody else.
+pub(super) async fn not_found(request: Request) -> Response {
+    let content_type = request
+        .headers()
+        .get(header::CONTENT_TYPE)
+        .and_then(|value| value.to_str().ok());
+    if content_type.is_some_and(|value| value.starts_with("application/grpc")) {
+        let name = request.uri().path();
+        return tonic::Status::unimplemented(format!("there is no method {name}")).into_http();
+    }
+    ApiError::NotFound(format!("there is nothing at {}", request.uri().path())).into_response()
+}
+
+/// A handler panicked: an incident like any other unexpected error.
+pub(super) fn panicked(panic: Box<dyn Any + Send>) -> Response {
+    let text = panic
+        .downcast_ref::<String>()
+        .cloned()
+        .or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()))
+        .unwrap_or_default();
+    ApiError::internal(format!("a handler panicked: {text}")).into_response()
+}
+
+/// JSON that is already written.
+pub(super) fn json_body(status: StatusCode, body: impl Into<Body>) -> Response {
+    (
+        status,
+        [(header::CONTENT_TYPE, "application/json")],
+        body.into(),
+    )
+        .into_response()
+}

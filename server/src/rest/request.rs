@@ -1,0 +1,347 @@
+//! How requests are read: strictly.
+
+use std::collections::BTreeMap;
+
+use axum::{
+    body::{Body, to_bytes},
+    extract::{FromRequestParts, Path},
+    http::{HeaderMap, header, request::Parts},
+};
+use serde_json::value::RawValue;
+use solver::{error::Violation, problem::Problem};
+
+use crate::{
+    error::ApiError,
+    job::JobId,
+    verbs::{
+        jobs::Envelope,
+        problems::{AT, prefixed},
+    },
+};
+
+/// A job's name in a path, and what follows it. An ill-formed name is a job that does not exist.
+pub(super) struct JobPath {
+    pub(super) id: JobId,
+    pub(super) boundary: String,
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for JobPath {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let path = Path::<BTreeMap<String, String>>::from_request_parts(parts, state).await;
+        let Ok(Path(mut path)) = path else {
+            return Err(ApiError::NotFound("the path is not well formed".into()));
+        };
+        let id = path.remove("id").unwrap_or_default();
+        let boundary = path.remove("boundary").unwrap_or_default();
+        match JobId::parse(&id) {
+            Some(id) => Ok(JobPath { id, boundary }),
+            None => Err(ApiError::NotFound(format!("there is no job {id}"))),
+        }
+    }
+}
+
+/// The parameters of a query, each of them known.
+pub(super) struct Params(Vec<(String, String)>);
+
+impl Params {
+    /// Reads a query; a name that is not among `known` is refused, since it was meant to do something.
+    pub(super) fn parse(query: Option<&str>, known: &[&str]) -> Result<Params, ApiError> {
+        let pairs: Vec<(String, String)> =
+            form_urlencoded::parse(query.unwrap_or_default().as_bytes())
+                .into_owned()
+                .collect();
+        match pairs
+            .iter()
+            .find(|(name, _)| !known.contains(&name.as_str()))
+        {
+            Some((name, _)) => {
+                let known = if known.is_empty() {
+                    "none".into()
+                } else {
+                    known.join(", ")
+                };
+                Err(ApiError::UnknownParameter {
+                    name: name.clone(),
+                    known,
+                })
+            }
+            None => Ok(Params(pairs)),
+        }
+    }
+
+    /// The last value of that name.
+    pub(super) fn one(&self, name: &str) -> Option<&str> {
+        self.0
+            .iter()
+            .rev()
+            .find(|(key, _)| key == name)
+            .map(|(_, value)| value.as_str())
+    }
+
+    /// All values of that name.
+    pub(super) fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a str> {
+        self.0
+            .iter()
+            .filter(move |(key, _)| key == name)
+            .map(|(_, value)| value.as_str())
+    }
+
+    /// A number, within bounds.
+    pub(super) fn number(
+        &self,
+        name: &'static str,
+        range: std::ops::RangeInclusive<i64>,
+        expected: &'static str,
+    ) -> Result<Option<i64>, ApiError> {
+        let Some(text) = self.one(name) else {
+            return Ok(None);
+        };
+        match text.parse() {
+            Ok(number) if range.contains(&number) => Ok(Some(number)),
+            _ => Err(ApiError::BadParameter {
+                name,
+                got: text.into(),
+                expected,
+            }),
+        }
+    }
+}
+
+/// The body as text, if it says that it is JSON and is not too large.
+pub(super) async fn json_text(
+    headers: &HeaderMap,
+    body: Body,
+    limit_bytes: usize,
+) -> Result<String, ApiError> {
+    let content_type = headers
+        .get(header::CONTENT_TYPE)
+        .and_then(|value| value.to_str().ok())
+        .unwrap_or("nothing");
+    let essence = content_type
+        .split(';')
+        .next()
+        .unwrap_or_default()
+        .trim()
+        .to_ascii_lowercase();
+    if essence != "application/json"
+        && !(essence.starts_with("application/") && essence.ends_with("+json"))
+    {
+        return Err(ApiError::UnsupportedMedia(content_type.into()));
+    }
+    let length = headers
+        .get(header::CONTENT_LENGTH)
+        .and_then(|value| value.to_str().ok()?.parse::<usize>().ok());
+    if length.is_some_and(|length| length > limit_bytes) {
+        return Err(ApiError::PayloadTooLarge { limit_bytes });
+    }
+    let bytes = to_bytes(body, limit_bytes).await.map_err(|error| {
+        let too_large = std::error::Error::source(&error)
+            .is_some_and(|cause| cause.to_string().contains("limit"));
+        if too_large {
+            ApiError::PayloadTooLarge { limit_bytes }
+        } else {
+            ApiError::MalformedJson(error.to_string())
+        }
+    })?;
+    String::from_utf8(bytes.into()).map_err(|error| ApiError::MalformedJson(error.to_string()))
+}
+
+/// What is wrong with a body whose JSON is well formed, or what it holds.
+type Read<T> = Result<T, Vec<Violation>>;
+
+/// A body `{problem, name, labels, priority}`. The problem's text goes to the solver's own strict
+/// parser; what is wrong with it comes together with what is wrong around it.
+pub(super) fn submission(text: &str) -> Result<(Envelope, Read<Problem>), ApiError> {
+    let mut fields = object(text)?;
+    let mut violations = vec![];
+    let mut envelope = Envelope::default();
+    let problem = problem(&mut fields, &mut violations);
+    take(
+        &mut fields,
+        "name",
+        "a string",
+        &mut violations,
+        &mut envelope.name,
+    );
+    take(
+        &mut fields,
+        "labels",
+        "an object of strings",
+        &mut violations,
+        &mut envelope.labels,
+    );
+    take(
+        &mut fields,
+        "priority",
+        "a whole number from -10 to 10",
+        &mut violations,
+        &mut envelope.priority,
+    );
+    unknown(fields, "problem, name, labels, priority", &mut violations);
+    Ok((envelope, together(violations, problem)))
+}
+
+/// A body `{problem}`.
+pub(super) fn bare_problem(text: &str) -> Result<Read<Problem>, ApiError> {
+    let mut fields = object(text)?;
+    let mut violations = vec![];
+    let problem = problem(&mut fields, &mut violations);
+    unknown(fields, "problem", &mut violations);
+    Ok(together(violations, problem))
+}
+
+fn object(text: &str) -> Result<BTreeMap<String, &RawValue>, ApiError> {
+    // First only the syntax, so that a well-formed array is told that it should be an object.
+    let whole: &RawValue =
+        serde_json::from_str(text).map_err(|error| ApiError::MalformedJson(error.to_string()))?;
+    serde_json::from_str(whole.get()).map_err(|_| {
+        ApiError::InvalidProblem(vec![wrong_type(
+            "",
+            whole,
+            "an object with the field problem",
+        )])
+    })
+}
+
+fn problem(
+    fields: &mut BTreeMap<String, &RawValue>,
+    violations: &mut Vec<Violation>,
+) -> Option<Problem> {
+    match fields.remove("problem") {
+        Some(raw) => match solver::parse(raw.get()) {
+            Ok(problem) => return Some(problem),
+            Err(found) => violations.extend(prefixed(AT, found)),
+        },
+        None => violations.push(Violation {
+            pointer: AT.into(),
+            reason: "missing".into(),
+            got: "nothing".into(),
+            expected: "the problem to solve".into(),
+            hint: "Send {\"problem\": {…}}.".into(),
+        }),
+    }
+    None
+}
+
+/// Reads one field into its place; null is as good as absent.
+fn take<T: serde::de::DeserializeOwned>(
+    fields: &mut BTreeMap<String, &RawValue>,
+    name: &str,
+    expected: &str,
+    violations: &mut Vec<Violation>,
+    place: &mut T,
+) {
+    let Some(raw) = fields.remove(name).filter(|raw| raw.get() != "null") else {
+        return;
+    };
+    match serde_json::from_str(raw.get()) {
+        Ok(value) => *place = value,
+        Err(_) => violations.push(wrong_type(&format!("/{name}"), raw, expected)),
+    }
+}
+
+fn unknown(fields: BTreeMap<String, &RawValue>, known: &str, violations: &mut Vec<Violation>) {
+    for name in fields.into_keys() {
+        violations.push(Violation {
+            pointer: format!("/{}", name.replace('~', "~0").replace('/', "~1")),
+            reason: "unknown_field".into(),
+            got: format!("{name:?}"),
+            expected: format!("one of {known}"),
+            hint: "Check the spelling, or leave it out.".into(),
+        });
+    }
+}
+
+fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
+    let got: String = raw.get().chars().take(60).collect();
+    Violation {
+        pointer: pointer.into(),
+        reason: "wrong_type".into(),
+        got,
+        expected: expected.into(),
+        hint: "See /v1/schema/problem.json for the problem itself.".into(),
+    }
+}
+
+fn together(violations: Vec<Violation>, problem: Option<Problem>) -> Read<Problem> {
+    match problem {
+        Some(problem) if violations.is_empty() => Ok(problem),
+        _ => Err(violations),
+    }
+}
+
+/// The `wait` of a `Prefer` header (RFC 7240) in whole seconds, if there is one that makes sense.
+pub(super) fn preferred_wait_s(headers: &HeaderMap) -> Option<u64> {
+    headers
+        .get_all("prefer")
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split([',', ';']))
+        .find_map(|preference| {
+            let (name, value) = preference.split_once('=')?;
+            if !name.trim().eq_ignore_ascii_case("wait") {
+                return None;
+            }
+            value.trim().trim_matches('"').parse().ok()
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn pointers(text: &str) -> Vec<String> {
+        submission(text)
+            .unwrap()
+            .1
+            .unwrap_err()
+            .into_iter()
+            .map(|v| v.pointer)
+            .collect()
+    }
+
+    #[test]
+    fn everything_wrong_with_an_envelope_is_said_at_once() {
+        let text = r#"{"name": 7, "labels": {"a": 1}, "priority": 0.5, "wait": 3}"#;
+        assert_eq!(
+            pointers(text),
+            ["/problem", "/name", "/labels", "/priority", "/wait"]
+        );
+    }
+
+    #[test]
+    fn broken_json_is_told_apart_from_a_wrong_shape() {
+        assert!(matches!(
+            submission("{\"problem\": "),
+            Err(ApiError::MalformedJson(_))
+        ));
+        assert!(matches!(
+            submission("[1]"),
+            Err(ApiError::InvalidProblem(_))
+        ));
+    }
+
+    #[test]
+    fn a_preference_for_waiting_is_found_among_others() {
+        let mut headers = HeaderMap::new();
+        assert_eq!(preferred_wait_s(&headers), None);
+        headers.insert("prefer", "respond-async, wait=10".parse().unwrap());
+        assert_eq!(preferred_wait_s(&headers), Some(10));
+        headers.insert("prefer", "wait=soon".parse().unwrap());
+        assert_eq!(preferred_wait_s(&headers), None);
+    }
+
+    #[test]
+    fn a_parameter_that_nobody_knows_is_refused() {
+        assert!(Params::parse(Some("status=queued&color=red"), &["status"]).is_err());
+        assert_eq!(
+            Params::parse(Some("status=queued"), &["status"])
+                .unwrap()
+                .one("status"),
+            Some("queued")
+        );
+    }
+}

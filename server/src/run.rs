@@ -1,0 +1,244 @@
+//! Solves one problem and measures it: the one place with a clock, used by the worker and by
+//! `signorini solve` alike, so that both write the same document.
+
+use std::{collections::BTreeMap, ops::ControlFlow, time::Instant};
+
+use serde::{Deserialize, Serialize};
+use solver::{
+    error::SolveError,
+    problem::Problem,
+    solution::{ContactProfile, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution},
+};
+
+use crate::digest;
+
+/// What a solved problem is stored, served and written as.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Document {
+    /// Scalars, extents, warnings, timings and fingerprints.
+    pub summary: Summary,
+    /// One row per iteration.
+    pub history: Vec<Iteration>,
+    /// Columns along each contact boundary.
+    pub profiles: BTreeMap<String, ContactProfile>,
+    /// One entry per load step; there are none yet.
+    pub steps: Vec<serde_json::Value>,
+    /// Displacements and stresses at all nodes.
+    pub fields: Fields,
+}
+
+/// The solver's summary, and what only its caller knows.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Summary {
+    /// What the solver says.
+    #[serde(flatten)]
+    pub solution: solver::solution::Summary,
+    /// Seconds by phase.
+    pub timings: Timings,
+    /// The program that solved it.
+    pub solver_version: String,
+    /// Fingerprint of the problem.
+    pub input_hash: String,
+    /// Fingerprint of the result.
+    pub digest: String,
+}
+
+/// Seconds by phase.
+pub type Timings = BTreeMap<String, f64>;
+
+/// The solver, or what stands in for it in a test.
+pub type Solve = fn(&Problem, &mut Observer<'_>) -> Result<Solution, SolveError>;
+
+/// Solves `problem`, stamps each iteration with the seconds since the start and measures the
+/// phases. `parse_s`: seconds that reading the problem took, the caller's own phase.
+pub fn run(
+    problem: &Problem,
+    parse_s: f64,
+    solve: Solve,
+    on_progress: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
+) -> Result<Document, SolveError> {
+    let mut watch = Stopwatch::new(parse_s);
+    let mut broken = false;
+    let solved = solve(problem, &mut |mut progress| {
+        match &mut progress {
+            Progress::Phase(phase) => watch.enter(*phase),
+            Progress::Iteration(row) => {
+                row.wall_s = watch.elapsed_s();
+                // JSON has no word for it, and to go on is pointless.
+                broken |= !is_finite(row);
+            }
+            Progress::Warning(_) => {}
+        }
+        if broken {
+            ControlFlow::Break(())
+        } else {
+            on_progress(progress)
+        }
+    });
+    if broken {
+        return Err(SolveError::NonFinite { phase: "iterate" });
+    }
+    let mut solution = solved?;
+    if solution.summary.outcome == Outcome::Canceled {
+        // Who cancels wants the end, not fifty megabytes of it: a canceled job must be terminal
+        // within half a second, and writing the fields of a large one takes longer.
+        solution.fields = Fields::default();
+    }
+    let timings = watch.stop();
+    let non_finite = |_| SolveError::NonFinite { phase: "recover" };
+    let input_hash = digest::input_hash(problem).map_err(non_finite)?;
+    let digest = digest::digest(&solution, &input_hash).map_err(non_finite)?;
+    let Solution {
+        summary,
+        history,
+        profiles,
+        fields,
+    } = solution;
+    let solver_version = env!("CARGO_PKG_VERSION").to_string();
+    let summary = Summary {
+        solution: summary,
+        timings,
+        solver_version,
+        input_hash,
+        digest,
+    };
+    Ok(Document {
+        summary,
+        history,
+        profiles,
+        steps: vec![],
+        fields,
+    })
+}
+
+fn is_finite(row: &Iteration) -> bool {
+    [
+        row.residual,
+        row.friction_residual,
+        row.tolerance,
+        row.force.normal,
+        row.force.tangential,
+    ]
+    .into_iter()
+    .chain(row.r_f)
+    .chain(row.contraction)
+    .all(f64::is_finite)
+}
+
+/// Seconds by phase; every phase is present, also one that was not reached.
+struct Stopwatch {
+    start: Instant,
+    current: Option<(Phase, Instant)>,
+    timings: Timings,
+}
+
+const PHASES: [Phase; 8] = [
+    Phase::Parse,
+    Phase::Mesh,
+    Phase::Assemble,
+    Phase::Order,
+    Phase::Factor,
+    Phase::Condense,
+    Phase::Iterate,
+    Phase::Recover,
+];
+
+impl Stopwatch {
+    fn new(parse_s: f64) -> Self {
+        let mut timings: Timings = PHASES
+            .into_iter()
+            .map(|phase| (phase_name(phase).to_string(), 0.0))
+            .collect();
+        timings.insert(phase_name(Phase::Parse).to_string(), parse_s);
+        Stopwatch {
+            start: Instant::now(),
+            current: None,
+            timings,
+        }
+    }
+
+    fn elapsed_s(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        self.leave();
+        self.current = Some((phase, Instant::now()));
+    }
+
+    fn leave(&mut self) {
+        if let Some((phase, since)) = self.current.take() {
+            *self
+                .timings
+                .entry(phase_name(phase).to_string())
+                .or_default() += since.elapsed().as_secs_f64();
+        }
+    }
+
+    fn stop(mut self) -> Timings {
+        self.leave();
+        self.timings
+    }
+}
+
+/// The word for a phase, as in JSON.
+pub fn phase_name(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Parse => "parse",
+        Phase::Mesh => "mesh",
+        Phase::Assemble => "assemble",
+        Phase::Order => "order",
+        Phase::Factor => "factor",
+        Phase::Condense => "condense",
+        Phase::Iterate => "iterate",
+        Phase::Recover => "recover",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::fake;
+
+    #[test]
+    fn every_iteration_is_stamped_and_every_phase_has_a_time() {
+        let mut stamps = vec![];
+        let document = run(&fake::problem(), 0.5, fake::solve, &mut |progress| {
+            if let Progress::Iteration(row) = progress {
+                stamps.push(row.wall_s);
+            }
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert_eq!(stamps.len(), 3);
+        assert!(stamps.is_sorted() && stamps[0] > 0.0);
+        assert_eq!(document.summary.timings.len(), 8);
+        assert_eq!(document.summary.timings["parse"], 0.5);
+    }
+
+    #[test]
+    fn the_same_problem_has_the_same_digest() {
+        let digest = |_| {
+            run(&fake::problem(), 0.0, fake::solve, &mut |_| {
+                ControlFlow::Continue(())
+            })
+            .unwrap()
+            .summary
+            .digest
+        };
+        assert_eq!(digest(1), digest(2));
+    }
+
+    #[test]
+    fn a_summary_is_read_back_as_it_was_written() {
+        let summary = run(&fake::problem(), 0.0, fake::solve, &mut |_| {
+            ControlFlow::Continue(())
+        })
+        .unwrap()
+        .summary;
+        let text = serde_json::to_string(&summary).unwrap();
+        let back: Summary = serde_json::from_str(&text).unwrap();
+        assert_eq!(serde_json::to_string(&back).unwrap(), text);
+    }
+}

@@ -1,0 +1,91 @@
+//! The story of each job: appended to, and read from any point on.
+
+use sqlx::{Row, SqliteConnection};
+
+use super::{Result, Store, StoreError, jobs::is_current};
+use crate::{
+    event::{Event, Payload},
+    job::Progress,
+    time::Time,
+};
+
+impl Store {
+    /// Appends to the story of this start of a job, with the progress that it amounts to, and
+    /// gives the number of the last event; `None` when the start is no longer current.
+    pub async fn append_events(
+        &self,
+        key: i64,
+        attempt: i32,
+        payloads: &[(Time, Payload)],
+        progress: &Progress,
+    ) -> Result<Option<i64>> {
+        let mut tx = self.begin().await?;
+        if !is_current(&mut tx, key, attempt).await? {
+            return Ok(None);
+        }
+        let seq = append(&mut tx, key, attempt, payloads).await?;
+        sqlx::query("update job set progress = ? where id = ?")
+            .bind(serde_json::to_string(progress)?)
+            .bind(key)
+            .execute(&mut *tx)
+            .await?;
+        tx.commit().await?;
+        Ok(Some(seq))
+    }
+
+    /// At most `limit` events after number `after`, in order.
+    pub async fn events_after(&self, key: i64, after: i64, limit: i64) -> Result<Vec<Event>> {
+        let rows = sqlx::query(
+            "select seq, attempt, t, body from event where job_id = ? and seq > ? order by seq limit ?",
+        )
+        .bind(key)
+        .bind(after)
+        .bind(limit)
+        .fetch_all(&self.reader)
+        .await?;
+        rows.iter()
+            .map(|row| {
+                let seq = row.try_get("seq")?;
+                let payload = serde_json::from_str(row.try_get("body")?)
+                    .map_err(|error| StoreError::Corrupt(format!("event {seq}: {error}")))?;
+                Ok(Event {
+                    seq,
+                    attempt: row.try_get("attempt")?,
+                    t: Time::from_micros(row.try_get("t")?),
+                    payload,
+                })
+            })
+            .collect()
+    }
+}
+
+/// Numbers and appends within a transaction; gives the last number.
+pub(super) async fn append(
+    tx: &mut SqliteConnection,
+    key: i64,
+    attempt: i32,
+    payloads: &[(Time, Payload)],
+) -> Result<i64> {
+    let last: i64 = sqlx::query_scalar(
+        "update job set last_seq = last_seq + ? where id = ? returning last_seq",
+    )
+    .bind(payloads.len() as i64)
+    .bind(key)
+    .fetch_one(&mut *tx)
+    .await?;
+    let first = last - payloads.len() as i64 + 1;
+    for (seq, (t, payload)) in (first..).zip(payloads) {
+        sqlx::query(
+            "insert into event (job_id, seq, attempt, t, type, body) values (?, ?, ?, ?, ?, ?)",
+        )
+        .bind(key)
+        .bind(seq)
+        .bind(attempt)
+        .bind(t.micros())
+        .bind(payload.kind())
+        .bind(serde_json::to_string(payload)?)
+        .execute(&mut *tx)
+        .await?;
+    }
+    Ok(last)
+}

@@ -1,0 +1,148 @@
+//! Everything durable, and the only SQL: one SQLite file.
+//!
+//! One connection writes, always in `begin immediate`, so that no transaction ever fails half-way
+//! for want of a lock; others read at the same time (WAL). A commit is on the disk when it returns
+//! (synchronous FULL). Each method answers one question, in one transaction.
+
+mod events;
+mod jobs;
+mod results;
+
+use std::{
+    fs::{File, OpenOptions, TryLockError},
+    path::Path,
+    time::Duration,
+};
+
+use sqlx::{
+    Sqlite, SqlitePool, Transaction,
+    migrate::MigrateError,
+    sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
+};
+
+pub use jobs::{CancelOutcome, Claim, Ending, NewJob};
+pub use results::Parts;
+
+/// The database of one server.
+#[derive(Debug)]
+pub struct Store {
+    writer: SqlitePool,
+    reader: SqlitePool,
+    /// Held as long as we live: a second server on the same folder would run our jobs again.
+    _lock: File,
+}
+
+/// What can go wrong with the store.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The folder cannot be used.
+    #[error("{0}")]
+    Folder(String),
+    /// The queue holds as many jobs as it may.
+    #[error("the queue is full")]
+    QueueFull,
+    /// The disk is full.
+    #[error("the disk is full")]
+    Full,
+    /// A row that cannot be ours.
+    #[error("the database holds something unexpected: {0}")]
+    Corrupt(String),
+    /// The database says no.
+    #[error("database: {0}")]
+    Database(sqlx::Error),
+    /// The tables cannot be brought up to date.
+    #[error("migration: {0}")]
+    Migrate(#[from] MigrateError),
+}
+
+impl From<sqlx::Error> for StoreError {
+    fn from(error: sqlx::Error) -> Self {
+        const SQLITE_FULL: &str = "13";
+        match &error {
+            sqlx::Error::Database(cause) if cause.code().as_deref() == Some(SQLITE_FULL) => {
+                StoreError::Full
+            }
+            _ => StoreError::Database(error),
+        }
+    }
+}
+
+impl From<serde_json::Error> for StoreError {
+    fn from(error: serde_json::Error) -> Self {
+        StoreError::Corrupt(error.to_string())
+    }
+}
+
+/// What the store answers.
+pub type Result<T> = std::result::Result<T, StoreError>;
+
+impl Store {
+    /// Opens the store in `folder`, made if need be, and brings its tables up to date.
+    pub async fn open(folder: &Path) -> Result<Store> {
+        let lock = lock(folder)?;
+        let options = SqliteConnectOptions::new()
+            .filename(folder.join("signorini.db"))
+            .foreign_keys(true)
+            .busy_timeout(Duration::from_secs(5));
+        let writing = options
+            .clone()
+            .create_if_missing(true)
+            .journal_mode(SqliteJournalMode::Wal)
+            .synchronous(SqliteSynchronous::Full);
+        let writer = pool(1).connect_with(writing).await?;
+        sqlx::migrate!("../migrations").run(&writer).await?;
+        let reader = pool(4).connect_with(options.read_only(true)).await?;
+        Ok(Store {
+            writer,
+            reader,
+            _lock: lock,
+        })
+    }
+
+    /// Ends every connection, and with the last one the write-ahead log.
+    pub async fn close(&self) {
+        self.reader.close().await;
+        self.writer.close().await;
+    }
+
+    /// Whether the store still answers.
+    pub async fn ping(&self) -> Result<()> {
+        sqlx::query("select 1").execute(&self.reader).await?;
+        Ok(())
+    }
+
+    async fn begin(&self) -> Result<Transaction<'static, Sqlite>> {
+        Ok(self.writer.begin_with("begin immediate").await?)
+    }
+}
+
+/// Connections to a local file neither age nor need a test before use.
+fn pool(connections: u32) -> SqlitePoolOptions {
+    SqlitePoolOptions::new()
+        .max_connections(connections)
+        .min_connections(connections)
+        .idle_timeout(None)
+        .max_lifetime(None)
+        .test_before_acquire(false)
+}
+
+fn lock(folder: &Path) -> Result<File> {
+    let named = |error: std::io::Error| {
+        StoreError::Folder(format!("cannot use {}: {error}", folder.display()))
+    };
+    std::fs::create_dir_all(folder).map_err(named)?;
+    let file = OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(folder.join("lock"))
+        .map_err(named)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(StoreError::Folder(format!(
+            "another server is using {}",
+            folder.display()
+        ))),
+        Err(TryLockError::Error(error)) => Err(named(error)),
+    }
+}

@@ -1,0 +1,79 @@
+//! Points in time: microseconds since 1970 in the store, RFC 3339 in UTC outside.
+
+use std::fmt;
+
+use jiff::Timestamp;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// A point in time, to the microsecond.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Time(i64);
+
+impl Time {
+    /// This moment.
+    pub fn now() -> Self {
+        Time(Timestamp::now().as_microsecond())
+    }
+
+    /// From microseconds since 1970.
+    pub fn from_micros(micros: i64) -> Self {
+        Time(micros)
+    }
+
+    /// Microseconds since 1970.
+    pub fn micros(self) -> i64 {
+        self.0
+    }
+
+    /// Seconds from here to `later`. A clock set back in between gives 0, not a negative duration.
+    pub fn seconds_until(self, later: Time) -> f64 {
+        later.0.saturating_sub(self.0).max(0) as f64 / 1e6
+    }
+}
+
+impl fmt::Display for Time {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match Timestamp::from_microsecond(self.0) {
+            Ok(time) => write!(f, "{time:.6}"),
+            Err(_) => write!(f, "{} µs", self.0), // beyond the year 9999: no clock of ours says so
+        }
+    }
+}
+
+impl Serialize for Time {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Time {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let time: Timestamp = text.parse().map_err(serde::de::Error::custom)?;
+        Ok(Time(time.as_microsecond()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_time_survives_its_text() {
+        let time = Time::from_micros(1_700_000_000_000_001);
+        assert_eq!(time.to_string(), "2023-11-14T22:13:20.000001Z");
+        assert_eq!(
+            serde_json::from_str::<Time>(&serde_json::to_string(&time).unwrap()).unwrap(),
+            time
+        );
+    }
+
+    #[test]
+    fn a_clock_set_back_gives_no_negative_duration() {
+        assert_eq!(
+            Time::from_micros(2_000_000).seconds_until(Time::from_micros(0)),
+            0.0
+        );
+    }
+}
