@@ -179,6 +179,8 @@ pub enum Reason {
     SingularSystem,
     /// A number that is not finite came up.
     NonFinite,
+    /// It needs more than there is.
+    ResourceExhausted,
     /// The process died under it once too often.
     WorkerLost,
     /// Our fault.
@@ -189,11 +191,12 @@ pub enum Reason {
 
 impl Reason {
     /// All of them.
-    pub const ALL: [Reason; 7] = [
+    pub const ALL: [Reason; 8] = [
         Reason::NotConverged,
         Reason::ContactCycling,
         Reason::SingularSystem,
         Reason::NonFinite,
+        Reason::ResourceExhausted,
         Reason::WorkerLost,
         Reason::Internal,
         Reason::UserCancel,
@@ -206,6 +209,7 @@ impl Reason {
             Reason::ContactCycling => "contact_cycling",
             Reason::SingularSystem => "singular_system",
             Reason::NonFinite => "non_finite",
+            Reason::ResourceExhausted => "resource_exhausted",
             Reason::WorkerLost => "worker_lost",
             Reason::Internal => "internal",
             Reason::UserCancel => "user_cancel",
@@ -301,6 +305,7 @@ impl Failure {
             Reason::ContactCycling => "The contact set repeats itself without settling",
             Reason::SingularSystem => "The stiffness matrix is singular",
             Reason::NonFinite => "A number that is not finite came up",
+            Reason::ResourceExhausted => "The job needs more than there is",
             Reason::WorkerLost => "The worker was lost once too often",
             Reason::Internal => "The service failed",
             Reason::UserCancel => "The job was canceled",

@@ -11,6 +11,7 @@ pub mod error;
 
 // Solve one problem and measure it; fingerprints of problem and result.
 pub mod digest;
+pub mod finite;
 pub mod run;
 
 // Remember: everything durable, and the only SQL.

@@ -10,7 +10,7 @@ use solver::{
     solution::{ContactProfile, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution},
 };
 
-use crate::digest;
+use crate::{digest, finite};
 
 /// What a solved problem is stored, served and written as.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -65,7 +65,7 @@ pub fn run(
             Progress::Iteration(row) => {
                 row.wall_s = watch.elapsed_s();
                 // JSON has no word for it, and to go on is pointless.
-                broken |= !is_finite(row);
+                broken |= !finite::iteration(row);
             }
             Progress::Warning(_) => {}
         }
@@ -85,7 +85,11 @@ pub fn run(
         solution.fields = Fields::default();
     }
     let timings = watch.stop();
-    let non_finite = |_| SolveError::NonFinite { phase: "recover" };
+    let non_finite = SolveError::NonFinite { phase: "recover" };
+    if !finite::solution(&solution) {
+        return Err(non_finite);
+    }
+    let non_finite = |_| non_finite.clone();
     let input_hash = digest::input_hash(problem).map_err(non_finite)?;
     let digest = digest::digest(&solution, &input_hash).map_err(non_finite)?;
     let Solution {
@@ -109,20 +113,6 @@ pub fn run(
         steps: vec![],
         fields,
     })
-}
-
-fn is_finite(row: &Iteration) -> bool {
-    [
-        row.residual,
-        row.friction_residual,
-        row.tolerance,
-        row.force.normal,
-        row.force.tangential,
-    ]
-    .into_iter()
-    .chain(row.r_f)
-    .chain(row.contraction)
-    .all(f64::is_finite)
 }
 
 /// Seconds by phase; every phase is present, also one that was not reached.

@@ -3,7 +3,7 @@
 //! it, with the pointers that the JSON form would have.
 
 use solver::{
-    error::Violation,
+    error::{Violation, escape},
     problem::{
         Algorithm, Along, Analysis, BoundaryPart, BoundaryValue, Contact, Friction, Grid, History,
         InlineMesh, Kernel, Load, Material, MeshInput, Normalization, Obstacle, Problem,
@@ -173,7 +173,7 @@ impl Reader {
         }
         for (name, pb::BoundaryPart { side, x, y }) in boundaries {
             let mut range = |axis: &str, range: Option<pb::Range>| {
-                let at = format!("/mesh/boundaries/{}/{axis}", escaped(&name));
+                let at = format!("/mesh/boundaries/{}/{axis}", escape(&name));
                 range.map(|r| {
                     [
                         self.number(&format!("{at}/0"), r.start),
@@ -224,7 +224,7 @@ impl Reader {
         let boundaries = boundaries
             .into_iter()
             .map(|(name, list)| {
-                let at = format!("/mesh/inline/boundaries/{}", escaped(&name));
+                let at = format!("/mesh/inline/boundaries/{}", escape(&name));
                 let edges = list.edges.into_iter().enumerate();
                 let edges = edges
                     .map(|(i, edge)| self.indices(&format!("{at}/{i}"), edge.nodes))
@@ -406,11 +406,6 @@ fn each<M, T>(
         .map(|(i, message)| read(&format!("{at}/{i}"), message))
         .collect();
     read.into_iter().collect()
-}
-
-/// A name as a step of a JSON Pointer.
-fn escaped(name: &str) -> String {
-    name.replace('~', "~0").replace('/', "~1")
 }
 
 /// Writes a problem as a message, every default spelled out.

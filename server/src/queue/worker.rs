@@ -152,17 +152,19 @@ fn judge(
             (ending, Some(parts))
         }
         Ok(Err(SolveError::Stopped)) => (Ending::canceled(), None),
-        Ok(Err(error @ SolveError::SingularSystem { .. })) => (
-            Ending::failed(Reason::SingularSystem, error.to_string()),
-            None,
-        ),
-        Ok(Err(error @ SolveError::NonFinite { .. })) => {
-            (Ending::failed(Reason::NonFinite, error.to_string()), None)
+        Ok(Err(error @ SolveError::SingularSystem { .. })) => {
+            failed(Reason::SingularSystem, &error)
         }
+        Ok(Err(error @ SolveError::NonFinite { .. })) => failed(Reason::NonFinite, &error),
+        Ok(Err(error @ SolveError::ResourceExhausted)) => failed(Reason::ResourceExhausted, &error),
         // It was checked before it was accepted: ours to explain, not the client's.
         Ok(Err(error @ SolveError::Invalid(_))) => (internal(job, &error), None),
         Err(panic) => (internal(job, &panicked(panic)), None),
     }
+}
+
+fn failed(reason: Reason, error: &SolveError) -> (Ending, Option<Parts>) {
+    (Ending::failed(reason, error.to_string()), None)
 }
 
 /// Logs the cause under an incident number, which is all that the client is told.

@@ -1,14 +1,18 @@
 //! How requests are read: strictly.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, time::Duration};
 
 use axum::{
-    body::{Body, to_bytes},
+    body::{Body, BodyDataStream},
     extract::{FromRequestParts, Path},
     http::{HeaderMap, header, request::Parts},
 };
+use futures_util::StreamExt;
 use serde_json::value::RawValue;
-use solver::{error::Violation, problem::Problem};
+use solver::{
+    error::{Violation, escape},
+    problem::Problem,
+};
 
 use crate::{
     error::ApiError,
@@ -130,22 +134,42 @@ pub(super) async fn json_text(
     {
         return Err(ApiError::UnsupportedMedia(content_type.into()));
     }
+    let mut pieces = body.into_data_stream();
     let length = headers
         .get(header::CONTENT_LENGTH)
         .and_then(|value| value.to_str().ok()?.parse::<usize>().ok());
-    if length.is_some_and(|length| length > limit_bytes) {
+    let mut bytes = Vec::new();
+    let mut too_large = length.is_some_and(|length| length > limit_bytes);
+    while !too_large && let Some(piece) = pieces.next().await {
+        let piece = piece
+            .map_err(|error| ApiError::MalformedJson(format!("the body broke off: {error}")))?;
+        too_large = bytes.len() + piece.len() > limit_bytes;
+        if !too_large {
+            bytes.extend_from_slice(&piece);
+        }
+    }
+    if too_large {
+        tokio::spawn(discard(pieces));
         return Err(ApiError::PayloadTooLarge { limit_bytes });
     }
-    let bytes = to_bytes(body, limit_bytes).await.map_err(|error| {
-        let too_large = std::error::Error::source(&error)
-            .is_some_and(|cause| cause.to_string().contains("limit"));
-        if too_large {
-            ApiError::PayloadTooLarge { limit_bytes }
-        } else {
-            ApiError::MalformedJson(error.to_string())
+    String::from_utf8(bytes).map_err(|error| ApiError::MalformedJson(error.to_string()))
+}
+
+/// Takes in, for a while, what nobody reads: many clients look at the answer only after they have
+/// sent everything, and see a broken connection if we hang up before.
+async fn discard(mut pieces: BodyDataStream) {
+    const MOST_BYTES: usize = 256 << 20;
+    const LONGEST: Duration = Duration::from_secs(10);
+    let all = async {
+        let mut bytes = 0;
+        while let Some(Ok(piece)) = pieces.next().await {
+            bytes += piece.len();
+            if bytes > MOST_BYTES {
+                break;
+            }
         }
-    })?;
-    String::from_utf8(bytes.into()).map_err(|error| ApiError::MalformedJson(error.to_string()))
+    };
+    let _ = tokio::time::timeout(LONGEST, all).await; // late or not, it is over
 }
 
 /// What is wrong with a body whose JSON is well formed, or what it holds.
@@ -245,8 +269,8 @@ fn take<T: serde::de::DeserializeOwned>(
 fn unknown(fields: BTreeMap<String, &RawValue>, known: &str, violations: &mut Vec<Violation>) {
     for name in fields.into_keys() {
         violations.push(Violation {
-            pointer: format!("/{}", name.replace('~', "~0").replace('/', "~1")),
-            reason: "unknown_field".into(),
+            pointer: format!("/{}", escape(&name)),
+            reason: "unknown_name".into(),
             got: format!("{name:?}"),
             expected: format!("one of {known}"),
             hint: "Check the spelling, or leave it out.".into(),

@@ -4,7 +4,10 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use async_stream::try_stream;
 use futures_util::Stream;
-use solver::{error::Violation, problem::Problem};
+use solver::{
+    error::{Violation, escape},
+    problem::Problem,
+};
 use tokio::time::{Instant, timeout_at};
 use tracing::info;
 
@@ -138,7 +141,7 @@ impl Envelope {
         for (key, value) in &self.labels {
             let longest = length(key).max(length(value));
             if longest > MOST || key.is_empty() {
-                let pointer = format!("/labels/{}", key.replace('~', "~0").replace('/', "~1"));
+                let pointer = format!("/labels/{}", escape(key));
                 add(
                     pointer,
                     format!("{longest} characters"),
