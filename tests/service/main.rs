@@ -1,1 +1,26 @@
-fn main() {}
+//! What the service promises, held against the real binary on a free port with its own store.
+//! Nothing sleeps to wait: a test listens to events.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod cancel;
+mod demo;
+mod errors;
+mod grpc;
+mod limits;
+mod list;
+mod rest_and_grpc_agree;
+mod restart;
+mod results;
+mod solve_command;
+mod submit;
+mod validate;
+mod watch;
+
+/// The binary under test.
+const SIGNORINI: &str = env!("CARGO_BIN_EXE_signorini");
+
+use suite::harness::Server;
+
+async fn server() -> Server {
+    Server::start(SIGNORINI, &[]).await
+}

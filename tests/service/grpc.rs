@@ -1,0 +1,302 @@
+//! The eight calls of `signorini.v1.JobService`, and what stands beside them.
+
+use service::{
+    convert::problem_to_pb,
+    pb::{self, job_service_client::JobServiceClient},
+};
+use solver::problem::Problem;
+use suite::{
+    example,
+    harness::{Server, large},
+};
+use tonic::{Code, transport::Channel};
+use tonic_types::StatusExt;
+
+use crate::{SIGNORINI, server};
+
+pub(crate) async fn connect(server: &Server) -> JobServiceClient<Channel> {
+    JobServiceClient::connect(server.url.clone()).await.unwrap()
+}
+
+pub(crate) fn message(text: &str) -> pb::Problem {
+    problem_to_pb(&solver::parse(text).unwrap())
+}
+
+#[tokio::test]
+async fn a_job_goes_all_the_way_over_grpc() {
+    let server = server().await;
+    let mut grpc = connect(&server).await;
+    let problem = message(&example("rectangular_punch"));
+    let judged = grpc
+        .validate_problem(pb::ValidateProblemRequest {
+            problem: Some(problem.clone()),
+        })
+        .await
+        .unwrap();
+    assert!(judged.into_inner().valid);
+    let request = pb::CreateJobRequest {
+        problem: Some(problem),
+        name: Some("x".into()),
+        ..Default::default()
+    };
+    let job = grpc.create_job(request).await.unwrap().into_inner();
+    assert_eq!(job.status(), pb::Status::Queued);
+
+    let mut stream = grpc
+        .watch_job(pb::WatchJobRequest {
+            id: job.id.clone(),
+            after_seq: 0,
+        })
+        .await
+        .unwrap()
+        .into_inner();
+    let mut events = vec![];
+    while let Some(event) = stream.message().await.unwrap() {
+        events.push(event);
+    }
+    assert!(
+        events
+            .iter()
+            .map(|event| event.seq)
+            .eq(1..=events.len() as i64)
+    );
+    let Some(pb::event::Payload::Done(done)) = events.pop().unwrap().payload else {
+        panic!("done comes last")
+    };
+    assert_eq!(done.job.unwrap().status(), pb::Status::Succeeded);
+
+    let job = grpc
+        .get_job(pb::GetJobRequest { id: job.id })
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(job.result_available(), pb::ResultAvailable::Final);
+    let result = grpc
+        .get_result(pb::GetResultRequest { id: job.id.clone() })
+        .await
+        .unwrap()
+        .into_inner();
+    assert!(result.summary.unwrap().converged);
+    let profile = grpc
+        .get_profile(pb::GetProfileRequest {
+            id: job.id.clone(),
+            boundary: "top".into(),
+        })
+        .await;
+    let profile = profile.unwrap().into_inner();
+    assert!(!profile.s.is_empty() && profile.state.len() == profile.s.len());
+    let list = grpc
+        .list_jobs(pb::ListJobsRequest {
+            page_size: 10,
+            ..Default::default()
+        })
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!((list.jobs.len(), list.next_page_token.as_str()), (1, ""));
+    let canceled = grpc
+        .cancel_job(pb::CancelJobRequest { id: job.id })
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(
+        canceled.outcome(),
+        pb::cancel_job_response::Outcome::AlreadyTerminal
+    );
+}
+
+#[tokio::test]
+async fn who_waits_over_grpc_gets_the_terminal_job() {
+    let server = server().await;
+    let mut grpc = connect(&server).await;
+    let problem = Some(message(&example("sheet")));
+    let job = grpc
+        .create_job(pb::CreateJobRequest {
+            problem: problem.clone(),
+            wait_s: Some(30.0),
+            ..Default::default()
+        })
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(job.status(), pb::Status::Succeeded);
+    let refused = grpc
+        .create_job(pb::CreateJobRequest {
+            problem,
+            wait_s: Some(61.0),
+            ..Default::default()
+        })
+        .await
+        .unwrap_err();
+    assert_eq!(refused.code(), Code::InvalidArgument);
+}
+
+#[tokio::test]
+async fn errors_carry_codes_and_details() {
+    let server = server().await;
+    let mut grpc = connect(&server).await;
+    let none = grpc
+        .get_job(pb::GetJobRequest { id: "job_7".into() })
+        .await
+        .unwrap_err();
+    assert_eq!(none.code(), Code::NotFound);
+    assert_eq!(
+        none.get_error_details().error_info().unwrap().reason,
+        "not-found"
+    );
+
+    let mut problem = message(&example("sheet"));
+    problem.materials[0].youngs_modulus = -1.0;
+    let request = pb::CreateJobRequest {
+        problem: Some(problem),
+        priority: 99,
+        ..Default::default()
+    };
+    let invalid = grpc.create_job(request).await.unwrap_err();
+    assert_eq!(invalid.code(), Code::InvalidArgument);
+    let details = invalid.get_error_details();
+    let fields: Vec<_> = details
+        .bad_request()
+        .unwrap()
+        .field_violations
+        .iter()
+        .map(|v| v.field.clone())
+        .collect();
+    assert_eq!(fields, ["/priority", "/problem/materials/0/youngs_modulus"]);
+
+    let empty = grpc
+        .create_job(pb::CreateJobRequest::default())
+        .await
+        .unwrap_err();
+    let details = empty.get_error_details();
+    assert!(
+        details
+            .bad_request()
+            .unwrap()
+            .field_violations
+            .iter()
+            .any(|v| v.field == "/problem/mesh")
+    );
+
+    // A message over 1 MiB.
+    let mut problem: Problem = solver::parse(&example("sheet")).unwrap();
+    problem.title = Some("x".repeat(2 << 20));
+    let request = pb::CreateJobRequest {
+        problem: Some(problem_to_pb(&problem)),
+        ..Default::default()
+    };
+    assert_eq!(
+        grpc.create_job(request).await.unwrap_err().code(),
+        Code::OutOfRange
+    );
+}
+
+#[tokio::test]
+async fn a_stream_over_grpc_ends_unavailable_when_the_service_stops() {
+    let mut server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
+    let id = server.submit(&large()).await;
+    server.until_running(&id).await;
+    let mut grpc = connect(&server).await;
+    let mut stream = grpc
+        .watch_job(pb::WatchJobRequest { id, after_seq: 0 })
+        .await
+        .unwrap()
+        .into_inner();
+    stream.message().await.unwrap();
+    assert!(server.terminate().await.success());
+    let status = loop {
+        match stream.message().await {
+            Ok(Some(event)) => assert!(!matches!(event.payload, Some(pb::event::Payload::Done(_)))),
+            Ok(None) => panic!("the stream ended as if the job had"),
+            Err(status) => break status,
+        }
+    };
+    assert_eq!(status.code(), Code::Unavailable);
+}
+
+#[tokio::test]
+async fn health_and_unknown_services_answer() {
+    let server = server().await;
+    let channel = Channel::from_shared(server.url.clone())
+        .unwrap()
+        .connect()
+        .await
+        .unwrap();
+    let mut health = tonic_health::pb::health_client::HealthClient::new(channel.clone());
+    for name in ["", "signorini.v1.JobService"] {
+        let request = tonic_health::pb::HealthCheckRequest {
+            service: name.into(),
+        };
+        let answer = health.check(request).await.unwrap().into_inner();
+        assert_eq!(
+            answer.status(),
+            tonic_health::pb::health_check_response::ServingStatus::Serving,
+            "{name:?}"
+        );
+    }
+    let mut unknown = tonic::client::Grpc::new(channel);
+    unknown.ready().await.unwrap();
+    let codec = tonic_prost::ProstCodec::<pb::GetJobRequest, pb::Job>::default();
+    let path = "/other.Service/Call".parse().unwrap();
+    let status = unknown
+        .unary(
+            tonic::Request::new(pb::GetJobRequest::default()),
+            path,
+            codec,
+        )
+        .await
+        .unwrap_err();
+    assert_eq!(status.code(), Code::Unimplemented);
+}
+
+#[tokio::test]
+async fn reflection_names_our_service_in_both_versions() {
+    use futures_util::stream;
+    let server = server().await;
+    let channel = Channel::from_shared(server.url.clone())
+        .unwrap()
+        .connect()
+        .await
+        .unwrap();
+
+    use tonic_reflection::pb::v1;
+    let mut reflection = v1::server_reflection_client::ServerReflectionClient::new(channel.clone());
+    let ask = v1::ServerReflectionRequest {
+        message_request: Some(v1::server_reflection_request::MessageRequest::ListServices(
+            String::new(),
+        )),
+        ..Default::default()
+    };
+    let mut answers = reflection
+        .server_reflection_info(stream::iter([ask]))
+        .await
+        .unwrap()
+        .into_inner();
+    let answer = format!("{:?}", answers.message().await.unwrap().unwrap());
+    assert!(
+        answer.contains("signorini.v1.JobService") && answer.contains("grpc.health.v1.Health"),
+        "{answer}"
+    );
+
+    use tonic_reflection::pb::v1alpha;
+    let mut reflection = v1alpha::server_reflection_client::ServerReflectionClient::new(channel);
+    let ask = v1alpha::ServerReflectionRequest {
+        message_request: Some(
+            v1alpha::server_reflection_request::MessageRequest::FileContainingSymbol(
+                "signorini.v1.JobService".into(),
+            ),
+        ),
+        ..Default::default()
+    };
+    let mut answers = reflection
+        .server_reflection_info(stream::iter([ask]))
+        .await
+        .unwrap()
+        .into_inner();
+    let answer = format!("{:?}", answers.message().await.unwrap().unwrap());
+    assert!(
+        answer.contains("FileDescriptorResponse"),
+        "{}",
+        &answer[..300.min(answer.len())]
+    );
+}

@@ -1,0 +1,116 @@
+//! What is too much is refused, and the rest goes on.
+
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use suite::{
+    example_json,
+    harness::{Server, large},
+};
+
+use crate::{SIGNORINI, server};
+
+#[tokio::test]
+async fn a_body_over_the_limit_is_refused() {
+    let server = server().await;
+    let body = format!("{{\"problem\": \"{}\"}}", "x".repeat(17 << 20));
+    let post = || {
+        server
+            .post("/v1/jobs")
+            .header("Content-Type", "application/json")
+    };
+    let response = post().body(body.clone()).send().await.unwrap();
+    assert_eq!(response.status(), StatusCode::PAYLOAD_TOO_LARGE);
+    assert_eq!(
+        response.json::<Value>().await.unwrap()["code"],
+        "payload-too-large"
+    );
+    // Also when the length is not announced.
+    let pieces = body
+        .into_bytes()
+        .chunks(1 << 16)
+        .map(|piece| Ok::<_, String>(piece.to_vec()))
+        .collect::<Vec<_>>();
+    let stream = futures_util::stream::iter(pieces);
+    let response = post()
+        .body(reqwest::Body::wrap_stream(stream))
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(response.status(), StatusCode::PAYLOAD_TOO_LARGE);
+}
+
+#[tokio::test]
+async fn a_problem_over_the_memory_budget_is_refused_with_the_figures() {
+    let server = Server::start(SIGNORINI, &["--memory-budget-bytes", "1000000000"]).await;
+    for path in ["/v1/jobs", "/v1/problems/validate"] {
+        let response = server
+            .post(path)
+            .json(&json!({ "problem": large() }))
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(response.status(), StatusCode::PAYLOAD_TOO_LARGE);
+        let document: Value = response.json().await.unwrap();
+        assert_eq!(document["code"], "problem-too-large");
+        assert!(document["estimate"]["memory_bytes"].as_u64().unwrap() > 1_000_000_000);
+        assert_eq!(document["memory_budget_bytes"], 1_000_000_000);
+    }
+    // A size beyond all numbers is refused as quickly.
+    let mut hopeless = example_json("sheet");
+    hopeless["mesh"]["refine"] = json!(4_000_000_000u32);
+    let response = server
+        .post("/v1/jobs")
+        .json(&json!({ "problem": hopeless }))
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(response.status(), StatusCode::PAYLOAD_TOO_LARGE);
+}
+
+#[tokio::test]
+async fn a_full_queue_refuses_jobs_and_nothing_else() {
+    let server = Server::start_alone(SIGNORINI, &["--workers", "1", "--max-queued", "2"]).await;
+    let front = server.submit(&large()).await;
+    server.until_running(&front).await;
+    let waiting = [
+        server.submit(&example_json("sheet")).await,
+        server.submit(&example_json("sheet")).await,
+    ];
+    let body = json!({ "problem": example_json("sheet") });
+    let full = server.post("/v1/jobs").json(&body).send().await.unwrap();
+    assert_eq!(full.status(), StatusCode::SERVICE_UNAVAILABLE);
+    assert!(full.headers().contains_key("retry-after"));
+    assert_eq!(full.json::<Value>().await.unwrap()["code"], "queue-full");
+    assert_eq!(server.job(&waiting[0]).await["status"], "queued");
+    assert_eq!(server.cancel(&waiting[0]).await["outcome"], "canceled");
+    server.submit(&example_json("sheet")).await; // there is room again
+}
+
+#[tokio::test]
+async fn two_large_jobs_run_at_once_and_a_third_waits() {
+    let server = Server::start_alone(SIGNORINI, &[]).await;
+    let (first, second) = (server.submit(&large()).await, server.submit(&large()).await);
+    let third = server.submit(&large()).await;
+    server.until_running(&first).await;
+    server.until_running(&second).await;
+    let status = async |id: &str| server.job(id).await["status"].as_str().unwrap().to_string();
+    assert_eq!(
+        [status(&first).await, status(&second).await],
+        ["running", "running"]
+    );
+    assert_eq!(status(&third).await, "queued");
+    assert_eq!(server.job(&third).await["queue"]["position"], 1);
+    // The third starts when one of the two has ended; all three find the same bits.
+    server.until_running(&third).await;
+    let running = server.json("/v1/jobs?status=running").await;
+    assert!(running["jobs"].as_array().unwrap().len() <= 2);
+    let mut digests = vec![];
+    for id in [&first, &second, &third] {
+        let job = server.until_done(id).await;
+        assert_eq!(job["status"], "succeeded", "{job:#}");
+        let summary = server.json(&format!("/v1/jobs/{id}/result")).await["summary"].take();
+        assert!(summary["dofs"].as_u64().unwrap() >= 500_000);
+        digests.push(summary["digest"].clone());
+    }
+    assert!(digests.iter().all(|digest| *digest == digests[0]));
+}

@@ -1,0 +1,103 @@
+//! POST /v1/problems/validate.
+
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use suite::example_json;
+
+use crate::server;
+
+#[tokio::test]
+async fn a_good_problem_is_valid_and_has_a_price() {
+    let server = server().await;
+    let body = json!({ "problem": example_json("cylinder") });
+    let response = server
+        .post("/v1/problems/validate")
+        .json(&body)
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(response.status(), StatusCode::OK);
+    let judgement: Value = response.json().await.unwrap();
+    assert_eq!(
+        (&judgement["valid"], &judgement["violations"]),
+        (&json!(true), &json!([]))
+    );
+    assert!(judgement["estimate"]["dofs"].as_u64().unwrap() > 0);
+    assert!(
+        judgement["input_hash"]
+            .as_str()
+            .unwrap()
+            .starts_with("sha256:")
+    );
+    assert_eq!(
+        server.json("/v1/jobs").await["jobs"],
+        json!([]),
+        "nothing was stored"
+    );
+}
+
+#[tokio::test]
+async fn a_bad_problem_is_an_answer_and_not_an_error() {
+    let server = server().await;
+    // Structural faults first: names and types …
+    let mut problem = example_json("cylinder");
+    problem["contact"] = json!([]);
+    problem["mesh"]["grid"]["x"][1] = json!("far");
+    let judgement = validate(&server, &problem).await;
+    assert_eq!(judgement["valid"], false);
+    let pointers = pointers(&judgement);
+    assert!(
+        pointers.contains(&"/problem/contact".into()),
+        "{pointers:?}"
+    );
+    assert!(
+        pointers.contains(&"/problem/mesh/grid/x/1".into()),
+        "{pointers:?}"
+    );
+    // … then those of meaning.
+    let mut problem = example_json("cylinder");
+    problem["supports"][0]["boundary"] = json!("lft");
+    let judgement = validate(&server, &problem).await;
+    assert_eq!(judgement["valid"], false);
+    let violation = &judgement["violations"][0];
+    assert_eq!(violation["pointer"], "/problem/supports/0/boundary");
+    assert!(
+        violation["expected"].as_str().unwrap().contains("left"),
+        "it names what exists: {violation}"
+    );
+}
+
+#[tokio::test]
+async fn a_body_without_a_problem_is_told_so() {
+    let server = server().await;
+    let response = server
+        .post("/v1/problems/validate")
+        .json(&json!({ "probelm": {} }))
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(response.status(), StatusCode::OK);
+    let judgement: Value = response.json().await.unwrap();
+    assert_eq!(pointers(&judgement), ["/problem", "/probelm"]);
+}
+
+async fn validate(server: &suite::harness::Server, problem: &Value) -> Value {
+    let body = json!({ "problem": problem });
+    server
+        .post("/v1/problems/validate")
+        .json(&body)
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap()
+}
+
+fn pointers(judgement: &Value) -> Vec<String> {
+    let violations = judgement["violations"].as_array().unwrap();
+    violations
+        .iter()
+        .map(|violation| violation["pointer"].as_str().unwrap().to_string())
+        .collect()
+}

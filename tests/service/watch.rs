@@ -1,0 +1,175 @@
+//! GET /v1/jobs/{id}/events.
+
+use reqwest::StatusCode;
+use serde_json::Value;
+use suite::{
+    example_json,
+    harness::{Server, block, large},
+};
+
+use crate::{SIGNORINI, server};
+
+#[tokio::test]
+async fn the_story_of_a_job_is_told_in_order_and_can_be_told_again() {
+    let server = server().await;
+    let id = server.submit(&example_json("rectangular_punch")).await;
+    let live = server.events(&id, 0).await.rest().await;
+    let again = server.events(&id, 0).await.rest().await;
+    assert_eq!(live, again);
+    assert_dense(&live);
+    assert_eq!(
+        (&live[0]["status"], &live[1]["status"]),
+        (&"queued".into(), &"running".into())
+    );
+    let rows: Vec<&Value> = live
+        .iter()
+        .filter(|event| event["type"] == "iteration")
+        .collect();
+    assert!(
+        rows.iter()
+            .map(|row| row["k"].as_u64().unwrap())
+            .eq(1..=rows.len() as u64)
+    );
+    for name in [
+        "stage",
+        "residual",
+        "friction_residual",
+        "tolerance",
+        "contact",
+        "friction",
+        "force",
+        "wall_s",
+    ] {
+        assert!(!rows[0][name].is_null(), "{name}");
+    }
+    let done = &live.last().unwrap()["job"];
+    assert_eq!(done["status"], "succeeded");
+    assert_eq!(*done, server.job(&id).await);
+}
+
+#[tokio::test]
+async fn a_stream_goes_on_where_it_was_left() {
+    let server = server().await;
+    let id = server.submit(&example_json("rectangular_punch")).await;
+    let all = server.events(&id, 0).await.rest().await;
+    let n = all.len();
+    assert_eq!(server.events(&id, 5).await.rest().await, all[5..]);
+    // The parameter does the same, and the header wins over it.
+    let get = |after: usize| server.get(&format!("/v1/jobs/{id}/events?after_seq={after}"));
+    let text = get(n - 1).send().await.unwrap().text().await.unwrap();
+    assert!(text.starts_with(&format!("id: {n}\n")), "{text}");
+    let text = get(0)
+        .header("Last-Event-ID", (n - 1).to_string())
+        .send()
+        .await
+        .unwrap()
+        .text()
+        .await
+        .unwrap();
+    assert!(text.starts_with(&format!("id: {n}\n")), "{text}");
+    // Nothing lies after the last.
+    let silent = get(n).send().await.unwrap();
+    assert_eq!(silent.status(), StatusCode::NO_CONTENT);
+    for wrong in ["-1", "last", ""] {
+        let response = get(0).header("Last-Event-ID", wrong).send().await.unwrap();
+        assert_eq!(response.status(), StatusCode::BAD_REQUEST, "{wrong:?}");
+    }
+}
+
+#[tokio::test]
+async fn closing_a_stream_does_not_cancel_the_job() {
+    let server = server().await;
+    let id = server.submit(&block(60, 60)).await;
+    let mut events = server.events(&id, 0).await;
+    events.next().await.unwrap();
+    drop(events);
+    assert_eq!(server.until_done(&id).await["status"], "succeeded");
+}
+
+/// The client hangs up after each event and comes back with the number of the last; meanwhile the
+/// service is killed before the job starts, killed in mid-job, and stopped in mid-job.
+#[tokio::test]
+async fn a_client_that_reconnects_after_each_event_gets_every_event_exactly_once() {
+    let mut server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
+    let front = server.submit(&large()).await;
+    server.until_running(&front).await;
+    let id = server.submit(&block(120, 110)).await;
+
+    let mut story: Vec<Value> = vec![];
+    let mut connections = 0;
+    let (mut connections_before_start, mut ends_of_the_service) = (0, 0);
+    while story.last().is_none_or(|event| event["type"] != "done") {
+        let mut stream = server.events(&id, story.len() as i64).await;
+        connections += 1;
+        let started = story.iter().any(|event| event["status"] == "running");
+        if !started {
+            connections_before_start += 1;
+        }
+        if !started && story.len() == 1 && ends_of_the_service == 0 {
+            // Connected, and waiting for the start that does not come: the service dies under us.
+            server.kill().await;
+            assert_eq!(stream.next().await, None, "the line is dead");
+            server.restart().await;
+            ends_of_the_service = 1;
+            continue;
+        }
+        if !started && story.len() == 1 {
+            server.cancel(&front).await;
+        }
+        let event = stream.next().await.expect("an event");
+        drop(stream);
+        let (attempt, stage) = (
+            event["attempt"].as_i64().unwrap(),
+            event["stage"].as_str().unwrap_or_default(),
+        );
+        let mid_job = event["type"] == "stage" && stage == "assemble";
+        story.push(event);
+        if mid_job && attempt == 1 {
+            server.kill().await;
+            server.restart().await;
+            ends_of_the_service += 1;
+        } else if mid_job && attempt == 2 {
+            assert!(server.terminate().await.success());
+            server.restart().await;
+            ends_of_the_service += 1;
+        }
+    }
+    assert_dense(&story);
+    assert!(connections > 20, "{connections} connections");
+    assert!(connections_before_start >= 3 && ends_of_the_service == 3);
+    let job = &story.last().unwrap()["job"];
+    assert_eq!(
+        (job["status"].as_str(), job["attempt"].as_i64()),
+        (Some("succeeded"), Some(3))
+    );
+    assert_eq!(
+        server.events(&id, 0).await.rest().await,
+        story,
+        "as one reads it in one go"
+    );
+    let reasons: Vec<_> = story
+        .iter()
+        .filter_map(|event| event["reason"].as_str())
+        .collect();
+    assert_eq!(reasons, ["worker_lost", "drain"]);
+}
+
+/// seq is dense from 1, and there is exactly one end.
+fn assert_dense(events: &[Value]) {
+    let numbers: Vec<i64> = events
+        .iter()
+        .map(|event| event["seq"].as_i64().unwrap())
+        .collect();
+    assert!(
+        numbers.iter().copied().eq(1..=events.len() as i64),
+        "{numbers:?}"
+    );
+    let ends = events
+        .iter()
+        .filter(|event| event["type"] == "done")
+        .count();
+    assert_eq!(
+        (ends, events.last().unwrap()["type"].as_str()),
+        (1, Some("done"))
+    );
+}
