@@ -51,10 +51,10 @@ async fn jobs_are_found_by_status_and_know_their_place() {
             .map(|job| job["id"].as_str().unwrap().to_string())
             .collect()
     };
-    assert_eq!(ids("status=running").await, [front.clone()]);
+    assert_eq!(ids("status=running").await, [front.as_str()]);
     assert_eq!(
         ids("status=queued").await,
-        [waiting[1].clone(), waiting[0].clone()]
+        [waiting[1].as_str(), waiting[0].as_str()]
     );
     assert_eq!(ids("status=queued,running").await.len(), 3);
     assert_eq!(ids("status=queued&status=running").await.len(), 3);
