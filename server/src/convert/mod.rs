@@ -1,8 +1,10 @@
-//! Between the types of the gRPC contract and ours: `problem` on the way in (and, for our own
-//! client, out), `answer` on the way out.
+//! Between the types of the gRPC contract and ours: `problem` on the way in, `answer` on the way
+//! out, and `message` for clients, whose way out is our way in.
 
 mod answer;
+mod message;
 mod problem;
 
 pub use answer::{judgement, pb_status, status};
-pub use problem::{problem_from_pb, problem_to_pb};
+pub use message::problem_to_pb;
+pub use problem::problem_from_pb;

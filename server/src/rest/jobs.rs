@@ -11,7 +11,8 @@ use serde::Serialize;
 
 use super::{
     Rest,
-    request::{JobPath, Params, bare_problem, json_text, preferred_wait_s, submission},
+    request::{JobPath, Params, json_text, preferred_wait_s},
+    submission::{bare_problem, submission},
 };
 use crate::{
     error::ApiError,

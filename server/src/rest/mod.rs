@@ -5,6 +5,7 @@ mod jobs;
 mod reply;
 mod request;
 mod results;
+mod submission;
 
 use std::sync::Arc;
 

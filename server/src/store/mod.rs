@@ -7,6 +7,7 @@
 mod events;
 mod jobs;
 mod results;
+mod rows;
 
 use std::{
     fs::{File, OpenOptions, TryLockError},

@@ -1,0 +1,178 @@
+//! Bodies that carry a problem: an envelope of ours around a text for the solver's own parser.
+
+use std::collections::BTreeMap;
+
+use serde_json::value::RawValue;
+use solver::{
+    error::{Violation, escape},
+    problem::Problem,
+};
+
+use crate::{
+    error::ApiError,
+    verbs::{
+        jobs::Envelope,
+        problems::{AT, prefixed},
+    },
+};
+
+/// What is wrong with a body whose JSON is well formed, or what it holds.
+type Read<T> = Result<T, Vec<Violation>>;
+
+/// A body `{problem, name, labels, priority}`. The problem's text goes to the solver's own strict
+/// parser; what is wrong with it comes together with what is wrong around it.
+pub(super) fn submission(text: &str) -> Result<(Envelope, Read<Problem>), ApiError> {
+    let mut fields = object(text)?;
+    let mut violations = vec![];
+    let mut envelope = Envelope::default();
+    let problem = problem(&mut fields, &mut violations);
+    take(
+        &mut fields,
+        "name",
+        "a string",
+        &mut violations,
+        &mut envelope.name,
+    );
+    take(
+        &mut fields,
+        "labels",
+        "an object of strings",
+        &mut violations,
+        &mut envelope.labels,
+    );
+    take(
+        &mut fields,
+        "priority",
+        "a whole number from -10 to 10",
+        &mut violations,
+        &mut envelope.priority,
+    );
+    unknown(fields, "problem, name, labels, priority", &mut violations);
+    Ok((envelope, together(violations, problem)))
+}
+
+/// A body `{problem}`.
+pub(super) fn bare_problem(text: &str) -> Result<Read<Problem>, ApiError> {
+    let mut fields = object(text)?;
+    let mut violations = vec![];
+    let problem = problem(&mut fields, &mut violations);
+    unknown(fields, "problem", &mut violations);
+    Ok(together(violations, problem))
+}
+
+fn object(text: &str) -> Result<BTreeMap<String, &RawValue>, ApiError> {
+    // First only the syntax, so that a well-formed array is told that it should be an object.
+    let whole: &RawValue =
+        serde_json::from_str(text).map_err(|error| ApiError::MalformedJson(error.to_string()))?;
+    serde_json::from_str(whole.get()).map_err(|_| {
+        ApiError::InvalidProblem(vec![wrong_type(
+            "",
+            whole,
+            "an object with the field problem",
+        )])
+    })
+}
+
+fn problem(
+    fields: &mut BTreeMap<String, &RawValue>,
+    violations: &mut Vec<Violation>,
+) -> Option<Problem> {
+    match fields.remove("problem") {
+        Some(raw) => match solver::parse(raw.get()) {
+            Ok(problem) => return Some(problem),
+            Err(found) => violations.extend(prefixed(AT, found)),
+        },
+        None => violations.push(Violation {
+            pointer: AT.into(),
+            reason: "missing".into(),
+            got: "nothing".into(),
+            expected: "the problem to solve".into(),
+            hint: "Send {\"problem\": {…}}.".into(),
+        }),
+    }
+    None
+}
+
+/// Reads one field into its place; null is as good as absent.
+fn take<T: serde::de::DeserializeOwned>(
+    fields: &mut BTreeMap<String, &RawValue>,
+    name: &str,
+    expected: &str,
+    violations: &mut Vec<Violation>,
+    place: &mut T,
+) {
+    let Some(raw) = fields.remove(name).filter(|raw| raw.get() != "null") else {
+        return;
+    };
+    match serde_json::from_str(raw.get()) {
+        Ok(value) => *place = value,
+        Err(_) => violations.push(wrong_type(&format!("/{name}"), raw, expected)),
+    }
+}
+
+fn unknown(fields: BTreeMap<String, &RawValue>, known: &str, violations: &mut Vec<Violation>) {
+    for name in fields.into_keys() {
+        violations.push(Violation {
+            pointer: format!("/{}", escape(&name)),
+            reason: "unknown_name".into(),
+            got: format!("{name:?}"),
+            expected: format!("one of {known}"),
+            hint: "Check the spelling, or leave it out.".into(),
+        });
+    }
+}
+
+fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
+    let got: String = raw.get().chars().take(60).collect();
+    Violation {
+        pointer: pointer.into(),
+        reason: "wrong_type".into(),
+        got,
+        expected: expected.into(),
+        hint: "See /v1/schema/problem.json for the problem itself.".into(),
+    }
+}
+
+fn together(violations: Vec<Violation>, problem: Option<Problem>) -> Read<Problem> {
+    match problem {
+        Some(problem) if violations.is_empty() => Ok(problem),
+        _ => Err(violations),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn pointers(text: &str) -> Vec<String> {
+        submission(text)
+            .unwrap()
+            .1
+            .unwrap_err()
+            .into_iter()
+            .map(|v| v.pointer)
+            .collect()
+    }
+
+    #[test]
+    fn everything_wrong_with_an_envelope_is_said_at_once() {
+        let text = r#"{"name": 7, "labels": {"a": 1}, "priority": 0.5, "wait": 3}"#;
+        assert_eq!(
+            pointers(text),
+            ["/problem", "/name", "/labels", "/priority", "/wait"]
+        );
+    }
+
+    #[test]
+    fn broken_json_is_told_apart_from_a_wrong_shape() {
+        assert!(matches!(
+            submission("{\"problem\": "),
+            Err(ApiError::MalformedJson(_))
+        ));
+        assert!(matches!(
+            submission("[1]"),
+            Err(ApiError::InvalidProblem(_))
+        ));
+    }
+}
