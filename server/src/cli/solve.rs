@@ -23,12 +23,22 @@ pub(super) struct Arguments {
     /// The problem, a JSON file
     file: PathBuf,
 
-    /// Write the whole result there as JSON; - is standard output. Without it a summary is printed
+    /// Write the result there: .json the whole of it, .svg the stress profile as a figure; - is
+    /// JSON on standard output. Without it a summary is printed
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 }
 
 pub(super) fn run(Arguments { file, output }: &Arguments) -> anyhow::Result<Exit> {
+    let format = match output.as_deref().map(Format::of) {
+        Some(None) => {
+            eprintln!(
+                "-o takes a file that ends in .json or .svg, or - for JSON on standard output"
+            );
+            return Ok(Exit::Invalid);
+        }
+        format => format.flatten(),
+    };
     let start = Instant::now();
     let text =
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
@@ -39,7 +49,7 @@ pub(super) fn run(Arguments { file, output }: &Arguments) -> anyhow::Result<Exit
     let parse_s = start.elapsed().as_secs_f64();
     let solved = run::run(&problem, parse_s, solver::solve, &mut |progress| {
         match progress {
-            Progress::Phase(_) => {}
+            Progress::Phase(phase) => eprintln!("{} …", run::phase_name(phase)),
             Progress::Iteration(row) => eprintln!("{}", report::iteration(row)),
             Progress::Warning(warning) => {
                 eprintln!("warning: {}: {}", warning.pointer, warning.message)
@@ -52,11 +62,11 @@ pub(super) fn run(Arguments { file, output }: &Arguments) -> anyhow::Result<Exit
         Err(SolveError::Invalid(violations)) => return Ok(invalid(file, &violations)),
         Err(error) => return Err(error.into()),
     };
-    match output {
-        Some(path) => {
-            write(path, &document).with_context(|| format!("cannot write {}", path.display()))?
-        }
-        None => print(&report::document(problem.title.as_deref(), &document))?,
+    let title = problem.title.as_deref();
+    match (output, format) {
+        (Some(path), Some(format)) => write(path, format, title, &document)
+            .with_context(|| format!("cannot write {}", path.display()))?,
+        _ => print(&report::document(title, &document))?,
     }
     Ok(if document.summary.solution.converged {
         Exit::Ok
@@ -78,13 +88,49 @@ fn invalid(file: &Path, violations: &[Violation]) -> Exit {
     Exit::Invalid
 }
 
-fn write(path: &Path, document: &Document) -> anyhow::Result<()> {
+/// What `-o` asks for.
+#[derive(Clone, Copy, Debug)]
+enum Format {
+    Json,
+    Svg,
+}
+
+impl Format {
+    fn of(path: &Path) -> Option<Format> {
+        if path.as_os_str() == "-" {
+            return Some(Format::Json);
+        }
+        match path.extension()?.to_str()? {
+            "json" => Some(Format::Json),
+            "svg" => Some(Format::Svg),
+            _ => None,
+        }
+    }
+}
+
+fn write(
+    path: &Path,
+    format: Format,
+    title: Option<&str>,
+    document: &Document,
+) -> anyhow::Result<()> {
+    let figure = match format {
+        Format::Json => None,
+        Format::Svg => {
+            let drawn =
+                solver::io::plot::profile_svg(title.unwrap_or_default(), &document.profiles);
+            Some(drawn.map_err(anyhow::Error::msg)?)
+        }
+    };
     let mut out: Box<dyn Write> = match path.to_str() {
         Some("-") => Box::new(std::io::stdout().lock()),
         _ => Box::new(File::create(path)?),
     };
     let mut out = BufWriter::new(&mut out);
-    serde_json::to_writer(&mut out, document)?;
+    match figure {
+        Some(svg) => out.write_all(svg.as_bytes())?,
+        None => serde_json::to_writer(&mut out, document)?,
+    }
     writeln!(out)?;
     out.flush()?;
     Ok(())
