@@ -49,6 +49,7 @@ pub enum Analysis {
         thickness: f64,
     },
     /// A body of revolution: x is the radius r ≥ 0, y is the axis z. Total forces include 2π.
+    /// Nodes on the axis stay there (u_r = 0) without a support.
     Axisymmetric {},
 }
 

@@ -82,6 +82,13 @@ fn a_body_free_to_move_is_refused_with_node_and_direction() {
             .got
             .contains("along the axis")
     );
+    // on the axis u_r = 0 needs no support: the same values without it
+    let mut bare = example("cylinder_on_end");
+    bare.supports.remove(0);
+    assert_eq!(
+        solve(&bare).summary.normal_force,
+        solve(&example("cylinder_on_end")).summary.normal_force
+    );
     let mut pinned = example("rectangular_punch");
     pinned.supports.clear();
     assert!(
@@ -115,6 +122,28 @@ fn an_obstacle_that_covers_no_node_is_refused_and_one_that_cuts_an_edge_is_warne
 }
 
 #[test]
+fn a_contact_that_turns_a_corner_is_warned_of() {
+    let mut p = example("sheet");
+    let part = p.mesh.boundaries.get_mut("taper").unwrap();
+    (part.x, p.mesh.grid.as_mut().unwrap().top) =
+        (None, Some(vec![[0.0, 1.0], [2.0, 0.4], [5.0, 1.0]]));
+    p.contacts[0].obstacle =
+        serde_json::from_str(r#"{"kind": "flat", "from": 0.5, "to": 4}"#).unwrap();
+    let warnings = solver::check(&p).unwrap();
+    let turn = warnings
+        .iter()
+        .find(|w| w.code == "contact_turns")
+        .expect("no warning");
+    assert!(turn.message.contains("28° at (2, 0.4)"), "{}", turn.message);
+    assert!(
+        solver::check(&example("sheet"))
+            .unwrap()
+            .iter()
+            .all(|w| w.code != "contact_turns")
+    );
+}
+
+#[test]
 fn inverted_elements_are_named_with_their_gauss_point() {
     let p = problem(
         r#"{"analysis": {"kind": "plane_strain"}, "materials": [{"youngs_modulus": 1, "poissons_ratio": 0}],
@@ -142,6 +171,34 @@ fn supports_that_contradict_each_other_or_hold_the_body_inside_the_obstacle_are_
     assert_eq!(
         violations(&p),
         [pair("/contacts/0/indentation", "impossible")]
+    );
+}
+
+/// Degenerate but valid: nothing left to solve, or nothing but contact unknowns.
+#[test]
+fn a_body_held_everywhere_and_one_element_alone_are_solved() {
+    let text = |supports: &str, contacts: &str| {
+        format!(
+            r#"{{"analysis": {{"kind": "plane_strain"}}, "materials": [{{"youngs_modulus": 1000, "poissons_ratio": 0.3}}],
+                "mesh": {{"grid": {{"x": [0, 1], "y": [0, 1]}}}}, "supports": [{supports}], "contacts": [{contacts}]}}"#
+        )
+    };
+    let held = |name: &str| format!(r#"{{"boundary": "{name}", "ux": 0, "uy": 0}}"#);
+    let all = ["left", "right", "top", "bottom"].map(held).join(",");
+    let rest = solve(&problem(&text(&all, ""))).summary;
+    assert_eq!(
+        (rest.dofs, rest.normal_force.to_bits()),
+        (0, 0),
+        "zero, and not minus zero"
+    );
+    let apart = r#"{"boundary": "top", "obstacle": {"kind": "flat"}, "indentation": -0.1}"#;
+    assert_eq!(solve(&problem(&text(&all, apart))).summary.contact_dofs, 0);
+    let pressed = r#"{"boundary": "top", "obstacle": {"kind": "flat"}, "indentation": 0.1,
+        "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}}"#;
+    let summary = solve(&problem(&text(&held("bottom"), pressed))).summary;
+    assert!(
+        summary.normal_force > 100.0 && summary.tangential_force.abs() < 1e-10,
+        "{summary:?}"
     );
 }
 

@@ -76,7 +76,7 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
             "{name}: REST and gRPC differ: {} and {digest}",
             summary["digest"]
         );
-        println!("  {name:<18} both    same bits: {digest}\n");
+        println!("  {name:<18} both    same bits: {digest:.23}…\n");
         first.get_or_insert((by_rest.clone(), summary));
     }
 
@@ -96,9 +96,11 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
             report::profile(&profile)
         );
     }
+    let force = |name: &str| summary[name].as_f64().unwrap_or(f64::NAN);
     println!(
         "normal force {:.4}, tangential force {:.4}",
-        summary["normal_force"], summary["tangential_force"]
+        force("normal_force"),
+        force("tangential_force")
     );
     Ok(Exit::Ok)
 }

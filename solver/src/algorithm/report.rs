@@ -50,7 +50,8 @@ pub fn report(
     }
     warn_of_iteration(&finished, &mut warnings);
 
-    let total = |f: fn(&ContactSummary) -> f64| contacts.values().map(f).sum::<f64>();
+    let total =
+        |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
     let (friction_energy, friction_work) = friction_energy(system, v, &finished.bound);
     let work_of_loads: f64 = body
         .nodal_loads

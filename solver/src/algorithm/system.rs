@@ -6,6 +6,10 @@ use crate::friction::{Chain, FrictionLaw, Row};
 use crate::linear::Dense;
 use crate::model::{ContactModel, Model};
 
+/// A radius below this part of the contact's length is the axis: a mesh generator may miss 0 by
+/// rounding, and the weight of such a node is nothing but rounding.
+const AXIS: f64 = 1e-12;
+
 /// Everything the iterations need, all contacts in a row.
 pub struct System<'a> {
     /// Ŝ.
@@ -79,8 +83,10 @@ impl<'a> System<'a> {
         for contact in &model.contacts {
             let (first, boundary) = (nodes.len(), &contact.boundary);
             let count = boundary.nodes.len();
-            let on_axis =
-                |i: usize| model.section.axisymmetric() && boundary.positions[i][0] == 0.0;
+            let on_axis = |i: usize| {
+                model.section.axisymmetric()
+                    && boundary.positions[i][0] <= AXIS * boundary.s[count - 1]
+            };
             for i in 0..count {
                 let [normal, tangent] = body.contact_dofs[first + i];
                 let towards = |step: [usize; 2]| Some(step.map(|s| first + s));

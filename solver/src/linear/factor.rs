@@ -169,6 +169,9 @@ impl Factor {
         let n = self.ordering.symbolic.nrows();
         let first = n - m;
         let mut l: Vec<Vec<f64>> = (0..m).map(|i| vec![0.0; i + 1]).collect();
+        if m == 0 {
+            return l; // and an empty matrix has no supernodes to walk
+        }
         let SymbolicCholeskyRaw::Supernodal(structure) = self.ordering.symbolic.raw() else {
             unreachable!("Ordering::new forces the supernodal factor");
         };
@@ -309,6 +312,14 @@ mod tests {
             .unwrap()
             .solve(&mut x);
         assert!(x.iter().zip(&exact).all(|(a, b)| (a - b).abs() < 1e-13));
+    }
+
+    #[test]
+    fn an_empty_matrix_has_an_empty_factor() {
+        let matrix = SparseSymmetric::zero(0, |_, _| {});
+        let factor = Factor::new(&matrix, Ordering::new(&matrix, &[], 0).unwrap()).unwrap();
+        assert_eq!(factor.trailing_schur_complement().size(), 0);
+        factor.solve(&mut []);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Meshes written out in the problem.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::element::quad8;
 use crate::error::{Violation, escape};
@@ -80,9 +80,17 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
     let mut boundaries = HashMap::new();
     for (name, edges) in &input.boundaries {
         let mut directed = Vec::with_capacity(edges.len());
+        let mut named = HashSet::with_capacity(edges.len());
         for (i, &[a, b, mid]) in edges.iter().enumerate() {
             let place = format!("/boundaries/{}/{i}", escape(name));
             match sides.get(&key(a, b)) {
+                _ if !named.insert(key(a, b)) => found.say(
+                    &place,
+                    "repeated_edge",
+                    format!("{a}–{b} once more"),
+                    "each edge once",
+                    "A load on it would count twice.",
+                ),
                 Some(side) if side.elements == 1 && side.mid == mid => directed.push(side.directed),
                 Some(side) if side.elements == 1 => found.say(
                     &place,
@@ -258,13 +266,21 @@ mod tests {
         input.nodes.push([5.0, 5.0]);
         input
             .boundaries
-            .insert("top".to_owned(), vec![[3, 1, 6], [3, 2, 5]]);
+            .insert("top".to_owned(), vec![[3, 1, 6], [3, 2, 5], [2, 3, 6]]);
         let reasons: Vec<_> = inline_mesh(&input, "")
             .unwrap_err()
             .into_iter()
             .map(|v| v.reason)
             .collect();
-        assert_eq!(reasons, ["unused_node", "unknown_edge", "wrong_midside"]);
+        assert_eq!(
+            reasons,
+            [
+                "unused_node",
+                "unknown_edge",
+                "wrong_midside",
+                "repeated_edge"
+            ]
+        );
     }
 
     #[test]

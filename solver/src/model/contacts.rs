@@ -8,7 +8,10 @@ use crate::contact::ContactBoundary;
 use crate::contact::obstacle::{self, FacingRun};
 use crate::elasticity::Section;
 use crate::mesh::{self, Edge, Mesh};
-use crate::problem::Contact;
+use crate::problem::{Contact, Friction};
+
+/// Cosine of the sharpest turn between two contact edges that goes without a warning: 20°.
+const SHARPEST_TURN: f64 = 0.94;
 
 impl Findings {
     pub(super) fn contacts(
@@ -186,29 +189,53 @@ impl Findings {
         }
     }
 
-    /// Too few elements for the contact or for ρ is a warning, not an error.
-    pub(super) fn coarseness(&mut self, contacts: &[ContactModel]) {
+    /// What is accepted, and yet makes the numbers doubtful.
+    pub(super) fn doubts(&mut self, contacts: &[ContactModel]) {
         for contact in contacts {
-            let Some(friction) = contact
-                .friction
-                .filter(|f| f.nonlocal_radius > 0.0 && f.coefficient > 0.0)
-            else {
-                continue;
-            };
-            let boundary = &contact.boundary;
-            let shortest = (0..boundary.edge_count())
-                .map(|k| {
-                    let [a, b, _] = boundary.edge_arc(k);
-                    b - a
-                })
-                .fold(f64::INFINITY, f64::min);
-            if shortest > friction.nonlocal_radius {
+            self.corners(contact);
+            self.coarseness(contact);
+        }
+    }
+
+    /// At a corner between two edges there is no one normal.
+    fn corners(&mut self, contact: &ContactModel) {
+        let boundary = &contact.boundary;
+        let chord = |from: usize, to: usize| {
+            let ([x0, y0], [x1, y1]) = (boundary.positions[from], boundary.positions[to]);
+            let length = (x1 - x0).hypot(y1 - y0);
+            [(x1 - x0) / length, (y1 - y0) / length]
+        };
+        for corner in (2..boundary.nodes.len() - 1).step_by(2) {
+            let (before, after) = (chord(corner - 1, corner), chord(corner, corner + 1));
+            let cosine = before[0] * after[0] + before[1] * after[1];
+            if cosine < SHARPEST_TURN {
+                let ([x, y], angle) = (boundary.positions[corner], cosine.acos().to_degrees());
                 self.warn(
-                    "mesh_too_coarse_for_radius",
-                    &format!("{}/friction/nonlocal_radius", contact.pointer),
-                    format!("The shortest contact edge ({shortest:.4}) is longer than the nonlocal radius ({}): the averaging is not resolved. Refine the mesh towards the ends of the contact.", friction.nonlocal_radius),
+                    "contact_turns",
+                    &format!("{}/boundary", contact.pointer),
+                    format!("The contact boundary turns by {angle:.0}° at ({x}, {y}), where the mean of the two normals is used. Give each side a contact of its own, or mesh the rounding."),
                 );
+                return;
             }
+        }
+    }
+
+    fn coarseness(&mut self, contact: &ContactModel) {
+        let averages = |f: &Friction| f.nonlocal_radius > 0.0 && f.coefficient > 0.0;
+        let Some(friction) = contact.friction.filter(averages) else {
+            return;
+        };
+        let boundary = &contact.boundary;
+        let length = |edge| boundary.edge_arc(edge)[1] - boundary.edge_arc(edge)[0];
+        let shortest = (0..boundary.edge_count())
+            .map(length)
+            .fold(f64::INFINITY, f64::min);
+        if shortest > friction.nonlocal_radius {
+            self.warn(
+                "mesh_too_coarse_for_radius",
+                &format!("{}/friction/nonlocal_radius", contact.pointer),
+                format!("The shortest contact edge ({shortest:.4}) is longer than the nonlocal radius ({}): the averaging is not resolved. Refine the mesh towards the ends of the contact.", friction.nonlocal_radius),
+            );
         }
     }
 }

@@ -6,6 +6,9 @@ use crate::solution::Warning;
 /// Directions count as equal to an axis, and prescribed values as equal, to this.
 pub(super) const ALIGNED: f64 = 1e-9;
 
+/// A radius below this part of the largest is the axis: a mesh generator may miss 0 by rounding.
+pub(super) const AXIS: f64 = 1e-12;
+
 /// Violations and warnings, gathered by every check.
 #[derive(Default)]
 pub(super) struct Findings {

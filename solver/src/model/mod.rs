@@ -77,14 +77,14 @@ impl Model {
         };
         let (e, nu) = material.map_or((1.0, 0.0), |m| (m.youngs_modulus, m.poissons_ratio));
         let section = Section::new(problem.analysis, e, nu);
-        let fixed = findings.supports(&mesh, &problem.supports);
+        let fixed = findings.supports(&mesh, &section, &problem.supports);
         let pressures = findings.loads(&mesh, &problem.loads);
         let contacts = findings.contacts(&mesh, &section, &problem.contacts, &fixed);
         findings.freedom(&mesh, &section, &fixed);
         if !findings.violations.is_empty() {
             return Err(findings.violations);
         }
-        findings.coarseness(&contacts);
+        findings.doubts(&contacts);
         let (controls, warnings) = (problem.solver, findings.warnings);
         Ok(Model {
             mesh,

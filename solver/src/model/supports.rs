@@ -2,18 +2,34 @@
 
 use std::collections::BTreeMap;
 
-use super::findings::{ALIGNED, Findings};
+use super::findings::{ALIGNED, AXIS, Findings};
 use crate::elasticity::Section;
 use crate::mesh::{Edge, Mesh};
-use crate::problem::{Load, Support};
+use crate::problem::{BoundaryValue, Load, Support};
 
 impl Findings {
+    /// Prescribed displacements by node. A body of revolution cannot leave its axis: there u_r = 0
+    /// whether a support says so or not.
     pub(super) fn supports(
         &mut self,
         mesh: &Mesh,
+        section: &Section,
         supports: &[Support],
     ) -> BTreeMap<u32, [Option<f64>; 2]> {
         let mut fixed: BTreeMap<u32, [Option<f64>; 2]> = BTreeMap::new();
+        if section.axisymmetric() {
+            let radius = mesh.nodes.iter().map(|[r, _]| *r).fold(0.0, f64::max);
+            let on_axis = |n: &u32| mesh.nodes[*n as usize][0] <= AXIS * radius;
+            for node in (0..mesh.nodes.len() as u32).filter(on_axis) {
+                fixed.insert(node, [Some(0.0), None]);
+            }
+        }
+        let size = supports
+            .iter()
+            .flat_map(|s| [s.ux, s.uy])
+            .flatten()
+            .map(largest)
+            .fold(0.0, f64::max);
         for (i, support) in supports.iter().enumerate() {
             let pointer = format!("/supports/{i}");
             if support.ux.is_none() && support.uy.is_none() {
@@ -39,7 +55,7 @@ impl Findings {
                 for (edge, values) in self.along(mesh, edges, value, place.clone()) {
                     for (node, value) in edge.into_iter().zip(values) {
                         let known = fixed.entry(node).or_default()[axis].get_or_insert(value);
-                        if (*known - value).abs() > ALIGNED * known.abs().max(value.abs()) {
+                        if (*known - value).abs() > ALIGNED * size {
                             conflict = Some((node, *known, value));
                         }
                     }
@@ -51,7 +67,7 @@ impl Findings {
                         "conflict",
                         value,
                         format!(
-                            "{known}, which another support prescribes at node {node} ({x}, {y})"
+                            "{known}, which another support (or the axis) prescribes at node {node} ({x}, {y})"
                         ),
                         "Two supports that share a node must agree there.",
                     );
@@ -96,6 +112,13 @@ impl Findings {
                 );
             }
         }
+    }
+}
+
+fn largest(value: BoundaryValue) -> f64 {
+    match value {
+        BoundaryValue::Constant(value) => value.abs(),
+        BoundaryValue::Linear([start, end]) => start.abs().max(end.abs()),
     }
 }
 
