@@ -39,10 +39,9 @@ pub struct Config {
     )]
     pub max_queued: u32,
 
-    /// Most memory that one job may need, by the estimate made before it is accepted
-    /// [default: half of the machine's]
-    #[arg(long, env = "SIGNORINI_MEMORY_BUDGET_BYTES", value_name = "BYTES")]
-    pub memory_budget_bytes: Option<u64>,
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the command
+    pub memory: MemoryBudget,
 
     /// Largest request body over REST
     #[arg(long, env = "SIGNORINI_MAX_BODY_BYTES", default_value_t = 16 << 20, value_name = "BYTES")]
@@ -58,9 +57,18 @@ pub struct Config {
     pub grace_s: u64,
 }
 
-impl Config {
-    /// The memory budget of one job in bytes.
-    pub fn memory_budget(&self) -> u64 {
+/// What one problem may cost.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct MemoryBudget {
+    /// Most memory that one problem may need, by the estimate made before it is meshed
+    /// [default: half of the machine's]
+    #[arg(long, env = "SIGNORINI_MEMORY_BUDGET_BYTES", value_name = "BYTES")]
+    memory_budget_bytes: Option<u64>,
+}
+
+impl MemoryBudget {
+    /// The budget in bytes.
+    pub fn bytes(self) -> u64 {
         self.memory_budget_bytes
             .unwrap_or_else(|| machine_memory() / 2)
     }

@@ -71,7 +71,7 @@ pub enum ApiError {
         budget_bytes: u64,
     },
     /// The problem, or the envelope it came in, is wrong.
-    #[error("{} violation(s) found", .0.len())]
+    #[error("{}", summed_up(.0))]
     InvalidProblem(Vec<Violation>),
     /// Our fault; the cause is in the log under this number.
     #[error("an unexpected error, logged as incident {incident}")]
@@ -237,6 +237,22 @@ fn shorten(text: &str) -> String {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_string(),
     }
+}
+
+/// The count and the first ones: a client that cannot unpack the details still learns something.
+fn summed_up(violations: &[Violation]) -> String {
+    const SHOWN: usize = 3;
+    let shown: Vec<String> = violations
+        .iter()
+        .take(SHOWN)
+        .map(Violation::to_string)
+        .collect();
+    let more = if violations.len() > SHOWN { " …" } else { "" };
+    format!(
+        "{} violation(s): {}{more}",
+        violations.len(),
+        shown.join(" | ")
+    )
 }
 
 #[cfg(test)]

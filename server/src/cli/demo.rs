@@ -14,7 +14,7 @@ use tonic::transport::Channel;
 use super::{Exit, examples, report};
 use crate::{
     app::App,
-    config::Config,
+    config::{Config, MemoryBudget},
     convert::problem_to_pb,
     event::{Event, Payload},
     job::{Job, Status},
@@ -28,7 +28,7 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         data: folder.path().to_path_buf(),
         workers: 2,
         max_queued: 100,
-        memory_budget_bytes: None,
+        memory: MemoryBudget::default(),
         max_body_bytes: 16 << 20,
         grace_s: 5,
     };

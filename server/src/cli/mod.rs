@@ -41,6 +41,8 @@ enum Command {
     Serve(Config),
     /// Solve one problem here, without a service. Exit code: 0 converged, 9 not converged, 2 invalid
     Solve(solve::Arguments),
+    /// Print the JSON Schema of a problem: every name, what it means and its default
+    Schema,
     /// Start a service for the occasion, submit five examples over REST and gRPC, watch them converge
     Demo,
 }
@@ -57,6 +59,7 @@ pub fn main() -> ExitCode {
             log(LevelFilter::WARN);
             solve::run(&arguments)
         }
+        Command::Schema => solve::schema(),
         Command::Demo => {
             log(LevelFilter::WARN);
             with_runtime(demo::run())

@@ -57,13 +57,14 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
             s.dofs, s.contact_dofs
         ),
     );
-    line("normal force", format!("{:.6e}", s.normal_force));
-    line("tangential force", format!("{:.6e}", s.tangential_force));
+    line("normal force", number(s.normal_force));
+    line("tangential force", number(s.tangential_force));
+    line("friction force", number(s.friction_force));
     line(
         "residuals",
         format!(
-            "{:.1e}, friction {:.1e}",
-            s.residuals.kkt, s.residuals.friction
+            "kkt {:.1e}, friction {:.1e}, monolithic {:.1e}, force balance {:.1e}",
+            s.residuals.kkt, s.residuals.friction, s.residuals.monolithic, s.residuals.equilibrium
         ),
     );
     for (name, contact) in &s.contacts {
@@ -79,6 +80,18 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
     text
 }
 
+/// Six digits, plain where that is readable.
+fn number(value: f64) -> String {
+    if value == 0.0 {
+        "0".to_string()
+    } else if (1e-3..1e7).contains(&value.abs()) {
+        let before_point = value.abs().log10().floor().max(0.0) as usize + 1;
+        format!("{value:.*}", 7_usize.saturating_sub(before_point))
+    } else {
+        format!("{value:.6e}")
+    }
+}
+
 fn contact_lines(name: &str, contact: &ContactSummary, line: &mut impl FnMut(&str, String)) {
     let ranges = |ranges: &[[f64; 2]]| {
         let ranges: Vec<String> = ranges
@@ -91,7 +104,7 @@ fn contact_lines(name: &str, contact: &ContactSummary, line: &mut impl FnMut(&st
             ranges.join(", ")
         }
     };
-    let peak = |peak: &Peak| format!("{:.4} at s = {:.4}", peak.value, peak.s);
+    let peak = |peak: &Peak| format!("{} at s = {:.4}", number(peak.value), peak.s);
     line(&format!("contact {name:?}"), String::new());
     line("  touches, s", ranges(&contact.contact));
     line("  sticks, s", ranges(&contact.stick));

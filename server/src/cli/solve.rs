@@ -16,7 +16,11 @@ use solver::{
 };
 
 use super::{Exit, report};
-use crate::run::{self, Document};
+use crate::{
+    config::MemoryBudget,
+    error::ApiError,
+    run::{self, Document},
+};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -27,9 +31,18 @@ pub(super) struct Arguments {
     /// JSON on standard output. Without it a summary is printed
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
+
+    #[command(flatten)]
+    memory: MemoryBudget,
 }
 
-pub(super) fn run(Arguments { file, output }: &Arguments) -> anyhow::Result<Exit> {
+pub(super) fn run(
+    Arguments {
+        file,
+        output,
+        memory,
+    }: &Arguments,
+) -> anyhow::Result<Exit> {
     let format = match output.as_deref().map(Format::of) {
         Some(None) => {
             eprintln!(
@@ -47,6 +60,15 @@ pub(super) fn run(Arguments { file, output }: &Arguments) -> anyhow::Result<Exit
         Err(violations) => return Ok(invalid(file, &violations)),
     };
     let parse_s = start.elapsed().as_secs_f64();
+    let (estimate, budget_bytes) = (solver::estimate(&problem), memory.bytes());
+    if estimate.memory_bytes > budget_bytes {
+        let too_large = ApiError::ProblemTooLarge {
+            estimate,
+            budget_bytes,
+        };
+        eprintln!("{}: {too_large}", file.display());
+        return Ok(Exit::Invalid);
+    }
     let solved = run::run(&problem, parse_s, solver::solve, &mut |progress| {
         match progress {
             Progress::Phase(phase) => eprintln!("{} …", run::phase_name(phase)),
@@ -73,6 +95,12 @@ pub(super) fn run(Arguments { file, output }: &Arguments) -> anyhow::Result<Exit
     } else {
         Exit::NotConverged
     })
+}
+
+/// `signorini schema`.
+pub(super) fn schema() -> anyhow::Result<Exit> {
+    print(&format!("{:#}\n", solver::schema()))?;
+    Ok(Exit::Ok)
 }
 
 fn invalid(file: &Path, violations: &[Violation]) -> Exit {

@@ -102,6 +102,13 @@ fn links(id: JobId) -> BTreeMap<String, String> {
     ["events", "result", "fields", "cancel"]
         .into_iter()
         .map(|verb| (verb.to_string(), format!("/v1/jobs/{id}/{verb}")))
-        .chain([("self".to_string(), format!("/v1/jobs/{id}"))])
+        .chain([
+            ("self".to_string(), format!("/v1/jobs/{id}")),
+            // a template: the boundaries are those of the problem
+            (
+                "profiles".to_string(),
+                format!("/v1/jobs/{id}/profiles/{{boundary}}"),
+            ),
+        ])
         .collect()
 }

@@ -37,7 +37,7 @@ impl Service {
             queue,
             checks: Semaphore::new(2),
             max_queued: config.max_queued,
-            memory_budget_bytes: config.memory_budget(),
+            memory_budget_bytes: config.memory.bytes(),
         }
     }
 

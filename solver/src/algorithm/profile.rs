@@ -2,6 +2,7 @@
 
 use super::system::{Patch, System};
 use crate::contact::edge_nodes;
+use crate::elasticity::Dof;
 use crate::element::edge3;
 use crate::solution::{ContactProfile, ContactSummary, NodeState, Peak, Warning};
 
@@ -139,14 +140,6 @@ impl PatchView<'_> {
                     Some([_, end]) if *end == pair[0] => *end = pair[1],
                     _ => list.push([pair[0], pair[1]]),
                 }
-            }
-            if from == to {
-                (if self.sticks(from) {
-                    &mut stick
-                } else {
-                    &mut slip
-                })
-                .push([from, to]);
             }
             i += 1;
         }
@@ -339,6 +332,40 @@ impl PatchView<'_> {
                 ),
             );
         }
+        let s = &contact.boundary.s;
+        let ends = [0, self.count() - 1].map(|i| (s[i], self.active(i) && !self.symmetric(i)));
+        for (s, _) in ends.into_iter().filter(|(_, pressed)| *pressed) {
+            warn(
+                "contact_reaches_obstacle_end",
+                format!(
+                    "The body presses against the very end of the obstacle, s = {s:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the obstacle goes on there, extend it."
+                ),
+            );
+        }
+        let radius = contact.friction.map_or(0.0, |f| f.nonlocal_radius);
+        let first = (0..self.count()).find(|&i| self.active(i));
+        let last = (0..self.count()).rfind(|&i| self.active(i));
+        if let (Some(first), Some(last)) = (first, last) {
+            let mirrored = [first, last]
+                .into_iter()
+                .filter(|&i| self.symmetric(i))
+                .count();
+            let width = (s[last] - s[first]) * (1 + mirrored) as f64;
+            if radius > width && width > 0.0 {
+                warn(
+                    "radius_exceeds_contact",
+                    format!(
+                        "The nonlocal radius {radius} is larger than the whole contact, {width:.4}: the averaged pressure, and friction with it, is smeared out beyond the contact."
+                    ),
+                );
+            }
+        }
+    }
+
+    /// A node on a line of symmetry: on the axis, or held along the tangent.
+    fn symmetric(&self, i: usize) -> bool {
+        let node = &self.system.nodes[self.patch.first + i];
+        node.follows.is_some() || matches!(node.tangent, Dof::Fixed(value) if value == 0.0)
     }
 }
 

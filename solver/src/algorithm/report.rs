@@ -12,6 +12,9 @@ use crate::error::SolveError;
 use crate::model::Model;
 use crate::solution::{ContactSummary, Fields, Outcome, Residuals, Solution, Summary, Warning};
 
+/// Displacement beyond this part of the body's size is not small.
+const LARGE_DISPLACEMENT: f64 = 0.1;
+
 /// q beyond which the sweeps barely contract.
 const SLOW_CONTRACTION: f64 = 0.9;
 
@@ -49,6 +52,7 @@ pub fn report(
         contacts.insert(patch.contact.name.clone(), summary);
     }
     warn_of_iteration(&finished, &mut warnings);
+    warn_of_displacement(model, &displacements, &mut warnings);
 
     let total =
         |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
@@ -182,6 +186,35 @@ fn fields(model: &Model, displacements: &[[f64; 2]], recovered: &Recovered) -> F
     }
 }
 
+/// Linear elasticity takes displacements for small beside the body.
+fn warn_of_displacement(model: &Model, displacements: &[[f64; 2]], warnings: &mut Vec<Warning>) {
+    let extent = |axis: usize| {
+        let (low, high) = model
+            .mesh
+            .nodes
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                (low.min(x[axis]), high.max(x[axis]))
+            });
+        high - low
+    };
+    let size = extent(0).hypot(extent(1));
+    let largest = displacements
+        .iter()
+        .map(|[x, y]| x.hypot(*y))
+        .fold(0.0, f64::max);
+    if largest > LARGE_DISPLACEMENT * size {
+        warnings.push(Warning {
+            code: "large_displacement".to_owned(),
+            pointer: String::new(),
+            message: format!(
+                "The largest displacement, {largest:.4}, is {:.0} % of the body's size: linear elasticity no longer describes it.",
+                100.0 * largest / size
+            ),
+        });
+    }
+}
+
 fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
     let mut warn = |code: &str, message: String| {
         warnings.push(Warning {
@@ -195,6 +228,19 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
             "slow_contraction",
             format!(
                 "The friction bound contracts by only q = {q:.3} per sweep: friction and pressure feed each other, and the state may not be the only one."
+            ),
+        );
+    }
+    if finished.outcome == Outcome::NotConverged {
+        let r = finished.residuals;
+        warn(
+            "not_converged",
+            format!(
+                "After {} iterations the residuals are kkt {:.1e}, friction {:.1e}, monolithic {:.1e}. Raise max_iterations if they still fall in the history; else raise elastic_slip or tolerance, or refine the mesh.",
+                finished.history.len(),
+                r.kkt,
+                r.friction,
+                r.monolithic
             ),
         );
     }

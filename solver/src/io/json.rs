@@ -27,6 +27,16 @@ pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
 }
 
 fn explain(text: &str, first: &serde_json::Error) -> Vec<Violation> {
+    if text.trim().is_empty() {
+        let hint = "An example is in the README.";
+        return vec![violation(
+            "",
+            "malformed_json",
+            "an empty text".to_owned(),
+            "a problem as JSON",
+            hint,
+        )];
+    }
     let value: Value = match serde_json::from_str(text) {
         Ok(value) => value,
         Err(error) => {
@@ -117,6 +127,23 @@ fn collect(error: &ValidationError<'_>, found: &mut Vec<Violation>) {
         ValidationErrorKind::AnyOf { context } | ValidationErrorKind::OneOfNotValid { context } => {
             alternatives(error, context, found);
         }
+        ValidationErrorKind::Minimum { limit } => found.push(violation(
+            pointer,
+            "out_of_range",
+            got(),
+            &format!("a number of at least {limit}"),
+            "Correct the number.",
+        )),
+        ValidationErrorKind::MinItems { limit } | ValidationErrorKind::MaxItems { limit } => {
+            let items = error.instance().as_array().map_or(0, Vec::len);
+            found.push(violation(
+                pointer,
+                "wrong_length",
+                format!("{items} item(s)"),
+                &format!("{limit} items"),
+                "Correct the list.",
+            ));
+        }
         ValidationErrorKind::Type { kind } => {
             found.push(violation(
                 pointer,
@@ -181,51 +208,47 @@ fn alternatives(
     }
     offers.dedup();
     offers.retain(|offer| offer != "null");
-    let (place, got) = if tagged {
+    let instance = error.instance();
+    let (place, got) = match instance.get("kind") {
+        Some(found) if tagged => (kind, shortened(found)),
+        None if tagged && instance.is_object() => (kind, "nothing".to_owned()),
+        _ => (pointer.to_owned(), shortened(instance)),
+    };
+    let kinds = kinds(error);
+    let (expected, hint) = if kinds.is_empty() {
         (
-            kind,
-            error
-                .instance()
-                .get("kind")
-                .map_or_else(|| "nothing".to_owned(), shortened),
+            offers.join(" or "),
+            "Write the value in one of these forms.".to_owned(),
+        )
+    } else if instance.is_object() {
+        (
+            format!("one of {}", kinds.join(", ")),
+            "Choose one of the kinds.".to_owned(),
         )
     } else {
-        (pointer.to_owned(), shortened(error.instance()))
-    };
-    let expected = if offers.is_empty() {
-        kinds(error)
-    } else {
-        format!("one of {}", offers.join(", "))
+        let example = format!("Write it as {{\"kind\": {}, …}}.", kinds[0]);
+        (
+            format!("an object with a `kind`, one of {}", kinds.join(", ")),
+            example,
+        )
     };
     found.push(violation(
         &place,
         "unknown_alternative",
         got,
         &expected,
-        "Choose one of the alternatives.",
+        &hint,
     ));
 }
 
 /// The `kind`s that the schema offers where `error` stands.
-fn kinds(error: &ValidationError<'_>) -> String {
+fn kinds(error: &ValidationError<'_>) -> Vec<String> {
     let schema = schema();
-    let branches = schema
-        .pointer(error.schema_path().as_str())
-        .and_then(Value::as_array);
-    let names: Vec<String> = branches
-        .into_iter()
-        .flatten()
-        .filter_map(|branch| {
-            branch
-                .pointer("/properties/kind/const")
-                .map(Value::to_string)
-        })
-        .collect();
-    if names.is_empty() {
-        "one of the alternatives of the schema".to_owned()
-    } else {
-        format!("one of {}", names.join(", "))
-    }
+    let branches = schema.pointer(error.schema_path().as_str());
+    let branches = branches.and_then(Value::as_array).into_iter().flatten();
+    branches
+        .filter_map(|b| b.pointer("/properties/kind/const").map(Value::to_string))
+        .collect()
 }
 
 /// The names that the schema has where an unknown one was found.
@@ -370,6 +393,13 @@ mod tests {
         );
         let found = faults(r#"{"kind": "flat"}"#, r#"{"from": 0}"#);
         assert_eq!(found[0].0, "/contacts/0/obstacle/kind");
+        let found = faults(r#"{"kind": "plane_strain"}"#, r#""plane_strain""#);
+        assert_eq!((found.len(), &found[0].0[..]), (1, "/analysis"));
+        assert!(
+            found[0].2.starts_with("an object with a `kind`"),
+            "{}",
+            found[0].2
+        );
         let found = faults(r#"{"kind": "flat"}"#, r#"{"kind": "circle"}"#);
         assert_eq!(
             (found.len(), &found[0].0[..]),
@@ -378,8 +408,23 @@ mod tests {
     }
 
     #[test]
+    fn numbers_and_lists_out_of_shape_are_said_in_words() {
+        let expected = |from: &str, to: &str| faults(from, to).remove(0).2;
+        assert_eq!(
+            expected(r#""grid": {"x""#, r#""refine": -1, "grid": {"x""#),
+            "a number of at least 0"
+        );
+        let support = r#""supports": [{"boundary": "top", "ux": [0, 1, 2]}], "materials""#;
+        assert_eq!(expected(r#""materials""#, support), "2 items");
+        let support = r#""supports": [{"boundary": "top", "ux": "5"}], "materials""#;
+        assert_eq!(expected(r#""materials""#, support), "number or array");
+    }
+
+    #[test]
     fn text_that_is_no_json_and_numbers_beyond_double_precision_are_named() {
-        assert_eq!(parse("{").unwrap_err()[0].reason, "malformed_json");
+        for text in ["{", "", " \n"] {
+            assert_eq!(parse(text).unwrap_err()[0].reason, "malformed_json");
+        }
         assert_eq!(faults("1000", "1e999")[0].1, "malformed_json");
     }
 

@@ -47,11 +47,13 @@ fn draw(
         .split_evenly((profiles.len(), 1));
     for ((name, profile), page) in profiles.iter().zip(pages) {
         let (above, below) = page.split_vertically(HEIGHT / 2);
+        let shown = stressed(profile);
         let curve = |label, color, width, values: Vec<f64>| Curve {
             label,
             color,
             width,
-            points: profile.s.iter().copied().zip(values).collect(),
+            points: profile.s.iter().copied().zip(values).collect::<Vec<_>>()[shown.clone()]
+                .to_vec(),
         };
         let opposite = profile.friction_bound.iter().map(|tau| -tau).collect();
         panel(
@@ -83,6 +85,25 @@ struct Curve {
     color: RGBColor,
     points: Vec<(f64, f64)>,
     width: u32,
+}
+
+/// The nodes under stress and a margin of a fifth on each side: a contact is often a small part of
+/// the boundary that faces the obstacle. All nodes where nothing is under stress.
+fn stressed(profile: &ContactProfile) -> Range<usize> {
+    let nodes = profile.s.len();
+    let loaded = |&i: &usize| profile.normal_stress[i] != 0.0 || profile.friction_bound[i] != 0.0;
+    let (Some(first), Some(last)) = ((0..nodes).find(loaded), (0..nodes).rfind(loaded)) else {
+        return 0..nodes;
+    };
+    let margin = 0.2 * (profile.s[last] - profile.s[first]);
+    let low = profile
+        .s
+        .partition_point(|s| *s < profile.s[first] - margin);
+    let high = profile
+        .s
+        .partition_point(|s| *s <= profile.s[last] + margin);
+    // one node beyond, so that the curves are seen to return to zero
+    low.min(first.saturating_sub(1))..high.max(last + 2).min(nodes)
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
@@ -241,6 +262,21 @@ mod tests {
         };
         assert!(profile_svg("", &BTreeMap::from([("top".to_owned(), flat)])).is_ok());
         assert!(profile_svg("", &BTreeMap::new()).is_err());
+    }
+
+    #[test]
+    fn a_small_contact_on_a_long_boundary_fills_the_figure() {
+        let mut profile = ContactProfile {
+            s: (0..400).map(f64::from).collect(),
+            normal_stress: vec![0.0; 400],
+            friction_bound: vec![0.0; 400],
+            ..ContactProfile::default()
+        };
+        assert_eq!(stressed(&profile), 0..400);
+        profile.normal_stress[100..=110].fill(-5.0);
+        assert_eq!(stressed(&profile), 98..113);
+        profile.normal_stress[0] = -1.0;
+        assert_eq!(stressed(&profile), 0..133);
     }
 
     #[test]

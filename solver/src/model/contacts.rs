@@ -41,6 +41,15 @@ impl Findings {
             else {
                 continue;
             };
+            // an obstacle whose numbers are wrong has been named already
+            let wrong = format!("{pointer}/obstacle");
+            if self
+                .violations
+                .iter()
+                .any(|v| v.pointer.starts_with(&wrong))
+            {
+                continue;
+            }
             let Some(run) = self.facing_run(mesh, edges, contact, &pointer) else {
                 continue;
             };
