@@ -27,10 +27,12 @@ pub struct Solution {
 pub enum Outcome {
     /// Contact set unchanged, every residual below the tolerance.
     Converged,
-    /// `max_iterations` reached, or no further progress.
+    /// `max_iterations` reached.
     NotConverged,
     /// The contact set repeats itself without settling.
     ContactCycling,
+    /// The method's own tests are met, but the forces on the body do not balance.
+    FalseConvergence,
     /// The observer asked to stop; the last state is kept.
     Canceled,
 }
@@ -293,6 +295,8 @@ pub enum Progress<'a> {
     Iteration(&'a mut Iteration),
     /// A finding, as soon as it is known; all stand in the summary again.
     Warning(&'a Warning),
+    /// Nothing to tell: the solver is at work and asks whether to go on.
+    Pulse,
 }
 
 /// The observer of a solution: called at every phase and iteration, it may break off.
