@@ -2,21 +2,34 @@
 //! Oden and Pires (A.C. Bolt, MSc thesis, University of Cape Town, 1983).
 //!
 //! A library of pure functions: no clock, thread, file or network; the same problem gives the same
-//! bits. From the ground up, each room uses only rooms above it in this list:
+//! bits. From the ground up; each room uses only rooms in the groups above it.
 
+// What is asked and answered, as plain data; violations and errors.
+pub mod error;
+pub mod problem;
+pub mod solution;
+
+// Pure maths on numbers: master elements and rules; matrices (the one room that names faer).
+pub mod element;
+pub mod linear;
+
+// The friction law, along arc length only; nodes, elements and named boundaries.
+pub mod friction;
+pub mod mesh;
+
+// A standard elastic program; the geometry of the contact boundary; problems in, figures out.
+pub mod contact;
+pub mod elasticity;
+pub mod io;
+
+// Every check: the only door to a problem that can be solved.
+pub mod model;
+
+// The body as felt from the contact boundary: one factorisation, then a small dense system.
+pub mod body;
+
+// Contact and friction on that system.
 pub mod algorithm;
-pub mod body; //       the body as felt from the contact boundary
-pub mod contact; //    the geometry of the contact boundary
-pub mod elasticity; // a standard elastic program
-pub mod element; //    master elements and integration rules
-pub mod error; //      violations and errors
-pub mod friction; //   the law, along arc length only
-pub mod io; //         problems in, plots out
-pub mod linear; //     matrices; the one room that names faer
-pub mod mesh; //       nodes, elements, named boundaries
-pub mod model; //      every check: the only door to a problem that can be solved
-pub mod problem; //    what a client asks for: plain data
-pub mod solution; //   what comes back: plain data //  contact and friction
 
 use error::{SolveError, Violation};
 use model::Model;

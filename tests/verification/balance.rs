@@ -269,7 +269,13 @@ fn no_admissible_state_has_less_energy_and_the_variational_inequality_holds() {
 #[test]
 fn a_solution_restarted_from_itself_stays() {
     with_solved("cylinder", |_, _, system, finished| {
-        let again = solver::algorithm::minimise(system, &finished.bound, &finished.state, 1e-12);
+        let again = solver::algorithm::minimise(
+            system,
+            &finished.bound,
+            &finished.state,
+            1e-12,
+            &mut || ControlFlow::Continue(()),
+        );
         let State { v, active } = &again.state;
         assert_eq!(active, &finished.state.active);
         assert!(
@@ -277,7 +283,13 @@ fn a_solution_restarted_from_itself_stays() {
                 .zip(&finished.state.v)
                 .all(|(a, b)| (a - b).abs() < 1e-13)
         );
-        let from_rest = solver::algorithm::minimise(system, &finished.bound, &system.rest(), 1e-12);
+        let from_rest = solver::algorithm::minimise(
+            system,
+            &finished.bound,
+            &system.rest(),
+            1e-12,
+            &mut || ControlFlow::Continue(()),
+        );
         assert!(
             from_rest
                 .state

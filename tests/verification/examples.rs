@@ -186,3 +186,28 @@ fn hard_cases_converge_by_the_fallback() {
     }
     assert!(fallbacks >= 2, "the fallback was taken {fallbacks} times");
 }
+
+/// FORMULATION 3: on the thesis-size mesh ε ≤ 1e-5 lets stick tractions oscillate (∫|σ_t| = 14.17,
+/// 15.20, 19.64 for ε = 1e-4, 1e-5, 1e-6), and the user is told.
+#[test]
+fn oscillating_stick_tractions_have_their_published_size_and_a_warning() {
+    for (elastic_slip, friction_force, warned) in [
+        (1e-4, 14.17, false),
+        (1e-5, 15.20, true),
+        (1e-6, 19.64, true),
+    ] {
+        let mut problem = example("rectangular_punch");
+        problem.contacts[0].friction.as_mut().unwrap().elastic_slip = elastic_slip;
+        let summary = solve(&problem).summary;
+        assert!(
+            (summary.friction_force - friction_force).abs() < 6e-3,
+            "ε = {elastic_slip}: {}",
+            summary.friction_force
+        );
+        let told = summary
+            .warnings
+            .iter()
+            .any(|w| w.code == "oscillating_stick");
+        assert_eq!(told, warned, "ε = {elastic_slip}: {:?}", summary.warnings);
+    }
+}

@@ -214,7 +214,7 @@ fn a_contact_that_never_engages_is_said_with_its_smallest_gap() {
         .iter()
         .find(|w| w.code == "no_contact")
         .expect("no warning");
-    assert!(warning.message.contains("0.125"), "{}", warning.message);
+    assert!(warning.message.contains("1.25"), "{}", warning.message);
     assert!(solution.summary.contacts["top"].contact.is_empty());
 }
 
@@ -263,4 +263,176 @@ fn an_observer_that_stops_before_the_first_state_gets_none() {
         std::ops::ControlFlow::Break(())
     });
     assert_eq!(end, Err(solver::error::SolveError::Stopped));
+}
+
+/// A mechanism must not come back as converged: two squares that touch in a corner only.
+#[test]
+fn parts_that_touch_in_a_corner_only_do_not_hold_each_other() {
+    let p = problem(
+        r#"{"analysis": {"kind": "plane_strain"}, "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "mesh": {"inline": {
+                "nodes": [[0,0],[1,0],[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5],
+                          [2,1],[2,2],[1,2],[1.5,1],[2,1.5],[1.5,2],[1,1.5]],
+                "elements": [[0,1,2,3,4,5,6,7], [2,8,9,10,11,12,13,14]],
+                "boundaries": {"base": [[0,1,4]], "top": [[10,9,13]]}}},
+            "supports": [{"boundary": "base", "ux": 0, "uy": 0}],
+            "loads": [{"boundary": "top", "pressure": [1, 2]}]}"#,
+    );
+    assert_eq!(violations(&p), [pair("/supports", "free_body")]);
+}
+
+/// What a contact's friction leaves open is the frictionless body, wherever the friction law starts.
+#[test]
+fn friction_that_never_acts_changes_nothing() {
+    let mut p = example("sheet");
+    p.contacts[0].indentation = -1.0;
+    let with = solve(&p);
+    p.contacts[0].friction = None;
+    let without = solve(&p);
+    assert_eq!(with.fields, without.fields);
+    assert_eq!(
+        with.profiles["taper"].tangential_displacement,
+        without.profiles["taper"].tangential_displacement
+    );
+}
+
+/// The row of history that an observer stops at and the result it gets are one state.
+#[test]
+fn a_solution_stopped_at_its_first_row_is_the_state_of_that_row() {
+    for name in ["rectangular_punch", "sheet"] {
+        let solution = solver::solve(&example(name), &mut |progress| match progress {
+            solver::solution::Progress::Iteration(_) => std::ops::ControlFlow::Break(()),
+            _ => std::ops::ControlFlow::Continue(()),
+        })
+        .unwrap();
+        assert_eq!(solution.history.len(), 1);
+        assert_eq!(
+            solution.history[0].force.normal, solution.summary.normal_force,
+            "{name}"
+        );
+    }
+}
+
+/// ρ far below the mesh's rounding is Coulomb's law; ρ far beyond the contact is refused.
+#[test]
+fn a_radius_of_nothing_is_local_and_an_endless_one_refused() {
+    let with_radius = |radius: f64| {
+        let mut p = example("rectangular_punch");
+        p.contacts[0].friction.as_mut().unwrap().nonlocal_radius = radius;
+        p
+    };
+    let local = solve(&with_radius(0.0)).summary.tangential_force;
+    for radius in [1e-300, 1e-12] {
+        assert_eq!(solve(&with_radius(radius)).summary.tangential_force, local);
+    }
+    assert!((solve(&with_radius(1e-6)).summary.tangential_force / local - 1.0).abs() < 1e-3);
+    for radius in [6.0, 1e12, 1e300] {
+        let pointer = "/contacts/0/friction/nonlocal_radius";
+        assert_eq!(
+            violations(&with_radius(radius)),
+            [pair(pointer, "out_of_range")]
+        );
+    }
+}
+
+/// A square with one midside moved along its side.
+fn square_with_midside(x: f64, refine: u32) -> Problem {
+    problem(&format!(
+        r#"{{"analysis": {{"kind": "plane_strain"}}, "materials": [{{"youngs_modulus": 1000, "poissons_ratio": 0.3}}],
+            "mesh": {{"refine": {refine}, "inline": {{
+                "nodes": [[0,0],[1,0],[1,1],[0,1],[0.5,0],[1,0.5],[{x},1],[0,0.5]],
+                "elements": [[0,1,2,3,4,5,6,7]], "boundaries": {{"base": [[0,1,4]], "top": [[3,2,6]]}}}}}},
+            "supports": [{{"boundary": "base", "ux": 0, "uy": 0}}],
+            "contacts": [{{"boundary": "top", "obstacle": {{"kind": "flat"}}, "indentation": 0.1}}]}}"#
+    ))
+}
+
+#[test]
+fn a_midside_far_off_its_middle_is_refused() {
+    for x in [0.24, 0.25, 0.76, 1.2] {
+        for refine in 0..3 {
+            let found = violations(&square_with_midside(x, refine));
+            assert!(
+                found.contains(&pair("/mesh/inline/elements/0", "inverted_element")),
+                "{x}: {found:?}"
+            );
+        }
+    }
+    let force = |refine| {
+        solve(&square_with_midside(0.4, refine))
+            .summary
+            .normal_force
+    };
+    assert!(
+        (force(1) / force(2) - 1.0).abs() < 0.05,
+        "a gently moved one converges"
+    );
+}
+
+#[test]
+fn contacts_without_area_normal_or_coordinate_are_refused() {
+    let mut axis = example("cylinder_on_end");
+    axis.supports.remove(0);
+    axis.contacts[0].boundary = "left".to_owned();
+    axis.contacts[0].obstacle = serde_json::from_str(r#"{"kind": "flat"}"#).unwrap();
+    assert!(violations(&axis).contains(&pair("/contacts/0/boundary", "no_area")));
+
+    let mut wall = example("rectangular_punch");
+    wall.contacts[0].boundary = "right".to_owned();
+    wall.contacts[0].obstacle = serde_json::from_str(r#"{"kind": "circle", "radius": 8}"#).unwrap();
+    let found = violations(&wall);
+    assert!(
+        found.contains(&pair("/contacts/0/obstacle/along", "not_monotonic")),
+        "{found:?}"
+    );
+
+    let mut corner = square_with_midside(0.5, 0);
+    let inline = corner.mesh.inline.as_mut().unwrap();
+    inline
+        .boundaries
+        .insert("top".to_owned(), vec![[3, 2, 6], [2, 1, 5]]);
+    assert!(violations(&corner).contains(&pair("/contacts/0/boundary", "turns_corner")));
+}
+
+/// A hostile problem costs little: many violations are counted, long lists refused.
+#[test]
+fn endless_lists_of_faults_are_cut_short() {
+    let mut p = example("rectangular_punch");
+    let stray = solver::problem::Support {
+        boundary: "nowhere".to_owned(),
+        ..p.supports[0].clone()
+    };
+    p.supports.extend(std::iter::repeat_n(stray.clone(), 500));
+    let list = solver::check(&p).unwrap_err();
+    assert_eq!(list.len(), 100);
+    assert!(list[99].hint.contains("400 more"), "{}", list[99].hint);
+    p.supports.extend(std::iter::repeat_n(stray, 5000));
+    assert_eq!(violations(&p), [pair("/supports", "too_many")]);
+
+    let faults = vec![r#"{"a": 0}"#; 20_000].join(",");
+    let list = solver::parse(&format!(r#"{{"supports": [{faults}]}}"#)).unwrap_err();
+    assert_eq!(list.len(), 100);
+}
+
+/// Far from the origin differences of coordinates lose digits: the inner problem must notice that
+/// no more can be had, instead of trying to the end.
+#[test]
+fn a_body_far_from_the_origin_is_solved_without_endless_inner_steps() {
+    let mut p = example("rectangular_punch");
+    let shift = 1e5;
+    let grid = p.mesh.grid.as_mut().unwrap();
+    grid.x
+        .iter_mut()
+        .chain(&mut grid.y)
+        .for_each(|c| *c += shift);
+    p.contacts[0].obstacle = serde_json::from_str(&format!(
+        r#"{{"kind": "flat", "from": {shift}, "to": {}}}"#,
+        shift + 0.5
+    ))
+    .unwrap();
+    let solution = solve(&p);
+    let steps: u32 = solution.history.iter().map(|row| row.inner).sum();
+    assert!(steps < 60, "{steps} inner steps");
+    let home = solve(&example("rectangular_punch")).summary.normal_force;
+    assert!((solution.summary.normal_force / home - 1.0).abs() < 1e-6);
 }

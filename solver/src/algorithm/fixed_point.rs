@@ -48,23 +48,20 @@ pub struct Cycle {
 pub fn run(system: &System<'_>, controls: &SolverControls, observe: &mut Observer<'_>) -> Finished {
     let mut sweeps = Sweeps::new(system, controls);
     let frictionless = vec![0.0; system.points.len()];
-    let mut stop = sweeps.solve(Stage::Frictionless, frictionless, observe);
-    if system.points.is_empty()
-        || system
-            .points
-            .iter()
-            .all(|p| system.law(p).coefficient == 0.0)
-    {
-        return sweeps.finish(stop.is_break());
-    }
-    // friction starts from u_t = d: every point sticks, and pulls with full stiffness
-    sweeps.stick();
-    for _ in 0..controls.max_iterations {
-        if stop.is_break() || sweeps.converged() || sweeps.cycle.is_some() {
+    let mut stop = sweeps.solve(Stage::Frictionless, frictionless, &system.rest(), observe);
+    for sweep in 0..controls.max_iterations {
+        let nothing_to_sweep = system.points.is_empty();
+        if nothing_to_sweep || stop.is_break() || sweeps.converged() || sweeps.cycle.is_some() {
             break;
         }
         let bound = sweeps.implied_bound.clone();
-        stop = sweeps.solve(Stage::Outer, bound, observe);
+        // friction starts from u_t = d: every point sticks, and pulls with full stiffness
+        let start = if sweep == 0 {
+            sweeps.stuck()
+        } else {
+            sweeps.state.clone()
+        };
+        stop = sweeps.solve(Stage::Outer, bound, &start, observe);
     }
     sweeps.finish(stop.is_break())
 }
@@ -111,8 +108,9 @@ impl<'a> Sweeps<'a> {
         }
     }
 
-    /// u_t = d at every contact node with friction.
-    fn stick(&mut self) {
+    /// The present state with u_t = d at every contact node with friction.
+    fn stuck(&self) -> State {
+        let mut state = self.state.clone();
         for patch in self
             .system
             .patches
@@ -121,10 +119,11 @@ impl<'a> Sweeps<'a> {
         {
             for node in &self.system.nodes[patch.first..patch.first + patch.contact.gap.len()] {
                 if let Dof::Free(dof) = node.tangent {
-                    self.state.v[dof] = patch.contact.tangential_displacement;
+                    state.v[dof] = patch.contact.tangential_displacement;
                 }
             }
         }
+        state
     }
 
     /// One convex problem and all that is measured of its solution.
@@ -132,10 +131,9 @@ impl<'a> Sweeps<'a> {
         &mut self,
         stage: Stage,
         bound: Vec<f64>,
+        start: &State,
         observe: &mut Observer<'_>,
     ) -> ControlFlow<()> {
-        // the inner problem is solved a little further than asked, so that its rest does not
-        // blur the outer residuals
         let Minimum {
             state,
             steps,
@@ -143,8 +141,9 @@ impl<'a> Sweeps<'a> {
         } = minimise(
             self.system,
             &bound,
-            &self.state,
-            0.1 * self.controls.tolerance,
+            start,
+            self.controls.tolerance,
+            &mut || observe(Progress::Pulse),
         );
         let changes = |from: bool| {
             let pairs = self.state.active.iter().zip(&state.active);
@@ -162,7 +161,8 @@ impl<'a> Sweeps<'a> {
         let r_f = (!self.history.is_empty()).then(|| relative_change(&pressures, &self.pressures));
         let implied = self.system.friction_bound(&pressures);
         let change = largest_difference(&implied, &bound);
-        let scale = implied.iter().fold(0.0f64, |a, &b| a.max(b));
+        // the largest bound, old or new: FORMULATION 4, guarded where one of them is nothing
+        let scale = implied.iter().chain(&bound).fold(0.0f64, |a, &b| a.max(b));
         self.contraction = match self.bound_change {
             Some(before) if stage == Stage::Outer && before > 0.0 && change > 0.0 => {
                 Some(change / before)
@@ -171,11 +171,7 @@ impl<'a> Sweeps<'a> {
         };
         self.bound_change = Some(change).filter(|_| stage == Stage::Outer);
         self.residuals.kkt = residual;
-        self.residuals.friction = if change == 0.0 {
-            0.0
-        } else {
-            change / scale.max(change)
-        };
+        self.residuals.friction = if change == 0.0 { 0.0 } else { change / scale };
         self.residuals.monolithic = self.system.kkt_residual(&state, &implied);
         self.contact_changed = contact.entered + contact.left > 0;
         let (slip, stick) = self.slipping(&state, &implied);

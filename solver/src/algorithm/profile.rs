@@ -9,6 +9,9 @@ use crate::solution::{ContactProfile, ContactSummary, NodeState, Peak, Warning};
 /// Samples per edge in the search for a peak, before it is narrowed down.
 const SAMPLES: usize = 16;
 
+/// Stick may turn once between two directions of slip; more often is the mesh's doing.
+const FEWEST_REVERSALS: usize = 2;
+
 /// Fewer edges than this across a contact say little about its pressure.
 const FEWEST_EDGES: usize = 6;
 
@@ -316,7 +319,7 @@ impl PatchView<'_> {
             warn(
                 "no_contact",
                 format!(
-                    "The body never touches the obstacle: the smallest gap is {smallest:.6}. Indent by more than that to engage it."
+                    "The body never touches the obstacle: the smallest gap is {smallest:.6e}. Indent by more than that to engage it."
                 ),
             );
             return;
@@ -329,6 +332,15 @@ impl PatchView<'_> {
                 "mesh_too_coarse_for_contact",
                 format!(
                     "Only {edges} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a pressure to rely on. Refine the mesh there."
+                ),
+            );
+        }
+        let reversals = self.stick_reversals();
+        if reversals >= FEWEST_REVERSALS {
+            warn(
+                "oscillating_stick",
+                format!(
+                    "The tangential stress changes its sign {reversals} times between neighbouring points that stick: the mesh does not resolve elastic_slip, and friction_force is too large. Refine the contact, or raise elastic_slip."
                 ),
             );
         }
@@ -360,6 +372,24 @@ impl PatchView<'_> {
                 );
             }
         }
+    }
+
+    /// How often φ changes its sign between neighbouring friction points inside stick.
+    fn stick_reversals(&self) -> usize {
+        let Some(law) = &self.patch.law else { return 0 };
+        let largest = self.bound.iter().fold(0.0f64, |a, b| a.max(*b));
+        let points = self.system.points.iter().zip(self.bound);
+        let own: Vec<Option<f64>> = points
+            .filter(|(point, _)| point.patch == self.p)
+            .map(|(point, tau)| {
+                let slip = self.system.slip(self.v, point);
+                let sticks = slip.abs() < law.elastic_slip && *tau > 1e-3 * largest;
+                // near zero a sign means nothing
+                sticks.then(|| law.phi(slip)).filter(|phi| phi.abs() > 0.01)
+            })
+            .collect();
+        let reverses = |pair: &&[Option<f64>]| matches!(pair, [Some(a), Some(b)] if a * b < 0.0);
+        own.windows(2).filter(reverses).count()
     }
 
     /// A node on a line of symmetry: on the axis, or held along the tangent.

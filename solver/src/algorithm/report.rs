@@ -12,6 +12,12 @@ use crate::error::SolveError;
 use crate::model::Model;
 use crate::solution::{ContactSummary, Fields, Outcome, Residuals, Solution, Summary, Warning};
 
+/// Forces that balance no better than this have lost half of their digits: no result to trust.
+const OUT_OF_BALANCE: f64 = 1e-7;
+
+/// Forces are told from rounding when they are above this part of modulus × displacement × depth.
+const FORCE_FLOOR: f64 = 1e-6;
+
 /// Displacement beyond this part of the body's size is not small.
 const LARGE_DISPLACEMENT: f64 = 0.1;
 
@@ -63,10 +69,21 @@ pub fn report(
         .zip(&displacements)
         .map(|(f, u)| f[0] * u[0] + f[1] * u[1])
         .sum();
-    let equilibrium = equilibrium(model, body, &recovered, &contact_force);
+    let equilibrium = equilibrium(model, body, &recovered, &displacements, &contact_force);
+    let outcome = match finished.outcome {
+        Outcome::Converged if equilibrium > OUT_OF_BALANCE => Outcome::FalseConvergence,
+        outcome => outcome,
+    };
+    if equilibrium > OUT_OF_BALANCE {
+        warnings.push(Warning {
+            code: "out_of_balance".to_owned(),
+            pointer: String::new(),
+            message: format!("The forces on the body do not balance: {equilibrium:.1e} of their sum is left over. The stiffness is all but singular: check supports, hinges and badly shaped elements."),
+        });
+    }
     let summary = Summary {
-        outcome: finished.outcome,
-        converged: finished.outcome == Outcome::Converged,
+        outcome,
+        converged: outcome == Outcome::Converged,
         normal_force: total(|c| c.normal_force),
         tangential_force: total(|c| c.tangential_force),
         friction_force: total(|c| c.friction_force),
@@ -141,6 +158,7 @@ fn equilibrium(
     model: &Model,
     body: &ElasticBody,
     recovered: &Recovered,
+    displacements: &[[f64; 2]],
     contact_force: &[f64],
 ) -> f64 {
     let first = usize::from(model.section.axisymmetric());
@@ -166,8 +184,24 @@ fn equilibrium(
             size += f.abs();
         }
     }
+    // a body that only moves has no forces but rounding: that must not look like imbalance
+    let moved = displacements
+        .iter()
+        .flatten()
+        .fold(0.0f64, |most, u| most.max(u.abs()));
+    let depth = model
+        .mesh
+        .nodes
+        .iter()
+        .map(|x| model.section.depth(x[0]))
+        .fold(0.0, f64::max);
+    let floor = FORCE_FLOOR * model.section.moduli[0][0] * moved * depth;
     let sum = sum[0].hypot(sum[1]);
-    if sum == 0.0 { 0.0 } else { sum / size }
+    if sum == 0.0 {
+        0.0
+    } else {
+        sum / f64::max(size, floor)
+    }
 }
 
 fn fields(model: &Model, displacements: &[[f64; 2]], recovered: &Recovered) -> Fields {
@@ -188,17 +222,7 @@ fn fields(model: &Model, displacements: &[[f64; 2]], recovered: &Recovered) -> F
 
 /// Linear elasticity takes displacements for small beside the body.
 fn warn_of_displacement(model: &Model, displacements: &[[f64; 2]], warnings: &mut Vec<Warning>) {
-    let extent = |axis: usize| {
-        let (low, high) = model
-            .mesh
-            .nodes
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-                (low.min(x[axis]), high.max(x[axis]))
-            });
-        high - low
-    };
-    let size = extent(0).hypot(extent(1));
+    let size = model.mesh.extent(0).hypot(model.mesh.extent(1));
     let largest = displacements
         .iter()
         .map(|[x, y]| x.hypot(*y))

@@ -24,6 +24,8 @@ pub struct FacingRun {
     pub chain: Vec<Edge>,
     /// Profile at each node of the chain (length; the indentation is not yet subtracted).
     pub profile: Vec<f64>,
+    /// The coordinate c there.
+    pub coordinate: Vec<f64>,
 }
 
 /// Finds the part of `boundary` (edges that follow one another) that faces the obstacle.
@@ -45,7 +47,7 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
     };
     let mut continues = false;
     for (k, edge) in boundary.iter().enumerate() {
-        let [start, end, mid] = edge.map(|node| node); // start, end, midside
+        let [start, end, mid] = *edge;
         let c = [
             coordinate(2 * k, start),
             coordinate(2 * k + 2, end),
@@ -67,11 +69,13 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
                     found.runs.push(FacingRun {
                         chain: Vec::new(),
                         profile: vec![a],
+                        coordinate: vec![c[0]],
                     });
                 }
                 if let Some(run) = found.runs.last_mut() {
                     run.chain.push(*edge);
                     run.profile.extend([m, b]);
+                    run.coordinate.extend([c[2], c[1]]);
                 }
                 continues = true;
             }

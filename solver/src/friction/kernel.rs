@@ -19,6 +19,10 @@ static FULL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(40));
 static SHORT_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(12));
 const SHORT: f64 = 0.1;
 
+/// A radius below this part of the chain's length averages over nothing: arc length itself is not
+/// known so well, and the law is Coulomb's.
+const LOCAL: f64 = 1e-9;
+
 /// Γ_C as arc length alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
@@ -63,7 +67,11 @@ impl Row {
 impl Averaging {
     /// The operator with the radius, kernel and normalization of `friction`.
     pub fn new(friction: &Friction, chain: Chain) -> Self {
-        let radius = friction.nonlocal_radius;
+        let length = chain.s[chain.s.len() - 1] - chain.s[0];
+        let radius = match friction.nonlocal_radius {
+            radius if radius < LOCAL * length => 0.0,
+            radius => radius,
+        };
         let scale = match (friction.normalization, friction.kernel) {
             (Normalization::UnitIntegral, Kernel::Bump) => 1.0 / (BUMP_INTEGRAL * radius),
             (Normalization::UnitIntegral, Kernel::Parabola) => 0.75 / radius,

@@ -17,8 +17,13 @@ pub fn schema() -> Value {
     schemars::schema_for!(Problem).to_value()
 }
 
+static SCHEMA: LazyLock<Value> = LazyLock::new(schema);
+
 static VALIDATOR: LazyLock<Option<Validator>> =
-    LazyLock::new(|| jsonschema::validator_for(&schema()).ok());
+    LazyLock::new(|| jsonschema::validator_for(&SCHEMA).ok());
+
+/// More violations than this say nothing new, and cost time and space.
+const MOST_LISTED: usize = 100;
 
 /// Reads a problem, or says everything that is wrong with its structure. Pointers are relative to
 /// the problem.
@@ -49,11 +54,18 @@ fn explain(text: &str, first: &serde_json::Error) -> Vec<Violation> {
             )];
         }
     };
-    let mut found = Vec::new();
+    let mut found: Vec<Violation> = Vec::new();
     if let Some(validator) = &*VALIDATOR {
-        validator
-            .iter_errors(&value)
-            .for_each(|error| collect(&error, &mut found));
+        for error in validator.iter_errors(&value) {
+            if found.len() >= MOST_LISTED {
+                found.truncate(MOST_LISTED);
+                found[MOST_LISTED - 1]
+                    .hint
+                    .push_str(" (There are more violations.)");
+                break;
+            }
+            collect(&error, &mut found);
+        }
     }
     if found.is_empty() {
         // a fault that the schema cannot express, such as a repeated name or a number out of its type
@@ -100,11 +112,11 @@ fn collect(error: &ValidationError<'_>, found: &mut Vec<Violation>) {
     match error.kind() {
         ValidationErrorKind::AdditionalProperties { unexpected } => {
             let known = known_names(error);
-            for name in unexpected {
+            for name in unexpected.iter().take(MOST_LISTED) {
                 found.push(violation(
-                    &format!("{pointer}/{}", escape(name)),
+                    &format!("{pointer}/{:.80}", escape(name)),
                     "unknown_name",
-                    format!("`{name}`"),
+                    format!("`{name:.80}`"),
                     &if known.is_empty() {
                         "a name that the schema has".to_owned()
                     } else {
@@ -243,8 +255,7 @@ fn alternatives(
 
 /// The `kind`s that the schema offers where `error` stands.
 fn kinds(error: &ValidationError<'_>) -> Vec<String> {
-    let schema = schema();
-    let branches = schema.pointer(error.schema_path().as_str());
+    let branches = SCHEMA.pointer(error.schema_path().as_str());
     let branches = branches.and_then(Value::as_array).into_iter().flatten();
     branches
         .filter_map(|b| b.pointer("/properties/kind/const").map(Value::to_string))
@@ -253,11 +264,10 @@ fn kinds(error: &ValidationError<'_>) -> Vec<String> {
 
 /// The names that the schema has where an unknown one was found.
 fn known_names(error: &ValidationError<'_>) -> Vec<String> {
-    let schema = schema();
     let path = error.schema_path().as_str();
     let object = path
         .strip_suffix("/additionalProperties")
-        .and_then(|parent| schema.pointer(parent));
+        .and_then(|parent| SCHEMA.pointer(parent));
     let properties = object
         .and_then(|o| o.get("properties"))
         .and_then(Value::as_object);

@@ -48,14 +48,19 @@ impl Dense {
     }
 }
 
-/// Solves the system A x = b of the given size, A positive definite and given by its lower
-/// triangle `entry(i, j)`, i ≥ j; `None` when it is not positive definite.
+/// Solves (A + Σ aᵢⱼ eᵢeⱼᵀ) x = b: A positive definite, given by its entries; `additions` lists
+/// (i, j, aᵢⱼ), symmetric. `None` when the sum is not positive definite.
 pub fn solve_positive_definite(
     size: usize,
     entry: impl Fn(usize, usize) -> f64,
+    additions: &[(usize, usize, f64)],
     b: &[f64],
 ) -> Option<Vec<f64>> {
-    let a = Mat::from_fn(size, size, |i, j| if i >= j { entry(i, j) } else { 0.0 });
+    // the factorisation reads the lower triangle only
+    let mut a = Mat::from_fn(size, size, |i, j| if i >= j { entry(i, j) } else { 0.0 });
+    for &(i, j, value) in additions.iter().filter(|(i, j, _)| i >= j) {
+        a[(i, j)] += value;
+    }
     let factor = a.llt(Side::Lower).ok()?;
     let x = factor.solve(Mat::from_fn(size, 1, |i, _| b[i]));
     Some((0..size).map(|i| x[(i, 0)]).collect())
@@ -67,9 +72,10 @@ mod tests {
 
     #[test]
     fn a_positive_definite_system_is_solved_and_an_indefinite_one_refused() {
-        let x =
-            solve_positive_definite(2, |i, j| [[4.0, 1.0], [1.0, 3.0]][i][j], &[6.0, 7.0]).unwrap();
+        let a = |i: usize, j: usize| [[3.0, 1.5], [1.5, 3.0]][i][j];
+        let additions = [(0, 0, 1.0), (0, 1, -0.5), (1, 0, -0.5)];
+        let x = solve_positive_definite(2, a, &additions, &[6.0, 7.0]).unwrap();
         assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] - 2.0).abs() < 1e-15);
-        assert!(solve_positive_definite(1, |_, _| -1.0, &[1.0]).is_none());
+        assert!(solve_positive_definite(1, |_, _| -1.0, &[], &[1.0]).is_none());
     }
 }

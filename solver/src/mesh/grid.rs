@@ -94,15 +94,35 @@ pub fn grid_mesh(grid: &Grid) -> Mesh {
 fn height(line: &Option<Vec<[f64; 2]>>, x: f64) -> f64 {
     let Some(points) = line else { return 0.0 };
     let after = points
-        .iter()
-        .position(|p| p[0] >= x)
-        .unwrap_or(points.len() - 1)
-        .max(1);
+        .partition_point(|p| p[0] < x)
+        .clamp(1, points.len() - 1);
     let ([x0, y0], [x1, y1]) = (points[after - 1], points[after]);
     if x == x1 {
         return y1; // exact at the kinks, where grid lines should lie
     }
     y0 + (x - x0) / (x1 - x0) * (y1 - y0)
+}
+
+/// Where the strip is farthest from its polylines: x and the distance; `None` when every kink has a
+/// grid line.
+pub fn largest_cut(grid: &Grid) -> Option<(f64, f64)> {
+    let rounding = 1e-9 * (grid.x[grid.x.len() - 1] - grid.x[0]);
+    let mut worst: Option<(f64, f64)> = None;
+    for line in [&grid.top, &grid.bottom] {
+        for &[x, y] in line.iter().flatten() {
+            let after = grid.x.partition_point(|grid_x| *grid_x < x);
+            if after == 0 || after == grid.x.len() {
+                continue;
+            }
+            let (x0, x1) = (grid.x[after - 1], grid.x[after]);
+            let (y0, y1) = (height(line, x0), height(line, x1));
+            let distance = (y - (y0 + (x - x0) / (x1 - x0) * (y1 - y0))).abs();
+            if distance > rounding && worst.is_none_or(|(_, most)| distance > most) {
+                worst = Some((x, distance));
+            }
+        }
+    }
+    worst
 }
 
 /// What is wrong with a grid; `pointer` is the grid's own.
@@ -220,7 +240,7 @@ mod tests {
     fn a_grid_of_two_by_one_has_thirteen_nodes_and_directed_boundaries() {
         let mesh = grid_mesh(&lines(&[0.0, 1.0, 3.0], &[-1.0, 0.0]));
         assert_eq!((mesh.nodes.len(), mesh.elements.len()), (13, 2));
-        assert!(mesh.inverted_elements().is_empty());
+        assert!(mesh.inverted_elements(true).is_empty());
         for (name, direction) in [
             ("top", [1.0, 0.0]),
             ("bottom", [-1.0, 0.0]),
@@ -246,10 +266,18 @@ mod tests {
         let mut grid = lines(&[0.0, 1.0, 2.0, 3.0, 5.0], &[0.0, 0.5, 1.0]);
         grid.top = Some(vec![[0.0, 1.0], [1.0, 1.0], [3.0, 0.5], [5.0, 0.5]]);
         assert!(grid_violations(&grid, "").is_empty());
+        assert_eq!(largest_cut(&grid), None);
         let mesh = grid_mesh(&grid);
         for (x, y) in [(1.0, 1.0), (2.0, 0.75), (3.0, 0.5), (2.5, 0.625)] {
             assert!(mesh.nodes.contains(&[x, y]), "({x}, {y})");
         }
+    }
+
+    #[test]
+    fn a_kink_between_grid_lines_is_noticed() {
+        let mut grid = lines(&[0.0, 2.0, 4.0], &[0.0, 1.0]);
+        grid.top = Some(vec![[0.0, 1.0], [1.0, 4.0], [2.0, 1.0], [4.0, 1.0]]);
+        assert_eq!(largest_cut(&grid), Some((1.0, 3.0)));
     }
 
     #[test]

@@ -4,7 +4,7 @@ mod grid;
 mod inline;
 mod refine;
 
-pub use grid::{grid_mesh, grid_violations};
+pub use grid::{grid_mesh, grid_violations, largest_cut};
 pub use inline::inline_mesh;
 pub use refine::refine;
 
@@ -35,19 +35,41 @@ impl Mesh {
         element.map(|n| self.nodes[n as usize])
     }
 
+    /// Largest minus smallest coordinate along an axis (0: x, 1: y).
+    pub fn extent(&self, axis: usize) -> f64 {
+        let span = |(low, high): (f64, f64), x: &[f64; 2]| (low.min(x[axis]), high.max(x[axis]));
+        let (low, high) = self
+            .nodes
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), span);
+        high - low
+    }
+
     /// Node positions of an edge.
     pub fn edge_nodes(&self, edge: &Edge) -> [[f64; 2]; 3] {
         edge.map(|n| self.nodes[n as usize])
     }
 
-    /// The first Gauss point (element, point from 0, det J) at which an element is inverted.
-    pub fn inverted_elements(&self) -> Vec<(usize, usize, f64)> {
+    /// Elements that are inverted somewhere: number, place, det J. Looked at are the nine Gauss points
+    /// and, with `at_nodes`, the nodes: a midside far off its middle folds the corner first.
+    pub fn inverted_elements(&self, at_nodes: bool) -> Vec<(usize, String, f64)> {
+        let places = if at_nodes { 17 } else { 9 };
         let inverted = |(e, element): (usize, &[u32; 8])| {
             let nodes = self.element_nodes(element);
-            (0..9).find_map(|g| {
-                let det = quad8::map(&nodes, GAUSS_3[g % 3].0, GAUSS_3[g / 3].0).det;
-                (det.is_nan() || det <= 0.0).then_some((e, g, det))
-            })
+            let det = |place: usize| {
+                let [xi, eta] = match place {
+                    0..9 => [GAUSS_3[place % 3].0, GAUSS_3[place / 3].0],
+                    _ => quad8::NODES[place - 9],
+                };
+                quad8::map(&nodes, xi, eta).det
+            };
+            let folded = |place: &usize| det(*place).is_nan() || det(*place) <= 0.0;
+            let place = (0..places).find(folded)?;
+            let name = match place {
+                0..9 => format!("Gauss point {place}"),
+                _ => format!("its node {}", place - 9),
+            };
+            Some((e, name, det(place)))
         };
         self.elements
             .iter()
@@ -56,22 +78,41 @@ impl Mesh {
             .collect()
     }
 
-    /// The parts that hang together, each as a list of its nodes.
+    /// The parts that hang together by sides of elements, each as a list of its nodes. Parts that
+    /// touch in a corner only are parts of their own, and share that node.
     pub fn connected_parts(&self) -> Vec<Vec<u32>> {
-        // union–find over the nodes, one element at a time
-        let mut parent: Vec<u32> = (0..self.nodes.len() as u32).collect();
-        for element in &self.elements {
-            let root = find(&mut parent, element[0]);
-            for &node in &element[1..] {
-                let other = find(&mut parent, node);
-                parent[other as usize] = root;
+        // union–find over the elements; a side is known by its midside node
+        let mut parent: Vec<u32> = (0..self.elements.len() as u32).collect();
+        let mut first_with_side = vec![u32::MAX; self.nodes.len()];
+        for (e, element) in self.elements.iter().enumerate() {
+            for [_, _, mid] in quad8::SIDES {
+                let first = &mut first_with_side[element[mid] as usize];
+                if *first == u32::MAX {
+                    *first = e as u32;
+                } else {
+                    let (a, b) = (find(&mut parent, *first), find(&mut parent, e as u32));
+                    parent[b as usize] = a;
+                }
             }
         }
-        let mut parts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for node in 0..self.nodes.len() as u32 {
-            parts.entry(find(&mut parent, node)).or_default().push(node);
+        let mut number = vec![usize::MAX; self.elements.len()];
+        let mut parts: Vec<Vec<u32>> = Vec::new();
+        let mut seen_by = vec![usize::MAX; self.nodes.len()];
+        for (e, element) in self.elements.iter().enumerate() {
+            let root = find(&mut parent, e as u32) as usize;
+            if number[root] == usize::MAX {
+                number[root] = parts.len();
+                parts.push(Vec::new());
+            }
+            let part = number[root];
+            for &node in element {
+                if seen_by[node as usize] != part {
+                    seen_by[node as usize] = part;
+                    parts[part].push(node);
+                }
+            }
         }
-        parts.into_values().collect()
+        parts
     }
 }
 
@@ -118,6 +159,32 @@ mod tests {
             sorted,
             vec![vec![[0, 2, 1], [2, 4, 3], [4, 6, 5]], vec![[10, 12, 11]]]
         );
+    }
+
+    #[test]
+    fn squares_that_share_a_corner_are_two_parts_and_a_strip_is_one() {
+        let square = |o: f64, n: [u32; 8], nodes: &mut Vec<[f64; 2]>| {
+            for (node, [x, y]) in n.iter().zip(quad8::NODES) {
+                nodes[*node as usize] = [o + 0.5 * (1.0 + x), o + 0.5 * (1.0 + y)];
+            }
+            n
+        };
+        let mut mesh = Mesh {
+            nodes: vec![[0.0; 2]; 15],
+            ..Mesh::default()
+        };
+        let first = square(0.0, [0, 1, 2, 3, 4, 5, 6, 7], &mut mesh.nodes);
+        let second = square(1.0, [2, 8, 9, 10, 11, 12, 13, 14], &mut mesh.nodes);
+        mesh.elements = vec![first, second];
+        let parts = mesh.connected_parts();
+        assert_eq!(parts.iter().map(Vec::len).collect::<Vec<_>>(), [8, 8]);
+        let strip = crate::problem::Grid {
+            x: vec![0.0, 1.0, 2.0],
+            y: vec![0.0, 1.0],
+            top: None,
+            bottom: None,
+        };
+        assert_eq!(grid_mesh(&strip).connected_parts().len(), 1);
     }
 
     #[test]

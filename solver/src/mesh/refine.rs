@@ -93,7 +93,7 @@ mod tests {
         };
         assert_eq!(sorted(&refined), sorted(&direct));
         assert_eq!(refined.elements.len(), direct.elements.len());
-        assert!(refined.inverted_elements().is_empty());
+        assert!(refined.inverted_elements(true).is_empty());
         for (name, edges) in &refined.boundaries {
             let place = |mesh: &Mesh, e: &Edge| mesh.edge_nodes(e);
             let expected: Vec<_> = direct.boundaries[name]

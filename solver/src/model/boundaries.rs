@@ -50,19 +50,9 @@ impl Findings {
             mesh = None;
         }
         let mut mesh = mesh?;
-        for (e, g, det) in mesh.inverted_elements().into_iter().take(20) {
-            self.say(
-                if input.inline.is_some() {
-                    format!("/mesh/inline/elements/{e}")
-                } else {
-                    "/mesh/grid".to_owned()
-                },
-                "inverted_element",
-                format!("element {e} with det J = {det:.3e} at Gauss point {g}"),
-                "det J > 0 at all nine Gauss points",
-                "List corners counter-clockwise, and keep midsides near the middle of their sides.",
-            );
-        }
+        // straight-sided grids need no look at their corners, and stay what they are when refined
+        let inline = input.inline.is_some();
+        self.inverted(&mesh, inline, "");
         if matches!(analysis, Analysis::Axisymmetric {})
             && let Some(node) = mesh.nodes.iter().position(|[r, _]| *r < 0.0)
         {
@@ -81,16 +71,49 @@ impl Findings {
         if self.violations.len() > before {
             return None;
         }
+        if let Some((x, distance)) = input.grid.as_ref().and_then(mesh::largest_cut) {
+            self.warn(
+                "strip_cuts_polyline",
+                "/mesh/grid",
+                format!("The strip leaves its polyline by {distance:.3e} at x = {x}, between two grid lines. Put a grid line there."),
+            );
+        }
         for _ in 0..input.refine {
             mesh = mesh::refine(&mesh);
+        }
+        if inline && input.refine > 0 {
+            self.inverted(&mesh, false, " of the refined mesh");
+        }
+        if self.violations.len() > before {
+            return None;
         }
         self.parts(&mut mesh, input);
         Some(mesh)
     }
 
+    fn inverted(&mut self, mesh: &Mesh, inline: bool, of: &str) {
+        for (e, place, det) in mesh.inverted_elements(inline).into_iter().take(20) {
+            let pointer = match (inline, of) {
+                (true, "") => format!("/mesh/inline/elements/{e}"),
+                _ => "/mesh".to_owned(),
+            };
+            self.say(
+                pointer,
+                "inverted_element",
+                format!("element {e}{of} with det J = {det:.3e} at {place}"),
+                "det J > 0 at all nine Gauss points and at the nodes",
+                "List corners counter-clockwise, and keep midsides near the middle of their sides.",
+            );
+        }
+    }
+
     /// Names for parts of boundaries.
     pub(super) fn parts(&mut self, mesh: &mut Mesh, input: &MeshInput) {
         let original = mesh.boundaries.clone();
+        let size = [0, 1]
+            .map(|axis| mesh.extent(axis))
+            .into_iter()
+            .fold(0.0, f64::max);
         for (name, part) in &input.boundaries {
             let pointer = format!("/mesh/boundaries/{}", escape(name));
             if original.contains_key(name) {
@@ -113,11 +136,6 @@ impl Findings {
                 );
                 continue;
             };
-            let size = mesh
-                .nodes
-                .iter()
-                .flatten()
-                .fold(0.0f64, |a, b| a.max(b.abs()));
             let within = |edge: &&Edge| {
                 mesh.edge_nodes(edge).iter().all(|position| {
                     [part.x, part.y].iter().zip(position).all(|(range, c)| {
@@ -197,10 +215,16 @@ impl Findings {
     }
 }
 
+/// The names that exist, or the first of them.
 fn names(boundaries: &BTreeMap<String, Vec<Edge>>) -> String {
-    boundaries
+    const SHOWN: usize = 20;
+    let shown: Vec<String> = boundaries
         .keys()
-        .map(|name| format!("`{name}`"))
-        .collect::<Vec<_>>()
-        .join(", ")
+        .take(SHOWN)
+        .map(|name| format!("`{name:.80}`"))
+        .collect();
+    match boundaries.len().saturating_sub(SHOWN) {
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
+    }
 }

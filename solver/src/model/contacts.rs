@@ -3,15 +3,22 @@
 use std::collections::BTreeMap;
 
 use super::ContactModel;
-use super::findings::{ALIGNED, Findings};
+use super::findings::{ALIGNED, AXIS, Findings};
 use crate::contact::ContactBoundary;
 use crate::contact::obstacle::{self, FacingRun};
 use crate::elasticity::Section;
 use crate::mesh::{self, Edge, Mesh};
-use crate::problem::{Contact, Friction};
+use crate::problem::{Contact, Friction, Obstacle};
 
 /// Cosine of the sharpest turn between two contact edges that goes without a warning: 20°.
 const SHARPEST_TURN: f64 = 0.94;
+
+/// And of the sharpest that is accepted at all: 45°.
+const SHARPEST_CORNER: f64 = 0.7;
+
+/// Largest nonlocal radius, in lengths of the contact boundary. Beyond it the average knows nothing
+/// of the contact, and between two lines of symmetry its cost grows with the radius.
+const LARGEST_RADIUS: f64 = 10.0;
 
 impl Findings {
     pub(super) fn contacts(
@@ -54,6 +61,9 @@ impl Findings {
                 continue;
             };
             let boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
+            if !self.sound(&boundary, section, contact, &run, &pointer) {
+                continue;
+            }
             if let Some((other, node)) = models.iter().find_map(|m| {
                 m.boundary
                     .nodes
@@ -85,6 +95,77 @@ impl Findings {
             });
         }
         models
+    }
+
+    /// Whether the chain can carry a pressure, and its obstacle and friction make sense on it.
+    fn sound(
+        &mut self,
+        boundary: &ContactBoundary,
+        section: &Section,
+        contact: &Contact,
+        run: &FacingRun,
+        pointer: &str,
+    ) -> bool {
+        let before = self.violations.len();
+        let last = boundary.nodes.len() - 1;
+        let at = |i: usize| boundary.positions[i];
+        let end_on_axis = |i: usize| {
+            section.axisymmetric() && (i == 0 || i == last) && at(i)[0] <= AXIS * boundary.s[last]
+        };
+        if let Some(i) = (0..=last).find(|&i| !(boundary.weights[i] > 0.0 || end_on_axis(i))) {
+            self.say(
+                format!("{pointer}/boundary"),
+                "no_area",
+                format!(
+                    "node {} at {:?} with a contact area of {:.3e}",
+                    boundary.nodes[i],
+                    at(i),
+                    boundary.weights[i]
+                ),
+                "a boundary with area at every node (in axisymmetry off the axis, but for an end)",
+                "Choose another boundary; keep midsides near the middle of their sides.",
+            );
+        }
+        if let Some(corner) = (2..last)
+            .step_by(2)
+            .find(|&corner| turn(boundary, corner) < SHARPEST_CORNER)
+        {
+            self.say(
+                format!("{pointer}/boundary"),
+                "turns_corner",
+                format!(
+                    "a boundary that turns by {:.0}° at {:?}",
+                    turn(boundary, corner).acos().to_degrees(),
+                    at(corner)
+                ),
+                "a boundary without corners: at one there is no normal",
+                "Give each side a contact of its own, with names under /mesh/boundaries.",
+            );
+        }
+        let curved = !matches!(contact.obstacle, Obstacle::Flat { .. });
+        let grows = |pair: &[f64]| pair[1] > pair[0];
+        let falls = |pair: &[f64]| pair[1] < pair[0];
+        if curved && !run.coordinate.windows(2).all(grows) && !run.coordinate.windows(2).all(falls)
+        {
+            self.say(
+                format!("{pointer}/obstacle/along"),
+                "not_monotonic",
+                "a coordinate x that does not grow or fall along the boundary",
+                "a coordinate that tells the places of the boundary apart",
+                "Write \"along\": \"arc_length\".",
+            );
+        }
+        if let Some(friction) = contact.friction {
+            let most = LARGEST_RADIUS * boundary.s[last];
+            self.require(
+                friction.nonlocal_radius <= most,
+                format!("{pointer}/friction/nonlocal_radius"),
+                friction.nonlocal_radius,
+                &format!("at most {most}, ten times the length of the contact boundary"),
+                "The radius is a material length, far below the size of the contact.",
+            );
+        }
+        self.violations.len() == before
     }
 
     /// The part of the boundary that faces the obstacle: one chain.
@@ -209,14 +290,8 @@ impl Findings {
     /// At a corner between two edges there is no one normal.
     fn corners(&mut self, contact: &ContactModel) {
         let boundary = &contact.boundary;
-        let chord = |from: usize, to: usize| {
-            let ([x0, y0], [x1, y1]) = (boundary.positions[from], boundary.positions[to]);
-            let length = (x1 - x0).hypot(y1 - y0);
-            [(x1 - x0) / length, (y1 - y0) / length]
-        };
         for corner in (2..boundary.nodes.len() - 1).step_by(2) {
-            let (before, after) = (chord(corner - 1, corner), chord(corner, corner + 1));
-            let cosine = before[0] * after[0] + before[1] * after[1];
+            let cosine = turn(boundary, corner);
             if cosine < SHARPEST_TURN {
                 let ([x, y], angle) = (boundary.positions[corner], cosine.acos().to_degrees());
                 self.warn(
@@ -243,8 +318,19 @@ impl Findings {
             self.warn(
                 "mesh_too_coarse_for_radius",
                 &format!("{}/friction/nonlocal_radius", contact.pointer),
-                format!("The shortest contact edge ({shortest:.4}) is longer than the nonlocal radius ({}): the averaging is not resolved. Refine the mesh towards the ends of the contact.", friction.nonlocal_radius),
+                format!("The shortest contact edge ({shortest:.3e}) is longer than the nonlocal radius ({}): the averaging is not resolved. Refine the mesh towards the ends of the contact.", friction.nonlocal_radius),
             );
         }
     }
+}
+
+/// Cosine of the angle by which a boundary turns at a corner node.
+fn turn(boundary: &ContactBoundary, corner: usize) -> f64 {
+    let chord = |from: usize, to: usize| {
+        let ([x0, y0], [x1, y1]) = (boundary.positions[from], boundary.positions[to]);
+        let length = (x1 - x0).hypot(y1 - y0);
+        [(x1 - x0) / length, (y1 - y0) / length]
+    };
+    let (before, after) = (chord(corner - 1, corner), chord(corner, corner + 1));
+    before[0] * after[0] + before[1] * after[1]
 }

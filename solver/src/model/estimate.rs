@@ -33,7 +33,7 @@ pub fn estimate(problem: &Problem) -> Estimate {
     // fill of a minimum-degree factor in the plane grows like n log n
     let fill = dofs * dofs.max(2.0).log2();
     let contact = contact_dofs(problem, n.sqrt());
-    let memory = 1500.0 * dofs + 95.0 * fill + 24.0 * contact * contact;
+    let memory = 1500.0 * dofs + 95.0 * fill + 60.0 * contact * contact;
     let time = 6e-6 * dofs + 4e-9 * dofs.powf(1.5) + 1e-9 * contact.powi(3);
     // floats saturate when cast: a hopeless problem gets the largest number there is
     Estimate {

@@ -9,11 +9,15 @@ pub(super) const ALIGNED: f64 = 1e-9;
 /// A radius below this part of the largest is the axis: a mesh generator may miss 0 by rounding.
 pub(super) const AXIS: f64 = 1e-12;
 
+/// More violations than this are counted, not listed: nobody reads them, and the answer stays small.
+const MOST_LISTED: usize = 100;
+
 /// Violations and warnings, gathered by every check.
 #[derive(Default)]
 pub(super) struct Findings {
     pub(super) violations: Vec<Violation>,
     pub(super) warnings: Vec<Warning>,
+    unlisted: usize,
 }
 
 impl Findings {
@@ -25,6 +29,10 @@ impl Findings {
         expected: impl Into<String>,
         hint: impl Into<String>,
     ) {
+        if self.violations.len() >= MOST_LISTED {
+            self.unlisted += 1;
+            return;
+        }
         self.violations.push(Violation {
             pointer: pointer.into(),
             reason: reason.to_owned(),
@@ -32,6 +40,15 @@ impl Findings {
             expected: expected.into(),
             hint: hint.into(),
         });
+    }
+
+    /// All violations; those beyond the first hundred are counted in the last one's hint.
+    pub(super) fn into_violations(mut self) -> Vec<Violation> {
+        if let Some(last) = self.violations.last_mut().filter(|_| self.unlisted > 0) {
+            last.hint
+                .push_str(&format!(" ({} more violations.)", self.unlisted));
+        }
+        self.violations
     }
 
     pub(super) fn warn(&mut self, code: &str, pointer: &str, message: String) {

@@ -64,7 +64,11 @@ impl Model {
         findings.finite(problem);
         // numbers that are not finite would make nonsense of every later check
         if !findings.violations.is_empty() {
-            return Err(findings.violations);
+            return Err(findings.into_violations());
+        }
+        findings.counts(problem);
+        if !findings.violations.is_empty() {
+            return Err(findings.into_violations());
         }
         findings.analysis(&problem.analysis);
         let material = findings.materials(&problem.materials);
@@ -73,7 +77,7 @@ impl Model {
             findings.contact_numbers(contact, &format!("/contacts/{i}"));
         }
         let Some(mesh) = findings.mesh(&problem.mesh, &problem.analysis) else {
-            return Err(findings.violations);
+            return Err(findings.into_violations());
         };
         let (e, nu) = material.map_or((1.0, 0.0), |m| (m.youngs_modulus, m.poissons_ratio));
         let section = Section::new(problem.analysis, e, nu);
@@ -82,7 +86,7 @@ impl Model {
         let contacts = findings.contacts(&mesh, &section, &problem.contacts, &fixed);
         findings.freedom(&mesh, &section, &fixed);
         if !findings.violations.is_empty() {
-            return Err(findings.violations);
+            return Err(findings.into_violations());
         }
         findings.doubts(&contacts);
         let (controls, warnings) = (problem.solver, findings.warnings);

@@ -46,6 +46,27 @@ impl Findings {
         }
     }
 
+    /// Long lists of the same thing are a mistake, and each of them is gone through edge by edge.
+    pub(super) fn counts(&mut self, problem: &Problem) {
+        const MOST: usize = 1000;
+        for (pointer, count) in [
+            ("/supports", problem.supports.len()),
+            ("/loads", problem.loads.len()),
+            ("/contacts", problem.contacts.len()),
+            ("/mesh/boundaries", problem.mesh.boundaries.len()),
+        ] {
+            if count > MOST {
+                self.say(
+                    pointer,
+                    "too_many",
+                    format!("{count} of them"),
+                    format!("at most {MOST}"),
+                    "Name boundaries so that fewer are needed.",
+                );
+            }
+        }
+    }
+
     pub(super) fn analysis(&mut self, analysis: &Analysis) {
         if let Analysis::PlaneStress { thickness } = *analysis {
             self.require(

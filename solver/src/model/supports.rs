@@ -108,7 +108,7 @@ impl Findings {
                     "free_body",
                     format!("a body free to move: {direction}, e.g. node {node} at ({x}, {y})"),
                     "supports against every rigid motion (contact does not count: it may open)",
-                    "Add a support with `ux` or `uy`.",
+                    "Add a support with `ux` or `uy`. Parts that touch in a corner only do not hold each other.",
                 );
             }
         }

@@ -8,6 +8,8 @@
 mod active_set;
 mod projected_newton;
 
+use std::ops::ControlFlow;
+
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 use crate::linear::solve_positive_definite;
@@ -22,13 +24,24 @@ pub struct Minimum {
     pub residual: f64,
 }
 
-/// Minimises J from `start` until the KKT residual is below `tolerance`.
-pub fn minimise(system: &System<'_>, bound: &[f64], start: &State, tolerance: f64) -> Minimum {
-    let by_active_set = active_set::run(system, bound, start, tolerance);
-    if by_active_set.residual <= tolerance {
+/// How far to go: the residual to reach, and a tenth of it to aim at, so that what the inner problem
+/// leaves does not blur the outer residuals. Where rounding allows no more, the first is enough.
+const AIM: f64 = 0.1;
+
+/// Minimises J from `start` until the KKT residual is below `tolerance`, and somewhat further where
+/// that is cheap. `go_on` is asked at every Newton step and may end it early.
+pub fn minimise(
+    system: &System<'_>,
+    bound: &[f64],
+    start: &State,
+    tolerance: f64,
+    go_on: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Minimum {
+    let by_active_set = active_set::run(system, bound, start, tolerance, go_on);
+    if by_active_set.residual <= tolerance || go_on().is_break() {
         return by_active_set;
     }
-    let mut fallback = projected_newton::run(system, bound, &by_active_set.state, tolerance);
+    let mut fallback = projected_newton::run(system, bound, &by_active_set.state, tolerance, go_on);
     fallback.steps += by_active_set.steps;
     if fallback.residual <= by_active_set.residual {
         fallback
@@ -80,8 +93,8 @@ fn newton_direction(
 ) -> Option<Vec<f64>> {
     let mut place = vec![usize::MAX; system.load.len()];
     free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
-    // friction couples the nodes of one edge only: a short list of additions to a dense matrix
-    let mut tangents = vec![Vec::<(usize, f64)>::new(); free.len()];
+    // friction couples the nodes of one edge only: a few additions to a dense matrix
+    let mut friction = Vec::new();
     for (point, tau) in system.points.iter().zip(bound) {
         let slope = point.weight * tau * system.law(point).phi_slope(system.slip(v, point));
         if slope == 0.0 {
@@ -91,21 +104,14 @@ fn newton_direction(
         for a in 0..3 {
             for b in 0..3 {
                 if let (Dof::Free(row), Dof::Free(column)) = (dofs[a], dofs[b]) {
-                    tangents[place[row]]
-                        .push((place[column], slope * point.shape[a] * point.shape[b]));
+                    let value = slope * point.shape[a] * point.shape[b];
+                    friction.push((place[row], place[column], value));
                 }
             }
         }
     }
-    let entry = |i: usize, j: usize| {
-        let friction: f64 = tangents[i]
-            .iter()
-            .filter(|(column, _)| *column == j)
-            .map(|(_, value)| value)
-            .sum();
-        system.stiffness.at(free[i], free[j]) + friction
-    };
+    let elastic = |i: usize, j: usize| system.stiffness.at(free[i], free[j]);
     let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
-    let direction = solve_positive_definite(free.len(), entry, &rhs)?;
+    let direction = solve_positive_definite(free.len(), elastic, &friction, &rhs)?;
     direction.iter().all(|d| d.is_finite()).then_some(direction)
 }

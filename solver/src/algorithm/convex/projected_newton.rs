@@ -1,6 +1,8 @@
 //! Projected Newton (Bertsekas 1982) with a line search: slower, and it always arrives.
 
-use super::{Minimum, follow, free_dofs, gradient, newton_direction};
+use std::ops::ControlFlow;
+
+use super::{AIM, Minimum, follow, free_dofs, gradient, newton_direction};
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::elasticity::Dof;
 use crate::friction::FrictionLaw;
@@ -8,12 +10,21 @@ use crate::friction::FrictionLaw;
 /// Steps of projected Newton; a dozen are usual.
 const PROJECTED_STEPS: u32 = 300;
 
+/// Steps without gain after which a residual that is good enough is taken.
+const PATIENCE: u32 = 5;
+
 /// Projected Newton (Bertsekas): hold the nodes that press against the obstacle, step in the
 /// others, and let the step end on the obstacle where it would pass it.
 ///
 /// A node on the axis is no inequality: it is locked to its neighbour's state, and the whole is
 /// solved again when that state turns out different.
-pub(super) fn run(system: &System<'_>, bound: &[f64], start: &State, tolerance: f64) -> Minimum {
+pub(super) fn run(
+    system: &System<'_>,
+    bound: &[f64],
+    start: &State,
+    tolerance: f64,
+    go_on: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Minimum {
     let mut best = Minimum {
         state: start.clone(),
         steps: 0,
@@ -39,7 +50,10 @@ pub(super) fn run(system: &System<'_>, bound: &[f64], start: &State, tolerance: 
                     residual,
                 };
             }
-            if best.residual <= tolerance {
+            let stale = steps - best.steps.min(steps);
+            let arrived =
+                best.residual <= AIM * tolerance || best.residual <= tolerance && stale >= PATIENCE;
+            if arrived || go_on().is_break() {
                 break;
             }
             steps += 1;
