@@ -5,7 +5,7 @@ use solver::elasticity::{Section, assemble_element};
 use solver::element::gauss::{GAUSS_2, GAUSS_3};
 use solver::problem::{Analysis, Problem};
 
-use crate::support::{problem, solve};
+use crate::support::{Lattice, problem, solve};
 
 /// Row 1. Nine distorted elements on a unit square at r ≥ 1, its boundary driven by a linear
 /// displacement: every node must follow, and the stress be one and the same.
@@ -30,44 +30,10 @@ fn distorted_patch(analysis: &str, ux: [f64; 3], uy: [f64; 3]) -> Problem {
         let [dx, dy] = shift(i, j);
         [1.0 + i as f64 / 3.0 + dx, j as f64 / 3.0 + dy]
     };
-    let mut nodes = Vec::new();
-    let mut number = std::collections::BTreeMap::new();
-    for j in 0..=6 {
-        for i in 0..=6 {
-            if i % 2 == 1 && j % 2 == 1 {
-                continue;
-            }
-            let (a, b) = (corner(i / 2, j / 2), corner(i.div_ceil(2), j.div_ceil(2)));
-            number.insert((i, j), nodes.len());
-            nodes.push([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]);
-        }
-    }
-    let n = |i: usize, j: usize| number[&(i, j)];
-    let elements: Vec<[usize; 8]> = (0..6)
-        .step_by(2)
-        .flat_map(|j| (0..6).step_by(2).map(move |i| (i, j)))
-        .map(|(i, j)| {
-            [
-                n(i, j),
-                n(i + 2, j),
-                n(i + 2, j + 2),
-                n(i, j + 2),
-                n(i + 1, j),
-                n(i + 2, j + 1),
-                n(i + 1, j + 2),
-                n(i, j + 1),
-            ]
-        })
-        .collect();
-    let side = |at: &dyn Fn(usize) -> (usize, usize)| {
-        [0, 2, 4].map(|k| {
-            let p = |k| {
-                let (i, j) = at(k);
-                n(i, j)
-            };
-            [p(k), p(k + 2), p(k + 1)]
-        })
-    };
+    let lattice = Lattice::new(3, 3, |i, j| {
+        let (a, b) = (corner(i / 2, j / 2), corner(i.div_ceil(2), j.div_ceil(2)));
+        [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]
+    });
     let u = |c: [f64; 3], x: f64, y: f64| c[0] + c[1] * x + c[2] * y;
     // a boundary runs with the body on its right: bottom from right to left, and so on round
     let ends = [
@@ -85,8 +51,9 @@ fn distorted_patch(analysis: &str, ux: [f64; 3], uy: [f64; 3]) -> Problem {
         .collect();
     let json = serde_json::json!({
         "analysis": serde_json::from_str::<serde_json::Value>(analysis).unwrap(),
-        "mesh": {"inline": {"nodes": nodes, "elements": elements, "boundaries": {
-            "bottom": side(&|k| (k, 0)), "top": side(&|k| (k, 6)), "left": side(&|k| (0, k)), "right": side(&|k| (6, k)),
+        "mesh": {"inline": {"nodes": lattice.nodes, "elements": lattice.elements, "boundaries": {
+            "bottom": lattice.edges(3, |k| (k, 0)), "top": lattice.edges(3, |k| (k, 6)),
+            "left": lattice.edges(3, |k| (0, k)), "right": lattice.edges(3, |k| (6, k)),
         }}},
         "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
         "supports": supports,

@@ -53,3 +53,48 @@ pub(crate) fn union(parts: &[Vec<f64>]) -> Vec<f64> {
     lines.dedup_by(|a, b| (*a - *b).abs() < 1e-12);
     lines
 }
+
+/// An inline mesh of columns × rows of 8-node elements, deformed as its maker likes.
+pub(crate) struct Lattice {
+    pub(crate) nodes: Vec<[f64; 2]>,
+    pub(crate) elements: Vec<[usize; 8]>,
+    number: std::collections::BTreeMap<(usize, usize), usize>,
+}
+
+impl Lattice {
+    /// `place(i, j)`: position of the node i half-elements to the right and j up.
+    pub(crate) fn new(
+        columns: usize,
+        rows: usize,
+        place: impl Fn(usize, usize) -> [f64; 2],
+    ) -> Self {
+        let (mut nodes, mut number) = (Vec::new(), std::collections::BTreeMap::new());
+        for j in 0..=2 * rows {
+            for i in (0..=2 * columns).filter(|i| i % 2 == 0 || j % 2 == 0) {
+                number.insert((i, j), nodes.len());
+                nodes.push(place(i, j));
+            }
+        }
+        #[rustfmt::skip]
+        const PLACES: [(usize, usize); 8] = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1)];
+        let cells = (0..rows).flat_map(|j| (0..columns).map(move |i| (2 * i, 2 * j)));
+        let elements = cells
+            .map(|(i, j)| PLACES.map(|(di, dj)| number[&(i + di, j + dj)]))
+            .collect();
+        Lattice {
+            nodes,
+            elements,
+            number,
+        }
+    }
+
+    /// Edges [start, end, midside] of `count` elements along a line of nodes; `at(k)`: half-steps.
+    pub(crate) fn edges(
+        &self,
+        count: usize,
+        at: impl Fn(usize) -> (usize, usize),
+    ) -> Vec<[usize; 3]> {
+        let edge = |k: usize| [2 * k, 2 * k + 2, 2 * k + 1].map(|k| self.number[&at(k)]);
+        (0..count).map(edge).collect()
+    }
+}

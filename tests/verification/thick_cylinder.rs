@@ -5,55 +5,25 @@ use serde_json::json;
 use solver::problem::Problem;
 use solver::solution::Fields;
 
-use crate::support::{close, problem, solve};
+use crate::support::{Lattice, close, problem, solve};
 
 const MATERIAL: &str = r#"[{"youngs_modulus": 1000, "poissons_ratio": 0.3}]"#;
 
-/// Quarter ring of `radial` × `round` elements, midsides on their circles, refined `refine` times.
+/// Quarter ring of `radial` × `round` elements, midsides on their circles.
 fn ring(radial: usize, round: usize) -> Problem {
-    let mut nodes = Vec::new();
-    let mut number = std::collections::BTreeMap::new();
-    for j in 0..=2 * round {
-        for i in 0..=2 * radial {
-            if i % 2 == 1 && j % 2 == 1 {
-                continue;
-            }
-            let (sin, cos) =
-                (std::f64::consts::FRAC_PI_2 * j as f64 / (2 * round) as f64).sin_cos();
-            let r = 1.0 + i as f64 / (2 * radial) as f64;
-            number.insert((i, j), nodes.len());
-            nodes.push([r * cos, r * sin]);
-        }
-    }
-    let n = |i: usize, j: usize| number[&(i, j)];
-    let elements: Vec<_> = (0..round)
-        .flat_map(|j| (0..radial).map(move |i| (2 * i, 2 * j)))
-        .map(|(i, j)| {
-            [
-                n(i, j),
-                n(i + 2, j),
-                n(i + 2, j + 2),
-                n(i, j + 2),
-                n(i + 1, j),
-                n(i + 2, j + 1),
-                n(i + 1, j + 2),
-                n(i, j + 1),
-            ]
-        })
-        .collect();
-    let across = |j: usize| {
-        (0..radial)
-            .map(|k| [n(2 * k, j), n(2 * k + 2, j), n(2 * k + 1, j)])
-            .collect::<Vec<_>>()
-    };
-    let inner: Vec<_> = (0..round)
-        .map(|k| [n(0, 2 * k), n(0, 2 * k + 2), n(0, 2 * k + 1)])
-        .collect();
+    let lattice = Lattice::new(radial, round, |i, j| {
+        let (sin, cos) = (std::f64::consts::FRAC_PI_2 * j as f64 / (2 * round) as f64).sin_cos();
+        let r = 1.0 + i as f64 / (2 * radial) as f64;
+        [r * cos, r * sin]
+    });
     problem(
         &json!({
             "analysis": {"kind": "plane_strain"},
-            "mesh": {"inline": {"nodes": nodes, "elements": elements,
-                "boundaries": {"inner": inner, "below": across(0), "side": across(2 * round)}}},
+            "mesh": {"inline": {"nodes": lattice.nodes, "elements": lattice.elements, "boundaries": {
+                "inner": lattice.edges(round, |k| (0, k)),
+                "below": lattice.edges(radial, |k| (k, 0)),
+                "side": lattice.edges(radial, |k| (k, 2 * round)),
+            }}},
             "materials": serde_json::from_str::<serde_json::Value>(MATERIAL).unwrap(),
             "supports": [{"boundary": "below", "uy": 0}, {"boundary": "side", "ux": 0}],
             "loads": [{"boundary": "inner", "pressure": 1}],
