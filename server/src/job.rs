@@ -171,10 +171,12 @@ impl Status {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
-    /// `max_iterations` reached, or no further progress.
+    /// `max_iterations` reached.
     NotConverged,
     /// The contact set repeats itself.
     ContactCycling,
+    /// The method's own tests were met, but the forces on the body do not balance.
+    FalseConvergence,
     /// The stiffness matrix has no factor.
     SingularSystem,
     /// A number that is not finite came up.
@@ -191,9 +193,10 @@ pub enum Reason {
 
 impl Reason {
     /// All of them.
-    pub const ALL: [Reason; 8] = [
+    pub const ALL: [Reason; 9] = [
         Reason::NotConverged,
         Reason::ContactCycling,
+        Reason::FalseConvergence,
         Reason::SingularSystem,
         Reason::NonFinite,
         Reason::ResourceExhausted,
@@ -207,6 +210,7 @@ impl Reason {
         match self {
             Reason::NotConverged => "not_converged",
             Reason::ContactCycling => "contact_cycling",
+            Reason::FalseConvergence => "false_convergence",
             Reason::SingularSystem => "singular_system",
             Reason::NonFinite => "non_finite",
             Reason::ResourceExhausted => "resource_exhausted",
@@ -268,7 +272,7 @@ pub struct QueuePosition {
 /// How far a job has come.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
-    /// The phase, and once it iterates the stage of the iteration.
+    /// The phase that began last: mesh, assemble, …, recover.
     pub stage: String,
     /// Rows of history so far.
     pub iteration: u32,
@@ -303,6 +307,7 @@ impl Failure {
         let title = match reason {
             Reason::NotConverged => "The iteration did not converge",
             Reason::ContactCycling => "The contact set repeats itself without settling",
+            Reason::FalseConvergence => "The iteration settled, but the forces do not balance",
             Reason::SingularSystem => "The stiffness matrix is singular",
             Reason::NonFinite => "A number that is not finite came up",
             Reason::ResourceExhausted => "The job needs more than there is",

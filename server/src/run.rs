@@ -67,7 +67,7 @@ pub fn run(
                 // JSON has no word for it, and to go on is pointless.
                 broken |= !finite::iteration(row);
             }
-            Progress::Warning(_) => {}
+            Progress::Warning(_) | Progress::Pulse => {}
         }
         if broken {
             ControlFlow::Break(())

@@ -36,6 +36,7 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
         Outcome::Converged => "converged",
         Outcome::NotConverged => "NOT CONVERGED",
         Outcome::ContactCycling => "NOT CONVERGED: the contact set repeats itself",
+        Outcome::FalseConvergence => "NOT CONVERGED: it settled, but the forces do not balance",
         Outcome::Canceled => "CANCELED",
     };
     let mut text = String::new();

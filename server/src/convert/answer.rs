@@ -248,6 +248,7 @@ impl From<Summary> for pb::Summary {
             Outcome::Converged => pb::Outcome::Converged,
             Outcome::NotConverged => pb::Outcome::NotConverged,
             Outcome::ContactCycling => pb::Outcome::ContactCycling,
+            Outcome::FalseConvergence => pb::Outcome::FalseConvergence,
             Outcome::Canceled => pb::Outcome::Canceled,
         };
         let contacts: BTreeMap<String, pb::ContactSummary> = solution

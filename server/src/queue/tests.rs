@@ -3,7 +3,11 @@
 
 use std::time::Instant;
 
-use solver::{error::SolveError, problem::Problem, solution::Observer, solution::Solution};
+use solver::{
+    error::SolveError,
+    problem::Problem,
+    solution::{Observer, Outcome, Progress, Solution},
+};
 
 use super::*;
 use crate::{
@@ -136,6 +140,59 @@ async fn a_canceled_running_job_keeps_its_last_state() {
         rig.store.part(job.key, "fields").await.unwrap().is_none(),
         "a canceled job has no fields"
     );
+}
+
+/// Settles where the forces do not balance.
+fn unbalanced(_: &Problem, _: &mut Observer<'_>) -> std::result::Result<Solution, SolveError> {
+    let mut solution = fake::solution();
+    solution.summary.outcome = Outcome::FalseConvergence;
+    solution.summary.converged = false;
+    solution.summary.residuals.equilibrium = 0.5;
+    Ok(solution)
+}
+
+#[tokio::test]
+async fn a_job_that_converged_to_no_balance_fails_and_keeps_its_result() {
+    let rig = rig(unbalanced).await;
+    rig.queue.start(1);
+    let job = rig.submit().await;
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.reason, done.result_available),
+        (
+            Status::Failed,
+            Some(Reason::FalseConvergence),
+            ResultAvailable::Partial
+        )
+    );
+    let failure = done.failure.unwrap();
+    assert_eq!(failure.code, "false-convergence");
+    assert!(failure.detail.contains("5.000e-1"), "{}", failure.detail);
+    assert!(rig.store.part(job.key, "fields").await.unwrap().is_some());
+}
+
+/// At work in one long phase, with nothing to tell.
+fn busy(_: &Problem, observe: &mut Observer<'_>) -> std::result::Result<Solution, SolveError> {
+    while observe(Progress::Pulse).is_continue() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    Err(SolveError::Stopped)
+}
+
+#[tokio::test]
+async fn a_pulse_is_answered_and_not_recorded() {
+    let rig = rig(busy).await;
+    rig.queue.start(1);
+    let job = rig.submit().await;
+    rig.until(&job, |event| event.seq == 2).await; // running
+    let start = Instant::now();
+    rig.queue.cancel(job.key).await.unwrap();
+    let done = rig.until_done(&job).await;
+    assert!(start.elapsed() < COOPERATION, "{:?}", start.elapsed());
+    assert_eq!((done.status, done.progress), (Status::Canceled, None));
+    let events = rig.store.events_after(job.key, 0, 100).await.unwrap();
+    let kinds: Vec<_> = events.iter().map(|event| event.payload.kind()).collect();
+    assert_eq!(kinds, ["status", "status", "done"]);
 }
 
 /// As one long factorisation: deaf for a second.

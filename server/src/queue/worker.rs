@@ -57,7 +57,7 @@ async fn attempt(queue: &Arc<Queue>, Claim { job, problem, .. }: Claim, running:
     let solving = tokio::task::spawn_blocking(move || {
         solve_aloud(&problem, solve, |payload| {
             // An error means that the recorder is gone, and with it everybody who would listen.
-            let heard = say.blocking_send((Time::now(), payload)).is_ok();
+            let heard = payload.is_none_or(|said| say.blocking_send((Time::now(), said)).is_ok());
             if heard && !stop.load(Ordering::Relaxed) {
                 ControlFlow::Continue(())
             } else {
@@ -75,20 +75,22 @@ async fn attempt(queue: &Arc<Queue>, Claim { job, problem, .. }: Claim, running:
     queue.release(&job);
 }
 
-/// Reads the problem and solves it, telling everything on the way. On a blocking thread.
+/// Reads the problem and solves it, telling everything on the way, or nothing where it only asks
+/// whether to go on. On a blocking thread.
 fn solve_aloud(
     problem: &str,
     solve: Solve,
-    mut say: impl FnMut(Payload) -> ControlFlow<()>,
+    mut say: impl FnMut(Option<Payload>) -> ControlFlow<()>,
 ) -> Result<Solved, SolveError> {
     let start = Instant::now();
     let problem: Problem = solver::parse(problem).map_err(SolveError::Invalid)?;
     let parse_s = start.elapsed().as_secs_f64();
     let document = run::run(&problem, parse_s, solve, &mut |progress| {
         say(match progress {
-            Progress::Phase(stage) => Payload::Stage { stage },
-            Progress::Iteration(row) => Payload::Iteration(row.clone()),
-            Progress::Warning(warning) => Payload::Warning(warning.clone()),
+            Progress::Phase(stage) => Some(Payload::Stage { stage }),
+            Progress::Iteration(row) => Some(Payload::Iteration(row.clone())),
+            Progress::Warning(warning) => Some(Payload::Warning(warning.clone())),
+            Progress::Pulse => None,
         })
     })?;
     let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite { phase: "recover" })?;
@@ -109,16 +111,28 @@ struct Solved {
 /// What the outcome of a solution means for its job.
 fn ending_of(document: &Document) -> Ending {
     let (summary, partial) = (&document.summary.solution, ResultAvailable::Partial);
-    let failed = |reason| {
+    let residuals = &summary.residuals;
+    let failed = |reason, found: String| {
         let detail = format!(
-            "after {} iterations the residual is {:.3e} and the friction residual {:.3e}; \
-             the last state and the history are kept",
-            summary.iterations, summary.residuals.kkt, summary.residuals.friction
+            "after {} iterations {found}; the last state and the history are kept",
+            summary.iterations
         );
         Ending {
             result: partial,
             ..Ending::failed(reason, detail)
         }
+    };
+    let unsettled = || {
+        format!(
+            "the residual is {:.3e} and the friction residual {:.3e}",
+            residuals.kkt, residuals.friction
+        )
+    };
+    let unbalanced = || {
+        format!(
+            "the forces on the body are out of balance by {:.3e} of their size",
+            residuals.equilibrium
+        )
     };
     match summary.outcome {
         Outcome::Converged => Ending {
@@ -127,8 +141,9 @@ fn ending_of(document: &Document) -> Ending {
             failure: None,
             result: ResultAvailable::Final,
         },
-        Outcome::NotConverged => failed(Reason::NotConverged),
-        Outcome::ContactCycling => failed(Reason::ContactCycling),
+        Outcome::NotConverged => failed(Reason::NotConverged, unsettled()),
+        Outcome::ContactCycling => failed(Reason::ContactCycling, unsettled()),
+        Outcome::FalseConvergence => failed(Reason::FalseConvergence, unbalanced()),
         Outcome::Canceled => Ending {
             result: partial,
             ..Ending::canceled()
