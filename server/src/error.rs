@@ -8,6 +8,8 @@ use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 use uuid::Uuid;
 
+use crate::violations::shortened;
+
 /// Why a request was not answered as asked.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ApiError {
@@ -224,18 +226,10 @@ impl From<ApiError> for Status {
                 "{}: expected {}, got {}. {}",
                 v.reason, v.expected, v.got, v.hint
             );
-            details.add_bad_request_violation(shorten(&v.pointer), shorten(&text));
+            // They quote their input, and so may be as long as that.
+            details.add_bad_request_violation(shortened(&v.pointer, 300), shortened(&text, 300));
         }
         Status::with_error_details(row.grpc, format!("{}: {error}", row.code), details)
-    }
-}
-
-/// The first part of a text that quotes its input, and so may be as long as that.
-fn shorten(text: &str) -> String {
-    const MOST: usize = 300;
-    match text.char_indices().nth(MOST) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.to_string(),
     }
 }
 
@@ -245,7 +239,7 @@ fn summed_up(violations: &[Violation]) -> String {
     let shown: Vec<String> = violations
         .iter()
         .take(SHOWN)
-        .map(Violation::to_string)
+        .map(|violation| shortened(&violation.to_string(), 300))
         .collect();
     let more = if violations.len() > SHOWN { " …" } else { "" };
     format!(

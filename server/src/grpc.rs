@@ -21,6 +21,7 @@ use crate::{
         jobs::{self, Envelope, MAX_PAGE_SIZE, PAGE_SIZE},
         problems, results,
     },
+    violations,
 };
 
 /// Largest message taken in; the contract's promise. (tonic answers a larger one with OUT_OF_RANGE.)
@@ -67,8 +68,8 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::ValidateProblemRequest>,
     ) -> Reply<pb::ValidateProblemResponse> {
-        let judged =
-            problems::validate(&self.service, problem(request.into_inner().problem)).await?;
+        let problem = problem(&self.service, request.into_inner().problem).await?;
+        let judged = problems::validate(&self.service, problem).await?;
         Ok(Response::new(judgement(judged)))
     }
 
@@ -86,7 +87,8 @@ impl JobService for Grpc {
             labels,
             priority,
         };
-        let mut job = jobs::create(&self.service, envelope, problem(message)).await?;
+        let problem = problem(&self.service, message).await?;
+        let mut job = jobs::create(&self.service, envelope, problem).await?;
         if let Some(wait_s) = wait_s {
             job = jobs::wait(&self.service, job.id, wait_s).await?;
         }
@@ -184,13 +186,20 @@ impl JobService for Grpc {
 }
 
 /// The problem of a request, or what is wrong with it, with pointers into the request.
-fn problem(message: Option<pb::Problem>) -> Result<Problem, Vec<Violation>> {
+async fn problem(
+    service: &Service,
+    message: Option<pb::Problem>,
+) -> Result<Result<Problem, Vec<Violation>>, ApiError> {
     let message = message.unwrap_or_default(); // which lacks everything, and is told so
-    problem_from_pb(message).map_err(|violations| problems::prefixed(problems::AT, violations))
+    let read = || {
+        problem_from_pb(message).map_err(|violations| problems::prefixed(problems::AT, violations))
+    };
+    service.work(read).await
 }
 
 fn id(text: &str) -> Result<JobId, ApiError> {
-    JobId::parse(text).ok_or_else(|| ApiError::NotFound(format!("there is no job {text:?}")))
+    JobId::parse(text)
+        .ok_or_else(|| ApiError::NotFound(format!("there is no job {:?}", violations::name(text))))
 }
 
 fn wait(wait_s: Option<f64>) -> Result<Option<f64>, ApiError> {

@@ -8,6 +8,7 @@ pub mod time;
 // What a request can be told went wrong, and what can be set.
 pub mod config;
 pub mod error;
+pub mod violations;
 
 // Solve one problem and measure it; fingerprints of problem and result.
 pub mod digest;

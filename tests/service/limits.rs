@@ -1,5 +1,7 @@
 //! What is too much is refused, and the rest goes on.
 
+use std::time::{Duration, Instant};
+
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use suite::{
@@ -37,6 +39,47 @@ async fn a_body_over_the_limit_is_refused() {
         .await
         .unwrap();
     assert_eq!(response.status(), StatusCode::PAYLOAD_TOO_LARGE);
+}
+
+/// Each support is wrong in five ways, to be explained one by one.
+fn faulty(supports: usize) -> Value {
+    let mut problem = example_json("sheet");
+    let wrong = json!({ "bundary": "left", "ux": "0", "uy": "0", "uz": 0 });
+    problem["supports"] = vec![wrong; supports].into();
+    json!({ "problem": problem })
+}
+
+#[tokio::test]
+async fn bodies_that_take_long_to_explain_do_not_hold_up_the_others() {
+    let server = Server::start_alone(SIGNORINI, &[]).await;
+    let body = faulty(14_000).to_string();
+    assert!(body.len() > 600_000, "{}", body.len());
+    // As many as there are cores, and so as many as there are async threads.
+    let cores = std::thread::available_parallelism().unwrap().get();
+    let sent = (0..cores).map(|_| {
+        let post = server.post("/v1/problems/validate");
+        post.header("Content-Type", "application/json")
+            .body(body.clone())
+            .send()
+    });
+    let all = futures_util::future::join_all(sent);
+    tokio::pin!(all);
+    let mut longest = Duration::ZERO;
+    let answers = loop {
+        let start = Instant::now();
+        let alive = server.get("/livez").send();
+        tokio::select! {
+            answers = &mut all => break answers,
+            answer = alive => assert_eq!(answer.unwrap().status(), StatusCode::OK),
+        }
+        longest = longest.max(start.elapsed());
+    };
+    for answer in answers {
+        let judgement: Value = answer.unwrap().json().await.unwrap();
+        assert_eq!(judgement["valid"], false);
+    }
+    println!("the longest answer took {longest:?}");
+    assert!(longest < Duration::from_secs(1), "{longest:?}");
 }
 
 #[tokio::test]

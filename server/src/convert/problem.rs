@@ -11,7 +11,7 @@ use solver::{
     },
 };
 
-use crate::pb;
+use crate::{pb, violations::Violations};
 
 /// Reads a message; every violation found, with pointers relative to the problem.
 pub fn problem_from_pb(message: pb::Problem) -> Result<Problem, Vec<Violation>> {
@@ -19,19 +19,19 @@ pub fn problem_from_pb(message: pb::Problem) -> Result<Problem, Vec<Violation>> 
     let problem = read.problem(message);
     match problem {
         Some(problem) if read.violations.is_empty() => Ok(problem),
-        _ => Err(read.violations),
+        _ => Err(read.violations.into_vec()),
     }
 }
 
 /// Collects what is wrong. A method that found its whole subject missing answers `None`.
 #[derive(Default)]
 struct Reader {
-    violations: Vec<Violation>,
+    violations: Violations,
 }
 
 impl Reader {
     fn wrong(&mut self, pointer: &str, reason: &str, got: impl ToString, expected: &str) {
-        self.violations.push(Violation {
+        self.violations.add(Violation {
             pointer: pointer.into(),
             reason: reason.into(),
             got: got.to_string(),
@@ -451,6 +451,24 @@ mod tests {
         }"#;
         let problem: Problem = serde_json::from_str(text).unwrap();
         assert_eq!(problem_from_pb(problem_to_pb(&problem)).unwrap(), problem);
+    }
+
+    #[test]
+    fn a_hundred_violations_are_enough() {
+        let message = pb::Problem {
+            supports: vec![
+                pb::Support {
+                    ux: Some(pb::BoundaryValue {
+                        start: f64::NAN,
+                        end: None
+                    }),
+                    ..Default::default()
+                };
+                1000
+            ],
+            ..Default::default()
+        };
+        assert_eq!(problem_from_pb(message).unwrap_err().len(), 100);
     }
 
     #[test]

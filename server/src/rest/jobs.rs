@@ -35,7 +35,7 @@ pub(super) async fn create(
     Params::parse(query.as_deref(), &[])?;
     rest.service.accepting()?;
     let text = json_text(&headers, body, rest.max_body_bytes).await?;
-    let (envelope, problem) = submission(&text)?;
+    let (envelope, problem) = rest.service.work(move || submission(&text)).await??;
     let mut job = verbs::create(&rest.service, envelope, problem).await?;
     let wait_s = preferred_wait_s(&headers).map(|seconds| seconds.min(MAX_WAIT_S as u64));
     if let Some(wait_s) = wait_s {
@@ -72,9 +72,8 @@ pub(super) async fn validate(
 ) -> Result<Json<problems::Judgement>, ApiError> {
     Params::parse(query.as_deref(), &[])?;
     let text = json_text(&headers, body, rest.max_body_bytes).await?;
-    Ok(Json(
-        problems::validate(&rest.service, bare_problem(&text)?).await?,
-    ))
+    let problem = rest.service.work(move || bare_problem(&text)).await??;
+    Ok(Json(problems::validate(&rest.service, problem).await?))
 }
 
 pub(super) async fn get(

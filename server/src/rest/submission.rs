@@ -14,6 +14,7 @@ use crate::{
         jobs::Envelope,
         problems::{AT, prefixed},
     },
+    violations::{self, Violations},
 };
 
 /// What is wrong with a body whose JSON is well formed, or what it holds.
@@ -23,7 +24,7 @@ type Read<T> = Result<T, Vec<Violation>>;
 /// parser; what is wrong with it comes together with what is wrong around it.
 pub(super) fn submission(text: &str) -> Result<(Envelope, Read<Problem>), ApiError> {
     let mut fields = object(text)?;
-    let mut violations = vec![];
+    let mut violations = Violations::default();
     let mut envelope = Envelope::default();
     let problem = problem(&mut fields, &mut violations);
     take(
@@ -54,7 +55,7 @@ pub(super) fn submission(text: &str) -> Result<(Envelope, Read<Problem>), ApiErr
 /// A body `{problem}`.
 pub(super) fn bare_problem(text: &str) -> Result<Read<Problem>, ApiError> {
     let mut fields = object(text)?;
-    let mut violations = vec![];
+    let mut violations = Violations::default();
     let problem = problem(&mut fields, &mut violations);
     unknown(fields, "problem", &mut violations);
     Ok(together(violations, problem))
@@ -75,14 +76,14 @@ fn object(text: &str) -> Result<BTreeMap<String, &RawValue>, ApiError> {
 
 fn problem(
     fields: &mut BTreeMap<String, &RawValue>,
-    violations: &mut Vec<Violation>,
+    violations: &mut Violations,
 ) -> Option<Problem> {
     match fields.remove("problem") {
         Some(raw) => match solver::parse(raw.get()) {
             Ok(problem) => return Some(problem),
             Err(found) => violations.extend(prefixed(AT, found)),
         },
-        None => violations.push(Violation {
+        None => violations.add(Violation {
             pointer: AT.into(),
             reason: "missing".into(),
             got: "nothing".into(),
@@ -98,7 +99,7 @@ fn take<T: serde::de::DeserializeOwned>(
     fields: &mut BTreeMap<String, &RawValue>,
     name: &str,
     expected: &str,
-    violations: &mut Vec<Violation>,
+    violations: &mut Violations,
     place: &mut T,
 ) {
     let Some(raw) = fields.remove(name).filter(|raw| raw.get() != "null") else {
@@ -106,13 +107,15 @@ fn take<T: serde::de::DeserializeOwned>(
     };
     match serde_json::from_str(raw.get()) {
         Ok(value) => *place = value,
-        Err(_) => violations.push(wrong_type(&format!("/{name}"), raw, expected)),
+        Err(_) => violations.add(wrong_type(&format!("/{name}"), raw, expected)),
     }
 }
 
-fn unknown(fields: BTreeMap<String, &RawValue>, known: &str, violations: &mut Vec<Violation>) {
-    for name in fields.into_keys() {
-        violations.push(Violation {
+fn unknown(fields: BTreeMap<String, &RawValue>, known: &str, violations: &mut Violations) {
+    // One more than are listed: the list shall say that there are more.
+    for name in fields.into_keys().take(violations::MOST + 1) {
+        let name = violations::name(&name);
+        violations.add(Violation {
             pointer: format!("/{}", escape(&name)),
             reason: "unknown_name".into(),
             got: format!("{name:?}"),
@@ -133,10 +136,10 @@ fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
     }
 }
 
-fn together(violations: Vec<Violation>, problem: Option<Problem>) -> Read<Problem> {
+fn together(violations: Violations, problem: Option<Problem>) -> Read<Problem> {
     match problem {
         Some(problem) if violations.is_empty() => Ok(problem),
-        _ => Err(violations),
+        _ => Err(violations.into_vec()),
     }
 }
 
@@ -162,6 +165,17 @@ mod tests {
             pointers(text),
             ["/problem", "/name", "/labels", "/priority", "/wait"]
         );
+    }
+
+    #[test]
+    fn a_thousand_unknown_names_are_a_hundred_violations_and_a_long_one_is_cut() {
+        let names: Vec<String> = (0..1000).map(|n| format!("\"n{n}\": 1")).collect();
+        let text = format!("{{\"problem\": {{}}, {}}}", names.join(", "));
+        assert_eq!(pointers(&text).len(), 100);
+        let text = format!("{{\"problem\": {{}}, \"{}\": 1}}", "x".repeat(1 << 20));
+        let violations = submission(&text).unwrap().1.unwrap_err();
+        let longest = violations.iter().map(|v| v.pointer.len().max(v.got.len()));
+        assert!(longest.max() < Some(100));
     }
 
     #[test]

@@ -11,13 +11,16 @@ use solver::{
 use tokio::time::{Instant, timeout_at};
 use tracing::info;
 
-use super::{Service, detached, page, problems};
+use super::{
+    Service, detached, page,
+    problems::{self, Admitted},
+};
 use crate::{
-    digest,
     error::ApiError,
     event::{Event, Payload},
     job::{Job, JobId, Status},
     store::{CancelOutcome, NewJob, StoreError},
+    violations::{Violations, shortened},
 };
 
 /// Longest time that a request may wait for a job, in seconds.
@@ -51,24 +54,24 @@ pub async fn create(
     let service = service.clone();
     detached(async move {
         let mut violations = envelope.violations();
-        let problem = match problem {
+        let admitted = match problem {
             Ok(problem) => match problems::admit(&service, problem).await {
                 Err(ApiError::InvalidProblem(more)) => Err(more),
                 admitted => Ok(admitted?),
             },
             Err(more) => Err(more),
         };
-        let mut problem = match problem {
-            Ok(problem) if violations.is_empty() => problem,
-            Ok(_) => return Err(ApiError::InvalidProblem(violations)),
-            Err(more) => {
-                violations.extend(more);
-                return Err(ApiError::InvalidProblem(violations));
+        let Admitted {
+            title,
+            input_hash,
+            json,
+        } = match admitted {
+            Ok(admitted) if violations.is_empty() => admitted,
+            refused => {
+                violations.extend(refused.err().into_iter().flatten());
+                return Err(ApiError::InvalidProblem(violations.into_vec()));
             }
         };
-        let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
-        let title = problem.title.take();
-        let problem = serde_json::to_string(&problem).map_err(ApiError::internal)?;
         let Envelope {
             name,
             labels,
@@ -80,7 +83,7 @@ pub async fn create(
             priority,
             title,
             input_hash,
-            problem,
+            problem: json,
         };
         let limit = service.max_queued;
         let job = service
@@ -100,12 +103,12 @@ pub async fn create(
 
 impl Envelope {
     /// What is out of bounds.
-    fn violations(&self) -> Vec<Violation> {
+    fn violations(&self) -> Violations {
         const MOST: usize = 256; // characters of a name or label
         const LABELS: usize = 64;
-        let mut found = vec![];
+        let mut found = Violations::default();
         let mut add = |pointer: String, got: String, expected: &str, hint: &str| {
-            found.push(Violation {
+            found.add(Violation {
                 pointer,
                 reason: "out_of_range".into(),
                 got,
@@ -138,10 +141,10 @@ impl Envelope {
                 "Leave some out.",
             );
         }
-        for (key, value) in &self.labels {
+        for (key, value) in self.labels.iter().take(LABELS) {
             let longest = length(key).max(length(value));
             if longest > MOST || key.is_empty() {
-                let pointer = format!("/labels/{}", escape(key));
+                let pointer = format!("/labels/{}", escape(&shortened(key, MOST)));
                 add(
                     pointer,
                     format!("{longest} characters"),

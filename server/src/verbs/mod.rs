@@ -23,8 +23,8 @@ pub struct Service {
     pub store: Arc<Store>,
     /// Who solves.
     pub queue: Arc<Queue>,
-    /// Bounds the problems checked at the same time: meshing is work, and the cores are few.
-    checks: Semaphore,
+    /// Bounds the problems read and checked at the same time: that is work, and the cores are few.
+    checks: Arc<Semaphore>,
     max_queued: u32,
     memory_budget_bytes: u64,
 }
@@ -35,7 +35,7 @@ impl Service {
         Service {
             store,
             queue,
-            checks: Semaphore::new(2),
+            checks: Arc::new(Semaphore::new(2)),
             max_queued: config.max_queued,
             memory_budget_bytes: config.memory.bytes(),
         }
@@ -48,6 +48,22 @@ impl Service {
         } else {
             Ok(())
         }
+    }
+
+    /// Does what takes as long as the client makes it (reading, meshing, hashing a problem) on a
+    /// blocking thread, a few at a time: the async threads stay free for everybody else. The place
+    /// is held by the work, not by the request: who hangs up does not make room before it is done.
+    pub async fn work<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, ApiError> {
+        let place = self.checks.clone().acquire_owned().await;
+        let place = place.map_err(ApiError::internal)?;
+        let working = tokio::task::spawn_blocking(move || {
+            let _place = place;
+            work()
+        });
+        working.await.map_err(ApiError::internal)
     }
 }
 
@@ -67,5 +83,60 @@ impl From<StoreError> for ApiError {
             StoreError::Full => ApiError::StorageFull,
             other => ApiError::internal(other),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::{sync::mpsc, time::Duration};
+
+    use super::*;
+    use crate::{config::MemoryBudget, fake};
+
+    async fn service(folder: &tempfile::TempDir) -> Service {
+        let config = Config {
+            listen: ([127, 0, 0, 1], 0).into(),
+            data: folder.path().to_path_buf(),
+            workers: 1,
+            max_queued: 10,
+            memory: MemoryBudget::default(),
+            max_body_bytes: 1 << 20,
+            grace_s: 1,
+        };
+        let store = Arc::new(Store::open(folder.path()).await.unwrap());
+        let queue = Queue::new(store.clone(), fake::solve);
+        Service::new(&config, store, queue)
+    }
+
+    /// On the one thread of this test: work that held it would wait for a word that cannot come.
+    #[tokio::test]
+    async fn work_leaves_the_async_threads_to_the_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let service = service(&folder).await;
+        let (say, heard) = mpsc::channel();
+        let work = service.work(move || heard.recv_timeout(Duration::from_secs(10)));
+        let (worked, said) = tokio::join!(work, async { say.send(7) });
+        said.unwrap();
+        assert_eq!(worked.unwrap(), Ok(7));
+    }
+
+    #[tokio::test]
+    async fn who_hangs_up_makes_no_room_before_the_work_is_done() {
+        let folder = tempfile::tempdir().unwrap();
+        let service = service(&folder).await;
+        let (say, heard) = mpsc::channel::<()>();
+        let (start, started) = tokio::sync::oneshot::channel();
+        let work = service.work(move || {
+            let _ = start.send(());
+            heard.recv()
+        });
+        tokio::select! {
+            _ = work => unreachable!("it waits for a word"),
+            _ = started => {} // and the request is dropped
+        }
+        assert_eq!(service.checks.available_permits(), 1);
+        drop(say);
+        service.checks.acquire_many(2).await.unwrap().forget();
     }
 }

@@ -29,51 +29,72 @@ pub async fn validate(
     service: &Service,
     problem: Result<Problem, Vec<Violation>>,
 ) -> Result<Judgement, ApiError> {
-    let judgement = match problem {
-        Ok(problem) => {
-            let estimate = affordable(service, &problem)?;
-            let input_hash = digest::input_hash(&problem).ok();
-            match check(service, problem).await? {
-                Ok((_, warnings)) => Judgement {
-                    valid: true,
-                    violations: vec![],
-                    warnings,
-                    estimate: Some(estimate),
-                    input_hash,
-                },
-                Err(violations) => Judgement {
-                    valid: false,
-                    violations,
-                    warnings: vec![],
-                    estimate: None,
-                    input_hash,
-                },
-            }
-        }
-        Err(violations) => Judgement {
+    let problem = match problem {
+        Ok(problem) => problem,
+        Err(violations) => return Ok(Judgement::invalid(violations, None)),
+    };
+    let budget_bytes = service.memory_budget_bytes;
+    let judge = move || {
+        let estimate = affordable(&problem, budget_bytes)?;
+        let input_hash = digest::input_hash(&problem).ok();
+        Ok(match check(&problem) {
+            Ok(warnings) => Judgement {
+                valid: true,
+                violations: vec![],
+                warnings,
+                estimate: Some(estimate),
+                input_hash,
+            },
+            Err(violations) => Judgement::invalid(violations, input_hash),
+        })
+    };
+    service.work(judge).await?
+}
+
+impl Judgement {
+    fn invalid(violations: Vec<Violation>, input_hash: Option<String>) -> Judgement {
+        Judgement {
             valid: false,
             violations,
             warnings: vec![],
             estimate: None,
-            input_hash: None,
-        },
-    };
-    Ok(judgement)
+            input_hash,
+        }
+    }
+}
+
+/// A problem that was found good, as it is stored.
+#[derive(Debug)]
+pub struct Admitted {
+    /// The title, which is the job's.
+    pub title: Option<String>,
+    /// Fingerprint of the rest.
+    pub input_hash: String,
+    /// The rest as JSON.
+    pub json: String,
 }
 
 /// Admits a problem that is affordable and means something.
-pub async fn admit(service: &Service, problem: Problem) -> Result<Problem, ApiError> {
-    affordable(service, &problem)?;
-    let (problem, _) = check(service, problem)
-        .await?
-        .map_err(ApiError::InvalidProblem)?;
-    Ok(problem)
+pub async fn admit(service: &Service, mut problem: Problem) -> Result<Admitted, ApiError> {
+    let budget_bytes = service.memory_budget_bytes;
+    let admit = move || {
+        affordable(&problem, budget_bytes)?;
+        check(&problem).map_err(ApiError::InvalidProblem)?;
+        let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
+        let title = problem.title.take();
+        let json = serde_json::to_string(&problem).map_err(ApiError::internal)?;
+        Ok(Admitted {
+            title,
+            input_hash,
+            json,
+        })
+    };
+    service.work(admit).await?
 }
 
 /// The estimate is made before anything is meshed: a mesh may be what we cannot afford.
-fn affordable(service: &Service, problem: &Problem) -> Result<Estimate, ApiError> {
+fn affordable(problem: &Problem, budget_bytes: u64) -> Result<Estimate, ApiError> {
     let estimate = solver::estimate(problem);
-    let budget_bytes = service.memory_budget_bytes;
     if estimate.memory_bytes > budget_bytes {
         return Err(ApiError::ProblemTooLarge {
             estimate,
@@ -83,18 +104,8 @@ fn affordable(service: &Service, problem: &Problem) -> Result<Estimate, ApiError
     Ok(estimate)
 }
 
-/// Meshes and checks on a blocking thread, a few at a time.
-async fn check(
-    service: &Service,
-    problem: Problem,
-) -> Result<Result<(Problem, Vec<Warning>), Vec<Violation>>, ApiError> {
-    let _permit = service.checks.acquire().await.map_err(ApiError::internal)?;
-    let checked = tokio::task::spawn_blocking(move || match solver::check(&problem) {
-        Ok(warnings) => Ok((problem, warnings)),
-        Err(violations) => Err(violations),
-    });
-    let checked = checked.await.map_err(ApiError::internal)?;
-    Ok(checked.map_err(|violations| prefixed(AT, violations)))
+fn check(problem: &Problem) -> Result<Vec<Warning>, Vec<Violation>> {
+    solver::check(problem).map_err(|violations| prefixed(AT, violations))
 }
 
 /// Moves violations to where their subject stands in a request.

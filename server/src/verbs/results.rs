@@ -11,6 +11,7 @@ use crate::{
     error::ApiError,
     job::{Job, JobId, ResultAvailable},
     run::Summary,
+    violations,
 };
 
 /// The summary of a job that has one.
@@ -31,7 +32,8 @@ pub async fn profile(
     let Some(bytes) = service.store.profile(job.key, boundary).await? else {
         let known = service.store.profiled_boundaries(job.key).await?.join(", ");
         return Err(ApiError::NotFound(format!(
-            "{id} has no contact boundary {boundary:?}; it has: {known}"
+            "{id} has no contact boundary {:?}; it has: {known}",
+            violations::name(boundary)
         )));
     };
     serde_json::from_slice(&bytes).map_err(ApiError::internal)
