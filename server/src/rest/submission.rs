@@ -24,6 +24,9 @@ type Read<T> = Result<T, Vec<Violation>>;
 /// parser; what is wrong with it comes together with what is wrong around it.
 pub(super) fn submission(text: &str) -> Result<(Envelope, Read<Problem>), ApiError> {
     let mut fields = object(text)?;
+    if let Some(violation) = unwrapped(&fields) {
+        return Ok((Envelope::default(), Err(vec![violation])));
+    }
     let mut violations = Violations::default();
     let mut envelope = Envelope::default();
     let problem = problem(&mut fields, &mut violations);
@@ -55,6 +58,9 @@ pub(super) fn submission(text: &str) -> Result<(Envelope, Read<Problem>), ApiErr
 /// A body `{problem}`.
 pub(super) fn bare_problem(text: &str) -> Result<Read<Problem>, ApiError> {
     let mut fields = object(text)?;
+    if let Some(violation) = unwrapped(&fields) {
+        return Ok(Err(vec![violation]));
+    }
     let mut violations = Violations::default();
     let problem = problem(&mut fields, &mut violations);
     unknown(fields, "problem", &mut violations);
@@ -71,6 +77,19 @@ fn object(text: &str) -> Result<BTreeMap<String, &RawValue>, ApiError> {
             whole,
             "an object with the field problem",
         )])
+    })
+}
+
+/// The problem itself where an envelope around it was expected: to call each of its names unknown
+/// would not help.
+fn unwrapped(fields: &BTreeMap<String, &RawValue>) -> Option<Violation> {
+    let has = |name: &str| fields.contains_key(name);
+    (!has("problem") && (has("analysis") || has("mesh"))).then(|| Violation {
+        pointer: AT.into(),
+        reason: "missing".into(),
+        got: "the bare problem".into(),
+        expected: "an object with the field problem".into(),
+        hint: "Wrap it as {\"problem\": …}.".into(),
     })
 }
 
@@ -165,6 +184,19 @@ mod tests {
             pointers(text),
             ["/problem", "/name", "/labels", "/priority", "/wait"]
         );
+    }
+
+    #[test]
+    fn a_bare_problem_is_told_once_to_be_wrapped() {
+        let text = serde_json::to_string(&crate::fake::problem()).unwrap();
+        let by_both = [
+            submission(&text).unwrap().1.unwrap_err(),
+            bare_problem(&text).unwrap().unwrap_err(),
+        ];
+        for violations in by_both {
+            assert_eq!(violations.len(), 1, "{violations:?}");
+            assert!(violations[0].hint.contains(r#"{"problem": …}"#));
+        }
     }
 
     #[test]
