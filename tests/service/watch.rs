@@ -4,7 +4,7 @@ use reqwest::StatusCode;
 use serde_json::Value;
 use suite::{
     example_json,
-    harness::{Server, block, large},
+    harness::{Server, block, large, soon},
 };
 
 use crate::{SIGNORINI, server};
@@ -74,6 +74,26 @@ async fn a_stream_goes_on_where_it_was_left() {
         let response = get(0).header("Last-Event-ID", wrong).send().await.unwrap();
         assert_eq!(response.status(), StatusCode::BAD_REQUEST, "{wrong:?}");
     }
+}
+
+/// Over both protocols: the client that lost count is not left waiting for ever.
+#[tokio::test]
+async fn a_stream_from_beyond_the_last_event_ends_with_the_job() {
+    let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
+    let front = server.submit(&large()).await;
+    let id = server.submit(&example_json("sheet")).await; // waits behind it
+    let mut by_rest = server.events(&id, 1_000_000).await;
+    let mut grpc = crate::grpc::connect(&server).await;
+    let request = service::pb::WatchJobRequest {
+        id: id.clone(),
+        after_seq: 1_000_000,
+    };
+    let mut by_grpc = grpc.watch_job(request).await.unwrap().into_inner();
+    assert_eq!(server.cancel(&id).await["outcome"], "canceled");
+    assert_eq!(by_rest.next().await, None);
+    let end = soon("the stream's end", by_grpc.message()).await;
+    assert_eq!(end.unwrap(), None);
+    server.cancel(&front).await;
 }
 
 #[tokio::test]

@@ -142,6 +142,15 @@ impl Store {
         Ok(Some(job))
     }
 
+    /// Whether the job is terminal, and its `done` so among its events.
+    pub async fn has_ended(&self, key: i64) -> Result<bool> {
+        let status: String = sqlx::query_scalar("select status from job where id = ?")
+            .bind(key)
+            .fetch_one(&self.reader)
+            .await?;
+        Ok(Status::parse(&status).is_some_and(Status::is_terminal))
+    }
+
     /// Jobs of these statuses (none: all), newest first, that arrived before the one numbered
     /// `before`.
     pub async fn jobs(

@@ -238,8 +238,9 @@ pub enum Cancellation {
     AlreadyTerminal,
 }
 
-/// Stored events after number `after`, then live ones; ends after `done`. When the service stops
-/// it ends with an error, so that nobody takes that for the end of the job.
+/// Stored events after number `after`, then live ones; ends after `done`, or with the job if `after`
+/// lies beyond that. When the service stops it ends with an error, so that nobody takes that for the
+/// end of the job.
 pub fn watch(
     service: Arc<Service>,
     key: i64,
@@ -248,6 +249,7 @@ pub fn watch(
     try_stream! {
         let mut cursor = after;
         let mut news = service.queue.subscribe(key);
+        let mut ended = false;
         loop {
             let events = service.store.events_after(key, cursor, EVENTS_PER_READ).await?;
             let idle = events.is_empty();
@@ -258,6 +260,13 @@ pub fn watch(
                 if done {
                     return;
                 }
+            }
+            if idle && ended {
+                return;
+            }
+            if idle && service.store.has_ended(key).await? {
+                ended = true;
+                continue; // once more: `done` may have come after the look for events
             }
             if service.queue.stopping().is_cancelled() {
                 Err(ApiError::Draining)?;
