@@ -102,16 +102,23 @@ impl Queue {
     /// second.
     pub async fn cancel(self: &Arc<Self>, key: i64) -> Result<CancelOutcome> {
         let _gate = self.gate.lock().await;
-        let outcome = self.store.request_cancel(key).await?;
-        match outcome {
-            CancelOutcome::Canceled(seq) => self.live.announce(key, seq),
-            CancelOutcome::Requested => {
-                if let Some(running) = self.running().get(&key).cloned() {
+        let mut outcome = self.store.request_cancel(key).await?;
+        if let CancelOutcome::Requested { attempt } = outcome {
+            let running = self.running().get(&key).cloned();
+            match running {
+                Some(running) => {
                     running.stop.store(true, Ordering::Relaxed);
                     tokio::spawn(self.clone().cancel_over_its_head(key, running.attempt));
                 }
+                // Its worker could not end it and has given it up: nobody else would.
+                None => {
+                    let ended = self.store.finish(key, attempt, &Ending::canceled()).await?;
+                    outcome = ended.map_or(CancelOutcome::AlreadyTerminal, CancelOutcome::Canceled);
+                }
             }
-            CancelOutcome::AlreadyTerminal => {}
+        }
+        if let CancelOutcome::Canceled(seq) = outcome {
+            self.live.announce(key, seq);
         }
         Ok(outcome)
     }

@@ -129,7 +129,7 @@ async fn a_canceled_running_job_keeps_its_last_state() {
         .await;
     assert_eq!(
         rig.queue.cancel(job.key).await.unwrap(),
-        CancelOutcome::Requested
+        CancelOutcome::Requested { attempt: 1 }
     );
     let done = rig.until_done(&job).await;
     assert_eq!(
@@ -235,6 +235,20 @@ async fn a_deaf_solver_delays_only_its_slot_and_not_the_cancel() {
     let next = rig.submit().await;
     assert_eq!(rig.until_done(&next).await.status, Status::Succeeded);
     assert_eq!(rig.store.job(job.id).await.unwrap().unwrap(), done);
+}
+
+#[tokio::test]
+async fn a_running_job_that_no_worker_holds_is_canceled_at_once() {
+    let rig = rig(fake::solve).await; // its workers never start: nobody holds what we claim
+    let job = rig.submit().await;
+    rig.store.claim_next().await.unwrap().unwrap();
+    let outcome = rig.queue.cancel(job.key).await.unwrap();
+    assert!(matches!(outcome, CancelOutcome::Canceled(_)), "{outcome:?}");
+    assert_eq!(rig.until_done(&job).await.status, Status::Canceled);
+    assert_eq!(
+        rig.queue.cancel(job.key).await.unwrap(),
+        CancelOutcome::AlreadyTerminal
+    );
 }
 
 #[tokio::test]

@@ -218,7 +218,7 @@ async fn end(queue: &Queue, job: &Job, ending: Ending, parts: Option<Parts>) {
         warn!(job.id = %job.id, %cause, "job {} could not be ended: {cause}", job.id);
         tokio::time::sleep(Duration::from_millis(pause_ms)).await;
     }
-    error!(job.id = %job.id, "job {} stays running until the service is restarted", job.id);
+    error!(job.id = %job.id, "job {} stays running until it is canceled or the service restarted", job.id);
 }
 
 async fn try_to_end(

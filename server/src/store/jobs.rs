@@ -82,10 +82,13 @@ impl Ending {
 /// What asking a job to stop did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CancelOutcome {
-    /// It was queued and is canceled, by the event of this number.
+    /// Nobody ran it and it is canceled, by the event of this number.
     Canceled(i64),
-    /// It is running and will stop.
-    Requested,
+    /// This start of it is running and should stop.
+    Requested {
+        /// The number of the start.
+        attempt: i32,
+    },
     /// It had ended.
     AlreadyTerminal,
 }
@@ -208,11 +211,14 @@ impl Store {
     pub async fn request_cancel(&self, key: i64) -> Result<CancelOutcome> {
         let mut tx = self.begin().await?;
         let job = read(&mut tx, key).await?;
+        let requested = CancelOutcome::Requested {
+            attempt: job.attempt,
+        };
         let outcome = match job.status {
             Status::Queued => {
                 CancelOutcome::Canceled(end(&mut tx, &job, &Ending::canceled()).await?)
             }
-            Status::Running if job.cancel_requested => CancelOutcome::Requested,
+            Status::Running if job.cancel_requested => requested,
             Status::Running => {
                 sqlx::query(
                     "update job set cancel_requested = 1, version = version + 1 where id = ?",
@@ -220,7 +226,7 @@ impl Store {
                 .bind(key)
                 .execute(&mut *tx)
                 .await?;
-                CancelOutcome::Requested
+                requested
             }
             Status::Succeeded | Status::Failed | Status::Canceled => CancelOutcome::AlreadyTerminal,
         };

@@ -218,7 +218,7 @@ pub async fn cancel(service: &Arc<Service>, id: JobId) -> Result<(Cancellation, 
     detached(async move {
         let outcome = match service.queue.cancel(key).await? {
             CancelOutcome::Canceled(_) => Cancellation::Canceled,
-            CancelOutcome::Requested => Cancellation::CancelRequested,
+            CancelOutcome::Requested { .. } => Cancellation::CancelRequested,
             CancelOutcome::AlreadyTerminal => Cancellation::AlreadyTerminal,
         };
         Ok((outcome, get(&service, id).await?))
@@ -230,7 +230,7 @@ pub async fn cancel(service: &Arc<Service>, id: JobId) -> Result<(Cancellation, 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cancellation {
-    /// It was queued and will not run.
+    /// Nobody ran it, and nobody will.
     Canceled,
     /// It was running; it will have ended in half a second.
     CancelRequested,
