@@ -31,7 +31,7 @@ use live::Live;
 pub use live::Subscription;
 
 use crate::{
-    job::Job,
+    job::{Job, Status},
     run::Solve,
     store::{CancelOutcome, Claim, Ending, Result, Store},
 };
@@ -145,6 +145,12 @@ impl Queue {
         for (key, Running { attempt, stop }) in running {
             stop.store(true, Ordering::Relaxed);
             match self.store.requeue_drained(key, attempt).await {
+                Ok(Some(Status::Canceled)) => {
+                    info!(
+                        job.key = key,
+                        attempt, "job canceled, as was asked before the stop"
+                    );
+                }
                 Ok(Some(_)) => info!(job.key = key, attempt, "job put back for the next start"),
                 Ok(None) => {}
                 // The next start finds it running and puts it back.

@@ -14,7 +14,7 @@ use crate::{
     digest,
     event::{Event, Payload},
     fake,
-    job::{Reason, ResultAvailable, Status},
+    job::{Reason, ResultAvailable},
     store::NewJob,
 };
 
@@ -290,6 +290,20 @@ async fn a_running_job_with_a_cancel_request_is_canceled_at_the_next_start() {
     rig.store.request_cancel(job.key).await.unwrap();
     rig.store.requeue_interrupted().await.unwrap();
     assert_eq!(rig.until_done(&job).await.status, Status::Canceled);
+}
+
+#[tokio::test]
+async fn a_drain_says_what_became_of_each_job() {
+    let rig = rig(fake::solve).await;
+    let (one, two) = (rig.submit().await, rig.submit().await);
+    for _ in 0..2 {
+        rig.store.claim_next().await.unwrap().unwrap();
+    }
+    rig.store.request_cancel(one.key).await.unwrap();
+    let drain = async |job: &Job| rig.store.requeue_drained(job.key, 1).await.unwrap();
+    assert_eq!(drain(&one).await, Some(Status::Canceled));
+    assert_eq!(drain(&two).await, Some(Status::Queued));
+    assert_eq!(drain(&two).await, None, "it runs no more");
 }
 
 #[tokio::test]

@@ -247,20 +247,24 @@ impl Store {
         Ok(Some(seq))
     }
 
-    /// Puts a running job back for a drain, which does not count against it.
-    pub async fn requeue_drained(&self, key: i64, attempt: i32) -> Result<Option<i64>> {
+    /// Puts a running job back for a drain, which does not count against it; one that was asked to
+    /// stop is canceled instead. Gives its new status; `None` when the start is no longer current.
+    pub async fn requeue_drained(&self, key: i64, attempt: i32) -> Result<Option<Status>> {
         let mut tx = self.begin().await?;
         if !is_current(&mut tx, key, attempt).await? {
             return Ok(None);
         }
         let job = read(&mut tx, key).await?;
         // Somebody who asked it to stop is not made to wait for the restart.
-        let seq = match job.cancel_requested {
-            true => end(&mut tx, &job, &Ending::canceled()).await?,
-            false => requeue(&mut tx, &job, Requeue::Drain).await?,
+        let status = if job.cancel_requested {
+            end(&mut tx, &job, &Ending::canceled()).await?;
+            Status::Canceled
+        } else {
+            requeue(&mut tx, &job, Requeue::Drain).await?;
+            Status::Queued
         };
         tx.commit().await?;
-        Ok(Some(seq))
+        Ok(Some(status))
     }
 
     /// Takes care of jobs that were running when the process died: back to the queue, or to their
