@@ -71,7 +71,7 @@ impl Server {
             child,
             url,
             folder,
-            client: Client::new(),
+            client: client(),
             _share: share,
         }
     }
@@ -266,6 +266,11 @@ impl std::fmt::Debug for Events {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Events")
     }
+}
+
+/// A client that asks the server itself, whatever proxy the environment names.
+pub fn client() -> Client {
+    Client::builder().no_proxy().build().unwrap()
 }
 
 /// What comes in time; a test that waits in vain says for what.

@@ -6,7 +6,13 @@ use crate::SIGNORINI;
 
 #[test]
 fn the_demo_solves_five_examples_over_both_protocols_and_prints_a_profile() {
-    let output = Command::new(SIGNORINI).arg("demo").output().unwrap();
+    // A proxy where nobody listens: the demo speaks with itself.
+    let output = Command::new(SIGNORINI)
+        .arg("demo")
+        .env("HTTP_PROXY", "http://127.0.0.1:9")
+        .env("http_proxy", "http://127.0.0.1:9")
+        .output()
+        .unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!(
         output.status.code(),

@@ -58,7 +58,7 @@ async fn unknown_things_are_not_found() {
 #[tokio::test]
 async fn a_wrong_method_is_told_the_right_ones() {
     let server = server().await;
-    let client = reqwest::Client::new();
+    let client = suite::harness::client();
     for (method, path, allowed) in [
         (Method::DELETE, "/v1/jobs", "GET,HEAD,POST"),
         (Method::GET, "/v1/problems/validate", "POST"),

@@ -41,7 +41,8 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
 async fn show(url: &str) -> anyhow::Result<Exit> {
     println!("Service at {url}, REST and gRPC on one port, its store in a temporary folder.\n");
     let rest = Rest {
-        client: Client::new(),
+        // Our own address: no proxy of the environment knows it.
+        client: Client::builder().no_proxy().build()?,
         url: url.to_string(),
     };
     let mut grpc = JobServiceClient::connect(url.to_string()).await?;
