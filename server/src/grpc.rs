@@ -79,7 +79,7 @@ impl JobService for Grpc {
             name,
             labels,
             priority,
-            wait_s,
+            wait: wait_s,
         } = request.into_inner();
         let wait_s = wait(wait_s)?;
         let envelope = Envelope {
@@ -205,7 +205,7 @@ fn id(text: &str) -> Result<JobId, ApiError> {
 fn wait(wait_s: Option<f64>) -> Result<Option<f64>, ApiError> {
     match wait_s {
         Some(seconds) if !(0.0..=jobs::MAX_WAIT_S).contains(&seconds) => {
-            Err(bad("wait_s", seconds, "0 … 60 seconds"))
+            Err(bad("wait", seconds, "0 … 60 seconds"))
         }
         fine => Ok(fine),
     }

@@ -113,7 +113,7 @@ async fn who_waits_over_grpc_gets_the_terminal_job() {
     let job = grpc
         .create_job(pb::CreateJobRequest {
             problem: problem.clone(),
-            wait_s: Some(30.0),
+            wait: Some(30.0),
             ..Default::default()
         })
         .await
@@ -123,7 +123,7 @@ async fn who_waits_over_grpc_gets_the_terminal_job() {
     let refused = grpc
         .create_job(pb::CreateJobRequest {
             problem,
-            wait_s: Some(61.0),
+            wait: Some(61.0),
             ..Default::default()
         })
         .await

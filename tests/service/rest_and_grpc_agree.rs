@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use service::pb;
 use suite::{example, example_json};
 
@@ -32,7 +32,7 @@ async fn rest_grpc_and_the_command_line_find_the_same_bits() {
 
         let request = pb::CreateJobRequest {
             problem: Some(message(&example(name))),
-            wait_s: Some(60.0),
+            wait: Some(60.0),
             ..Default::default()
         };
         let job = grpc.create_job(request).await.unwrap().into_inner();
@@ -82,6 +82,41 @@ async fn rest_grpc_and_the_command_line_find_the_same_bits() {
             "{name}"
         );
     }
+}
+
+#[tokio::test]
+async fn both_protocols_say_the_same_of_a_job_that_failed() {
+    let server = server().await;
+    let mut grpc = connect(&server).await;
+    let mut problem = example_json("rectangular_punch");
+    problem["solver"] = json!({ "max_iterations": 3 });
+    let id = server.submit(&problem).await;
+    let job = server.until_done(&id).await;
+    let twin = grpc.get_job(pb::GetJobRequest { id }).await.unwrap();
+    let twin = twin.into_inner();
+    let (progress, failure) = (twin.progress.unwrap(), twin.failure.unwrap());
+    assert!(job["progress"]["eta_s"].is_number(), "{job:#}");
+    assert_eq!(
+        job["progress"],
+        json!({
+            "stage": progress.stage,
+            "iteration": progress.iteration,
+            "residual": progress.residual,
+            "tolerance": progress.tolerance,
+            "contact_changes": progress.contact_changes,
+            "rate": progress.rate,
+            "eta_s": progress.eta_s,
+        })
+    );
+    assert_eq!(
+        job["failure"],
+        json!({
+            "type": failure.r#type,
+            "title": failure.title,
+            "code": failure.code,
+            "detail": failure.detail,
+        })
+    );
 }
 
 #[tokio::test]

@@ -88,21 +88,27 @@ impl From<Job> for pb::Job {
                      iteration,
                      residual,
                      tolerance,
-                     ..
+                     contact_changes,
+                     rate,
+                     eta_s,
                  }| pb::JobProgress {
                     stage,
                     iteration,
                     residual,
                     tolerance,
+                    contact_changes,
+                    rate,
+                    eta_s,
                 },
             ),
             failure: job.failure.map(
                 |Failure {
+                     r#type,
                      code,
                      title,
                      detail,
-                     ..
                  }| pb::Failure {
+                    r#type,
                     code,
                     title,
                     detail,
