@@ -178,6 +178,29 @@ async fn errors_carry_codes_and_details() {
             .any(|v| v.field == "/problem/mesh")
     );
 
+    // Many violations, each of some length, still fit into what a client takes for headers.
+    let mut problem = message(&example("sheet"));
+    let wrong = pb::Load {
+        boundary: "b".repeat(1000),
+        pressure: Some(pb::BoundaryValue {
+            start: f64::NAN,
+            end: None,
+        }),
+    };
+    problem.loads = vec![wrong; 1000];
+    let request = pb::CreateJobRequest {
+        problem: Some(problem),
+        ..Default::default()
+    };
+    let many = grpc.create_job(request).await.unwrap_err();
+    assert_eq!(many.code(), Code::InvalidArgument, "{many}");
+    let details = many.get_error_details();
+    assert!(details.bad_request().unwrap().field_violations.len() >= 20);
+    let long = pb::GetJobRequest {
+        id: "x".repeat(1 << 19),
+    };
+    assert_eq!(grpc.get_job(long).await.unwrap_err().code(), Code::NotFound);
+
     // A message over 1 MiB.
     let mut problem: Problem = solver::parse(&example("sheet")).unwrap();
     problem.title = Some("x".repeat(2 << 20));
