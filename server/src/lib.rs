@@ -1,4 +1,5 @@
-//! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms above it.
+//! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms of its own
+//! group and of the groups above it; ARCHITECTURE.md has the finer order.
 
 // What everybody may know: points in time, a job and its moves, what its watchers are told.
 pub mod event;
