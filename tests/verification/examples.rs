@@ -113,16 +113,16 @@ fn example_2_refined_once_is_near_its_mesh_converged_value() {
 
 #[test]
 fn uniform_refinement_of_example_1_gives_the_published_sequence() {
-    for (refine, normal, tangential) in [
-        (0, 96.651, 14.169),
-        (1, 95.665, 14.114),
-        (2, 95.405, 14.124),
-        (3, 95.327, 14.174),
+    for (refine, normal, tangential, peak) in [
+        (0, 96.651, 14.169, 443.0),
+        (1, 95.665, 14.114, 332.0),
+        (2, 95.405, 14.124, 269.0),
+        (3, 95.327, 14.174, 254.0),
     ] {
         let mut problem = example("rectangular_punch");
         problem.mesh.refine = refine;
         let summary = solve(&problem).summary;
-        // three decimals are published
+        // three decimals are published, and whole numbers of the peak
         assert!(
             (summary.normal_force - normal).abs() < 6e-4,
             "{refine}: Y = {}",
@@ -133,6 +133,11 @@ fn uniform_refinement_of_example_1_gives_the_published_sequence() {
             "{refine}: T = {}",
             summary.tangential_force
         );
+        let found = summary.contacts["top"]
+            .peak_tangential_stress
+            .unwrap()
+            .value;
+        assert!((found - peak).abs() < 0.6, "{refine}: peak {found}");
     }
 }
 
