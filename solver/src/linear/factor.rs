@@ -322,6 +322,27 @@ mod tests {
         factor.solve(&mut []);
     }
 
+    /// The smallest and emptiest systems that a body can leave: the factor must still be the kind
+    /// that shows its trailing block.
+    #[test]
+    fn tiny_and_diagonal_systems_have_their_trailing_block() {
+        for n in 1..=4 {
+            for trailing in 1..=n {
+                let mut matrix = SparseSymmetric::zero(n, |j, rows| rows.push(j));
+                (0..n).for_each(|j| matrix.add(j, j, 4.0 + j as f64));
+                let order: Vec<usize> = (0..n).collect();
+                let ordering = Ordering::new(&matrix, &order, trailing).unwrap();
+                let schur = Factor::new(&matrix, ordering)
+                    .unwrap()
+                    .trailing_schur_complement();
+                for k in 0..trailing {
+                    let exact = 4.0 + (n - trailing + k) as f64;
+                    assert!((schur.at(k, k) - exact).abs() < 1e-14, "{n}, {trailing}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_singular_matrix_is_refused() {
         let mut matrix = SparseSymmetric::zero(2, |j, rows| rows.extend(j..2));

@@ -12,7 +12,7 @@ const MOST_LISTED: usize = 20;
 
 /// The mesh, or everything that is wrong with its numbering; `pointer` is the inline mesh's own.
 pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violation>> {
-    let mut found = Findings {
+    let mut found = Faults {
         pointer,
         list: Vec::new(),
         unlisted: HashMap::new(),
@@ -137,7 +137,7 @@ struct Side {
 }
 
 /// All sides by their corners; says where neighbours do not share a midside.
-fn surface(input: &InlineMesh, found: &mut Findings) -> HashMap<(u32, u32), Side> {
+fn surface(input: &InlineMesh, found: &mut Faults) -> HashMap<(u32, u32), Side> {
     let mut sides: HashMap<(u32, u32), Side> = HashMap::with_capacity(2 * input.elements.len());
     for (e, element) in input.elements.iter().enumerate() {
         for (k, [a, b, m]) in quad8::SIDES.into_iter().enumerate() {
@@ -174,13 +174,13 @@ fn key(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-struct Findings<'a> {
+struct Faults<'a> {
     pointer: &'a str,
     list: Vec<Violation>,
     unlisted: HashMap<&'static str, usize>,
 }
 
-impl Findings<'_> {
+impl Faults<'_> {
     fn say(
         &mut self,
         place: &str,

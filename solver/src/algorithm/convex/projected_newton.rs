@@ -1,4 +1,4 @@
-//! Projected Newton (Bertsekas 1982) with a line search: slower, and it always arrives.
+//! Projected Newton (Bertsekas 1982) with a line search: slower, and it goes downhill at every step.
 
 use std::ops::ControlFlow;
 
