@@ -24,14 +24,10 @@ pub fn input_hash(problem: &Problem) -> serde_json::Result<String> {
 pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<String> {
     let mut summary = serde_json::to_value(&solution.summary)?;
     summary["input_hash"] = json!(input_hash);
-    let mut history = serde_json::to_value(&solution.history)?;
-    for row in history
-        .as_array_mut()
-        .into_iter()
-        .flatten()
-        .filter_map(Value::as_object_mut)
-    {
-        row.remove("wall_s");
+    let history = untimed(serde_json::to_value(&solution.history)?);
+    let mut steps = serde_json::to_value(&solution.steps)?;
+    for step in steps.as_array_mut().into_iter().flatten() {
+        step["history"] = untimed(step["history"].take());
     }
     // The outermost object is written by hand, its keys in canonical order: the canonical writer
     // holds every object it is inside of in memory, and fields can be large.
@@ -39,9 +35,19 @@ pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<Strin
     hash.text_of(r#"{"fields":"#).json(&solution.fields)?;
     hash.text_of(r#","history":"#).json(&history)?;
     hash.text_of(r#","profiles":"#).json(&solution.profiles)?;
-    hash.text_of(r#","steps":[],"summary":"#).json(&summary)?;
+    hash.text_of(r#","steps":"#).json(&steps)?;
+    hash.text_of(r#","summary":"#).json(&summary)?;
     hash.text_of("}");
     Ok(hash.text())
+}
+
+/// A history without its times.
+fn untimed(mut history: Value) -> Value {
+    let rows = history.as_array_mut().into_iter().flatten();
+    for row in rows.filter_map(Value::as_object_mut) {
+        row.remove("wall_s");
+    }
+    history
 }
 
 /// SHA-256 as something to write canonical JSON to.
@@ -87,6 +93,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::fake;
+    use solver::solution::StepSolution;
 
     #[test]
     fn a_title_does_not_change_the_input() {
@@ -97,7 +104,7 @@ mod tests {
         };
         assert_eq!(input_hash(&problem).unwrap(), input_hash(&titled).unwrap());
         let mut other = problem.clone();
-        other.materials[0].youngs_modulus = 1001.0;
+        other.materials[0].youngs_modulus = Some(1001.0);
         assert_ne!(input_hash(&problem).unwrap(), input_hash(&other).unwrap());
     }
 
@@ -124,12 +131,20 @@ mod tests {
 
     #[test]
     fn a_digest_is_the_hash_of_one_canonical_document() {
-        let solution = fake::solution();
+        let mut solution = fake::solution();
+        solution.steps.push(StepSolution {
+            name: "indent".into(),
+            summary: solution.summary.clone(),
+            history: solution.history.clone(),
+            profiles: solution.profiles.clone(),
+        });
         let mut document = serde_json::to_value(&solution).unwrap();
-        document["steps"] = json!([]);
         document["summary"]["input_hash"] = json!("h");
-        for row in document["history"].as_array_mut().unwrap() {
-            row.as_object_mut().unwrap().remove("wall_s");
+        for rows in ["/history", "/steps/0/history"] {
+            let rows = document.pointer_mut(rows).unwrap().as_array_mut();
+            for row in rows.unwrap() {
+                row.as_object_mut().unwrap().remove("wall_s");
+            }
         }
         let mut whole = Hash::default();
         whole.json(&document).unwrap();

@@ -6,8 +6,8 @@ use solver::{
     error::SolveError,
     problem::Problem,
     solution::{
-        ContactCount, ContactProfile, Fields, ForcePair, FrictionCount, Iteration, NodeState,
-        Observer, Outcome, Phase, Progress, Residuals, Solution, Stage, Summary,
+        ContactCount, ContactProfile, ErrorEstimate, Fields, ForcePair, FrictionCount, Iteration,
+        NodeState, Observer, Outcome, Phase, Progress, Residuals, Solution, Stage, Summary,
     },
 };
 
@@ -45,6 +45,12 @@ pub(crate) fn solution() -> Solution {
             residuals: Residuals::default(),
             energy: -1.5,
             friction_work: 0.1,
+            error_estimate: ErrorEstimate::default(),
+            increments: 1,
+            cut_backs: 0,
+            uniqueness: None,
+            doubled_increments: None,
+            refinements: vec![],
             warnings: vec![],
             dofs: 26,
             contact_dofs: 10,
@@ -68,6 +74,7 @@ pub(crate) fn solution() -> Solution {
             },
         )]
         .into(),
+        steps: vec![],
         fields: Fields {
             x: vec![0.0, 1.0],
             y: vec![0.0, 0.0],
@@ -87,6 +94,7 @@ pub(crate) fn iteration(k: u32) -> Iteration {
             Stage::Outer
         },
         step: 0,
+        increment: 0,
         residual: 10f64.powi(-4 * k as i32),
         friction_residual: 10f64.powi(-3 * k as i32),
         r_f: (k > 1).then_some(1e-3),

@@ -5,8 +5,8 @@
 //! has its place here.
 
 use solver::solution::{
-    ContactProfile, ContactSummary, Fields, ForcePair, Iteration, Peak, Residuals, Solution,
-    Summary,
+    Comparison, ContactProfile, ContactSummary, ErrorEstimate, Fields, ForcePair, GaussFields,
+    Iteration, Peak, Refinement, Residuals, Solution, StepSolution, Summary,
 };
 
 /// Whether every number of a solution is finite.
@@ -15,11 +15,13 @@ pub fn solution(solution: &Solution) -> bool {
         summary: scalars,
         history,
         profiles,
+        steps,
         fields: nodes,
     } = solution;
     summary(scalars)
         && history.iter().all(iteration)
         && profiles.values().all(profile)
+        && steps.iter().all(step)
         && fields(nodes)
 }
 
@@ -28,7 +30,7 @@ pub fn solution(solution: &Solution) -> bool {
 pub fn iteration(row: &Iteration) -> bool {
     let Iteration {
         residual, friction_residual, r_f, tolerance, force: ForcePair { normal, tangential }, contraction, wall_s,
-        k: _, stage: _, step: _, contact: _, friction: _, inner: _,
+        k: _, stage: _, step: _, increment: _, contact: _, friction: _, inner: _,
     } = row;
     all(&[*residual, *friction_residual, *tolerance, *normal, *tangential, *wall_s]) && some(*r_f) && some(*contraction)
 }
@@ -38,18 +40,49 @@ fn summary(summary: &Summary) -> bool {
     let Summary {
         normal_force, tangential_force, friction_force, contacts, contraction, energy, friction_work,
         residuals: Residuals { kkt, friction, monolithic, equilibrium },
-        outcome: _, converged: _, iterations: _, stage: _, warnings: _, dofs: _, contact_dofs: _,
+        error_estimate: ErrorEstimate { error, energy_norm, relative }, uniqueness, doubled_increments, refinements,
+        outcome: _, converged: _, iterations: _, stage: _, warnings: _, dofs: _, contact_dofs: _, increments: _, cut_backs: _,
     } = summary;
-    all(&[*normal_force, *tangential_force, *friction_force, *energy, *friction_work])
+    all(&[*error, *energy_norm, *relative])
+        && [uniqueness, doubled_increments].into_iter().flatten().all(comparison)
+        && refinements.iter().all(refinement)
+        && all(&[*normal_force, *tangential_force, *friction_force, *energy, *friction_work])
         && all(&[*kkt, *friction, *monolithic, *equilibrium])
         && some(*contraction)
         && contacts.values().all(contact)
 }
 
 #[rustfmt::skip]
+fn comparison(comparison: &Comparison) -> bool {
+    let Comparison { normal_force, tangential_force, friction_force, change, agrees: _, converged: _ } = comparison;
+    all(&[*normal_force, *tangential_force, *friction_force, *change])
+}
+
+#[rustfmt::skip]
+fn refinement(refinement: &Refinement) -> bool {
+    let Refinement {
+        normal_force, tangential_force, friction_force, peak_tangential_stress, peak_normal_stress, change,
+        elements: _, dofs: _,
+    } = refinement;
+    all(&[*normal_force, *tangential_force, *friction_force, *peak_tangential_stress, *peak_normal_stress])
+        && some(*change)
+}
+
+fn step(step: &StepSolution) -> bool {
+    let StepSolution {
+        summary: scalars,
+        history,
+        profiles,
+        name: _,
+    } = step;
+    summary(scalars) && history.iter().all(iteration) && profiles.values().all(profile)
+}
+
+#[rustfmt::skip]
 fn contact(contact: &ContactSummary) -> bool {
     let ContactSummary {
         normal_force, tangential_force, friction_force, contact, stick, slip, peak_normal_stress, peak_tangential_stress,
+        normal: _,
     } = contact;
     let peak = |peak: &Peak| all(&[peak.value, peak.s, peak.x, peak.y]);
     all(&[*normal_force, *tangential_force, *friction_force])
@@ -71,8 +104,11 @@ fn profile(profile: &ContactProfile) -> bool {
 
 #[rustfmt::skip]
 fn fields(fields: &Fields) -> bool {
-    let Fields { x, y, ux, uy, stress_xx, stress_yy, stress_xy, stress_zz, elements: _ } = fields;
-    [x, y, ux, uy, stress_xx, stress_yy, stress_xy, stress_zz].into_iter().all(|column| all(column))
+    let Fields { x, y, ux, uy, stress_xx, stress_yy, stress_xy, stress_zz, element_error, gauss, elements: _ } = fields;
+    let GaussFields { x: gx, y: gy, stress_xx: gxx, stress_yy: gyy, stress_xy: gxy, stress_zz: gzz, order: _ } = gauss;
+    [x, y, ux, uy, stress_xx, stress_yy, stress_xy, stress_zz, element_error, gx, gy, gxx, gyy, gxy, gzz]
+        .into_iter()
+        .all(|column| all(column))
 }
 
 fn all(numbers: &[f64]) -> bool {
@@ -96,6 +132,7 @@ mod tests {
             |s: &mut Solution| s.summary.contraction = Some(f64::NAN),
             |s: &mut Solution| s.history[0].residual = f64::INFINITY,
             |s: &mut Solution| s.fields.ux[0] = f64::NAN,
+            |s: &mut Solution| s.fields.gauss.x.push(f64::NAN),
             |s: &mut Solution| {
                 s.profiles
                     .values_mut()

@@ -157,9 +157,11 @@ impl JobService for Grpc {
     }
 
     async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {
-        let summary = results::summary(&self.service, id(&request.into_inner().id)?).await?;
+        let id = id(&request.into_inner().id)?;
+        let (summary, steps) = results::summary(&self.service, id).await?;
         Ok(Response::new(pb::Result {
             summary: Some(summary.into()),
+            steps: steps.into_iter().map(Into::into).collect(),
         }))
     }
 
@@ -167,8 +169,13 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::GetProfileRequest>,
     ) -> Reply<pb::ContactProfile> {
-        let pb::GetProfileRequest { id: name, boundary } = request.into_inner();
-        let profile = results::profile(&self.service, id(&name)?, &boundary).await?;
+        let pb::GetProfileRequest {
+            id: name,
+            boundary,
+            step,
+        } = request.into_inner();
+        let step = step.as_deref();
+        let profile = results::profile(&self.service, id(&name)?, &boundary, step).await?;
         Ok(Response::new(profile.into()))
     }
 

@@ -7,7 +7,10 @@ use serde::{Deserialize, Serialize};
 use solver::{
     error::SolveError,
     problem::Problem,
-    solution::{ContactProfile, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution},
+    solution::{
+        ContactProfile, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution,
+        StepSolution,
+    },
 };
 
 use crate::{digest, finite};
@@ -21,8 +24,8 @@ pub struct Document {
     pub history: Vec<Iteration>,
     /// Columns along each contact boundary.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// One entry per load step; there are none yet.
-    pub steps: Vec<serde_json::Value>,
+    /// One entry per load step of the problem.
+    pub steps: Vec<StepSolution>,
     /// Displacements and stresses at all nodes.
     pub fields: Fields,
 }
@@ -96,6 +99,7 @@ pub fn run(
         summary,
         history,
         profiles,
+        steps,
         fields,
     } = solution;
     let solver_version = env!("CARGO_PKG_VERSION").to_string();
@@ -110,7 +114,7 @@ pub fn run(
         summary,
         history,
         profiles,
-        steps: vec![],
+        steps,
         fields,
     })
 }

@@ -88,7 +88,7 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
 
 fn solve(text: &str, refine: u32, phases: &mut Vec<(Phase, f64)>) -> Solution {
     let mut problem = solver::parse(text).unwrap();
-    problem.mesh.refine = refine;
+    problem.mesh.refine = solver::problem::Refine::Times(refine);
     let solution = solver::solve(&problem, &mut |progress| {
         if let Progress::Phase(phase) = progress {
             phases.push((phase, now()));

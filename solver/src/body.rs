@@ -7,17 +7,20 @@
 use std::ops::ControlFlow;
 
 use crate::elasticity::{self, Dof, DofMap};
+use crate::element::gauss;
 use crate::error::SolveError;
 use crate::linear::{Dense, Factor, FactorError, Graph, Ordering, SparseSymmetric};
-use crate::model::Model;
+use crate::model::{Held, Level, Model};
 use crate::solution::{Observer, Phase, Progress};
 
 /// Assembled, supported, condensed onto the contact boundaries.
 pub struct ElasticBody {
     /// Ŝ, on the contact unknowns in the order of `contact_dofs`.
     pub stiffness: Dense,
-    /// f̂.
-    pub load: Vec<f64>,
+    /// f̂ of the loads.
+    load_of_loads: Vec<f64>,
+    /// f̂ of the prescribed displacements.
+    load_of_supports: Vec<f64>,
     /// Normal and tangential displacement of every contact node, all contacts in a row; free ones
     /// count from 0 in Ŝ.
     pub contact_dofs: Vec<[Dof; 2]>,
@@ -26,7 +29,11 @@ pub struct ElasticBody {
     /// Which displacements are unknown.
     pub map: DofMap,
     matrix: SparseSymmetric,
-    right_hand_side: Vec<f64>,
+    /// Forces of the loads, and of the prescribed displacements, on all unknowns.
+    right_hand_sides: [Vec<f64>; 2],
+    /// Added to the diagonal of the contact unknowns in `matrix`, and taken off Ŝ again: what contact
+    /// alone holds has no factor without (force/length).
+    spring: f64,
     factor: Factor,
 }
 
@@ -43,12 +50,24 @@ impl ElasticBody {
             model.mesh.nodes.len(),
             model.mesh.elements.iter().map(|e| &e[..]),
         );
-        let (matrix, mut right_hand_side) =
-            elasticity::assemble_stiffness(&model.mesh, &model.section, &map, &graph);
-        let nodal_loads = elasticity::assemble_loads(&model.mesh, &model.section, &model.pressures);
-        add_forces(&map, &nodal_loads, &mut right_hand_side);
-        if !matrix.is_finite() || right_hand_side.iter().any(|f| !f.is_finite()) {
+        let rule = gauss::of_order(model.quadrature);
+        let (mut matrix, of_supports) =
+            elasticity::assemble_stiffness(&model.mesh, &model.section, rule, &map, &graph);
+        let nodal_loads =
+            elasticity::assemble_loads(&model.mesh, &model.section, rule, &model.loads);
+        let of_loads = on_unknowns(&map, &nodal_loads);
+        let right_hand_sides = [of_loads, of_supports];
+        let finite = |forces: &Vec<f64>| forces.iter().all(|f| f.is_finite());
+        if !matrix.is_finite() || !right_hand_sides.iter().all(finite) {
             return Err(SolveError::NonFinite { phase: "assembly" });
+        }
+        let spring = if model.held_by_contact {
+            matrix.mean_diagonal(interior)
+        } else {
+            0.0
+        };
+        for i in interior..map.unknowns {
+            matrix.add(i, i, spring);
         }
 
         phase(Phase::Order)?;
@@ -60,15 +79,23 @@ impl ElasticBody {
         let factor = Factor::new(&matrix, ordering)?;
 
         phase(Phase::Condense)?;
-        let stiffness = factor.trailing_schur_complement();
-        // f̂ = Ŝ u_c with u_c from the whole system under its loads alone
-        let load = if right_hand_side.iter().all(|f| *f == 0.0) {
-            vec![0.0; contact_unknowns]
-        } else {
-            let mut u = right_hand_side.clone();
+        let mut stiffness = factor.trailing_schur_complement();
+        // f̂ = Ŝ u_c with u_c from the whole system under its loads alone; springs and all
+        let condensed = |forces: &Vec<f64>| {
+            if forces.iter().all(|f| *f == 0.0) {
+                return vec![0.0; contact_unknowns];
+            }
+            let mut u = forces.clone();
             factor.solve(&mut u);
             stiffness.times(&u[interior..])
         };
+        let (load_of_loads, load_of_supports) = (
+            condensed(&right_hand_sides[0]),
+            condensed(&right_hand_sides[1]),
+        );
+        for i in 0..contact_unknowns {
+            stiffness.set(i, i, stiffness.at(i, i) - spring);
+        }
         if !(0..stiffness.size()).all(|j| stiffness.column(j).iter().all(|v| v.is_finite())) {
             return Err(SolveError::NonFinite {
                 phase: "condensation",
@@ -83,25 +110,44 @@ impl ElasticBody {
             .collect();
         Ok(ElasticBody {
             stiffness,
-            load,
+            load_of_loads,
+            load_of_supports,
             contact_dofs,
             nodal_loads,
             map,
             matrix,
-            right_hand_side,
+            right_hand_sides,
+            spring,
             factor,
         })
     }
 
-    /// Displacements along x and y of every node under the loads and the given forces on the
-    /// contact unknowns.
-    pub fn displacements(&self, contact_force: &[f64]) -> Vec<[f64; 2]> {
-        let mut rhs = self.right_hand_side.clone();
+    /// f̂ at a load level.
+    pub fn load(&self, level: &Level) -> Vec<f64> {
+        let parts = self.load_of_loads.iter().zip(&self.load_of_supports);
+        parts
+            .map(|(a, b)| level.loads * a + level.supports * b)
+            .collect()
+    }
+
+    /// Displacements along x and y of every node at a load level, under the given forces on the
+    /// contact unknowns; their displacements are known already from the condensed system.
+    pub fn displacements(
+        &self,
+        contact_force: &[f64],
+        contact_displacement: &[f64],
+        level: &Level,
+    ) -> Vec<[f64; 2]> {
+        let [of_loads, of_supports] = &self.right_hand_sides;
+        let both = of_loads.iter().zip(of_supports);
+        let mut rhs: Vec<f64> = both
+            .map(|(a, b)| level.loads * a + level.supports * b)
+            .collect();
         let interior = rhs.len() - contact_force.len();
-        rhs[interior..]
-            .iter_mut()
-            .zip(contact_force)
-            .for_each(|(r, f)| *r += f);
+        for (i, force) in contact_force.iter().enumerate() {
+            // the springs in the matrix pull back what they are stretched by
+            rhs[interior + i] += force + self.spring * contact_displacement[i];
+        }
         let mut u = rhs.clone();
         self.factor.solve(&mut u);
         // one step of iterative refinement: the residual is known to far more digits than u
@@ -114,7 +160,7 @@ impl ElasticBody {
             .collect();
         self.factor.solve(&mut correction);
         u.iter_mut().zip(&correction).for_each(|(u, c)| *u += c);
-        self.map.displacements(&u)
+        self.map.displacements(&u, level.supports)
     }
 }
 
@@ -130,9 +176,22 @@ fn contact_nodes(model: &Model) -> impl Iterator<Item = u32> {
 fn number(model: &Model) -> (DofMap, usize) {
     let count = model.mesh.nodes.len();
     let mut axes = vec![None; count];
+    // a node that is held along an oblique direction has its axes there
+    for (&node, held) in &model.fixed {
+        if let Held::Along {
+            direction: [x, y], ..
+        } = *held
+            && x != 0.0
+            && y != 0.0
+        {
+            axes[node as usize] = Some([[x, y], [y, -x]]);
+        }
+    }
+    let mut in_contact = vec![false; count];
     for contact in &model.contacts {
         for (i, &node) in contact.boundary.nodes.iter().enumerate() {
             axes[node as usize] = Some([contact.boundary.normals[i], contact.boundary.tangent(i)]);
+            in_contact[node as usize] = true;
         }
     }
     let mut map = DofMap {
@@ -140,45 +199,26 @@ fn number(model: &Model) -> (DofMap, usize) {
         axes,
         unknowns: 0,
     };
-    let interior_nodes = (0..count as u32)
-        .filter(|&n| map.axes[n as usize].is_none())
-        .collect::<Vec<_>>();
     let assign = |map: &mut DofMap, node: u32| {
-        let fixed = fixed_along_axes(model, map, node);
+        let axes = map.axes[node as usize].unwrap_or([[1.0, 0.0], [0.0, 1.0]]);
+        let held = model.fixed.get(&node);
         for a in 0..2 {
-            map.dofs[node as usize][a] = fixed[a].map_or_else(
-                || {
+            // Model::new has seen to it that a single direction is one of the node's axes
+            map.dofs[node as usize][a] = match held.and_then(|held| held.along(axes[a])) {
+                Some(value) => Dof::Fixed(value),
+                None => {
                     map.unknowns += 1;
                     Dof::Free(map.unknowns - 1)
-                },
-                Dof::Fixed,
-            );
+                }
+            };
         }
     };
-    interior_nodes
-        .into_iter()
+    (0..count as u32)
+        .filter(|&node| !in_contact[node as usize])
         .for_each(|node| assign(&mut map, node));
     let interior = map.unknowns;
     contact_nodes(model).for_each(|node| assign(&mut map, node));
     (map, interior)
-}
-
-/// Prescribed displacements of a node along its own axes. Model::new has seen to it that a single
-/// one acts along an axis of the node.
-fn fixed_along_axes(model: &Model, map: &DofMap, node: u32) -> [Option<f64>; 2] {
-    let fixed = model.fixed.get(&node).copied().unwrap_or_default();
-    let Some(rows) = map.axes[node as usize] else {
-        return fixed;
-    };
-    match fixed {
-        [Some(_), Some(_)] => map
-            .to_axes(node as usize, fixed.map(Option::unwrap_or_default))
-            .map(Some),
-        _ => rows.map(|row| {
-            let along = if row[0].abs() > row[1].abs() { 0 } else { 1 };
-            fixed[along].map(|value| row[along] * value)
-        }),
-    }
 }
 
 /// Minimum degree on the nodes away from contact, a node's unknowns together; then the contact
@@ -224,15 +264,17 @@ fn elimination_order(
     Ok(order)
 }
 
-/// Adds nodal forces along x and y to the right-hand side.
-fn add_forces(map: &DofMap, forces: &[[f64; 2]], right_hand_side: &mut [f64]) {
+/// Nodal forces along x and y as forces on the unknowns.
+fn on_unknowns(map: &DofMap, forces: &[[f64; 2]]) -> Vec<f64> {
+    let mut on_unknowns = vec![0.0; map.unknowns];
     for (node, force) in forces.iter().enumerate() {
         for (dof, f) in map.dofs[node].iter().zip(map.to_axes(node, *force)) {
             if let Dof::Free(i) = dof {
-                right_hand_side[*i] += f;
+                on_unknowns[*i] += f;
             }
         }
     }
+    on_unknowns
 }
 
 impl From<FactorError> for SolveError {

@@ -52,6 +52,13 @@ pub enum SolveError {
         /// The pivot (in factor order) at which the factorisation stopped.
         pivot: usize,
     },
+    /// Supports leave the body free to move, and in the end contact does not hold it either.
+    Unheld {
+        /// The motion that nothing hinders.
+        motion: String,
+        /// A node that moves.
+        node: u32,
+    },
     /// The factor of the stiffness matrix has more entries than can be addressed or held.
     ResourceExhausted,
     /// A number that is not finite came up in the named phase.
@@ -72,8 +79,15 @@ impl fmt::Display for SolveError {
             }
             SolveError::SingularSystem { pivot } => write!(
                 f,
-                "the stiffness matrix is singular to working precision (pivot {pivot}): \
-                 check the supports, and the ratio of the largest to the smallest element"
+                "the stiffness matrix is singular to working precision (pivot {pivot}): check the \
+                 supports, the ratio of the largest to the smallest element, and whether 2 × 2 \
+                 quadrature leaves a mode without stiffness (3 × 3 has none)"
+            ),
+            SolveError::Unheld { motion, node } => write!(
+                f,
+                "nothing holds the body: it is free to move {motion}, e.g. at node {node}. Supports leave \
+                 that to contact, which does not touch in the end, or not where it would hold. Add a \
+                 support, or loads that press the body against the obstacle"
             ),
             SolveError::ResourceExhausted => {
                 write!(

@@ -31,9 +31,15 @@ pub mod body;
 // Contact and friction on that system.
 pub mod algorithm;
 
+// Load steps, one after the other.
+pub mod steps;
+
+// Finer and finer grids until the results settle.
+pub mod adapt;
+
 use error::{SolveError, Violation};
 use model::Model;
-use problem::Problem;
+use problem::{Problem, Refine};
 use solution::{Observer, Phase, Progress, Solution, Warning};
 
 /// Solves a problem: the whole flow on one screen.
@@ -41,18 +47,24 @@ use solution::{Observer, Phase, Progress, Solution, Warning};
 /// `observe` is told every phase and iteration and may break off: then the last state comes back
 /// as `Outcome::Canceled`, or `SolveError::Stopped` when there is none yet.
 pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
+    match problem.mesh.refine {
+        Refine::Times(_) => solve_once(problem, observe),
+        Refine::Adaptive(goal) => {
+            check(problem).map_err(SolveError::Invalid)?;
+            adapt::run(problem, &goal, &solve_once, observe)
+        }
+    }
+}
+
+/// On one mesh.
+fn solve_once(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
     begin(observe, Phase::Mesh)?;
     let model = Model::new(problem).map_err(SolveError::Invalid)?;
     for warning in &model.warnings {
         begin_warning(observe, warning)?;
     }
     let body = body::ElasticBody::new(&model, observe)?;
-    begin(observe, Phase::Iterate)?;
-    let system = algorithm::System::new(&model, &body);
-    let finished = algorithm::run(&system, &model.controls, observe);
-    // the last state is kept also when the observer broke off: its answer no longer matters
-    let _ = observe(Progress::Phase(Phase::Recover));
-    algorithm::report(&model, &body, &system, finished)
+    steps::run(&model, &body, observe)
 }
 
 /// Checks a problem without solving it: its warnings, or everything that is wrong with it.

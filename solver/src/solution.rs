@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::problem::NormalOf;
+
 /// A solved problem, converged or not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Solution {
@@ -17,8 +19,23 @@ pub struct Solution {
     pub history: Vec<Iteration>,
     /// Columns along each contact boundary, by its name.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// Displacements and stresses at all nodes.
+    /// One entry per load step of the problem; summary, profiles and fields above are of the last.
+    pub steps: Vec<StepSolution>,
+    /// Displacements and stresses.
     pub fields: Fields,
+}
+
+/// The end of one load step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepSolution {
+    /// Its name in the problem, or its number from 1.
+    pub name: String,
+    /// As of a whole solution.
+    pub summary: Summary,
+    /// Rows of this step.
+    pub history: Vec<Iteration>,
+    /// Columns along each contact boundary, by its name.
+    pub profiles: BTreeMap<String, ContactProfile>,
 }
 
 /// How an iteration ended.
@@ -62,8 +79,21 @@ pub struct Summary {
     pub residuals: Residuals,
     /// Potential energy (1.21) of the final state with its own friction bound (force × length).
     pub energy: f64,
-    /// Work done against friction in the total law, ∫τ φ |u_t − d| ≥ 0 (force × length).
+    /// Work done against friction (force × length): ∫τ φ |u_t − d| in the total law; in the
+    /// incremental law ∫τ φ Δ(u_t − d), summed over the increments so far.
     pub friction_work: f64,
+    /// Estimate of the discretisation error.
+    pub error_estimate: ErrorEstimate,
+    /// Increments that it took, over all steps so far.
+    pub increments: u32,
+    /// Increments that did not converge and were halved.
+    pub cut_backs: u32,
+    /// What `check_uniqueness` found; absent when it was not asked for.
+    pub uniqueness: Option<Comparison>,
+    /// What twice the increments change; absent when `check_increments` was not asked for.
+    pub doubled_increments: Option<Comparison>,
+    /// The meshes of adaptive refinement, coarsest first; empty without.
+    pub refinements: Vec<Refinement>,
     /// What the user should know before trusting the result.
     pub warnings: Vec<Warning>,
     /// Unknowns of the body after supports.
@@ -72,9 +102,62 @@ pub struct Summary {
     pub contact_dofs: u64,
 }
 
+/// Error estimate of Zienkiewicz and Zhu: stresses recovered at nodes against those of the elements,
+/// in the energy norm (∫ σ : C⁻¹ σ)^½.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ErrorEstimate {
+    /// Estimated norm of the error ((force × length)^½).
+    pub error: f64,
+    /// Norm of the solution, √(2 · strain energy).
+    pub energy_norm: f64,
+    /// error / √(energy_norm² + error²); 0 for a body without stress.
+    pub relative: f64,
+}
+
+/// A second solution of the same problem beside the first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// True where the two agree: forces and friction bounds to 1e-6 (uniqueness only; for doubled
+    /// increments to `tolerance`).
+    pub agrees: bool,
+    /// Whether the second one converged; without that `agrees` says nothing.
+    pub converged: bool,
+    /// ∫p of the second.
+    pub normal_force: f64,
+    /// ∫σ_t of the second.
+    pub tangential_force: f64,
+    /// ∫|σ_t| of the second.
+    pub friction_force: f64,
+    /// Largest relative difference of these forces.
+    pub change: f64,
+}
+
+/// One mesh of adaptive refinement and what it gave.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Refinement {
+    /// Elements of the mesh.
+    pub elements: u64,
+    /// Unknowns of the body.
+    pub dofs: u64,
+    /// ∫p.
+    pub normal_force: f64,
+    /// ∫σ_t.
+    pub tangential_force: f64,
+    /// ∫|σ_t|.
+    pub friction_force: f64,
+    /// max|σ_t| over all contacts.
+    pub peak_tangential_stress: f64,
+    /// max|σ_n| over all contacts; without mesh limit at a sharp edge.
+    pub peak_normal_stress: f64,
+    /// Largest relative change against the mesh before; absent for the first.
+    pub change: Option<f64>,
+}
+
 /// Scalars of one contact boundary.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContactSummary {
+    /// Whose normal was used.
+    pub normal: NormalOf,
     /// ∫p ≥ 0 (force).
     pub normal_force: f64,
     /// ∫σ_t, positive along t (force).
@@ -136,8 +219,31 @@ pub struct Warning {
 pub enum Stage {
     /// The first solution, without friction.
     Frictionless,
+    /// A solution with u_t = d on all of Γ_C: where `check_uniqueness` starts, and a body that
+    /// only friction holds.
+    Bonded,
     /// A sweep over the friction bound.
     Outer,
+    /// A convex problem with a prescribed friction bound.
+    Inner,
+    /// A step of the monolithic Newton method.
+    Newton,
+    /// A sweep of the thesis's own iteration.
+    Thesis,
+}
+
+impl Stage {
+    /// The name that the API has for it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Stage::Frictionless => "frictionless",
+            Stage::Bonded => "bonded",
+            Stage::Outer => "outer",
+            Stage::Inner => "inner",
+            Stage::Newton => "newton",
+            Stage::Thesis => "thesis",
+        }
+    }
 }
 
 /// One line of history.
@@ -149,6 +255,8 @@ pub struct Iteration {
     pub stage: Stage,
     /// Load step, from 0.
     pub step: u32,
+    /// Increment within the step, from 0.
+    pub increment: u32,
     /// `Residuals::kkt` of the convex problem just solved.
     pub residual: f64,
     /// `Residuals::friction`.
@@ -262,6 +370,30 @@ pub struct Fields {
     pub stress_zz: Vec<f64>,
     /// Eight node numbers per element: corners counter-clockwise, then midsides.
     pub elements: Vec<[u32; 8]>,
+    /// Estimated error of each element (see [`ErrorEstimate`]).
+    pub element_error: Vec<f64>,
+    /// Stresses at the integration points of every element, not averaged.
+    pub gauss: GaussFields,
+}
+
+/// Values at the integration points, element by element; within one the first local coordinate runs
+/// fastest.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GaussFields {
+    /// Points of an element in each direction.
+    pub order: u32,
+    /// Position before deformation.
+    pub x: Vec<f64>,
+    /// Position before deformation.
+    pub y: Vec<f64>,
+    /// σ_xx (σ_rr).
+    pub stress_xx: Vec<f64>,
+    /// σ_yy (σ_zz in axisymmetry).
+    pub stress_yy: Vec<f64>,
+    /// σ_xy (σ_rz).
+    pub stress_xy: Vec<f64>,
+    /// σ_zz (σ_θθ in axisymmetry).
+    pub stress_zz: Vec<f64>,
 }
 
 /// Phases of a solution, in their order; the caller times them.

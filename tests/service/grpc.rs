@@ -81,6 +81,7 @@ async fn a_job_goes_all_the_way_over_grpc() {
         .get_profile(pb::GetProfileRequest {
             id: job.id.clone(),
             boundary: "top".into(),
+            step: None,
         })
         .await;
     let profile = profile.unwrap().into_inner();
@@ -146,7 +147,7 @@ async fn errors_carry_codes_and_details() {
     );
 
     let mut problem = message(&example("sheet"));
-    problem.materials[0].youngs_modulus = -1.0;
+    problem.materials[0].youngs_modulus = Some(-1.0);
     let request = pb::CreateJobRequest {
         problem: Some(problem),
         priority: 99,
@@ -181,11 +182,12 @@ async fn errors_carry_codes_and_details() {
     // Many violations, each of some length, still fit into what a client takes for headers.
     let mut problem = message(&example("sheet"));
     let wrong = pb::Load {
-        boundary: "b".repeat(1000),
+        boundary: Some("b".repeat(1000)),
         pressure: Some(pb::BoundaryValue {
             start: f64::NAN,
             end: None,
         }),
+        ..Default::default()
     };
     problem.loads = vec![wrong; 1000];
     let request = pb::CreateJobRequest {

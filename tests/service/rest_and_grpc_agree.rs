@@ -164,6 +164,7 @@ async fn both_protocols_tell_the_same_story_of_one_job() {
         .get_profile(pb::GetProfileRequest {
             id,
             boundary: "top".into(),
+            step: None,
         })
         .await
         .unwrap()
@@ -180,4 +181,62 @@ async fn both_protocols_tell_the_same_story_of_one_job() {
     assert_eq!(column("normal_stress"), twin.normal_stress);
     assert_eq!(column("tangential_stress"), twin.tangential_stress);
     assert_eq!(column("friction_bound"), twin.friction_bound);
+}
+
+/// Load steps: indented, then dragged, by the incremental law; the second solution asked for.
+#[tokio::test]
+async fn both_protocols_serve_every_load_step() {
+    let server = server().await;
+    let mut grpc = connect(&server).await;
+    let mut problem = example_json("cylinder");
+    problem["contacts"][0]["friction"]["history"] = json!("incremental");
+    problem["contacts"][0]["tangential_displacement"] = json!(0.01);
+    problem["solver"] = json!({ "check_uniqueness": true });
+    problem["steps"] = json!([
+        { "name": "indent", "increments": 2, "spacing": "contact_width" },
+        { "name": "drag", "tangential_displacement": 1 },
+    ]);
+    let id = server.submit(&problem).await;
+    assert_eq!(server.until_done(&id).await["status"], "succeeded");
+    let result = server.json(&format!("/v1/jobs/{id}/result")).await;
+    let twin = grpc
+        .get_result(pb::GetResultRequest { id: id.clone() })
+        .await
+        .unwrap()
+        .into_inner();
+    let (steps, twins) = (result["steps"].as_array().unwrap(), twin.steps);
+    assert_eq!((steps.len(), twins.len()), (2, 2));
+    for (step, twin) in steps.iter().zip(twins) {
+        assert_eq!(step["name"], twin.name);
+        let summary = twin.summary.unwrap();
+        let force = step["summary"]["tangential_force"].as_f64();
+        assert_eq!(force, Some(summary.tangential_force));
+        let second = summary.uniqueness.unwrap();
+        assert_eq!(step["summary"]["uniqueness"]["agrees"], second.agrees);
+    }
+    assert_eq!(result["summary"]["increments"], 3);
+    assert_eq!(
+        steps[1]["summary"]["normal_force"],
+        result["summary"]["normal_force"]
+    );
+
+    let at = |step: &str| format!("/v1/jobs/{id}/profiles/top{step}");
+    let end = server.json(&at("")).await;
+    assert_eq!(end, server.json(&at("?step=drag")).await);
+    assert_eq!(end, server.json(&at("?step=1")).await);
+    let first = server.json(&at("?step=indent")).await;
+    assert_ne!(end, first);
+    let profile = grpc.get_profile(pb::GetProfileRequest {
+        id: id.clone(),
+        boundary: "top".into(),
+        step: Some("0".into()),
+    });
+    let profile = profile.await.unwrap().into_inner();
+    assert_eq!(first["tangential_stress"], json!(profile.tangential_stress));
+    let none = grpc.get_profile(pb::GetProfileRequest {
+        id,
+        boundary: "top".into(),
+        step: Some("unload".into()),
+    });
+    assert_eq!(none.await.unwrap_err().code(), tonic::Code::NotFound);
 }

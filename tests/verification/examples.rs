@@ -1,7 +1,7 @@
 //! The five examples of thesis chapter 4, FORMULATION 5: discrete values on the thesis-size meshes
 //! to 1e-6, and mesh-converged values on graded ones.
 
-use solver::problem::Problem;
+use solver::problem::{Problem, Refine};
 use solver::solution::Solution;
 
 use crate::support::{close, example, graded, solve, union};
@@ -107,7 +107,7 @@ fn example_1_on_a_graded_grid_has_the_mesh_converged_values() {
 #[test]
 fn example_2_refined_once_is_near_its_mesh_converged_value() {
     let mut problem = example("cylinder");
-    problem.mesh.refine = 1;
+    problem.mesh.refine = Refine::Times(1);
     close(solve(&problem).summary.normal_force, 312.870, 1e-3);
 }
 
@@ -120,7 +120,7 @@ fn uniform_refinement_of_example_1_gives_the_published_sequence() {
         (3, 95.327, 14.174, 254.0),
     ] {
         let mut problem = example("rectangular_punch");
-        problem.mesh.refine = refine;
+        problem.mesh.refine = Refine::Times(refine);
         let summary = solve(&problem).summary;
         // three decimals are published, and whole numbers of the peak
         assert!(
@@ -157,7 +157,7 @@ fn the_elastic_slip_matters_as_published() {
         (1e-5, 14.152, 5e-4),
     ] {
         let mut problem = example("rectangular_punch");
-        problem.mesh.refine = 2;
+        problem.mesh.refine = Refine::Times(2);
         problem.contacts[0].friction.as_mut().unwrap().elastic_slip = elastic_slip;
         let found = solve(&problem).summary.tangential_force;
         assert!(
@@ -181,11 +181,11 @@ fn hard_cases_converge_by_the_fallback() {
         ("sheet", 1, 0.6, 1e-6, 0.05),
     ] {
         let mut problem = example(name);
-        problem.mesh.refine = refine;
+        problem.mesh.refine = Refine::Times(refine);
         let friction = problem.contacts[0].friction.as_mut().unwrap();
-        friction.coefficient = coefficient;
+        friction.coefficient = Some(coefficient);
         friction.elastic_slip = elastic_slip;
-        friction.nonlocal_radius = radius;
+        friction.nonlocal_radius = Some(radius);
         let solution = solve(&problem);
         fallbacks += u32::from(solution.history.iter().any(|row| row.inner > 30));
     }

@@ -1,6 +1,6 @@
 //! What `Model::new` refuses, all at once, and what the solver says of what it accepts.
 
-use solver::error::Violation;
+use solver::error::{SolveError, Violation};
 use solver::problem::Problem;
 
 use crate::support::{example, problem, solve};
@@ -20,8 +20,8 @@ fn pair(pointer: &str, reason: &str) -> (String, String) {
 #[test]
 fn every_number_out_of_range_is_named_at_once() {
     let mut p = example("rectangular_punch");
-    p.materials[0].youngs_modulus = -1.0;
-    p.materials[0].poissons_ratio = 0.5;
+    p.materials[0].youngs_modulus = Some(-1.0);
+    p.materials[0].poissons_ratio = Some(0.5);
     p.solver.tolerance = 2.0;
     p.solver.max_iterations = 0;
     let friction = p.contacts[0].friction.as_mut().unwrap();
@@ -29,7 +29,7 @@ fn every_number_out_of_range_is_named_at_once() {
         friction.coefficient,
         friction.nonlocal_radius,
         friction.elastic_slip,
-    ) = (-0.1, -1.0, 0.0);
+    ) = (Some(-0.1), Some(-1.0), 0.0);
     p.supports[0].boundary = "lfet".to_owned();
     let found = violations(&p);
     for pointer in [
@@ -68,6 +68,7 @@ fn numbers_that_are_not_finite_are_refused_wherever_they_stand() {
 fn a_body_free_to_move_is_refused_with_node_and_direction() {
     let mut p = example("rectangular_punch");
     p.supports.remove(1); // the base: now only ux at the side
+    p.contacts.clear();
     let list = solver::check(&p).unwrap_err();
     assert_eq!(list.len(), 1);
     assert!(
@@ -77,6 +78,7 @@ fn a_body_free_to_move_is_refused_with_node_and_direction() {
     );
     let mut round = example("cylinder_on_end");
     round.supports.remove(1);
+    round.contacts.clear();
     assert!(
         solver::check(&round).unwrap_err()[0]
             .got
@@ -91,10 +93,80 @@ fn a_body_free_to_move_is_refused_with_node_and_direction() {
     );
     let mut pinned = example("rectangular_punch");
     pinned.supports.clear();
+    pinned.contacts.clear();
     assert!(
         solver::check(&pinned).unwrap_err()[0]
             .got
             .contains("along x")
+    );
+}
+
+/// Contact could hold these bodies; it does not, since nothing presses them against the obstacle. Peers
+/// answer "converged" here, with forces of rounding.
+#[test]
+fn a_body_that_contact_could_hold_and_does_not_is_an_error_with_its_motion() {
+    for (name, motion) in [
+        ("rectangular_punch", "along y"),
+        ("cylinder_on_end", "along the axis"),
+    ] {
+        let mut p = example(name);
+        p.supports.remove(1);
+        assert!(solver::check(&p).is_ok(), "{name}");
+        match solver::solve(&p, &mut |_| std::ops::ControlFlow::Continue(())) {
+            Err(SolveError::Unheld { motion: found, .. }) => assert_eq!(found, motion, "{name}"),
+            other => panic!("{name}: {:?}", other.map(|s| s.summary)),
+        }
+    }
+}
+
+/// A block on a rigid flat, pressed down from above and held by nothing else: the pressure below is
+/// that above, to rounding.
+#[test]
+fn a_block_that_only_contact_holds_stands_on_its_pressure() {
+    for friction in [
+        "null",
+        r#"{"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}"#,
+    ] {
+        let json = format!(
+            r#"{{"analysis": {{"kind": "plane_strain"}}, "mesh": {{"grid": {{"x": [0, 0.4, 1, 2], "y": [0, 0.7, 1]}}}},
+                "materials": [{{"youngs_modulus": 1000, "poissons_ratio": 0.3}}], "loads": [{{"boundary": "top", "pressure": 5}}],
+                "supports": [{{"boundary": "left", "ux": 0}}],
+                "contacts": [{{"boundary": "bottom", "obstacle": {{"kind": "flat"}}, "indentation": -0.125, "friction": {friction}}}]}}"#
+        );
+        let solution = solve(&problem(&json.replace(r#", "friction": null"#, "")));
+        assert!((solution.summary.normal_force - 10.0).abs() < 1e-9);
+        assert!(solution.summary.residuals.equilibrium < 1e-9);
+        if friction == "null" {
+            let stress = &solution.profiles["bottom"].normal_stress;
+            assert!(stress.iter().all(|s| (s + 5.0).abs() < 1e-9), "{stress:?}");
+        }
+    }
+}
+
+/// Pushed sideways, nothing but friction holds it: it sticks below μ N, and is not held above.
+#[test]
+fn a_block_that_only_friction_holds_sticks_or_slides_away() {
+    let solve = |push: f64| {
+        let json = format!(
+            r#"{{"analysis": {{"kind": "plane_strain"}}, "mesh": {{"grid": {{"x": [0, 1, 2, 3, 4], "y": [0, 0.5, 1]}}}},
+                "materials": [{{"youngs_modulus": 1000, "poissons_ratio": 0}}],
+                "loads": [{{"boundary": "top", "traction": [{push}, -5]}}],
+                "contacts": [{{"boundary": "bottom", "obstacle": {{"kind": "flat"}},
+                    "friction": {{"coefficient": 0.5, "nonlocal_radius": 0, "elastic_slip": 1e-4}}}}]}}"#
+        );
+        solver::solve(
+            &problem(&json),
+            &mut |_| std::ops::ControlFlow::Continue(()),
+        )
+    };
+    let held = solve(1.0).unwrap().summary;
+    assert!(held.converged, "{held:#?}");
+    // t of a bottom edge runs along −x
+    assert!((held.tangential_force - 4.0).abs() < 1e-8 && (held.normal_force - 20.0).abs() < 1e-8);
+    let gone = solve(4.0);
+    assert!(
+        gone.as_ref().is_err() || !gone.as_ref().unwrap().summary.converged,
+        "{gone:?}"
     );
 }
 
@@ -318,7 +390,7 @@ fn a_solution_stopped_at_its_first_row_is_the_state_of_that_row() {
 fn a_radius_of_nothing_is_local_and_an_endless_one_refused() {
     let with_radius = |radius: f64| {
         let mut p = example("rectangular_punch");
-        p.contacts[0].friction.as_mut().unwrap().nonlocal_radius = radius;
+        p.contacts[0].friction.as_mut().unwrap().nonlocal_radius = Some(radius);
         p
     };
     let local = solve(&with_radius(0.0)).summary.tangential_force;

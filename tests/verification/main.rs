@@ -3,11 +3,16 @@
 //! Each test opens with its source, its goal and the reason of its tolerance.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod adaptive;
 mod balance;
 mod cylinder;
 mod examples;
 mod flat_punch;
 mod input;
+mod invariance;
 mod patch;
+mod record;
+mod robustness;
 mod support;
+mod thesis;
 mod thick_cylinder;

@@ -1,7 +1,7 @@
 //! VERIFICATION rows 1 and 2: the element.
 
 use faer::Side;
-use solver::elasticity::{Section, assemble_element};
+use solver::elasticity::{Section, assemble_element, isotropic};
 use solver::element::gauss::{GAUSS_2, GAUSS_3};
 use solver::problem::{Analysis, Problem};
 
@@ -149,7 +149,9 @@ fn an_element_has_its_rigid_modes_and_no_others() {
         [1.0, 0.45],
     ];
     let zero_modes = |analysis: Analysis, rule: &[(f64, f64)]| {
-        let k = assemble_element(&distorted, &Section::new(analysis, 1000.0, 0.3), rule);
+        let moduli = isotropic(&analysis, 1000.0, 0.3);
+        let section = Section::uniform(analysis, moduli);
+        let k = assemble_element(&distorted, &section, &moduli, rule);
         let values = faer::Mat::from_fn(16, 16, |i, j| k[i][j])
             .self_adjoint_eigenvalues(Side::Lower)
             .unwrap();

@@ -111,7 +111,7 @@ fn the_error_of_displacement_falls_with_the_third_power_of_the_element_or_better
 fn refining_a_curved_mesh_converges_to_its_curve() {
     let error = |n: usize, refine: u32| {
         let mut ring = ring(n, n);
-        ring.mesh.refine = refine;
+        ring.mesh.refine = solver::problem::Refine::Times(refine);
         let fields = solve(&ring).fields;
         (fields.ux[node(&fields, 1.0, 0.0)] / 1.906667e-3 - 1.0).abs()
     };

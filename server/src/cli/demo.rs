@@ -242,11 +242,12 @@ impl Line {
     }
 
     fn step(&mut self, row: &Iteration) -> anyhow::Result<()> {
-        let stage = match row.stage {
-            solver::solution::Stage::Frictionless => "frictionless",
-            solver::solution::Stage::Outer => "outer",
-        };
-        self.step_by(row.k, stage, row.residual, row.friction_residual)
+        self.step_by(
+            row.k,
+            row.stage.as_str(),
+            row.residual,
+            row.friction_residual,
+        )
     }
 
     fn step_by(&mut self, k: u32, stage: &str, residual: f64, friction: f64) -> anyhow::Result<()> {

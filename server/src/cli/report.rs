@@ -2,21 +2,16 @@
 
 use std::fmt::Write;
 
-use solver::solution::{
-    ContactProfile, ContactSummary, Iteration, NodeState, Outcome, Peak, Stage,
-};
+use solver::solution::{ContactProfile, ContactSummary, Iteration, NodeState, Outcome, Peak};
 
 use crate::run::Document;
 
 /// One row of history on one line.
 pub(super) fn iteration(row: &Iteration) -> String {
-    let stage = match row.stage {
-        Stage::Frictionless => "frictionless",
-        Stage::Outer => "outer",
-    };
     let mut line = format!(
-        "{:>4}  {stage:<12}  residual {:8.2e}  friction {:8.2e}  contact {:>3} (+{} -{})",
+        "{:>4}  {:<12}  residual {:8.2e}  friction {:8.2e}  contact {:>3} (+{} -{})",
         row.k,
+        row.stage.as_str(),
         row.residual,
         row.friction_residual,
         row.contact.active,
@@ -25,6 +20,14 @@ pub(super) fn iteration(row: &Iteration) -> String {
     );
     if let Some(q) = row.contraction {
         let _ = write!(line, "  q {q:.3}");
+    }
+    if row.step + row.increment > 0 {
+        let _ = write!(
+            line,
+            "  step {} increment {}",
+            row.step + 1,
+            row.increment + 1
+        );
     }
     line
 }
@@ -68,6 +71,48 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
             s.residuals.kkt, s.residuals.friction, s.residuals.monolithic, s.residuals.equilibrium
         ),
     );
+    let error = 100.0 * s.error_estimate.relative;
+    line(
+        "estimated error",
+        format!("{error:.1} % in the energy norm"),
+    );
+    for mesh in &s.refinements {
+        let change = mesh
+            .change
+            .map_or(String::new(), |change| format!(", changed by {change:.1e}"));
+        line(
+            "  mesh",
+            format!(
+                "{:>6} elements: Y {}, T {}, peak σ_t {}{change}",
+                mesh.elements,
+                number(mesh.normal_force),
+                number(mesh.tangential_force),
+                number(mesh.peak_tangential_stress)
+            ),
+        );
+    }
+    for step in &document.steps {
+        line(
+            &format!("step {:?}", step.name),
+            format!(
+                "Y {}, T {}, {} iterations",
+                number(step.summary.normal_force),
+                number(step.summary.tangential_force),
+                step.summary.iterations
+            ),
+        );
+    }
+    if let Some(second) = &s.uniqueness {
+        let found = match (second.converged, second.agrees) {
+            (false, _) => "unknown: from the bonded state the method does not converge".to_string(),
+            (true, true) => "the bonded state leads to the same solution".to_string(),
+            (true, false) => format!(
+                "NO: the bonded state leads to Y {}",
+                number(second.normal_force)
+            ),
+        };
+        line("unique", found);
+    }
     for (name, contact) in &s.contacts {
         contact_lines(name, contact, &mut line);
     }

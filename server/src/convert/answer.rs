@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use prost_types::Timestamp;
 use solver::{
     error::Violation,
+    problem::NormalOf,
     solution::{
-        ContactProfile, ContactSummary, Iteration, NodeState, Outcome, Peak, Residuals, Stage,
-        Warning,
+        Comparison, ContactProfile, ContactSummary, ErrorEstimate, Iteration, NodeState, Outcome,
+        Peak, Refinement, Residuals, Warning,
     },
 };
 
@@ -17,7 +18,7 @@ use crate::{
     pb,
     run::{Summary, phase_name},
     time::Time,
-    verbs::{jobs::Cancellation, problems::Judgement},
+    verbs::{jobs::Cancellation, problems::Judgement, results::StepResult},
 };
 
 /// A status as the contract numbers it.
@@ -159,19 +160,13 @@ impl From<Event> for pb::Event {
     }
 }
 
-fn stage_name(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Frictionless => "frictionless",
-        Stage::Outer => "outer",
-    }
-}
-
 impl From<Iteration> for pb::Iteration {
     fn from(row: Iteration) -> Self {
         pb::Iteration {
             k: row.k,
-            stage: stage_name(row.stage).into(),
+            stage: row.stage.as_str().into(),
             step: row.step,
+            increment: row.increment,
             residual: row.residual,
             friction_residual: row.friction_residual,
             r_f: row.r_f,
@@ -250,6 +245,27 @@ impl From<Summary> for pb::Summary {
             input_hash,
             digest,
         } = summary;
+        pb::Summary {
+            timings,
+            solver_version,
+            input_hash,
+            digest,
+            ..solution.into()
+        }
+    }
+}
+
+impl From<StepResult> for pb::StepResult {
+    fn from(StepResult { name, summary }: StepResult) -> Self {
+        pb::StepResult {
+            name,
+            summary: Some(summary.into()),
+        }
+    }
+}
+
+impl From<solver::solution::Summary> for pb::Summary {
+    fn from(solution: solver::solution::Summary) -> Self {
         let outcome = match solution.outcome {
             Outcome::Converged => pb::Outcome::Converged,
             Outcome::NotConverged => pb::Outcome::NotConverged,
@@ -268,6 +284,11 @@ impl From<Summary> for pb::Summary {
             monolithic,
             equilibrium,
         } = solution.residuals;
+        let ErrorEstimate {
+            error,
+            energy_norm,
+            relative,
+        } = solution.error_estimate;
         pb::Summary {
             outcome: outcome.into(),
             converged: solution.converged,
@@ -276,7 +297,7 @@ impl From<Summary> for pb::Summary {
             friction_force: solution.friction_force,
             contacts,
             iterations: solution.iterations,
-            stage: stage_name(solution.stage).into(),
+            stage: solution.stage.as_str().into(),
             contraction: solution.contraction,
             residuals: Some(pb::Residuals {
                 kkt,
@@ -286,13 +307,66 @@ impl From<Summary> for pb::Summary {
             }),
             energy: solution.energy,
             friction_work: solution.friction_work,
+            error_estimate: Some(pb::ErrorEstimate {
+                error,
+                energy_norm,
+                relative,
+            }),
+            increments: solution.increments,
+            cut_backs: solution.cut_backs,
+            uniqueness: solution.uniqueness.map(Into::into),
+            doubled_increments: solution.doubled_increments.map(Into::into),
+            refinements: solution.refinements.into_iter().map(Into::into).collect(),
             warnings: solution.warnings.into_iter().map(Into::into).collect(),
             dofs: solution.dofs,
             contact_dofs: solution.contact_dofs,
-            timings,
-            solver_version,
-            input_hash,
-            digest,
+            ..Default::default()
+        }
+    }
+}
+
+impl From<Comparison> for pb::Comparison {
+    fn from(second: Comparison) -> Self {
+        let Comparison {
+            agrees,
+            converged,
+            normal_force,
+            tangential_force,
+            friction_force,
+            change,
+        } = second;
+        pb::Comparison {
+            agrees,
+            converged,
+            normal_force,
+            tangential_force,
+            friction_force,
+            change,
+        }
+    }
+}
+
+impl From<Refinement> for pb::Refinement {
+    fn from(mesh: Refinement) -> Self {
+        let Refinement {
+            elements,
+            dofs,
+            normal_force,
+            tangential_force,
+            friction_force,
+            peak_tangential_stress,
+            peak_normal_stress,
+            change,
+        } = mesh;
+        pb::Refinement {
+            elements,
+            dofs,
+            normal_force,
+            tangential_force,
+            friction_force,
+            peak_tangential_stress,
+            peak_normal_stress,
+            change,
         }
     }
 }
@@ -306,7 +380,12 @@ impl From<ContactSummary> for pb::ContactSummary {
                 .collect()
         };
         let peak = |Peak { value, s, x, y }: Peak| pb::Peak { value, s, x, y };
+        let normal = match contact.normal {
+            NormalOf::Body => pb::NormalOf::Body,
+            NormalOf::Obstacle => pb::NormalOf::Obstacle,
+        };
         pb::ContactSummary {
+            normal: normal.into(),
             normal_force: contact.normal_force,
             tangential_force: contact.tangential_force,
             friction_force: contact.friction_force,

@@ -167,7 +167,7 @@ fn judge(
             (ending, Some(parts))
         }
         Ok(Err(SolveError::Stopped)) => (Ending::canceled(), None),
-        Ok(Err(error @ SolveError::SingularSystem { .. })) => {
+        Ok(Err(error @ (SolveError::SingularSystem { .. } | SolveError::Unheld { .. }))) => {
             failed(Reason::SingularSystem, &error)
         }
         Ok(Err(error @ SolveError::NonFinite { .. })) => failed(Reason::NonFinite, &error),

@@ -23,7 +23,7 @@ use crate::{error::ApiError, run::Summary, verbs::results};
 #[derive(Serialize)]
 pub(super) struct Found {
     summary: Summary,
-    steps: [Summary; 0],
+    steps: Vec<results::StepResult>,
 }
 
 pub(super) async fn result(
@@ -32,8 +32,8 @@ pub(super) async fn result(
     path: JobPath,
 ) -> Result<Json<Found>, ApiError> {
     Params::parse(query.as_deref(), &[])?;
-    let summary = results::summary(&rest.service, path.id).await?;
-    Ok(Json(Found { summary, steps: [] }))
+    let (summary, steps) = results::summary(&rest.service, path.id).await?;
+    Ok(Json(Found { summary, steps }))
 }
 
 pub(super) async fn profile(
@@ -42,10 +42,11 @@ pub(super) async fn profile(
     headers: HeaderMap,
     path: JobPath,
 ) -> Result<Response, ApiError> {
-    let params = Params::parse(query.as_deref(), &["format"])?;
+    let params = Params::parse(query.as_deref(), &["format", "step"])?;
     let formats = [("json", "application/json"), ("csv", "text/csv")];
     let format = choose(&formats, "json, csv", params.one("format"), &headers)?;
-    let profile = results::profile(&rest.service, path.id, &path.boundary).await?;
+    let step = params.one("step");
+    let profile = results::profile(&rest.service, path.id, &path.boundary, step).await?;
     Ok(match format {
         "csv" => (
             [(header::CONTENT_TYPE, "text/csv; charset=utf-8")],

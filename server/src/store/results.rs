@@ -1,5 +1,7 @@
 //! Results: named parts, each in pieces, written before the job's end and served after it.
 
+use serde_json::json;
+
 use super::{Result, Store, jobs::is_current};
 use crate::run::Document;
 
@@ -25,10 +27,22 @@ impl Parts {
                 "history".to_string(),
                 serde_json::to_vec(&document.history)?,
             ),
-            ("steps".to_string(), serde_json::to_vec(&document.steps)?),
         ];
+        // the rows of a step are among the history's; its profiles are served one by one
+        let steps: Vec<_> = document
+            .steps
+            .iter()
+            .map(|step| json!({"name": step.name, "summary": step.summary}))
+            .collect();
+        parts.push(("steps".to_string(), serde_json::to_vec(&steps)?));
+        for (number, step) in document.steps.iter().enumerate() {
+            for (boundary, profile) in &step.profiles {
+                let name = profile_part(boundary, Some(number));
+                parts.push((name, serde_json::to_vec(profile)?));
+            }
+        }
         for (boundary, profile) in &document.profiles {
-            parts.push((profile_part(boundary), serde_json::to_vec(profile)?));
+            parts.push((profile_part(boundary, None), serde_json::to_vec(profile)?));
         }
         if !document.fields.x.is_empty() {
             parts.push(("fields".to_string(), serde_json::to_vec(&document.fields)?));
@@ -37,9 +51,12 @@ impl Parts {
     }
 }
 
-/// The part that holds the profile of a boundary.
-fn profile_part(boundary: &str) -> String {
-    format!("profile/{boundary}")
+/// The part that holds the profile of a boundary, at the end or at the end of a load step.
+fn profile_part(boundary: &str, step: Option<usize>) -> String {
+    match step {
+        None => format!("profile/{boundary}"),
+        Some(number) => format!("step/{number}/profile/{boundary}"),
+    }
 }
 
 impl Store {
@@ -108,14 +125,19 @@ impl Store {
         Ok((!pieces.is_empty()).then(|| pieces.concat()))
     }
 
-    /// The profile of a boundary.
-    pub async fn profile(&self, key: i64, boundary: &str) -> Result<Option<Vec<u8>>> {
-        self.part(key, &profile_part(boundary)).await
+    /// The profile of a boundary, at the end or at the end of a load step (from 0).
+    pub async fn profile(
+        &self,
+        key: i64,
+        boundary: &str,
+        step: Option<usize>,
+    ) -> Result<Option<Vec<u8>>> {
+        self.part(key, &profile_part(boundary, step)).await
     }
 
     /// The boundaries that have a profile.
     pub async fn profiled_boundaries(&self, key: i64) -> Result<Vec<String>> {
-        let prefix = profile_part("");
+        let prefix = profile_part("", None);
         let names: Vec<String> = sqlx::query_scalar(
             "select name from result_part where job_id = ? and piece = 0 and substr(name, 1, ?) = ? order by name",
         )

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use async_stream::try_stream;
 use futures_util::Stream;
+use serde::{Deserialize, Serialize};
 use solver::solution::ContactProfile;
 
 use super::{Service, jobs};
@@ -14,22 +15,45 @@ use crate::{
     violations,
 };
 
-/// The summary of a job that has one.
-pub async fn summary(service: &Service, id: JobId) -> Result<Summary, ApiError> {
+/// What is said of one load step.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct StepResult {
+    /// Its name in the problem, or its number from 1.
+    pub name: String,
+    /// Its end.
+    pub summary: solver::solution::Summary,
+}
+
+/// The summary of a job that has one, and those of its load steps.
+pub async fn summary(service: &Service, id: JobId) -> Result<(Summary, Vec<StepResult>), ApiError> {
     let job = finished(service, id).await?;
     let bytes = service.store.part(job.key, "summary").await?;
     let bytes = bytes.ok_or_else(|| ApiError::internal(format!("{id} has no summary")))?;
-    serde_json::from_slice(&bytes).map_err(ApiError::internal)
+    let summary = serde_json::from_slice(&bytes).map_err(ApiError::internal)?;
+    Ok((summary, steps(service, &job).await?))
 }
 
-/// The profile of one contact boundary.
+async fn steps(service: &Service, job: &Job) -> Result<Vec<StepResult>, ApiError> {
+    let bytes = service.store.part(job.key, "steps").await?;
+    bytes.map_or(Ok(vec![]), |bytes| {
+        serde_json::from_slice(&bytes).map_err(ApiError::internal)
+    })
+}
+
+/// The profile of one contact boundary: at the end, or at the end of a load step, by its name or its
+/// number from 0.
 pub async fn profile(
     service: &Service,
     id: JobId,
     boundary: &str,
+    step: Option<&str>,
 ) -> Result<ContactProfile, ApiError> {
     let job = finished(service, id).await?;
-    let Some(bytes) = service.store.profile(job.key, boundary).await? else {
+    let step = match step {
+        None => None,
+        Some(wanted) => Some(step_number(&steps(service, &job).await?, wanted, id)?),
+    };
+    let Some(bytes) = service.store.profile(job.key, boundary, step).await? else {
         let known = service.store.profiled_boundaries(job.key).await?.join(", ");
         return Err(ApiError::NotFound(format!(
             "{id} has no contact boundary {:?}; it has: {known}",
@@ -37,6 +61,24 @@ pub async fn profile(
         )));
     };
     serde_json::from_slice(&bytes).map_err(ApiError::internal)
+}
+
+fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, ApiError> {
+    let named = steps.iter().position(|step| step.name == wanted);
+    let numbered = wanted.parse().ok().filter(|n| *n < steps.len());
+    named.or(numbered).ok_or_else(|| {
+        let names: Vec<_> = steps
+            .iter()
+            .take(20)
+            .map(|step| step.name.as_str())
+            .collect();
+        ApiError::NotFound(format!(
+            "{id} has no load step {:?}; it has {} (by name, or by number from 0): {}",
+            violations::name(wanted),
+            steps.len(),
+            names.join(", ")
+        ))
+    })
 }
 
 /// The fields at all nodes as JSON, piece by piece: they may be large.

@@ -1,15 +1,241 @@
 //! Contact and friction on the condensed system, FORMULATION 4.
 //!
-//! Algorithms are functions of one signature: from a [`System`] to its final [`State`], an
-//! iteration at a time to the observer.
+//! Algorithms are functions of one kind: from a [`System`] to its final state, an iteration at a
+//! time to the observer. [`run`] chooses among them.
 
 mod convex;
 mod fixed_point;
+mod newton;
 mod profile;
 mod report;
 mod system;
+mod thesis;
+mod track;
+mod uniqueness;
 
 pub use convex::{Minimum, minimise};
-pub use fixed_point::{Finished, run};
-pub use report::report;
-pub use system::{ContactNode, Patch, Point, State, System};
+pub use report::{Reported, report};
+pub use system::{ContactNode, Patch, Point, State, System, Work};
+pub use track::Cycle;
+pub use uniqueness::{compared, note_doubled_increments, note_uniqueness, other_solution};
+
+use std::ops::ControlFlow;
+
+use crate::problem::{Algorithm, SolverControls};
+use crate::solution::{Iteration, Observer, Outcome, Residuals, Stage};
+use fixed_point::{stuck, sweep};
+use track::{Measured, Track};
+
+/// Newton steps before giving up.
+const NEWTON_STEPS: u32 = 60;
+
+/// The end of the iterations at one load level.
+#[derive(Clone)]
+pub struct Finished {
+    /// The final state.
+    pub state: State,
+    /// The friction bound that it was solved with, at every friction point.
+    pub bound: Vec<f64>,
+    /// σ_t at every friction point.
+    pub tractions: Vec<f64>,
+    /// The tractions are those of the thesis's own iteration, not what the law says of the state.
+    pub own_tractions: bool,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// What produced the final state.
+    pub stage: Stage,
+    /// kkt, friction and monolithic; equilibrium is the body's to say.
+    pub residuals: Residuals,
+    /// Last q = |Δτ_k|/|Δτ_{k−1}| of plain sweeps.
+    pub contraction: Option<f64>,
+    /// All rows.
+    pub history: Vec<Iteration>,
+    /// Period and nodes of a cycle.
+    pub cycle: Option<Cycle>,
+}
+
+/// Where the iterations stand in the load history.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Place {
+    /// Load step, from 0.
+    pub step: u32,
+    /// Increment within the step, from 0.
+    pub increment: u32,
+    /// Rows told before.
+    pub rows: u32,
+}
+
+/// Solves a system at its load level with the algorithm asked for, from the end of the increment
+/// before where there is one.
+pub fn run(
+    system: &System<'_>,
+    controls: &SolverControls,
+    place: Place,
+    before: Option<&Finished>,
+    observe: &mut Observer<'_>,
+) -> Finished {
+    let mut track = Track::new(system, controls, place);
+    if controls.algorithm == Algorithm::Thesis {
+        let (end, tractions) = thesis::run(&mut track, observe);
+        return Finished {
+            tractions,
+            own_tractions: true,
+            ..finish(track, end)
+        };
+    }
+    let (start, answer) = start(&mut track, before, observe);
+    // without friction, or where friction never acts, the first solution is the last
+    let solved = start.within(controls.tolerance) && before.is_none();
+    if system.points.is_empty() || solved || answer.is_break() {
+        let outcome = match answer {
+            _ if start.within(controls.tolerance) => Outcome::Converged,
+            ControlFlow::Break(()) => Outcome::Canceled,
+            ControlFlow::Continue(()) => Outcome::NotConverged,
+        };
+        let end = End {
+            measured: start,
+            stage: Stage::Frictionless,
+            outcome,
+            cycle: None,
+            contraction: None,
+            exhausted: false,
+        };
+        return finish(track, end);
+    }
+    let end = match controls.algorithm {
+        Algorithm::FixedPoint => fixed_point::run(&mut track, start, false, observe),
+        Algorithm::Newton => newton::run(&mut track, &start, controls.max_iterations, observe),
+        Algorithm::Auto | Algorithm::Thesis => return auto(track, start, observe),
+    };
+    finish(track, end)
+}
+
+/// The state that friction starts from: that of the increment before; else the frictionless
+/// solution with u_t = d (friction pulls with full stiffness at first).
+fn start(
+    track: &mut Track<'_, '_>,
+    before: Option<&Finished>,
+    observe: &mut Observer<'_>,
+) -> (Measured, ControlFlow<()>) {
+    let system = track.system;
+    if let (Some(before), false) = (before, system.points.is_empty()) {
+        let (state, bound) = (before.state.clone(), before.bound.clone());
+        // its reactions mean nothing at the new level; its friction bound is near
+        let measured = Measured {
+            implied_bound: bound.clone(),
+            ..Measured::new(system, state, bound)
+        };
+        return (measured, ControlFlow::Continue(()));
+    }
+    let none = vec![0.0; system.points.len()];
+    let rest = before.map_or_else(|| system.rest(), |before| before.state.clone());
+    let stage = Stage::Frictionless;
+    let (mut measured, answer) = sweep(track, stage, none, &rest, observe, |_| None);
+    let solved = measured.within(track.controls.tolerance);
+    if system.points.is_empty() || solved || answer.is_break() {
+        return (measured, answer);
+    }
+    if system.semidefinite && measured.residuals.kkt > track.controls.tolerance {
+        // nothing but friction holds this body: the frictionless one slides away
+        let (bonded, answer) = bonded_state(system, track.controls, observe);
+        return (bonded, answer);
+    }
+    measured.state = stuck(system, &measured.state);
+    (measured, answer)
+}
+
+/// The state with u_t = d throughout, and the friction bound that it implies.
+fn bonded_state(
+    system: &System<'_>,
+    controls: &SolverControls,
+    observe: &mut Observer<'_>,
+) -> (Measured, ControlFlow<()>) {
+    let bonded = system.bonded();
+    let mut track = Track::new(&bonded, controls, Place::default());
+    let quiet: &mut Observer<'_> = &mut |progress| match progress {
+        crate::solution::Progress::Pulse => observe(progress),
+        _ => ControlFlow::Continue(()),
+    };
+    let (found, answer) = sweep(
+        &mut track,
+        Stage::Bonded,
+        Vec::new(),
+        &bonded.rest(),
+        quiet,
+        |_| None,
+    );
+    let none = vec![0.0; system.points.len()];
+    (Measured::new(system, found.state, none), answer)
+}
+
+/// Sweeps; where they do not get on, Newton's method from the best sweep; where that fails too, both
+/// again from the bonded state: beyond a fold the free branch ends, and only a jammed state is left.
+fn auto(mut track: Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> Finished {
+    let first = both(&mut track, start, observe);
+    if first.ended() {
+        return finish(track, first);
+    }
+    let (bonded, answer) = bonded_state(track.system, track.controls, observe);
+    if answer.is_break() {
+        let outcome = Outcome::Canceled;
+        return finish(track, End { outcome, ..first });
+    }
+    track.forget();
+    let second = both(&mut track, bonded, observe);
+    let nearer = second.outcome == Outcome::Converged
+        || second.outcome == Outcome::Canceled
+        || second.measured.residuals.monolithic < first.measured.residuals.monolithic;
+    finish(track, if nearer { second } else { first })
+}
+
+/// Sweeps, then Newton's method from the best of them.
+fn both(track: &mut Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> End {
+    let swept = fixed_point::run(track, start, true, observe);
+    if swept.ended() {
+        return swept;
+    }
+    track.forget();
+    let newton = newton::run(track, &swept.measured, NEWTON_STEPS, observe);
+    let nearer = newton.outcome == Outcome::Converged
+        || newton.outcome == Outcome::Canceled
+        || newton.measured.residuals.monolithic < swept.measured.residuals.monolithic;
+    End {
+        contraction: swept.contraction,
+        ..if nearer { newton } else { swept }
+    }
+}
+
+/// Where a method ended.
+struct End {
+    measured: Measured,
+    stage: Stage,
+    outcome: Outcome,
+    cycle: Option<Cycle>,
+    /// Last q of sweeps that were not accelerated.
+    contraction: Option<f64>,
+    /// All iterations that were allowed are done.
+    exhausted: bool,
+}
+
+impl End {
+    /// Nothing else is to be tried: it converged, or the observer or the limit put an end to it.
+    fn ended(&self) -> bool {
+        matches!(self.outcome, Outcome::Converged | Outcome::Canceled) || self.exhausted
+    }
+}
+
+fn finish(track: Track<'_, '_>, end: End) -> Finished {
+    let measured = end.measured;
+    Finished {
+        tractions: track.system.tractions(&measured.state.v, &measured.bound),
+        own_tractions: false,
+        outcome: end.outcome,
+        stage: end.stage,
+        residuals: measured.residuals,
+        contraction: end.contraction,
+        history: track.history,
+        cycle: end.cycle,
+        state: measured.state,
+        bound: measured.bound,
+    }
+}

@@ -1,16 +1,19 @@
 //! One contact in the final state: forces, extents, peaks, columns, and what to warn of.
 
+use super::Finished;
 use super::system::{Patch, System};
 use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
 use crate::element::edge3;
+use crate::element::gauss::GAUSS_3;
+use crate::problem::Condition;
 use crate::solution::{ContactProfile, ContactSummary, NodeState, Peak, Warning};
 
 /// Samples per edge in the search for a peak, before it is narrowed down.
 const SAMPLES: usize = 16;
 
-/// Stick may turn once between two directions of slip; more often is the mesh's doing.
-const FEWEST_REVERSALS: usize = 2;
+/// Part of the friction force that cancels inside edges, from which on stick tractions oscillate.
+const OSCILLATING: f64 = 3e-3;
 
 /// Fewer edges than this across a contact say little about its pressure.
 const FEWEST_EDGES: usize = 6;
@@ -24,23 +27,104 @@ struct Extents {
 
 /// One contact in the final state.
 pub(super) struct PatchView<'a> {
-    pub(super) system: &'a System<'a>,
-    pub(super) patch: &'a Patch<'a>,
-    pub(super) p: usize,
-    pub(super) v: &'a [f64],
-    pub(super) active: &'a [bool],
-    pub(super) reactions: &'a [f64],
-    pub(super) pressures: &'a [f64],
-    pub(super) bound: &'a [f64],
+    system: &'a System<'a>,
+    patch: &'a Patch<'a>,
+    p: usize,
+    v: &'a [f64],
+    finished: &'a Finished,
+    forces: &'a Forces,
+    /// g at start, end and midside of every edge; in the total law nothing.
+    anchors: Vec<[f64; 3]>,
+    /// σ_t likewise, where it is not the law's: of the thesis's own iteration, and of bonded contacts.
+    tractions: Option<Vec<[f64; 3]>>,
 }
 
-impl PatchView<'_> {
+/// Nodal forces of a state, all contacts in a row.
+pub(super) struct Forces {
+    pub(super) reactions: Vec<f64>,
+    pub(super) tangential_reactions: Vec<f64>,
+    pub(super) pressures: Vec<f64>,
+}
+
+impl<'a> PatchView<'a> {
+    pub(super) fn new(
+        system: &'a System<'a>,
+        p: usize,
+        finished: &'a Finished,
+        forces: &'a Forces,
+    ) -> Self {
+        let patch = &system.patches[p];
+        let mut view = PatchView {
+            system,
+            patch,
+            p,
+            v: &finished.state.v,
+            finished,
+            forces,
+            anchors: Vec::new(),
+            tractions: None,
+        };
+        view.anchors = view.carried_to_nodes(&|g| system.points[g].anchor);
+        if patch.contact.condition == Condition::Bonded {
+            let shear = |i: usize| {
+                let node = patch.first + i;
+                forces.tangential_reactions[node] / system.nodes[node].weight
+            };
+            // on the axis there is no shear
+            let stress = |i: usize| match system.nodes[patch.first + i].follows {
+                Some(_) => 0.0,
+                None => shear(i),
+            };
+            let edges = 0..patch.contact.boundary.edge_count();
+            view.tractions = Some(edges.map(|edge| edge_nodes(edge).map(stress)).collect());
+        } else if finished.own_tractions {
+            view.tractions = Some(view.carried_to_nodes(&|g| finished.tractions[g]));
+        }
+        view
+    }
+
+    /// Values at friction points, carried to start, end and midside of every edge: the parabola
+    /// through its three Gauss points, or the nodes' own.
+    fn carried_to_nodes(&self, value: &dyn Fn(usize) -> f64) -> Vec<[f64; 3]> {
+        let points = &self.system.points;
+        let own: Vec<usize> = (0..points.len())
+            .filter(|&g| points[g].patch == self.p)
+            .collect();
+        let edges = self.patch.contact.boundary.edge_count();
+        if own.is_empty() {
+            return vec![[0.0; 3]; edges];
+        }
+        if own.len() == 3 * edges {
+            let gauss = GAUSS_3[2].0;
+            let parabola = |edge: usize| {
+                let [low, middle, high] = [0, 1, 2].map(|k| value(own[3 * edge + k]));
+                let slope = (high - low) / (2.0 * gauss);
+                let curve = (high + low - 2.0 * middle) / (2.0 * gauss * gauss);
+                [middle - slope + curve, middle + slope + curve, middle]
+            };
+            return (0..edges).map(parabola).collect();
+        }
+        // a node without a point lies on the axis, where nothing slides
+        let mut nodal = vec![0.0; self.count()];
+        for g in own {
+            nodal[points[g].nodes[0] - self.patch.first] = value(g);
+        }
+        (0..edges)
+            .map(|edge| edge_nodes(edge).map(|i| nodal[i]))
+            .collect()
+    }
+
     fn count(&self) -> usize {
-        self.patch.contact.gap.len()
+        self.patch.contact.boundary.nodes.len()
+    }
+
+    /// True where friction may act: in contact, or without any obstacle.
+    fn engaged(&self, i: usize) -> bool {
+        self.active(i) || self.patch.contact.condition == Condition::None
     }
 
     fn active(&self, i: usize) -> bool {
-        self.active[self.patch.first + i]
+        self.finished.state.active[self.patch.first + i]
     }
 
     fn u_t(&self, i: usize) -> f64 {
@@ -49,47 +133,73 @@ impl PatchView<'_> {
     }
 
     fn pressure(&self, i: usize) -> f64 {
-        self.pressures[self.patch.first + i]
+        self.forces.pressures[self.patch.first + i]
     }
 
-    /// u_t − d along an edge.
+    /// e = u_t − d − g along an edge.
     fn slip_at(&self, edge: usize, xi: f64) -> f64 {
         let u_t = edge_nodes(edge).map(|i| self.u_t(i));
-        edge3::interpolate(&edge3::shape(xi), &u_t) - self.patch.contact.tangential_displacement
+        let h = edge3::shape(xi);
+        edge3::interpolate(&h, &u_t)
+            - edge3::interpolate(&h, &self.anchors[edge])
+            - self.patch.obstacle_displacement
     }
 
     fn own_pressures(&self) -> &[f64] {
-        &self.pressures[self.patch.first..self.patch.first + self.count()]
+        &self.forces.pressures[self.system.range(self.patch)]
     }
 
-    /// σ_t(s) = −τ(s) φ(u_t(s) − d), with W at this very s.
+    /// S_ρ and τ at arc length s.
+    fn averaged_and_bound(&self, s: f64) -> (f64, f64) {
+        let Some(law) = &self.patch.law else {
+            return (0.0, 0.0);
+        };
+        let source = law.bound.source(s);
+        let pressures = self.own_pressures();
+        (
+            source.nonlocal_pressure(pressures),
+            law.bound.bound(&source, pressures),
+        )
+    }
+
+    /// σ_t(s) = −τ(s) φ(e(s)), with W at this very s.
     fn tangential_stress_at(&self, edge: usize, xi: f64) -> f64 {
+        let h = edge3::shape(xi);
+        if let Some(tractions) = &self.tractions {
+            return edge3::interpolate(&h, &tractions[edge]);
+        }
         let Some(law) = &self.patch.law else {
             return 0.0;
         };
-        let s = edge3::interpolate(
-            &edge3::shape(xi),
-            &self.patch.contact.boundary.edge_arc(edge),
-        );
-        let averaged = law.averaging.row(s).apply(self.own_pressures());
-        -law.bound(averaged) * law.phi(self.slip_at(edge, xi))
+        let s = edge3::interpolate(&h, &self.patch.contact.boundary.edge_arc(edge));
+        -self.averaged_and_bound(s).1 * law.phi(self.slip_at(edge, xi))
+    }
+
+    /// A value at a node: the mean of those of the edges that meet there.
+    fn at_node(&self, i: usize, value: impl Fn(usize, f64) -> f64) -> f64 {
+        if i % 2 == 1 {
+            return value(i / 2, 0.0);
+        }
+        let before = (i > 0).then(|| value(i / 2 - 1, 1.0));
+        let after = (i + 1 < self.count()).then(|| value(i / 2, -1.0));
+        match (before, after) {
+            (Some(a), Some(b)) => 0.5 * (a + b),
+            (a, b) => a.or(b).unwrap_or(0.0),
+        }
     }
 
     pub(super) fn summary(&self) -> ContactSummary {
         let circumference = self.system.circumference;
-        let range = self.patch.first..self.patch.first + self.count();
+        let range = self.system.range(self.patch);
         let (mut tangential, mut friction) = (0.0, 0.0);
-        for (point, tau) in self
-            .system
-            .points
-            .iter()
-            .zip(self.bound)
-            .filter(|(point, _)| point.patch == self.p)
-        {
-            let traction =
-                point.weight * tau * self.system.law(point).phi(self.system.slip(self.v, point));
-            tangential -= traction;
-            friction += traction.abs();
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        for (point, traction) in points.filter(|(point, _)| point.patch == self.p) {
+            tangential += point.weight * traction;
+            friction += point.weight * traction.abs();
+        }
+        for held in &self.forces.tangential_reactions[range.clone()] {
+            tangential += held;
+            friction += held.abs();
         }
         let Extents {
             contact,
@@ -97,7 +207,8 @@ impl PatchView<'_> {
             slip,
         } = self.extents();
         ContactSummary {
-            normal_force: circumference * self.reactions[range].iter().sum::<f64>(),
+            normal: self.patch.contact.normal,
+            normal_force: circumference * self.forces.reactions[range].iter().sum::<f64>(),
             tangential_force: circumference * tangential,
             friction_force: circumference * friction,
             contact,
@@ -108,23 +219,25 @@ impl PatchView<'_> {
         }
     }
 
-    /// Contact between its outermost nodes, and its division by |u_t − d| < ε.
+    /// Contact between its outermost nodes, and its division by |e| < ε.
     fn extents(&self) -> Extents {
         let s = &self.patch.contact.boundary.s;
         let (mut contact, mut stick, mut slip) =
             (Vec::new(), Vec::<[f64; 2]>::new(), Vec::<[f64; 2]>::new());
         let mut i = 0;
         while i < self.count() {
-            if !self.active(i) {
+            if !self.engaged(i) {
                 i += 1;
                 continue;
             }
             let first = i;
-            while i + 1 < self.count() && self.active(i + 1) {
+            while i + 1 < self.count() && self.engaged(i + 1) {
                 i += 1;
             }
             let (from, to) = (s[first], s[i]);
-            contact.push([from, to]);
+            if self.active(first) {
+                contact.push([from, to]);
+            }
             let mut cuts = vec![from];
             cuts.extend(
                 self.stick_ends()
@@ -155,7 +268,7 @@ impl PatchView<'_> {
 
     fn sticks(&self, s: f64) -> bool {
         let Some(law) = &self.patch.law else {
-            return false;
+            return self.patch.contact.condition == Condition::Bonded;
         };
         let boundary = &self.patch.contact.boundary;
         let edge = (0..boundary.edge_count())
@@ -166,7 +279,7 @@ impl PatchView<'_> {
             < law.elastic_slip
     }
 
-    /// Arc lengths at which |u_t − d| = ε: roots of a quadratic on each edge, in order.
+    /// Arc lengths at which |e| = ε: roots of a quadratic on each edge, in order.
     fn stick_ends(&self) -> Vec<f64> {
         let Some(law) = &self.patch.law else {
             return Vec::new();
@@ -174,8 +287,7 @@ impl PatchView<'_> {
         let boundary = &self.patch.contact.boundary;
         let mut ends = Vec::new();
         for edge in 0..boundary.edge_count() {
-            let [start, end, middle] =
-                edge_nodes(edge).map(|i| self.u_t(i) - self.patch.contact.tangential_displacement);
+            let [start, end, middle] = [-1.0, 1.0, 0.0].map(|xi| self.slip_at(edge, xi));
             for target in [-law.elastic_slip, law.elastic_slip] {
                 let (a, b, c) = (
                     0.5 * (start + end) - middle,
@@ -230,7 +342,9 @@ impl PatchView<'_> {
     }
 
     fn peak_tangential_stress(&self) -> Option<Peak> {
-        self.patch.law.as_ref()?;
+        if self.patch.law.is_none() && self.tractions.is_none() {
+            return None;
+        }
         let size = |edge: usize, xi: f64| self.tangential_stress_at(edge, xi).abs();
         let step = 2.0 / SAMPLES as f64;
         let samples = (0..self.patch.contact.boundary.edge_count())
@@ -262,34 +376,37 @@ impl PatchView<'_> {
         let boundary = &self.patch.contact.boundary;
         let mut profile = ContactProfile::default();
         for i in 0..self.count() {
-            let slip = self.u_t(i) - self.patch.contact.tangential_displacement;
-            let (averaged, bound, phi) = match &self.patch.law {
-                None => (0.0, 0.0, 0.0),
+            let (averaged, bound) = self.averaged_and_bound(boundary.s[i]);
+            let law = self.patch.law.as_ref();
+            let phi = |edge, xi| law.map_or(0.0, |law| law.phi(self.slip_at(edge, xi)));
+            let sticks = match law {
+                None => self.patch.contact.condition == Condition::Bonded,
                 Some(law) => {
-                    let averaged = law.averaging.row(boundary.s[i]).apply(self.own_pressures());
-                    (averaged, law.bound(averaged), law.phi(slip))
+                    self.at_node(i, |edge, xi| self.slip_at(edge, xi)).abs() < law.elastic_slip
                 }
             };
-            let sticks = self
-                .patch
-                .law
-                .as_ref()
-                .is_some_and(|law| slip.abs() < law.elastic_slip);
+            let ratio = self.at_node(i, phi);
+            let stress = match &self.tractions {
+                None => -bound * ratio,
+                Some(_) => self.at_node(i, |edge, xi| self.tangential_stress_at(edge, xi)),
+            };
             profile.s.push(boundary.s[i]);
             profile.x.push(boundary.positions[i][0]);
             profile.y.push(boundary.positions[i][1]);
-            profile.gap.push(self.patch.contact.gap[i]);
+            profile
+                .gap
+                .push(self.patch.contact.gap(i, self.system.level.indentation));
             profile.normal_displacement.push(
                 self.system
                     .normal_displacement(self.v, self.patch.first + i),
             );
             profile.tangential_displacement.push(self.u_t(i));
             profile.normal_stress.push(-self.pressure(i) + 0.0);
-            profile.tangential_stress.push(-bound * phi + 0.0);
+            profile.tangential_stress.push(stress + 0.0);
             profile.nonlocal_pressure.push(averaged);
             profile.friction_bound.push(bound);
-            profile.friction_ratio.push(phi.abs());
-            profile.state.push(match (self.active(i), sticks) {
+            profile.friction_ratio.push(ratio.abs());
+            profile.state.push(match (self.engaged(i), sticks) {
                 (false, _) => NodeState::Open,
                 (true, true) => NodeState::Stick,
                 (true, false) => NodeState::Slip,
@@ -299,6 +416,11 @@ impl PatchView<'_> {
     }
 
     pub(super) fn warn(&self, warnings: &mut Vec<Warning>) {
+        self.warn_of_oscillation(warnings);
+        self.warn_of_contact(warnings);
+    }
+
+    fn warn_of_contact(&self, warnings: &mut Vec<Warning>) {
         let contact = self.patch.contact;
         let mut warn = |code: &str, message: String| {
             warnings.push(Warning {
@@ -308,9 +430,12 @@ impl PatchView<'_> {
             });
         };
         let touching = (0..self.count()).filter(|&i| self.active(i)).count();
+        if contact.condition != Condition::Unilateral {
+            return;
+        }
         if touching == 0 {
             let opening = |i: usize| {
-                contact.gap[i]
+                contact.gap(i, self.system.level.indentation)
                     - self
                         .system
                         .normal_displacement(self.v, self.patch.first + i)
@@ -335,15 +460,6 @@ impl PatchView<'_> {
                 ),
             );
         }
-        let reversals = self.stick_reversals();
-        if reversals >= FEWEST_REVERSALS {
-            warn(
-                "oscillating_stick",
-                format!(
-                    "The tangential stress changes its sign {reversals} times between neighbouring points that stick: the mesh does not resolve elastic_slip, and friction_force is too large. Refine the contact, or raise elastic_slip."
-                ),
-            );
-        }
         let s = &contact.boundary.s;
         let ends = [0, self.count() - 1].map(|i| (s[i], self.active(i) && !self.symmetric(i)));
         for (s, _) in ends.into_iter().filter(|(_, pressed)| *pressed) {
@@ -354,7 +470,11 @@ impl PatchView<'_> {
                 ),
             );
         }
-        let radius = contact.friction.map_or(0.0, |f| f.nonlocal_radius);
+        let radius = contact
+            .friction
+            .as_ref()
+            .and_then(|f| f.nonlocal_radius)
+            .unwrap_or(0.0);
         let first = (0..self.count()).find(|&i| self.active(i));
         let last = (0..self.count()).rfind(|&i| self.active(i));
         if let (Some(first), Some(last)) = (first, last) {
@@ -374,22 +494,34 @@ impl PatchView<'_> {
         }
     }
 
-    /// How often φ changes its sign between neighbouring friction points inside stick.
-    fn stick_reversals(&self) -> usize {
-        let Some(law) = &self.patch.law else { return 0 };
-        let largest = self.bound.iter().fold(0.0f64, |a, b| a.max(*b));
-        let points = self.system.points.iter().zip(self.bound);
-        let own: Vec<Option<f64>> = points
+    /// Inside an edge the tangential stress changes its sign where the motion turns, and there it is
+    /// small. What else cancels inside edges is an oscillation of stick tractions, and
+    /// `friction_force` is too large by about that much.
+    fn warn_of_oscillation(&self, warnings: &mut Vec<Warning>) {
+        let (mut canceling, mut total) = (0.0, 0.0);
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        let own: Vec<f64> = points
             .filter(|(point, _)| point.patch == self.p)
-            .map(|(point, tau)| {
-                let slip = self.system.slip(self.v, point);
-                let sticks = slip.abs() < law.elastic_slip && *tau > 1e-3 * largest;
-                // near zero a sign means nothing
-                sticks.then(|| law.phi(slip)).filter(|phi| phi.abs() > 0.01)
-            })
+            .map(|(point, traction)| point.weight * traction)
             .collect();
-        let reverses = |pair: &&[Option<f64>]| matches!(pair, [Some(a), Some(b)] if a * b < 0.0);
-        own.windows(2).filter(reverses).count()
+        if own.len() != 3 * self.patch.contact.boundary.edge_count() {
+            return; // friction at nodes does not oscillate
+        }
+        for edge in own.chunks(3) {
+            let size: f64 = edge.iter().map(|force| force.abs()).sum();
+            canceling += size - edge.iter().sum::<f64>().abs();
+            total += size;
+        }
+        if canceling > OSCILLATING * total {
+            warnings.push(Warning {
+                code: "oscillating_stick".to_owned(),
+                pointer: self.patch.contact.pointer.clone(),
+                message: format!(
+                    "The tangential stress oscillates between the friction points of single edges: the mesh does not resolve elastic_slip, and friction_force is too large by about {:.1} %. Refine the contact, raise elastic_slip, or choose \"points\": \"nodal\".",
+                    100.0 * canceling / total
+                ),
+            });
+        }
     }
 
     /// A node on a line of symmetry: on the axis, or held along the tangent.

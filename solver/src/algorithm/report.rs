@@ -3,14 +3,18 @@
 
 use std::collections::BTreeMap;
 
-use crate::algorithm::fixed_point::Finished;
-use crate::algorithm::profile::PatchView;
+use crate::algorithm::Finished;
+use crate::algorithm::profile::{Forces, PatchView};
 use crate::algorithm::system::System;
 use crate::body::ElasticBody;
-use crate::elasticity::{Dof, Recovered, recover};
+use crate::elasticity::{Dof, Recovered, StressError, recover, stress_error};
+use crate::element::gauss;
 use crate::error::SolveError;
 use crate::model::Model;
-use crate::solution::{ContactSummary, Fields, Outcome, Residuals, Solution, Summary, Warning};
+use crate::solution::{
+    ContactProfile, ContactSummary, ErrorEstimate, Fields, GaussFields, Outcome, Residuals,
+    Summary, Warning,
+};
 
 /// Forces that balance no better than this have lost half of their digits: no result to trust.
 const OUT_OF_BALANCE: f64 = 1e-7;
@@ -25,51 +29,69 @@ const LARGE_DISPLACEMENT: f64 = 0.1;
 const SLOW_CONTRACTION: f64 = 0.9;
 
 /// Everything a user gets to see of a final state.
+pub struct Reported {
+    /// Scalars, extents and warnings.
+    pub summary: Summary,
+    /// Columns along each contact boundary, by its name.
+    pub profiles: BTreeMap<String, ContactProfile>,
+    /// Displacements and stresses.
+    pub fields: Fields,
+}
+
+/// What a final state means: forces, extents, profiles, fields, and whether to trust them.
 pub fn report(
     model: &Model,
     body: &ElasticBody,
     system: &System<'_>,
-    finished: Finished,
-) -> Result<Solution, SolveError> {
+    finished: &Finished,
+) -> Result<Reported, SolveError> {
     let v = &finished.state.v;
+    if system.semidefinite && finished.outcome != Outcome::Canceled {
+        held(model, system, finished)?;
+    }
     let reactions = system.reactions(&finished.state);
-    let pressures = system.pressures(&reactions);
-    let contact_force = contact_force(system, v, &finished.bound, &reactions);
-    let displacements = body.displacements(&contact_force);
-    let recovered = recover(&model.mesh, &model.section, &displacements);
+    let forces = Forces {
+        pressures: system.pressures(&reactions),
+        tangential_reactions: system.tangential_reactions(&finished.state),
+        reactions,
+    };
+    let contact_force = contact_force(system, finished, &forces);
+    let displacements = body.displacements(&contact_force, v, &system.level);
+    let rule = gauss::of_order(model.quadrature);
+    let recovered = recover(&model.mesh, &model.section, rule, &displacements);
+    let error = stress_error(&model.mesh, &model.section, rule, &recovered);
     let circumference = system.circumference;
 
     let mut warnings = model.warnings.clone();
     let (mut contacts, mut profiles) = (BTreeMap::new(), BTreeMap::new());
     for (p, patch) in system.patches.iter().enumerate() {
-        let view = PatchView {
-            system,
-            patch,
-            p,
-            v,
-            active: &finished.state.active,
-            reactions: &reactions,
-            pressures: &pressures,
-            bound: &finished.bound,
-        };
+        let view = PatchView::new(system, p, finished, &forces);
         let summary = view.summary();
         view.warn(&mut warnings);
         profiles.insert(patch.contact.name.clone(), view.profile());
         contacts.insert(patch.contact.name.clone(), summary);
     }
-    warn_of_iteration(&finished, &mut warnings);
+    warn_of_iteration(finished, &mut warnings);
     warn_of_displacement(model, &displacements, &mut warnings);
 
     let total =
         |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
-    let (friction_energy, friction_work) = friction_energy(system, v, &finished.bound);
+    let work = system.work(v, &finished.bound);
     let work_of_loads: f64 = body
         .nodal_loads
         .iter()
         .zip(&displacements)
         .map(|(f, u)| f[0] * u[0] + f[1] * u[1])
-        .sum();
-    let equilibrium = equilibrium(model, body, &recovered, &displacements, &contact_force);
+        .sum::<f64>()
+        * system.level.loads;
+    let equilibrium = equilibrium(
+        model,
+        body,
+        system.level.loads,
+        &recovered,
+        &displacements,
+        &contact_force,
+    );
     let outcome = match finished.outcome {
         Outcome::Converged if equilibrium > OUT_OF_BALANCE => Outcome::FalseConvergence,
         outcome => outcome,
@@ -95,13 +117,20 @@ pub fn report(
             equilibrium,
             ..finished.residuals
         },
-        energy: circumference * (recovered.strain_energy - work_of_loads + friction_energy),
-        friction_work: circumference * friction_work,
+        energy: circumference
+            * (recovered.strain_energy - work_of_loads + friction_energy(system, finished)),
+        friction_work: circumference * (work.total + work.incremental),
+        error_estimate: error_estimate(circumference, &recovered, &error),
+        increments: 1,
+        cut_backs: 0,
+        uniqueness: None,
+        doubled_increments: None,
+        refinements: Vec::new(),
         warnings,
         dofs: body.map.unknowns as u64,
-        contact_dofs: body.load.len() as u64,
+        contact_dofs: system.load.len() as u64,
     };
-    let fields = fields(model, &displacements, &recovered);
+    let fields = fields(model, &displacements, &recovered, error);
     let finite = [
         summary.normal_force,
         summary.tangential_force,
@@ -115,41 +144,70 @@ pub fn report(
     if !finite {
         return Err(SolveError::NonFinite { phase: "recovery" });
     }
-    Ok(Solution {
+    Ok(Reported {
         summary,
-        history: finished.history,
         profiles,
         fields,
     })
 }
 
-/// Force on every contact unknown: the obstacle's reaction −R along n and friction along t.
-fn contact_force(system: &System<'_>, v: &[f64], bound: &[f64], reactions: &[f64]) -> Vec<f64> {
-    let mut friction = vec![0.0; v.len()];
-    system.add_friction_force(v, bound, &mut friction);
+/// Whether the contacts that touch in the end, and their friction, hold what supports do not.
+fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
+    let mut hindered = Vec::new();
+    for patch in &system.patches {
+        let boundary = &patch.contact.boundary;
+        for (i, node) in system.range(patch).enumerate() {
+            let state = &system.nodes[node];
+            if finished.state.active[node] {
+                hindered.push((boundary.nodes[i], boundary.normals[i]));
+            }
+            if state.held_tangent.is_some() {
+                hindered.push((boundary.nodes[i], boundary.tangent(i)));
+            }
+        }
+    }
+    let points = system.points.iter().zip(&finished.bound);
+    for (point, _) in points.filter(|(_, tau)| **tau > 0.0) {
+        let patch = &system.patches[point.patch];
+        for node in point.nodes {
+            let (boundary, i) = (&patch.contact.boundary, node - patch.first);
+            hindered.push((boundary.nodes[i], boundary.tangent(i)));
+        }
+    }
+    match model.free_motion(&hindered) {
+        None => Ok(()),
+        Some((motion, node)) => Err(SolveError::Unheld {
+            motion: motion.to_owned(),
+            node,
+        }),
+    }
+}
+
+/// Force on every contact unknown: the obstacle's reaction −R along n, friction and what holds a
+/// bonded node along t.
+fn contact_force(system: &System<'_>, finished: &Finished, forces: &Forces) -> Vec<f64> {
+    let mut friction = vec![0.0; finished.state.v.len()];
+    system.add_traction_force(&finished.tractions, &mut friction);
     let mut force: Vec<f64> = friction.iter().map(|f| -f).collect();
-    for (node, reaction) in system.nodes.iter().zip(reactions) {
+    for (i, node) in system.nodes.iter().enumerate() {
         if let Dof::Free(dof) = node.normal {
-            force[dof] -= reaction;
+            force[dof] -= forces.reactions[i];
+        }
+        if let Dof::Free(dof) = node.tangent {
+            force[dof] += forces.tangential_reactions[i];
         }
     }
     force
 }
 
-/// ∫τψ and ∫τφ (u_t − d), without 2π.
-fn friction_energy(system: &System<'_>, v: &[f64], bound: &[f64]) -> (f64, f64) {
-    system
-        .points
-        .iter()
-        .zip(bound)
-        .fold((0.0, 0.0), |(energy, work), (point, tau)| {
-            let (law, slip) = (system.law(point), system.slip(v, point));
-            let weight = point.weight * tau;
-            (
-                energy + weight * law.psi(slip),
-                work + weight * law.phi(slip) * slip,
-            )
-        })
+/// ∫τψ of (1.21), without 2π.
+fn friction_energy(system: &System<'_>, finished: &Finished) -> f64 {
+    let points = system.points.iter().zip(&finished.bound);
+    let energy = points.map(|(point, tau)| {
+        let slip = system.slip(&finished.state.v, point);
+        point.weight * tau * system.law(point).psi(slip)
+    });
+    energy.sum()
 }
 
 /// |Σ forces| / Σ|forces| over loads, contact, friction and the supports' reactions, the last
@@ -157,6 +215,7 @@ fn friction_energy(system: &System<'_>, v: &[f64], bound: &[f64]) -> (f64, f64) 
 fn equilibrium(
     model: &Model,
     body: &ElasticBody,
+    loads: f64,
     recovered: &Recovered,
     displacements: &[[f64; 2]],
     contact_force: &[f64],
@@ -165,7 +224,9 @@ fn equilibrium(
     let (mut sum, mut size) = ([0.0; 2], 0.0);
     let interior = body.map.unknowns - contact_force.len();
     for (node, dofs) in body.map.dofs.iter().enumerate() {
-        let load = body.map.to_axes(node, body.nodal_loads[node]);
+        let load = body
+            .map
+            .to_axes(node, body.nodal_loads[node].map(|f| loads * f));
         let internal = body.map.to_axes(node, recovered.internal_force[node]);
         let external: [f64; 2] = std::array::from_fn(|a| match dofs[a] {
             Dof::Free(i) if i >= interior => load[a] + contact_force[i - interior],
@@ -195,7 +256,9 @@ fn equilibrium(
         .iter()
         .map(|x| model.section.depth(x[0]))
         .fold(0.0, f64::max);
-    let floor = FORCE_FLOOR * model.section.moduli[0][0] * moved * depth;
+    let materials = model.section.materials().iter();
+    let modulus = materials.map(|m| m[0][0]).fold(0.0, f64::max);
+    let floor = FORCE_FLOOR * modulus * moved * depth;
     let sum = sum[0].hypot(sum[1]);
     if sum == 0.0 {
         0.0
@@ -204,8 +267,32 @@ fn equilibrium(
     }
 }
 
-fn fields(model: &Model, displacements: &[[f64; 2]], recovered: &Recovered) -> Fields {
+fn error_estimate(circumference: f64, recovered: &Recovered, error: &StressError) -> ErrorEstimate {
+    let energy_norm = (2.0 * circumference * recovered.strain_energy)
+        .max(0.0)
+        .sqrt();
+    let error = circumference.sqrt() * error.total;
+    let whole = energy_norm.hypot(error);
+    ErrorEstimate {
+        error,
+        energy_norm,
+        relative: if whole > 0.0 { error / whole } else { 0.0 },
+    }
+}
+
+fn fields(
+    model: &Model,
+    displacements: &[[f64; 2]],
+    recovered: &Recovered,
+    error: StressError,
+) -> Fields {
     let mesh = &model.mesh;
+    let at_points = |component: usize| {
+        let stress = recovered.point_stress.iter();
+        stress.map(|s| s[component]).collect()
+    };
+    let circumference = model.section.circumference().sqrt();
+    let per_element = error.elements.iter().map(|e| circumference * e).collect();
     let stress = |component: usize| recovered.stress.iter().map(|s| s[component]).collect();
     Fields {
         x: mesh.nodes.iter().map(|x| x[0]).collect(),
@@ -217,6 +304,16 @@ fn fields(model: &Model, displacements: &[[f64; 2]], recovered: &Recovered) -> F
         stress_xy: stress(2),
         stress_zz: stress(3),
         elements: mesh.elements.clone(),
+        element_error: per_element,
+        gauss: GaussFields {
+            order: model.quadrature,
+            x: recovered.points.iter().map(|x| x[0]).collect(),
+            y: recovered.points.iter().map(|x| x[1]).collect(),
+            stress_xx: at_points(0),
+            stress_yy: at_points(1),
+            stress_xy: at_points(2),
+            stress_zz: at_points(3),
+        },
     }
 }
 
@@ -268,11 +365,20 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
             ),
         );
     }
+    if finished.own_tractions && finished.outcome == Outcome::FalseConvergence {
+        warn(
+            "false_convergence",
+            format!(
+                "The thesis's iteration meets its own test, R_F, but does not solve the problem: the true residual is {:.1e}. Choose \"algorithm\": \"auto\".",
+                finished.residuals.monolithic
+            ),
+        );
+    }
     if let Some(cycle) = &finished.cycle {
         warn(
             "contact_cycling",
             format!(
-                "The contact set repeats every {} sweeps; contact nodes {:?} keep changing state. Refine the mesh there, or raise elastic_slip.",
+                "Contact and slip repeat every {} iterations; contact nodes {:?} keep changing state. Refine the mesh there, or raise elastic_slip.",
                 cycle.period, cycle.nodes
             ),
         );

@@ -1,21 +1,27 @@
-//! The problem as seen from Γ_C: contact nodes, friction points, and the forces between them.
+//! The problem as seen from Γ_C at one load level: contact nodes, friction points, and the forces
+//! between them.
 
 use crate::body::ElasticBody;
 use crate::elasticity::Dof;
-use crate::friction::{Chain, FrictionLaw, Row};
+use crate::friction::{Chain, FrictionLaw, Source};
 use crate::linear::Dense;
-use crate::model::{ContactModel, Model};
+use crate::model::{ContactModel, Level, Model};
+use crate::problem::{Condition, Friction, FrictionPoints, History, Measure};
 
 /// A radius below this part of the contact's length is the axis: a mesh generator may miss 0 by
 /// rounding, and the weight of such a node is nothing but rounding.
 const AXIS: f64 = 1e-12;
 
+/// A friction point whose bound is below this part of the largest is open: its anchor follows it.
+const OPEN: f64 = 1e-12;
+
 /// Everything the iterations need, all contacts in a row.
+#[derive(Clone)]
 pub struct System<'a> {
     /// Ŝ.
     pub stiffness: &'a Dense,
-    /// f̂.
-    pub load: &'a [f64],
+    /// f̂ at this level.
+    pub load: Vec<f64>,
     /// Contact nodes.
     pub nodes: Vec<ContactNode>,
     /// Points where friction acts; none in a frictionless contact.
@@ -24,6 +30,14 @@ pub struct System<'a> {
     pub patches: Vec<Patch<'a>>,
     /// From a sum of nodal forces to a total: 2π in axisymmetry, else 1.
     pub circumference: f64,
+    /// The load level that all of the above is for.
+    pub level: Level,
+    /// Ŝ has rigid motions that contact alone can hold.
+    pub semidefinite: bool,
+    /// Work done against friction under the incremental law in the increments so far (without 2π).
+    pub past_work: f64,
+    pub(super) body: &'a ElasticBody,
+    pub(super) model: &'a Model,
 }
 
 /// One contact node.
@@ -33,8 +47,12 @@ pub struct ContactNode {
     pub normal: Dof,
     /// u_t.
     pub tangent: Dof,
-    /// u_n ≤ gap.
+    /// u_n ≤ gap; infinite where there is no obstacle.
     pub gap: f64,
+    /// u_n = gap, whatever the reaction.
+    pub bonded: bool,
+    /// u_t where it is held.
+    pub held_tangent: Option<f64>,
     /// ∫ h_i.
     pub weight: f64,
     /// A node on the axis has no weight: its state is that of this node, and its pressure is
@@ -42,22 +60,43 @@ pub struct ContactNode {
     pub follows: Option<[usize; 2]>,
 }
 
+impl ContactNode {
+    /// True where u_n ≤ gap and R ≥ 0 decide the state: neither bonded nor following another node.
+    pub fn decides(&self) -> bool {
+        !self.bonded && self.follows.is_none()
+    }
+}
+
 /// One friction point.
 #[derive(Clone, Debug)]
 pub struct Point {
     /// The patch it belongs to.
     pub patch: usize,
+    /// Arc length.
+    pub s: f64,
     /// Its three nodes.
     pub nodes: [usize; 3],
     /// Their shape functions.
     pub shape: [f64; 3],
     /// w_g.
     pub weight: f64,
-    /// Its row of W, on all nodes.
-    pub row: Row,
+    /// Where its bound comes from, on all nodes.
+    pub source: Source,
+    /// g, the part of its displacement that friction has forgotten; 0 in the total law.
+    pub anchor: f64,
+    /// The slip at the end of the increment before, for the work done.
+    past_displacement: f64,
+}
+
+/// Whether a friction does anything: with a bound of zero there is nothing to average or iterate.
+fn acts(friction: &Friction) -> bool {
+    friction.bound.is_some()
+        || friction.coefficient.is_some_and(|mu| mu > 0.0)
+        || friction.cohesion > 0.0
 }
 
 /// One contact of the model in the system.
+#[derive(Clone)]
 pub struct Patch<'a> {
     /// The contact.
     pub contact: &'a ContactModel,
@@ -65,6 +104,8 @@ pub struct Patch<'a> {
     pub first: usize,
     /// Its friction law; none: frictionless.
     pub law: Option<FrictionLaw>,
+    /// d at this level.
+    pub obstacle_displacement: f64,
 }
 
 /// A state of the system.
@@ -76,80 +117,202 @@ pub struct State {
     pub active: Vec<bool>,
 }
 
+/// Work done against friction (force × length, without 2π).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Work {
+    /// In contacts with the total law.
+    pub total: f64,
+    /// In contacts with the incremental law, all increments together.
+    pub incremental: f64,
+}
+
 impl<'a> System<'a> {
-    /// Collects the contacts of a model on its condensed body.
+    /// Collects the contacts of a model on its condensed body, at full load.
     pub fn new(model: &'a Model, body: &'a ElasticBody) -> Self {
-        let (mut nodes, mut points, mut patches) = (Vec::new(), Vec::new(), Vec::new());
+        let mut system = System {
+            stiffness: &body.stiffness,
+            load: Vec::new(),
+            nodes: Vec::new(),
+            points: Vec::new(),
+            patches: Vec::new(),
+            circumference: model.section.circumference(),
+            level: Level::FULL,
+            semidefinite: model.held_by_contact,
+            past_work: 0.0,
+            body,
+            model,
+        };
         for contact in &model.contacts {
-            let (first, boundary) = (nodes.len(), &contact.boundary);
-            let count = boundary.nodes.len();
-            let on_axis = |i: usize| {
-                model.section.axisymmetric()
-                    && boundary.positions[i][0] <= AXIS * boundary.s[count - 1]
+            system.add(model, contact);
+        }
+        system.set_level(Level::FULL);
+        system
+    }
+
+    fn add(&mut self, model: &Model, contact: &'a ContactModel) {
+        let (first, boundary) = (self.nodes.len(), &contact.boundary);
+        let count = boundary.nodes.len();
+        let on_axis = |i: usize| {
+            model.section.axisymmetric() && boundary.positions[i][0] <= AXIS * boundary.s[count - 1]
+        };
+        for i in 0..count {
+            let [normal, tangent] = self.body.contact_dofs[first + i];
+            let towards = |step: [usize; 2]| Some(step.map(|s| first + s));
+            let follows = match i {
+                0 if on_axis(0) => towards([1, 2]),
+                _ if i == count - 1 && on_axis(i) => towards([i - 1, i - 2]),
+                _ => None,
             };
-            for i in 0..count {
-                let [normal, tangent] = body.contact_dofs[first + i];
-                let towards = |step: [usize; 2]| Some(step.map(|s| first + s));
-                let follows = match i {
-                    0 if on_axis(0) => towards([1, 2]),
-                    _ if i == count - 1 && on_axis(i) => towards([i - 1, i - 2]),
-                    _ => None,
-                };
-                let (gap, weight) = (contact.gap[i], boundary.weights[i]);
-                nodes.push(ContactNode {
-                    normal,
-                    tangent,
-                    gap,
-                    weight,
-                    follows,
-                });
-            }
-            let symmetric = |i: usize| {
-                on_axis(i) || matches!(nodes[first + i].tangent, Dof::Fixed(value) if value == 0.0)
-            };
-            let chain = Chain {
-                s: boundary.s.clone(),
-                mirror_start: symmetric(0),
-                mirror_end: symmetric(count - 1),
-            };
-            // a coefficient of zero is no friction: nothing to average, nothing to iterate
-            let friction = contact.friction.filter(|f| f.coefficient > 0.0);
-            let law = friction.map(|f| FrictionLaw::new(&f, chain));
-            if let Some(law) = &law {
-                for point in &boundary.friction_points {
-                    let mut row = law.averaging.row(point.s);
-                    row.first += first;
-                    points.push(Point {
-                        patch: patches.len(),
-                        nodes: point.nodes.map(|i| first + i),
-                        shape: point.shape,
-                        weight: point.weight,
-                        row,
-                    });
-                }
-            }
-            patches.push(Patch {
-                contact,
-                first,
-                law,
+            self.nodes.push(ContactNode {
+                normal,
+                tangent,
+                gap: 0.0,
+                bonded: contact.condition == Condition::Bonded,
+                held_tangent: None,
+                weight: boundary.weights[i],
+                follows,
             });
         }
-        System {
-            stiffness: &body.stiffness,
-            load: &body.load,
-            nodes,
-            points,
-            patches,
-            circumference: model.section.circumference(),
+        let surface = |f: &Friction| f.measure == Measure::Surface;
+        // over a surface the rings themselves lead round the axis
+        let round = contact.friction.as_ref().is_some_and(surface);
+        let symmetric = |i: usize| {
+            let held = matches!(self.nodes[first + i].tangent, Dof::Fixed(value) if value == 0.0);
+            if on_axis(i) { !round } else { held }
+        };
+        let chain = Chain {
+            s: boundary.s.clone(),
+            radius: boundary.positions.iter().map(|x| x[0]).collect(),
+            mirror_start: symmetric(0),
+            mirror_end: symmetric(count - 1),
+        };
+        let friction = contact.friction.as_ref().filter(|f| acts(f));
+        let law = friction.map(|f| FrictionLaw::new(f, chain));
+        if let (Some(law), Some(friction)) = (&law, friction) {
+            let patch = self.patches.len();
+            let point = |s: f64, nodes: [usize; 3], shape: [f64; 3], weight: f64| Point {
+                patch,
+                s,
+                nodes: nodes.map(|i| first + i),
+                shape,
+                weight,
+                source: law.bound.source(s).shifted(first),
+                anchor: 0.0,
+                past_displacement: 0.0,
+            };
+            match friction.points {
+                FrictionPoints::Gauss3 => self.points.extend(
+                    boundary
+                        .friction_points
+                        .iter()
+                        .map(|p| point(p.s, p.nodes, p.shape, p.weight)),
+                ),
+                // a node on the axis has no weight, and no friction
+                FrictionPoints::Nodal => {
+                    self.points
+                        .extend((0..count).filter(|&i| !on_axis(i)).map(|i| {
+                            point(boundary.s[i], [i; 3], [1.0, 0.0, 0.0], boundary.weights[i])
+                        }))
+                }
+            }
+        }
+        self.patches.push(Patch {
+            contact,
+            first,
+            law,
+            obstacle_displacement: 0.0,
+        });
+    }
+
+    /// Moves obstacles, loads and supports to a load level; anchors stay.
+    pub fn set_level(&mut self, level: Level) {
+        self.level = level;
+        self.load = self.body.load(&level);
+        for patch in &mut self.patches {
+            let contact = patch.contact;
+            patch.obstacle_displacement =
+                level.tangential_displacement * contact.tangential_displacement;
+            for (i, node) in self.nodes[patch.first..].iter_mut().enumerate() {
+                if i >= contact.boundary.nodes.len() {
+                    break;
+                }
+                let [normal, tangent] =
+                    self.body.contact_dofs[patch.first + i].map(|dof| match dof {
+                        Dof::Fixed(value) => Dof::Fixed(level.supports * value),
+                        free => free,
+                    });
+                (node.normal, node.tangent) = (normal, tangent);
+                node.gap = match contact.condition {
+                    Condition::None => f64::INFINITY,
+                    _ => contact.gap(i, level.indentation),
+                };
+                node.held_tangent = node.bonded.then_some(patch.obstacle_displacement);
+            }
         }
     }
 
-    /// The state to start from: nothing moves, nothing touches.
+    /// The same with u_t = d at all nodes of contacts with friction: everything sticks.
+    pub fn bonded(&self) -> Self {
+        let mut bonded = self.clone();
+        for patch in bonded.patches.iter().filter(|patch| patch.law.is_some()) {
+            let count = patch.contact.boundary.nodes.len();
+            for node in &mut bonded.nodes[patch.first..patch.first + count] {
+                node.held_tangent = Some(patch.obstacle_displacement);
+            }
+        }
+        bonded.points.clear();
+        bonded
+    }
+
+    /// The end of an increment: anchors move to where friction has forgotten what came before.
+    pub fn remember(&mut self, v: &[f64], bound: &[f64]) {
+        self.past_work = self.work(v, bound).incremental;
+        let largest = bound.iter().fold(0.0f64, |a, b| a.max(*b));
+        for (g, tau) in bound.iter().enumerate() {
+            let point = &self.points[g];
+            let (slip, u_t) = (self.slip(v, point), self.displacement(v, point));
+            let open = *tau <= OPEN * largest;
+            let d = self.patches[point.patch].obstacle_displacement;
+            let forgotten = self.law(point).anchor_move(slip, open);
+            self.points[g].anchor += forgotten;
+            self.points[g].past_displacement = u_t - d;
+        }
+    }
+
+    /// Work done against friction (without 2π): ∫τ φ (u_t − d) in the total law, ∫τ φ Δ(u_t − d)
+    /// summed over the increments in the incremental law, this state included.
+    pub fn work(&self, v: &[f64], bound: &[f64]) -> Work {
+        let (mut total, mut increment) = (0.0, 0.0);
+        for (point, tau) in self.points.iter().zip(bound) {
+            let law = self.law(point);
+            let slip = self.slip(v, point);
+            let force = point.weight * tau * law.phi(slip);
+            match law.history {
+                History::Total => total += force * slip,
+                History::Incremental => {
+                    let d = self.patches[point.patch].obstacle_displacement;
+                    increment +=
+                        force * (self.displacement(v, point) - d - point.past_displacement);
+                }
+            }
+        }
+        Work {
+            total,
+            incremental: self.past_work + increment,
+        }
+    }
+
+    /// The state to start from: nothing moves, nothing touches but what is bonded.
     pub fn rest(&self) -> State {
         State {
             v: vec![0.0; self.load.len()],
-            active: vec![false; self.nodes.len()],
+            active: self.nodes.iter().map(|node| node.bonded).collect(),
         }
+    }
+
+    /// Nodes of a patch.
+    pub fn range(&self, patch: &Patch<'_>) -> std::ops::Range<usize> {
+        patch.first..patch.first + patch.contact.boundary.nodes.len()
     }
 
     /// u_n of a node.
@@ -162,12 +325,17 @@ impl<'a> System<'a> {
         value(self.nodes[node].tangent, v)
     }
 
-    /// u_t − d at a friction point.
-    pub fn slip(&self, v: &[f64], point: &Point) -> f64 {
-        let u_t: f64 = (0..3)
+    /// u_t at a friction point.
+    fn displacement(&self, v: &[f64], point: &Point) -> f64 {
+        (0..3)
             .map(|i| point.shape[i] * self.tangential_displacement(v, point.nodes[i]))
-            .sum();
-        u_t - self.patches[point.patch].contact.tangential_displacement
+            .sum()
+    }
+
+    /// e = u_t − d − g at a friction point: what friction answers to.
+    pub fn slip(&self, v: &[f64], point: &Point) -> f64 {
+        let d = self.patches[point.patch].obstacle_displacement;
+        self.displacement(v, point) - d - point.anchor
     }
 
     /// The law at a friction point.
@@ -183,18 +351,26 @@ impl<'a> System<'a> {
         self.stiffness
             .times(v)
             .iter()
-            .zip(self.load)
+            .zip(&self.load)
             .map(|(a, b)| a - b)
             .collect()
     }
 
-    /// Adds the force Σ w τ φ(u_t − d) h of friction, on the left-hand side, thesis (2.29).
-    pub fn add_friction_force(&self, v: &[f64], bound: &[f64], force: &mut [f64]) {
-        for (point, tau) in self.points.iter().zip(bound) {
-            let traction = point.weight * tau * self.law(point).phi(self.slip(v, point));
+    /// σ_t = −τ φ at every friction point (stress, along t).
+    pub fn tractions(&self, v: &[f64], bound: &[f64]) -> Vec<f64> {
+        self.points
+            .iter()
+            .zip(bound)
+            .map(|(point, tau)| -tau * self.law(point).phi(self.slip(v, point)))
+            .collect()
+    }
+
+    /// Adds the nodal forces −Σ w σ_t h of tangential tractions, on the left-hand side, thesis (2.29).
+    pub fn add_traction_force(&self, tractions: &[f64], force: &mut [f64]) {
+        for (point, traction) in self.points.iter().zip(tractions) {
             for i in 0..3 {
                 if let Dof::Free(dof) = self.nodes[point.nodes[i]].tangent {
-                    force[dof] += traction * point.shape[i];
+                    force[dof] -= point.weight * traction * point.shape[i];
                 }
             }
         }
@@ -210,6 +386,17 @@ impl<'a> System<'a> {
         self.nodes.iter().zip(&state.active).map(reaction).collect()
     }
 
+    /// Nodal forces along t of the obstacle on nodes whose tangential displacement is held; exactly 0
+    /// on the others.
+    pub fn tangential_reactions(&self, state: &State) -> Vec<f64> {
+        let force = self.elastic_force(&state.v);
+        let reaction = |node: &ContactNode| match (node.tangent, node.held_tangent) {
+            (Dof::Free(dof), Some(_)) => force[dof],
+            _ => 0.0,
+        };
+        self.nodes.iter().map(reaction).collect()
+    }
+
     /// Nodal pressures p = R / ∫h; on the axis the parabola through the next two nodes.
     pub fn pressures(&self, reactions: &[f64]) -> Vec<f64> {
         let direct = |i: usize| reactions[i] / self.nodes[i].weight;
@@ -221,41 +408,45 @@ impl<'a> System<'a> {
         (0..self.nodes.len()).map(pressure).collect()
     }
 
-    /// τ = μ max(S_ρ(p), 0) at every friction point, thesis (1.3): also where the body is open but
-    /// within ρ of contact.
+    /// τ at every friction point, thesis (1.3): also where the body is open but within ρ of contact.
     pub fn friction_bound(&self, pressures: &[f64]) -> Vec<f64> {
         self.points
             .iter()
-            .map(|point| self.law(point).bound(point.row.apply(pressures)))
+            .map(|point| self.law(point).bound.bound(&point.source, pressures))
             .collect()
     }
 
     /// The largest force or complementarity defect for a given friction bound, divided by the
-    /// largest nodal reaction (by the largest load where nothing touches).
+    /// largest nodal reaction (by the largest load or friction force where nothing touches).
     pub fn kkt_residual(&self, state: &State, bound: &[f64]) -> f64 {
-        let mut force = self.elastic_force(&state.v);
-        self.add_friction_force(&state.v, bound, &mut force);
+        let mut friction = vec![0.0; state.v.len()];
+        self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
+        let elastic = self.elastic_force(&state.v);
+        let force: Vec<f64> = elastic.iter().zip(&friction).map(|(a, b)| a + b).collect();
         let reactions = self.reactions(state);
         let mut defect: f64 = 0.0;
         for (i, node) in self.nodes.iter().enumerate() {
             if let Dof::Free(dof) = node.tangent {
-                defect = defect.max(force[dof].abs());
+                defect = defect.max(match node.held_tangent {
+                    Some(d) => (self.stiffness.at(dof, dof) * (state.v[dof] - d)).abs(),
+                    None => force[dof].abs(),
+                });
             }
             let Dof::Free(dof) = node.normal else {
                 continue;
             };
             let opening = node.gap - state.v[dof];
             let stiffness = self.stiffness.at(dof, dof);
-            defect = defect.max(match (state.active[i], node.follows) {
-                (true, None) => (stiffness * opening).abs().max(-reactions[i]),
-                (true, Some(_)) => (stiffness * opening).abs(),
-                (false, None) => force[dof].abs().max(-stiffness * opening),
-                (false, Some(_)) => force[dof].abs(),
+            defect = defect.max(match (state.active[i], node.decides()) {
+                (true, true) => (stiffness * opening).abs().max(-reactions[i]),
+                (true, false) => (stiffness * opening).abs(),
+                (false, true) => force[dof].abs().max(-stiffness * opening),
+                (false, false) => force[dof].abs(),
             });
         }
         let largest = |values: &[f64]| values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
         let scale = match largest(&reactions) {
-            0.0 => largest(self.load).max(defect),
+            0.0 => largest(&self.load).max(largest(&friction)).max(defect),
             reaction => reaction,
         };
         if defect == 0.0 { 0.0 } else { defect / scale }

@@ -58,13 +58,11 @@ impl ContactBoundary {
         for (k, edge) in chain.iter().enumerate() {
             let local = edge_nodes(k);
             let positions = mesh.edge_nodes(edge);
-            for (i, xi) in [-1.0, 1.0, 0.0].into_iter().enumerate() {
-                let [dx, dy] = edge3::map(&positions, xi).1;
-                let length = dx.hypot(dy);
+            for (i, [x, y]) in edge_normals(&positions).into_iter().enumerate() {
                 boundary.nodes[local[i]] = edge[i];
                 boundary.positions[local[i]] = positions[i];
-                boundary.normals[local[i]][0] -= dy / length;
-                boundary.normals[local[i]][1] += dx / length;
+                boundary.normals[local[i]][0] += x;
+                boundary.normals[local[i]][1] += y;
             }
             for (xi, w) in GAUSS_3 {
                 let shape = edge3::shape(xi);
@@ -108,6 +106,15 @@ impl ContactBoundary {
 /// Chain nodes (start, end, midside) of an edge.
 pub fn edge_nodes(edge: usize) -> [usize; 3] {
     [2 * edge, 2 * edge + 2, 2 * edge + 1]
+}
+
+/// Unit outward normals of an edge at its start, end and midside.
+pub fn edge_normals(positions: &[[f64; 2]; 3]) -> [[f64; 2]; 3] {
+    [-1.0, 1.0, 0.0].map(|xi| {
+        let [dx, dy] = edge3::map(positions, xi).1;
+        let length = dx.hypot(dy);
+        [-dy / length, dx / length]
+    })
 }
 
 /// Arc length at the nodes of a chain of edges, from its first node.

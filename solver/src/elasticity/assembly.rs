@@ -1,7 +1,7 @@
 //! `assemble_element`, `assemble_stiffness`, `assemble_loads`: thesis (2.18), (2.20), (2.27), (2.28).
 
 use crate::elasticity::Section;
-use crate::elasticity::material::COMPONENTS;
+use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::element::gauss::GAUSS_3;
 use crate::element::{edge3, quad8};
 use crate::linear::{Graph, SparseSymmetric};
@@ -28,12 +28,12 @@ pub struct DofMap {
 }
 
 impl DofMap {
-    /// Displacements along x and y of every node, from the unknowns.
-    pub fn displacements(&self, unknowns: &[f64]) -> Vec<[f64; 2]> {
+    /// Displacements along x and y of every node, from the unknowns; prescribed ones times `supports`.
+    pub fn displacements(&self, unknowns: &[f64], supports: f64) -> Vec<[f64; 2]> {
         let node = |(dofs, axes): (&[Dof; 2], &Option<[[f64; 2]; 2]>)| {
             let [a, b] = dofs.map(|dof| match dof {
                 Dof::Free(i) => unknowns[i],
-                Dof::Fixed(value) => value,
+                Dof::Fixed(value) => supports * value,
             });
             match axes {
                 None => [a, b],
@@ -59,6 +59,7 @@ impl DofMap {
 pub fn assemble_element(
     nodes: &[[f64; 2]; 8],
     section: &Section,
+    moduli: &Moduli,
     rule: &[(f64, f64)],
 ) -> [[f64; 16]; 16] {
     let mut k = [[0.0; 16]; 16];
@@ -70,7 +71,7 @@ pub fn assemble_element(
             for j in 0..8 {
                 for q in 0..2 {
                     let strain: [f64; COMPONENTS] = std::array::from_fn(|c| b[j][c][q]);
-                    let stress = section.stress(&strain);
+                    let stress = stress(moduli, &strain);
                     for i in 0..=j {
                         for p in 0..2 {
                             let work: f64 = (0..COMPONENTS).map(|c| b[i][c][p] * stress[c]).sum();
@@ -91,10 +92,11 @@ pub fn assemble_element(
 
 /// The stiffness of the unknowns, and the load −K_fp u_p of the prescribed displacements on them.
 ///
-/// `graph`: neighbours among the nodes.
+/// `rule`: as in `assemble_element`; `graph`: neighbours among the nodes.
 pub fn assemble_stiffness(
     mesh: &Mesh,
     section: &Section,
+    rule: &[(f64, f64)],
     map: &DofMap,
     graph: &Graph,
 ) -> (SparseSymmetric, Vec<f64>) {
@@ -119,8 +121,9 @@ pub fn assemble_stiffness(
         }
     });
     let mut load = vec![0.0; map.unknowns];
-    for element in &mesh.elements {
-        let mut k = assemble_element(&mesh.element_nodes(element), section, &GAUSS_3);
+    for (e, element) in mesh.elements.iter().enumerate() {
+        let nodes = mesh.element_nodes(element);
+        let mut k = assemble_element(&nodes, section, section.moduli(e), rule);
         for (i, &node) in element.iter().enumerate() {
             if let Some(axes) = map.axes[node as usize] {
                 rotate(&mut k, i, axes);
@@ -154,29 +157,95 @@ fn rotate(k: &mut [[f64; 16]; 16], i: usize, [n, t]: [[f64; 2]; 2]) {
     }
 }
 
-/// Nodal forces along x and y of pressures on edges: F_i = −∫ p n h_i, thesis (2.28).
-///
-/// `loads`: an edge and the pressure at its start, end and midside, interpolated between them.
-pub fn assemble_loads(mesh: &Mesh, section: &Section, loads: &[(Edge, [f64; 3])]) -> Vec<[f64; 2]> {
+/// External forces on a body.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Loads {
+    /// Stresses on edges.
+    pub edges: Vec<EdgeLoad>,
+    /// Force per volume along x and y.
+    pub body_force: [f64; 2],
+    /// Forces along x and y at nodes (without 2π).
+    pub nodal: Vec<(u32, [f64; 2])>,
+}
+
+/// A stress on an edge, interpolated between start, end and midside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeLoad {
+    /// The edge.
+    pub edge: Edge,
+    /// What the two components are along.
+    pub axes: LoadAxes,
+    /// Two components (stress) at start, end and midside.
+    pub values: [[f64; 2]; 3],
+}
+
+/// Axes of a stress on an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LoadAxes {
+    /// x and y.
+    Fixed,
+    /// The outward normal, and t: the normal turned clockwise.
+    Edge,
+}
+
+/// Nodal forces along x and y: F_i = ∫ t h_i ds + ∫ f h_i dA, thesis (2.20), (2.28).
+pub fn assemble_loads(
+    mesh: &Mesh,
+    section: &Section,
+    rule: &[(f64, f64)],
+    loads: &Loads,
+) -> Vec<[f64; 2]> {
     let mut forces = vec![[0.0; 2]; mesh.nodes.len()];
-    for (edge, pressure) in loads {
-        let nodes = mesh.edge_nodes(edge);
-        for (xi, w) in GAUSS_3 {
-            let (h, ([x, _], [dx, dy])) = (edge3::shape(xi), edge3::map(&nodes, xi));
-            let p = edge3::interpolate(&h, pressure) * w * section.depth(x);
-            for (i, &node) in edge.iter().enumerate() {
-                // (−dy, dx) is the outward normal times the length
-                forces[node as usize][0] += p * dy * h[i];
-                forces[node as usize][1] -= p * dx * h[i];
+    for load in &loads.edges {
+        add_edge_load(mesh, section, load, &mut forces);
+    }
+    if loads.body_force != [0.0; 2] {
+        for element in &mesh.elements {
+            let nodes = mesh.element_nodes(element);
+            for &(eta, w_eta) in rule {
+                for &(xi, w_xi) in rule {
+                    let m = quad8::map(&nodes, xi, eta);
+                    let weight = w_xi * w_eta * m.det * section.depth(m.x);
+                    for (i, &node) in element.iter().enumerate() {
+                        for a in 0..2 {
+                            forces[node as usize][a] += weight * m.shape[i] * loads.body_force[a];
+                        }
+                    }
+                }
             }
         }
     }
+    for (node, [x, y]) in &loads.nodal {
+        forces[*node as usize][0] += x;
+        forces[*node as usize][1] += y;
+    }
     forces
+}
+
+fn add_edge_load(mesh: &Mesh, section: &Section, load: &EdgeLoad, forces: &mut [[f64; 2]]) {
+    let nodes = mesh.edge_nodes(&load.edge);
+    for (xi, w) in GAUSS_3 {
+        let (h, ([x, _], [dx, dy])) = (edge3::shape(xi), edge3::map(&nodes, xi));
+        let [p, q] = [0, 1].map(|c| edge3::interpolate(&h, &load.values.map(|v| v[c])));
+        let length = dx.hypot(dy);
+        // t lies along the edge; n is t turned counter-clockwise
+        let stress = match load.axes {
+            LoadAxes::Fixed => [p, q],
+            LoadAxes::Edge => [(q * dx - p * dy) / length, (q * dy + p * dx) / length],
+        };
+        let weight = w * length * section.depth(x);
+        for (i, &node) in load.edge.iter().enumerate() {
+            for a in 0..2 {
+                forces[node as usize][a] += weight * stress[a] * h[i];
+            }
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::elasticity::isotropic;
     use crate::problem::Analysis;
 
     const SQUARE: [[f64; 2]; 8] = [
@@ -192,32 +261,79 @@ mod tests {
 
     #[test]
     fn rigid_motions_cost_no_force() {
-        let plane = Section::new(Analysis::PlaneStrain {}, 1000.0, 0.3);
-        let round = Section::new(Analysis::Axisymmetric {}, 1000.0, 0.3);
-        let no_force = |section: &Section, motion: &dyn Fn([f64; 2]) -> [f64; 2]| {
+        let no_force = |analysis: Analysis, motion: &dyn Fn([f64; 2]) -> [f64; 2]| {
+            let moduli = isotropic(&analysis, 1000.0, 0.3);
+            let section = Section::uniform(analysis, moduli);
             let u: Vec<f64> = SQUARE.iter().flat_map(|&x| motion(x)).collect();
-            for row in assemble_element(&SQUARE, section, &GAUSS_3) {
+            for row in assemble_element(&SQUARE, &section, &moduli, &GAUSS_3) {
                 let force: f64 = row.iter().zip(&u).map(|(a, b)| a * b).sum();
                 assert!(force.abs() < 1e-11, "{force}");
             }
         };
-        no_force(&plane, &|_| [1.0, 0.0]);
-        no_force(&plane, &|_| [0.0, 1.0]);
-        no_force(&plane, &|[x, y]| [-y, x]);
-        no_force(&round, &|_| [0.0, 1.0]);
+        let plane = Analysis::PlaneStrain {};
+        no_force(plane, &|_| [1.0, 0.0]);
+        no_force(plane, &|_| [0.0, 1.0]);
+        no_force(plane, &|[x, y]| [-y, x]);
+        no_force(Analysis::Axisymmetric {}, &|_| [0.0, 1.0]);
+    }
+
+    fn sheet() -> Section {
+        let analysis = Analysis::PlaneStress { thickness: 0.5 };
+        Section::uniform(analysis, isotropic(&analysis, 1.0, 0.0))
     }
 
     #[test]
-    fn a_uniform_pressure_loads_an_edge_one_four_one() {
+    fn uniform_stresses_load_an_edge_one_four_one() {
+        // a top edge: n = (0, 1), t = (1, 0)
         let mesh = Mesh {
             nodes: vec![[0.0, 0.0], [3.0, 0.0], [1.5, 0.0]],
             ..Mesh::default()
         };
-        let section = Section::new(Analysis::PlaneStress { thickness: 0.5 }, 1.0, 0.0);
-        let forces = assemble_loads(&mesh, &section, &[([0, 1, 2], [4.0; 3])]);
-        for (node, share) in [(0, 1.0 / 6.0), (1, 1.0 / 6.0), (2, 4.0 / 6.0)] {
-            assert!((forces[node][1] + 4.0 * 3.0 * 0.5 * share).abs() < 1e-14);
-            assert_eq!(forces[node][0], 0.0);
+        for axes in [LoadAxes::Fixed, LoadAxes::Edge] {
+            let load = EdgeLoad {
+                edge: [0, 1, 2],
+                axes,
+                values: [[4.0, -2.0]; 3],
+            };
+            let loads = Loads {
+                edges: vec![load],
+                ..Loads::default()
+            };
+            let [x, y] = match axes {
+                LoadAxes::Fixed => [4.0, -2.0],
+                LoadAxes::Edge => [-2.0, 4.0],
+            };
+            let forces = assemble_loads(&mesh, &sheet(), &GAUSS_3, &loads);
+            for (node, share) in [(0, 1.0 / 6.0), (1, 1.0 / 6.0), (2, 4.0 / 6.0)] {
+                assert!((forces[node][0] - x * 1.5 * share).abs() < 1e-14);
+                assert!((forces[node][1] - y * 1.5 * share).abs() < 1e-14);
+            }
         }
+    }
+
+    #[test]
+    fn a_body_force_weighs_the_body() {
+        let mesh = Mesh {
+            nodes: SQUARE.to_vec(),
+            elements: vec![[0, 1, 2, 3, 4, 5, 6, 7]],
+            ..Mesh::default()
+        };
+        let loads = Loads {
+            body_force: [0.0, -3.0],
+            nodal: vec![(2, [7.0, 0.0])],
+            ..Loads::default()
+        };
+        let forces = assemble_loads(&mesh, &sheet(), &GAUSS_3, &loads);
+        let total: f64 = forces.iter().map(|f| f[1]).sum();
+        // straight sides: the shoelace formula
+        let corners = [0, 1, 2, 3].map(|i| SQUARE[i]);
+        let area: f64 = (0..4)
+            .map(|i| {
+                let ([x0, y0], [x1, y1]) = (corners[i], corners[(i + 1) % 4]);
+                0.5 * (x0 * y1 - x1 * y0)
+            })
+            .sum();
+        assert!((total + 3.0 * 0.5 * area).abs() < 1e-13);
+        assert_eq!(forces[2][0], 7.0);
     }
 }

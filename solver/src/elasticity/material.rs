@@ -1,48 +1,55 @@
 //! Hooke's law (thesis 1.10) in the three two-dimensional theories.
 
-use crate::problem::Analysis;
+use crate::problem::{Analysis, Orthotropic};
 
 /// Strains and stresses have four components, in this order: xx, yy, xy, zz (rr, zz, rz, θθ in
 /// axisymmetry); the shear strain is the engineering one, γ = 2 ε_xy.
 pub const COMPONENTS: usize = 4;
 
-/// The material seen in the plane of the analysis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// σ = moduli · ε, symmetric (stress).
+pub type Moduli = [[f64; COMPONENTS]; COMPONENTS];
+
+/// The body's theory and its materials, seen in the plane of the analysis.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Section {
-    /// σ = moduli · ε, symmetric (stress).
-    pub moduli: [[f64; COMPONENTS]; COMPONENTS],
     analysis: Analysis,
+    moduli: Vec<Moduli>,
+    /// Material of every element; empty: the first for all.
+    material_of: Vec<u16>,
 }
 
 impl Section {
-    /// From E and Poisson's ratio.
-    #[rustfmt::skip]
-    pub fn new(analysis: Analysis, youngs_modulus: f64, poissons_ratio: f64) -> Self {
-        let (e, nu) = (youngs_modulus, poissons_ratio);
-        let shear = e / (2.0 * (1.0 + nu));
-        let moduli = match analysis {
-            Analysis::PlaneStress { .. } => {
-                let a = e / (1.0 - nu * nu);
-                [
-                    [a,      nu * a, 0.0,   0.0],
-                    [nu * a, a,      0.0,   0.0],
-                    [0.0,    0.0,    shear, 0.0],
-                    [0.0,    0.0,    0.0,   0.0], // σ_zz = 0
-                ]
-            }
-            // in plane strain ε_zz = 0 and the last row gives σ_zz
-            Analysis::PlaneStrain {} | Analysis::Axisymmetric {} => {
-                let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
-                let a = lambda + 2.0 * shear;
-                [
-                    [a,      lambda, 0.0,   lambda],
-                    [lambda, a,      0.0,   lambda],
-                    [0.0,    0.0,    shear, 0.0   ],
-                    [lambda, lambda, 0.0,   a     ],
-                ]
-            }
-        };
-        Section { moduli, analysis }
+    /// One material for the whole body.
+    pub fn uniform(analysis: Analysis, moduli: Moduli) -> Self {
+        Section {
+            analysis,
+            moduli: vec![moduli],
+            material_of: Vec::new(),
+        }
+    }
+
+    /// Several materials, with the number of its own for every element.
+    pub fn by_element(analysis: Analysis, moduli: Vec<Moduli>, material_of: Vec<u16>) -> Self {
+        Section {
+            analysis,
+            moduli,
+            material_of,
+        }
+    }
+
+    /// Number of an element's material.
+    pub fn material_of(&self, element: usize) -> usize {
+        self.material_of.get(element).map_or(0, |&m| usize::from(m))
+    }
+
+    /// Moduli of an element.
+    pub fn moduli(&self, element: usize) -> &Moduli {
+        &self.moduli[self.material_of(element)]
+    }
+
+    /// Moduli of every material.
+    pub fn materials(&self) -> &[Moduli] {
+        &self.moduli
     }
 
     /// The factor of every integral over the section at the first coordinate x: thickness, or r.
@@ -81,10 +88,179 @@ impl Section {
             [hoop, 0.0],
         ]
     }
+}
 
-    /// σ = moduli · ε.
-    pub fn stress(&self, strain: &[f64; COMPONENTS]) -> [f64; COMPONENTS] {
-        self.moduli
-            .map(|row| (0..COMPONENTS).map(|k| row[k] * strain[k]).sum())
+/// σ = moduli · ε.
+pub fn stress(moduli: &Moduli, strain: &[f64; COMPONENTS]) -> [f64; COMPONENTS] {
+    moduli.map(|row| (0..COMPONENTS).map(|k| row[k] * strain[k]).sum())
+}
+
+/// From E and Poisson's ratio.
+#[rustfmt::skip]
+pub fn isotropic(analysis: &Analysis, youngs_modulus: f64, poissons_ratio: f64) -> Moduli {
+    let (e, nu) = (youngs_modulus, poissons_ratio);
+    let shear = e / (2.0 * (1.0 + nu));
+    match analysis {
+        Analysis::PlaneStress { .. } => {
+            let a = e / (1.0 - nu * nu);
+            [
+                [a,      nu * a, 0.0,   0.0],
+                [nu * a, a,      0.0,   0.0],
+                [0.0,    0.0,    shear, 0.0],
+                [0.0,    0.0,    0.0,   0.0], // σ_zz = 0
+            ]
+        }
+        // in plane strain ε_zz = 0 and the last row gives σ_zz
+        Analysis::PlaneStrain {} | Analysis::Axisymmetric {} => {
+            let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
+            let a = lambda + 2.0 * shear;
+            [
+                [a,      lambda, 0.0,   lambda],
+                [lambda, a,      0.0,   lambda],
+                [0.0,    0.0,    shear, 0.0   ],
+                [lambda, lambda, 0.0,   a     ],
+            ]
+        }
+    }
+}
+
+/// From the constants of an orthotropic material; `None` where they make no stable one. Constants
+/// across the plane are needed but in plane stress.
+#[rustfmt::skip]
+pub fn orthotropic(analysis: &Analysis, material: &Orthotropic) -> Option<Moduli> {
+    let Orthotropic { e1, e2, nu12, g12, angle, e3, nu13, nu23 } = *material;
+    let sheet = matches!(analysis, Analysis::PlaneStress { .. });
+    let (e3, nu13, nu23) = match sheet {
+        true => (0.0, 0.0, 0.0),
+        false => (e3?, nu13?, nu23?),
+    };
+    let across = if sheet { 0.0 } else { 1.0 / e3 };
+    let compliance = [
+        [ 1.0 / e1,  -nu12 / e1, 0.0,       -nu13 / e1],
+        [-nu12 / e1,  1.0 / e2,  0.0,       -nu23 / e2],
+        [ 0.0,        0.0,       1.0 / g12,  0.0      ],
+        [-nu13 / e1, -nu23 / e2, 0.0,        across   ],
+    ];
+    let own = inverse(&compliance)?;
+    let (s, c) = angle.to_radians().sin_cos();
+    // strains along the material's axes from those along x and y
+    let turn = [
+        [c * c,        s * s,       c * s,         0.0],
+        [s * s,        c * c,      -c * s,         0.0],
+        [-2.0 * c * s, 2.0 * c * s, c * c - s * s, 0.0],
+        [0.0,          0.0,         0.0,           1.0],
+    ];
+    let mut moduli = [[0.0; COMPONENTS]; COMPONENTS];
+    for i in 0..COMPONENTS {
+        for j in 0..COMPONENTS {
+            for k in 0..COMPONENTS {
+                for l in 0..COMPONENTS {
+                    moduli[i][j] += turn[k][i] * own[k][l] * turn[l][j];
+                }
+            }
+        }
+    }
+    Some(moduli)
+}
+
+/// The inverse of a symmetric matrix whose last row and column may be nothing (σ_zz = 0) and are
+/// then left so; `None` when the rest is not positive definite.
+pub fn inverse(matrix: &Moduli) -> Option<Moduli> {
+    let n = if matrix[COMPONENTS - 1][COMPONENTS - 1] == 0.0 {
+        COMPONENTS - 1
+    } else {
+        COMPONENTS
+    };
+    let (mut a, mut b) = (*matrix, [[0.0; COMPONENTS]; COMPONENTS]);
+    (0..n).for_each(|i| b[i][i] = 1.0);
+    // Gauss–Jordan: the pivots of a positive definite matrix are positive
+    for k in 0..n {
+        let pivot = a[k][k];
+        if pivot.is_nan() || pivot <= 1e-12 * matrix[k][k].abs() {
+            return None;
+        }
+        for j in 0..n {
+            a[k][j] /= pivot;
+            b[k][j] /= pivot;
+        }
+        for i in (0..n).filter(|&i| i != k) {
+            let factor = a[i][k];
+            for j in 0..n {
+                a[i][j] -= factor * a[k][j];
+                b[i][j] -= factor * b[k][j];
+            }
+        }
+    }
+    Some(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wood(angle: f64) -> Orthotropic {
+        Orthotropic {
+            e1: 120.0,
+            e2: 10.0,
+            nu12: 0.3,
+            g12: 5.0,
+            angle,
+            e3: Some(8.0),
+            nu13: Some(0.25),
+            nu23: Some(0.4),
+        }
+    }
+
+    #[test]
+    fn equal_constants_in_all_directions_are_isotropic_at_any_angle() {
+        let (e, nu) = (200.0, 0.3);
+        let material = Orthotropic {
+            e1: e,
+            e2: e,
+            nu12: nu,
+            g12: e / (2.0 * (1.0 + nu)),
+            angle: 37.0,
+            e3: Some(e),
+            nu13: Some(nu),
+            nu23: Some(nu),
+        };
+        for analysis in [
+            Analysis::PlaneStrain {},
+            Analysis::Axisymmetric {},
+            Analysis::PlaneStress { thickness: 1.0 },
+        ] {
+            let (a, b) = (
+                orthotropic(&analysis, &material).unwrap(),
+                isotropic(&analysis, e, nu),
+            );
+            for i in 0..COMPONENTS {
+                for j in 0..COMPONENTS {
+                    assert!((a[i][j] - b[i][j]).abs() < 1e-11, "{i}, {j}");
+                }
+            }
+        }
+    }
+
+    /// A sheet pulled at an angle θ to its stiff axis:
+    /// 1/E = c⁴/e1 + (1/g12 − 2 nu12/e1) c²s² + s⁴/e2.
+    #[test]
+    fn a_sheet_pulled_off_its_axis_has_the_known_modulus() {
+        let sheet = Analysis::PlaneStress { thickness: 1.0 };
+        for angle in [0.0, 20.0, 45.0, 90.0] {
+            let compliance = inverse(&orthotropic(&sheet, &wood(angle)).unwrap()).unwrap();
+            let (s, c) = f64::to_radians(angle).sin_cos();
+            let exact = c.powi(4) / 120.0
+                + (1.0 / 5.0 - 2.0 * 0.3 / 120.0) * c * c * s * s
+                + s.powi(4) / 10.0;
+            assert!((compliance[0][0] / exact - 1.0).abs() < 1e-12, "{angle}");
+        }
+    }
+
+    #[test]
+    fn an_unstable_material_has_no_moduli() {
+        let mut material = wood(0.0);
+        material.nu12 = 4.0; // nu12² > e1/e2
+        assert!(orthotropic(&Analysis::PlaneStrain {}, &material).is_none());
+        assert!(orthotropic(&Analysis::PlaneStress { thickness: 1.0 }, &material).is_none());
     }
 }

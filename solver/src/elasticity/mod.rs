@@ -1,9 +1,13 @@
 //! A standard elastic program, thesis 1.3 and 2.2; no word of contact.
 
 mod assembly;
+mod error_estimate;
 mod material;
 mod recovery;
 
-pub use assembly::{Dof, DofMap, assemble_element, assemble_loads, assemble_stiffness};
-pub use material::{COMPONENTS, Section};
-pub use recovery::{Recovered, recover};
+pub use assembly::{
+    Dof, DofMap, EdgeLoad, LoadAxes, Loads, assemble_element, assemble_loads, assemble_stiffness,
+};
+pub use error_estimate::{StressError, stress_error};
+pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic, stress};
+pub use recovery::{Recovered, recover, stress_at};

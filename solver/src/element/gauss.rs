@@ -16,6 +16,11 @@ pub const GAUSS_2: [(f64, f64); 2] = [
     ( 0.577_350_269_189_625_7, 1.0),
 ];
 
+/// The rule of 2 or 3 points, thesis 2.3.
+pub fn of_order(order: u32) -> &'static [(f64, f64)] {
+    if order == 2 { &GAUSS_2 } else { &GAUSS_3 }
+}
+
 /// Points and weights of the n-point rule.
 ///
 /// The points are the roots of the Legendre polynomial P_n, by Newton's method from the usual

@@ -9,10 +9,13 @@
 use std::sync::LazyLock;
 
 use crate::element::{edge3, gauss};
-use crate::problem::{Friction, Kernel, Normalization};
+use crate::problem::{Friction, Kernel, Measure, Normalization};
 
 /// ∫ exp(1/(x² − 1)) dx over (−1, 1).
 const BUMP_INTEGRAL: f64 = 0.443_993_816_168_079;
+
+/// 1 / ∫ exp(1/(r² − 1)) dA over the unit disc.
+const BUMP_DISC: f64 = 2.143_565_775_8;
 
 /// Points per piece; a piece much shorter than ρ sees almost a constant kernel and needs fewer.
 static FULL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(40));
@@ -23,15 +26,29 @@ const SHORT: f64 = 0.1;
 /// known so well, and the law is Coulomb's.
 const LOCAL: f64 = 1e-9;
 
-/// Γ_C as arc length alone.
+/// Γ_C as arc length, and radius where rings count.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
     /// Arc length at the nodes (corner, midside, corner, …).
     pub s: Vec<f64>,
+    /// Distance of the nodes from the axis, for `Measure::Surface`; not used otherwise.
+    pub radius: Vec<f64>,
     /// The pressure goes on as an even function beyond the first node: a line of symmetry.
     pub mirror_start: bool,
     /// Likewise beyond the last node.
     pub mirror_end: bool,
+}
+
+impl Chain {
+    /// Arc length only, without lines of symmetry.
+    pub fn plain(s: Vec<f64>) -> Self {
+        Chain {
+            s,
+            radius: Vec::new(),
+            mirror_start: false,
+            mirror_end: false,
+        }
+    }
 }
 
 /// The averaging operator of one chain.
@@ -40,6 +57,7 @@ pub struct Averaging {
     chain: Chain,
     radius: f64,
     kernel: Kernel,
+    measure: Measure,
     /// C of (1.2).
     scale: f64,
 }
@@ -68,26 +86,39 @@ impl Averaging {
     /// The operator with the radius, kernel and normalization of `friction`.
     pub fn new(friction: &Friction, chain: Chain) -> Self {
         let length = chain.s[chain.s.len() - 1] - chain.s[0];
-        let radius = match friction.nonlocal_radius {
+        let radius = match friction.nonlocal_radius.unwrap_or(0.0) {
             radius if radius < LOCAL * length => 0.0,
             radius => radius,
         };
-        let scale = match (friction.normalization, friction.kernel) {
-            (Normalization::UnitIntegral, Kernel::Bump) => 1.0 / (BUMP_INTEGRAL * radius),
-            (Normalization::UnitIntegral, Kernel::Parabola) => 0.75 / radius,
-            (Normalization::PeakOne, Kernel::Bump) => std::f64::consts::E,
-            (Normalization::PeakOne, Kernel::Parabola) => 1.0,
+        let disc = radius * radius;
+        let scale = match (friction.normalization, friction.kernel, friction.measure) {
+            (Normalization::UnitIntegral, Kernel::Bump, Measure::Line) => {
+                1.0 / (BUMP_INTEGRAL * radius)
+            }
+            (Normalization::UnitIntegral, Kernel::Parabola, Measure::Line) => 0.75 / radius,
+            (Normalization::UnitIntegral, Kernel::Bump, Measure::Surface) => BUMP_DISC / disc,
+            (Normalization::UnitIntegral, Kernel::Parabola, Measure::Surface) => {
+                2.0 / (std::f64::consts::PI * disc)
+            }
+            (Normalization::PeakOne, Kernel::Bump, _) => std::f64::consts::E,
+            (Normalization::PeakOne, Kernel::Parabola, _) => 1.0,
         };
         Averaging {
             chain,
             radius,
             kernel: friction.kernel,
+            measure: friction.measure,
             scale,
         }
     }
 
+    /// ρ, or 0 where the law is local (length).
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
     /// ω_ρ at a distance.
-    fn omega(&self, distance: f64) -> f64 {
+    pub fn omega(&self, distance: f64) -> f64 {
         let r = distance / self.radius;
         let rest = 1.0 - r * r;
         if rest <= 0.0 {
@@ -119,8 +150,12 @@ impl Averaging {
             let edge = self.edge_at(s);
             add(edge, &edge3::shape(edge3::invert(&self.arc(edge), s)), 1.0);
         } else {
+            let ring = match self.measure {
+                Measure::Line => None,
+                Measure::Surface => Some(self.distance_from_axis(s)),
+            };
             for centre in self.images(s) {
-                self.integrate(centre, &mut add);
+                self.integrate(centre, ring, &mut add);
             }
         }
         if first > last {
@@ -135,8 +170,46 @@ impl Averaging {
         }
     }
 
-    /// Integrates the kernel centred at `centre` (also outside the chain) edge by edge.
-    fn integrate(&self, centre: f64, add: &mut impl FnMut(usize, &[f64; 3], f64)) {
+    /// Distance from the axis at arc length s.
+    fn distance_from_axis(&self, s: f64) -> f64 {
+        let edge = self.edge_at(s);
+        let r = |i: usize| self.chain.radius[i];
+        let h = edge3::shape(edge3::invert(&self.arc(edge), s));
+        edge3::interpolate(&h, &[r(2 * edge), r(2 * edge + 2), r(2 * edge + 1)]).max(0.0)
+    }
+
+    /// The kernel around a place at distance r from the axis, integrated over a ring of radius
+    /// `ring` that lies `along` away on the meridian, per length of meridian:
+    ///
+    ///   ∫ ω(d) ring dθ,   d² = along² + 4 r ring sin²(θ/2)
+    fn ring_omega(&self, along: f64, r: f64, ring: f64) -> f64 {
+        let rest = self.radius * self.radius - along * along;
+        let product = 4.0 * r * ring;
+        if rest <= 0.0 || ring <= 0.0 {
+            return 0.0;
+        }
+        // the ring lies within the kernel up to this angle, or altogether
+        let half_sine = (rest / product).sqrt().min(1.0);
+        let most = 2.0 * half_sine.asin();
+        let around: f64 = FULL_RULE
+            .iter()
+            .map(|(xi, w)| {
+                let sine = (0.25 * most * (1.0 + xi)).sin();
+                w * self.omega((along * along + product * sine * sine).sqrt())
+            })
+            .sum();
+        // twice, for both directions; ½ from the rule's own length of two
+        around * most * ring
+    }
+
+    /// Integrates the kernel centred at `centre` (also outside the chain) edge by edge; over rings
+    /// where the centre's distance from the axis is given.
+    fn integrate(
+        &self,
+        centre: f64,
+        ring: Option<f64>,
+        add: &mut impl FnMut(usize, &[f64; 3], f64),
+    ) {
         let (low, high) = (centre - self.radius, centre + self.radius);
         for edge in self.edge_at(low)..self.chain.s.len() / 2 {
             let arc = self.arc(edge);
@@ -157,7 +230,11 @@ impl Averaging {
                 };
                 for (xi, w) in rule.iter() {
                     let y = a + 0.5 * length * (1.0 + xi);
-                    let factor = 0.5 * length * w * self.omega(y - centre);
+                    let omega = match ring {
+                        None => self.omega(y - centre),
+                        Some(r) => self.ring_omega(y - centre, r, self.distance_from_axis(y)),
+                    };
+                    let factor = 0.5 * length * w * omega;
                     add(edge, &edge3::shape(edge3::invert(&arc, y)), factor);
                 }
             }
@@ -202,7 +279,7 @@ impl Averaging {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::problem::{History, Transition};
+    use crate::friction::tests::friction;
 
     fn averaging(
         radius: f64,
@@ -212,18 +289,14 @@ mod tests {
         mirror_end: bool,
     ) -> Averaging {
         let friction = Friction {
-            coefficient: 0.3,
-            nonlocal_radius: radius,
-            elastic_slip: 1e-4,
             kernel,
-            normalization: Normalization::UnitIntegral,
-            transition: Transition::Linear,
-            history: History::Total,
+            ..friction(radius)
         };
         Averaging::new(
             &friction,
             Chain {
                 s,
+                radius: Vec::new(),
                 mirror_start,
                 mirror_end,
             },
@@ -329,5 +402,46 @@ mod tests {
             .row(0.33)
             .apply(&p);
         assert!((mean - 0.33 * 0.33).abs() < 1e-15);
+    }
+
+    /// On a flat surface the surface kernel averages p(r) over a disc: ∫ω = 1 and the second moment
+    /// follow from the bump itself; S(r²) = r² + m ρ², m = ∫ω |x|² dA / ρ².
+    #[test]
+    fn the_surface_kernel_averages_over_discs() {
+        let rule = gauss::rule(60);
+        let moment = |k: i32| -> f64 {
+            let f = |x: f64| (-1.0 / (1.0 - x * x)).exp() * x.powi(k + 1);
+            rule.iter()
+                .map(|(xi, w)| std::f64::consts::PI * w * f(0.5 * (1.0 + xi)))
+                .sum()
+        };
+        let m = moment(2) / moment(0);
+        let rho = 0.3;
+        let s = with_midsides(&[0.0, 0.1, 0.25, 0.6, 1.1, 1.7, 2.5]);
+        let surface = Friction {
+            measure: Measure::Surface,
+            ..friction(rho)
+        };
+        let chain = Chain {
+            radius: s.clone(),
+            ..Chain::plain(s.clone())
+        };
+        let averaging = Averaging::new(&surface, chain);
+        let p: Vec<f64> = s.iter().map(|r| r * r).collect();
+        for r in [0.0, 0.02, 0.2, 0.31, 1.3, 2.1] {
+            let row = averaging.row(r);
+            let one = row.apply(&vec![1.0; s.len()]);
+            assert!((one - 1.0).abs() < 1e-8, "r = {r}: S(1) = {one}");
+            let second = row.apply(&p);
+            assert!((second - r * r - m * rho * rho).abs() < 1e-8, "r = {r}");
+        }
+        // far from the axis it differs from the line kernel by O(ρ²/r)
+        let line = averaging_of_line(rho, &s).row(2.1).apply(&p);
+        let difference = averaging.row(2.1).apply(&p) - line;
+        assert!(difference.abs() > 1e-4 && difference.abs() < rho * rho);
+    }
+
+    fn averaging_of_line(radius: f64, s: &[f64]) -> Averaging {
+        averaging(radius, Kernel::Bump, s.to_vec(), false, false)
     }
 }

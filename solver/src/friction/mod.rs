@@ -1,44 +1,42 @@
 //! The friction law, thesis 1.2: numbers along arc length only, no mesh.
 
+mod bound;
 mod kernel;
 mod transition;
 
+pub use bound::{BoundLaw, Source};
 pub use kernel::{Averaging, Chain, Row};
 pub use transition::{phi, phi_slope, psi};
 
-use crate::problem::{Friction, Transition};
+use crate::problem::{Friction, History, Transition};
 
 /// From pressure and tangential displacement along Γ_C to the tangential traction,
-/// σ_t = −τ φ_ε(|u_t − d|) sign(u_t − d), τ = μ max(S_ρ(p), 0): thesis (1.3), (1.8).
+/// σ_t = −τ φ_ε(|e|) sign(e): thesis (1.3), (1.8). e = u_t − d in the total law; in the incremental
+/// law e = u_t − d − g with the anchor g of the point, FORMULATION 1.
 #[derive(Clone, Debug)]
 pub struct FrictionLaw {
-    /// μ.
-    pub coefficient: f64,
+    /// τ.
+    pub bound: BoundLaw,
     /// ε (length).
     pub elastic_slip: f64,
     /// φ_ε.
     pub transition: Transition,
-    /// S_ρ.
-    pub averaging: Averaging,
+    /// Whether points keep an anchor.
+    pub history: History,
 }
 
 impl FrictionLaw {
     /// The law on a chain of contact edges.
     pub fn new(friction: &Friction, chain: Chain) -> Self {
         FrictionLaw {
-            coefficient: friction.coefficient,
+            bound: BoundLaw::new(friction, chain),
             elastic_slip: friction.elastic_slip,
             transition: friction.transition,
-            averaging: Averaging::new(friction, chain),
+            history: friction.history,
         }
     }
 
-    /// τ = μ max(S, 0) from the averaged pressure S (stress).
-    pub fn bound(&self, nonlocal_pressure: f64) -> f64 {
-        self.coefficient * nonlocal_pressure.max(0.0)
-    }
-
-    /// φ_ε with the sign of `slip` = u_t − d.
+    /// φ_ε with the sign of `slip`, e above (length).
     pub fn phi(&self, slip: f64) -> f64 {
         phi(self.transition, slip / self.elastic_slip)
     }
@@ -51,5 +49,53 @@ impl FrictionLaw {
     /// ψ_ε, the primitive of φ_ε (length).
     pub fn psi(&self, slip: f64) -> f64 {
         self.elastic_slip * psi(self.transition, slip / self.elastic_slip)
+    }
+
+    /// By how much the anchor of a point moves at the end of an increment: what lies beyond the elastic
+    /// slip; all of it where the point is `open` (length).
+    pub fn anchor_move(&self, slip: f64, open: bool) -> f64 {
+        match self.history {
+            History::Total => 0.0,
+            History::Incremental if open => slip,
+            History::Incremental => slip - slip.clamp(-self.elastic_slip, self.elastic_slip),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::{FrictionPoints, Kernel, Measure, Normalization};
+
+    /// The law that most tests start from.
+    pub(super) fn friction(radius: f64) -> Friction {
+        Friction {
+            coefficient: Some(0.3),
+            nonlocal_radius: Some(radius),
+            elastic_slip: 1e-4,
+            kernel: Kernel::Bump,
+            normalization: Normalization::UnitIntegral,
+            transition: Transition::Linear,
+            history: History::Incremental,
+            points: FrictionPoints::Gauss3,
+            measure: Measure::Line,
+            cohesion: 0.0,
+            shear_cap: None,
+            bound: None,
+        }
+    }
+
+    #[test]
+    fn an_anchor_follows_what_slips_and_what_is_open() {
+        let chain = Chain::plain(vec![0.0, 0.5, 1.0]);
+        let law = FrictionLaw::new(&friction(0.0), chain.clone());
+        assert_eq!(law.anchor_move(0.5e-4, false), 0.0);
+        assert!((law.anchor_move(-3e-4, false) + 2e-4).abs() < 1e-18);
+        assert_eq!(law.anchor_move(0.5e-4, true), 0.5e-4);
+        let total = Friction {
+            history: History::Total,
+            ..friction(0.0)
+        };
+        assert_eq!(FrictionLaw::new(&total, chain).anchor_move(1.0, true), 0.0);
     }
 }

@@ -351,7 +351,6 @@ mod tests {
                 "/contacts/0/friction/elastic_slip",
                 "/contacts/0/friction/kernel",
                 "/materials/0/young",
-                "/materials/0/youngs_modulus",
                 "/mesh/grid/x/1",
             ]
         );

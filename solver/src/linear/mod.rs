@@ -4,6 +4,6 @@ mod dense;
 mod factor;
 mod sparse;
 
-pub use dense::{Dense, solve_positive_definite};
+pub use dense::{Dense, least_squares, solve_general, solve_positive_definite};
 pub use factor::{Factor, FactorError, Ordering};
 pub use sparse::{Graph, SparseSymmetric};

@@ -108,6 +108,19 @@ impl SparseSymmetric {
         }
     }
 
+    /// Mean of the diagonal from row `first` on; of all of it where there is none.
+    pub fn mean_diagonal(&self, first: usize) -> f64 {
+        let rows = if first < self.size() {
+            first..self.size()
+        } else {
+            0..self.size()
+        };
+        let count = rows.len().max(1) as f64;
+        // rows are sorted, and none lies above the diagonal
+        let diagonal = rows.map(|j| self.values.get(self.column_starts[j]).unwrap_or(&0.0));
+        diagonal.sum::<f64>() / count
+    }
+
     /// A v.
     pub fn times(&self, v: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; v.len()];

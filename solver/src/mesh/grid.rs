@@ -87,6 +87,7 @@ pub fn grid_mesh(grid: &Grid) -> Mesh {
         nodes,
         elements,
         boundaries,
+        groups: Default::default(),
     }
 }
 

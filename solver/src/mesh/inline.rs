@@ -52,6 +52,29 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
             }
         }
     }
+    for (name, group) in &input.groups {
+        let mut members = HashSet::with_capacity(group.len());
+        for (i, e) in group.iter().enumerate() {
+            let place = format!("/groups/{}/{i}", escape(name));
+            if *e as usize >= input.elements.len() {
+                found.say(
+                    &place,
+                    "unknown_element",
+                    e,
+                    &format!("an element below {}", input.elements.len()),
+                    "Elements are numbered from 0.",
+                );
+            } else if !members.insert(*e) {
+                found.say(
+                    &place,
+                    "repeated_element",
+                    e,
+                    "each element once",
+                    "Remove it.",
+                );
+            }
+        }
+    }
     for (name, edges) in &input.boundaries {
         if edges.is_empty() {
             found.say(
@@ -123,6 +146,7 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
             nodes: input.nodes.clone(),
             elements: input.elements.clone(),
             boundaries,
+            groups: input.groups.clone(),
         })
     } else {
         Err(found.into_list())
@@ -232,6 +256,7 @@ mod tests {
             ],
             elements: vec![[0, 1, 2, 3, 4, 5, 6, 7]],
             boundaries: BTreeMap::from([("top".to_owned(), vec![[3, 2, 6]])]),
+            groups: BTreeMap::new(),
         }
     }
 

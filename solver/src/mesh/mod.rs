@@ -27,6 +27,8 @@ pub struct Mesh {
     pub elements: Vec<[u32; 8]>,
     /// Surface edges by name.
     pub boundaries: BTreeMap<String, Vec<Edge>>,
+    /// Elements by the name of their group.
+    pub groups: BTreeMap<String, Vec<u32>>,
 }
 
 impl Mesh {

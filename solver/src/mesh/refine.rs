@@ -58,10 +58,17 @@ pub fn refine(mesh: &Mesh) -> Mesh {
             (name.clone(), children.collect())
         })
         .collect();
+    // the children of an element follow one another
+    let four = |e: &u32| (0..4).map(|child| 4 * e + child).collect::<Vec<u32>>();
+    let groups = mesh.groups.iter();
+    let groups = groups
+        .map(|(name, group)| (name.clone(), group.iter().flat_map(four).collect()))
+        .collect();
     Mesh {
         nodes,
         elements,
         boundaries,
+        groups,
     }
 }
 

@@ -5,14 +5,19 @@ use std::collections::BTreeMap;
 use super::findings::{ALIGNED, Findings};
 use crate::error::escape;
 use crate::mesh::{self, Edge, Mesh};
-use crate::problem::{Analysis, BoundaryValue, MeshInput};
+use crate::problem::{AdaptiveRefine, Analysis, BoundaryValue, MeshInput, Refine};
 
 /// More refinements than this overflow any machine; the size itself is bounded by the caller.
 const MOST_REFINEMENTS: u32 = 20;
 
 impl Findings {
     /// The refined mesh with all its names, or `None` after saying why not.
-    pub(super) fn mesh(&mut self, input: &MeshInput, analysis: &Analysis) -> Option<Mesh> {
+    pub(super) fn mesh(
+        &mut self,
+        input: &MeshInput,
+        analysis: &Analysis,
+        contacts: usize,
+    ) -> Option<Mesh> {
         let before = self.violations.len();
         let mut mesh = match (&input.grid, &input.inline) {
             (Some(grid), None) => {
@@ -39,11 +44,18 @@ impl Findings {
                 None
             }
         };
-        if input.refine > MOST_REFINEMENTS {
+        let refine = match input.refine {
+            Refine::Times(times) => times,
+            Refine::Adaptive(goal) => {
+                self.adaptive(input, &goal, contacts);
+                0
+            }
+        };
+        if refine > MOST_REFINEMENTS {
             self.say(
                 "/mesh/refine",
                 "out_of_range",
-                input.refine,
+                refine,
                 format!("0 … {MOST_REFINEMENTS}"),
                 "Each refinement makes four elements of one.",
             );
@@ -78,17 +90,85 @@ impl Findings {
                 format!("The strip leaves its polyline by {distance:.3e} at x = {x}, between two grid lines. Put a grid line there."),
             );
         }
-        for _ in 0..input.refine {
+        for _ in 0..refine {
             mesh = mesh::refine(&mesh);
         }
-        if inline && input.refine > 0 {
+        if inline && refine > 0 {
             self.inverted(&mesh, false, " of the refined mesh");
         }
         if self.violations.len() > before {
             return None;
         }
         self.parts(&mut mesh, input);
+        self.groups(&mut mesh, input);
         Some(mesh)
+    }
+
+    /// What adaptive refinement needs: a tolerance, a grid to put lines into, a contact to watch.
+    fn adaptive(&mut self, input: &MeshInput, goal: &AdaptiveRefine, contacts: usize) {
+        self.require(
+            goal.tolerance > 0.0 && goal.tolerance < 1.0,
+            "/mesh/refine/tolerance".into(),
+            goal.tolerance,
+            "0 < tolerance < 1",
+            "The relative change that is left; 0.01 is one percent.",
+        );
+        if input.grid.is_none() {
+            self.say(
+                "/mesh/refine",
+                "not_used",
+                "adaptive refinement of a mesh that is no grid",
+                "a `grid`, or a number of refinements",
+                "Lines can be put into a grid only; refine an inline mesh by a number.",
+            );
+        }
+        if contacts == 0 {
+            self.say(
+                "/mesh/refine",
+                "not_used",
+                "adaptive refinement without a contact",
+                "a contact, or a number of refinements",
+                "It watches the forces and peak stresses of contacts.",
+            );
+        }
+    }
+
+    /// Names for groups of elements.
+    fn groups(&mut self, mesh: &mut Mesh, input: &MeshInput) {
+        let size = [0, 1]
+            .map(|axis| mesh.extent(axis))
+            .into_iter()
+            .fold(0.0, f64::max);
+        for (name, range) in &input.groups {
+            let pointer = format!("/mesh/groups/{}", escape(name));
+            if mesh.groups.contains_key(name) {
+                self.say(
+                    &pointer,
+                    "name_taken",
+                    name,
+                    "a name that the mesh does not have yet",
+                    "Groups of an inline mesh have names already.",
+                );
+                continue;
+            }
+            let holds = |e: &u32| {
+                let nodes = mesh.element_nodes(&mesh.elements[*e as usize]);
+                nodes
+                    .iter()
+                    .all(|place| within(&[range.x, range.y], place, size))
+            };
+            let elements: Vec<u32> = (0..mesh.elements.len() as u32).filter(holds).collect();
+            if elements.is_empty() {
+                self.say(
+                    &pointer,
+                    "empty_group",
+                    "no element",
+                    "at least one element whose nodes all lie in the range",
+                    "Put grid lines on the edges of the group.",
+                );
+            }
+            mesh.groups.insert(name.clone(), elements);
+        }
     }
 
     fn inverted(&mut self, mesh: &Mesh, inline: bool, of: &str) {
@@ -136,16 +216,13 @@ impl Findings {
                 );
                 continue;
             };
-            let within = |edge: &&Edge| {
-                mesh.edge_nodes(edge).iter().all(|position| {
-                    [part.x, part.y].iter().zip(position).all(|(range, c)| {
-                        range.is_none_or(|[low, high]| {
-                            *c >= low - ALIGNED * size && *c <= high + ALIGNED * size
-                        })
-                    })
-                })
+            let holds = |edge: &&Edge| {
+                let nodes = mesh.edge_nodes(edge);
+                nodes
+                    .iter()
+                    .all(|place| within(&[part.x, part.y], place, size))
             };
-            let part: Vec<Edge> = edges.iter().filter(within).copied().collect();
+            let part: Vec<Edge> = edges.iter().filter(holds).copied().collect();
             if part.is_empty() {
                 self.say(
                     &pointer,
@@ -213,6 +290,13 @@ impl Findings {
             }
         }
     }
+}
+
+/// Whether a place lies in the ranges of x and y, ends included.
+fn within(ranges: &[Option<[f64; 2]>; 2], place: &[f64; 2], size: f64) -> bool {
+    ranges.iter().zip(place).all(|(range, c)| {
+        range.is_none_or(|[low, high]| *c >= low - ALIGNED * size && *c <= high + ALIGNED * size)
+    })
 }
 
 /// The names that exist, or the first of them.

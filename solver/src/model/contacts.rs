@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::ContactModel;
 use super::findings::{ALIGNED, AXIS, Findings};
+use super::{ContactModel, Held};
 use crate::contact::ContactBoundary;
 use crate::contact::obstacle::{self, FacingRun};
 use crate::elasticity::Section;
 use crate::mesh::{self, Edge, Mesh};
-use crate::problem::{Contact, Friction, Obstacle};
+use crate::problem::{Condition, Contact, Friction, NormalOf, Obstacle, Problem, Step};
 
 /// Cosine of the sharpest turn between two contact edges that goes without a warning: 20°.
 const SHARPEST_TURN: f64 = 0.94;
@@ -25,9 +25,10 @@ impl Findings {
         &mut self,
         mesh: &Mesh,
         section: &Section,
-        contacts: &[Contact],
-        fixed: &BTreeMap<u32, [Option<f64>; 2]>,
+        problem: &Problem,
+        fixed: &BTreeMap<u32, Held>,
     ) -> Vec<ContactModel> {
+        let contacts = &problem.contacts;
         let mut models: Vec<ContactModel> = Vec::new();
         for (i, contact) in contacts.iter().enumerate() {
             let pointer = format!("/contacts/{i}");
@@ -60,7 +61,7 @@ impl Findings {
             let Some(run) = self.facing_run(mesh, edges, contact, &pointer) else {
                 continue;
             };
-            let boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
+            let mut boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
             if !self.sound(&boundary, section, contact, &run, &pointer) {
                 continue;
             }
@@ -79,20 +80,25 @@ impl Findings {
                     "End one of them an edge earlier with `from` or `to`.",
                 );
             }
-            let gap: Vec<f64> = run
-                .profile
-                .iter()
-                .map(|profile| profile - contact.indentation)
-                .collect();
-            self.supported_contact_nodes(&boundary, &gap, fixed, &pointer);
-            models.push(ContactModel {
+            let cosines = turn_normals(&mut boundary, &run, contact.normal);
+            let along = |length: &dyn Fn(usize) -> f64| -> Vec<f64> {
+                let along = |(i, cosine): (usize, &f64)| cosine * length(i);
+                cosines.iter().enumerate().map(along).collect()
+            };
+            let model = ContactModel {
                 name: contact.boundary.clone(),
                 pointer,
                 boundary,
-                gap,
+                profile: along(&|i| run.profile[i].distance),
+                indentation: along(&|_| contact.indentation),
                 tangential_displacement: contact.tangential_displacement,
-                friction: contact.friction,
-            });
+                normal: contact.normal,
+                condition: contact.condition,
+                power: power(&contact.obstacle),
+                friction: contact.friction.clone(),
+            };
+            self.supported_contact_nodes(&model, &problem.steps, fixed);
+            models.push(model);
         }
         models
     }
@@ -142,7 +148,11 @@ impl Findings {
                 "Give each side a contact of its own, with names under /mesh/boundaries.",
             );
         }
-        let curved = !matches!(contact.obstacle, Obstacle::Flat { .. });
+        // a flat is the same everywhere, and a curve in space knows no coordinate
+        let curved = !matches!(
+            contact.obstacle,
+            Obstacle::Flat { .. } | Obstacle::Line { .. } | Obstacle::Polyline { .. }
+        );
         let grows = |pair: &[f64]| pair[1] > pair[0];
         let falls = |pair: &[f64]| pair[1] < pair[0];
         if curved && !run.coordinate.windows(2).all(grows) && !run.coordinate.windows(2).all(falls)
@@ -155,12 +165,12 @@ impl Findings {
                 "Write \"along\": \"arc_length\".",
             );
         }
-        if let Some(friction) = contact.friction {
+        if let Some(radius) = contact.friction.as_ref().and_then(|f| f.nonlocal_radius) {
             let most = LARGEST_RADIUS * boundary.s[last];
             self.require(
-                friction.nonlocal_radius <= most,
+                radius <= most,
                 format!("{pointer}/friction/nonlocal_radius"),
-                friction.nonlocal_radius,
+                radius,
                 &format!("at most {most}, ten times the length of the contact boundary"),
                 "The radius is a material length, far below the size of the contact.",
             );
@@ -242,39 +252,51 @@ impl Findings {
     }
 
     /// A supported contact node keeps its two unknowns apart only where a support acts along the
-    /// normal or along the tangent.
-    pub(super) fn supported_contact_nodes(
+    /// normal or along the tangent; and it must not be held inside the obstacle, at the end of any step.
+    fn supported_contact_nodes(
         &mut self,
-        boundary: &ContactBoundary,
-        gap: &[f64],
-        fixed: &BTreeMap<u32, [Option<f64>; 2]>,
-        pointer: &str,
+        contact: &ContactModel,
+        steps: &[Step],
+        fixed: &BTreeMap<u32, Held>,
     ) {
+        let (boundary, pointer) = (&contact.boundary, &contact.pointer);
+        let ends: Vec<[f64; 2]> = match steps {
+            [] => vec![[1.0, 1.0]],
+            _ => steps.iter().map(|s| [s.indentation, s.supports]).collect(),
+        };
         for (i, node) in boundary.nodes.iter().enumerate() {
-            let Some(values) = fixed.get(node) else {
+            let Some(held) = fixed.get(node) else {
                 continue;
             };
-            let ([nx, ny], [x, y]) = (boundary.normals[i], boundary.positions[i]);
-            if values.iter().any(Option::is_none) && nx.abs().min(ny.abs()) > ALIGNED {
+            let (n, t, [x, y]) = (
+                boundary.normals[i],
+                boundary.tangent(i),
+                boundary.positions[i],
+            );
+            let (along_n, along_t) = (held.along(n), held.along(t));
+            if along_n.is_none() && along_t.is_none() {
                 self.say(
-                    format!("{pointer}/boundary"), "oblique_support", format!("node {node} at ({x}, {y}), normal ({nx:.4}, {ny:.4}), supported along one axis"),
-                    "a support along the contact's normal or tangent, or along both axes", "End the contact an edge before the support with `from` or `to`.",
+                    format!("{pointer}/boundary"),
+                    "oblique_support",
+                    format!("node {node} at ({x}, {y}), normal ({:.4}, {:.4}), supported along one axis", n[0], n[1]),
+                    "a support along the contact's normal or tangent, or along both axes",
+                    "End the contact an edge before the support with `from` or `to`.",
                 );
             }
-            let normal_displacement = match *values {
-                [Some(ux), Some(uy)] => Some(nx * ux + ny * uy),
-                [Some(ux), None] if ny.abs() <= ALIGNED => Some(nx * ux),
-                [None, Some(uy)] if nx.abs() <= ALIGNED => Some(ny * uy),
-                _ => None,
-            };
-            if let Some(u_n) = normal_displacement
-                && u_n > gap[i] + ALIGNED * gap[i].abs()
-            {
-                self.say(
-                    format!("{pointer}/indentation"), "impossible", format!("node {node} at ({x}, {y}) held at u_n = {u_n} by a support, {} inside the obstacle", u_n - gap[i]),
-                    "supports that leave the body outside the obstacle", "End the obstacle before the support with `from` or `to`.",
-                );
-                return;
+            let Some(u_n) = along_n else { continue };
+            for [indentation, supports] in &ends {
+                let (u_n, gap) = (supports * u_n, contact.gap(i, *indentation));
+                let free = contact.condition == Condition::None;
+                if !free && u_n > gap + ALIGNED * gap.abs() {
+                    self.say(
+                        format!("{pointer}/indentation"),
+                        "impossible",
+                        format!("node {node} at ({x}, {y}) held at u_n = {u_n} by a support, {} inside the obstacle", u_n - gap),
+                        "supports that leave the body outside the obstacle",
+                        "End the obstacle before the support with `from` or `to`.",
+                    );
+                    return;
+                }
             }
         }
     }
@@ -305,8 +327,10 @@ impl Findings {
     }
 
     fn coarseness(&mut self, contact: &ContactModel) {
-        let averages = |f: &Friction| f.nonlocal_radius > 0.0 && f.coefficient > 0.0;
-        let Some(friction) = contact.friction.filter(averages) else {
+        let averages = |f: &&Friction| f.coefficient.is_some_and(|mu| mu > 0.0);
+        let friction = contact.friction.as_ref().filter(averages);
+        let radius = friction.and_then(|f| f.nonlocal_radius);
+        let Some(radius) = radius.filter(|radius| *radius > 0.0) else {
             return;
         };
         let boundary = &contact.boundary;
@@ -314,13 +338,42 @@ impl Findings {
         let shortest = (0..boundary.edge_count())
             .map(length)
             .fold(f64::INFINITY, f64::min);
-        if shortest > friction.nonlocal_radius {
+        if shortest > radius {
             self.warn(
                 "mesh_too_coarse_for_radius",
                 &format!("{}/friction/nonlocal_radius", contact.pointer),
-                format!("The shortest contact edge ({shortest:.3e}) is longer than the nonlocal radius ({}): the averaging is not resolved. Refine the mesh towards the ends of the contact.", friction.nonlocal_radius),
+                format!("The shortest contact edge ({shortest:.3e}) is longer than the nonlocal radius ({radius}): the averaging is not resolved. Refine the mesh towards the ends of the contact."),
             );
         }
+    }
+}
+
+/// Turns the normals to those of the obstacle where they are asked for; the cosine of each turn. At
+/// the angle whose tangent is the slope p′ of the profile, m = (n − p′ t)/√(1 + p′²).
+fn turn_normals(boundary: &mut ContactBoundary, run: &FacingRun, normal: NormalOf) -> Vec<f64> {
+    let count = boundary.nodes.len();
+    if normal == NormalOf::Body {
+        return vec![1.0; count];
+    }
+    let mut cosines = Vec::with_capacity(count);
+    for i in 0..count {
+        let slope = run.profile[i].slope;
+        let cosine = 1.0 / slope.hypot(1.0);
+        let (n, t) = (boundary.normals[i], boundary.tangent(i));
+        // + 0.0 turns −0 into 0, so that an axis-parallel normal is exactly that
+        boundary.normals[i] = [0, 1].map(|a| cosine * (n[a] - slope * t[a]) + 0.0);
+        cosines.push(cosine);
+    }
+    cosines
+}
+
+/// The power of a profile.
+fn power(obstacle: &Obstacle) -> Option<f64> {
+    match obstacle {
+        Obstacle::Circle { .. } | Obstacle::Parabola { .. } => Some(2.0),
+        Obstacle::Wedge { .. } | Obstacle::Cone { .. } => Some(1.0),
+        Obstacle::Power { exponent, .. } => Some(*exponent),
+        _ => None,
     }
 }
 

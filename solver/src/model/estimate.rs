@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::problem::Problem;
+use crate::problem::{MeshInput, Problem, Refine};
 
 /// The cost of solving a problem on one core.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -15,10 +15,14 @@ pub struct Estimate {
     pub run_s: f64,
 }
 
+/// Adaptive refinement makes no larger mesh.
+pub const MOST_ADAPTIVE_ELEMENTS: usize = 60_000;
+
 /// Estimates from the numbers of elements alone; the constants are measured in `docs/performance.md`.
 pub fn estimate(problem: &Problem) -> Estimate {
     let mesh = &problem.mesh;
-    let split = 4f64.powi(mesh.refine.min(64) as i32);
+    let split = 4f64.powi(halvings(mesh));
+    let adaptive = matches!(mesh.refine, Refine::Adaptive(_));
     let elements = match (&mesh.grid, &mesh.inline) {
         (Some(grid), _) => {
             grid.x.len().saturating_sub(1) as f64 * grid.y.len().saturating_sub(1) as f64
@@ -27,14 +31,23 @@ pub fn estimate(problem: &Problem) -> Estimate {
         (None, None) => 0.0,
     };
     // A large mesh has three nodes an element, a small one up to eight.
-    let n = split * elements;
+    let n = match adaptive {
+        // as large as it may become
+        true => MOST_ADAPTIVE_ELEMENTS as f64,
+        false => split * elements,
+    };
     let nodes = (3.0 * n + 4.0 * n.sqrt() + 1.0).min(8.0 * n);
     let dofs = 2.0 * nodes;
     // fill of a minimum-degree factor in the plane grows like n log n
     let fill = dofs * dofs.max(2.0).log2();
     let contact = contact_dofs(problem, n.sqrt());
     let memory = 1500.0 * dofs + 95.0 * fill + 60.0 * contact * contact;
-    let time = 6e-6 * dofs + 4e-9 * dofs.powf(1.5) + 1e-9 * contact.powi(3);
+    let increments: f64 = problem.steps.iter().map(|s| f64::from(s.increments)).sum();
+    let once_more = 1
+        + u32::from(problem.solver.check_uniqueness)
+        + 2 * u32::from(problem.solver.check_increments);
+    let iterations = increments.max(1.0) * f64::from(once_more);
+    let time = 6e-6 * dofs + 4e-9 * dofs.powf(1.5) + 1e-9 * contact.powi(3) * iterations;
     // floats saturate when cast: a hopeless problem gets the largest number there is
     Estimate {
         dofs: dofs as u64,
@@ -43,11 +56,18 @@ pub fn estimate(problem: &Problem) -> Estimate {
     }
 }
 
+fn halvings(mesh: &MeshInput) -> i32 {
+    match mesh.refine {
+        Refine::Times(times) => times.min(64) as i32,
+        Refine::Adaptive(_) => 0,
+    }
+}
+
 /// Unknowns on the contact boundaries: two for each of two nodes per edge, taken from the sides of
 /// the mesh.
 fn contact_dofs(problem: &Problem, side: f64) -> f64 {
     let mesh = &problem.mesh;
-    let split = 2f64.powi(mesh.refine.min(64) as i32);
+    let split = 2f64.powi(halvings(mesh));
     let edges = |name: &str| match (&mesh.grid, &mesh.inline) {
         (Some(grid), _) if name == "left" || name == "right" => grid.y.len() as f64 * split,
         (Some(grid), _) => grid.x.len() as f64 * split,

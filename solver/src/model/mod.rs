@@ -7,18 +7,23 @@ mod boundaries;
 mod contacts;
 pub mod estimate;
 mod findings;
+mod laws;
+mod loads;
+mod materials;
 mod numbers;
 mod supports;
+
+pub use supports::Held;
 
 use std::collections::BTreeMap;
 
 use findings::Findings;
 
 use crate::contact::ContactBoundary;
-use crate::elasticity::Section;
+use crate::elasticity::{Loads, Section};
 use crate::error::Violation;
-use crate::mesh::{Edge, Mesh};
-use crate::problem::{Friction, Problem, SolverControls};
+use crate::mesh::Mesh;
+use crate::problem::{Condition, Friction, NormalOf, Problem, SolverControls, Step};
 use crate::solution::Warning;
 
 /// A problem that can be solved.
@@ -26,18 +31,55 @@ use crate::solution::Warning;
 pub struct Model {
     /// The refined mesh.
     pub mesh: Mesh,
-    /// Material and depth.
+    /// Theory and materials.
     pub section: Section,
-    /// Prescribed displacements along x and y by node.
-    pub fixed: BTreeMap<u32, [Option<f64>; 2]>,
-    /// Edges under pressure, with the pressure at start, end and midside.
-    pub pressures: Vec<(Edge, [f64; 3])>,
+    /// Gauss points of an element in each direction.
+    pub quadrature: u32,
+    /// Prescribed displacements by node.
+    pub fixed: BTreeMap<u32, Held>,
+    /// External forces.
+    pub loads: Loads,
     /// Contact boundaries with their obstacles.
     pub contacts: Vec<ContactModel>,
+    /// Supports alone leave a rigid motion free, which contact must hold.
+    pub held_by_contact: bool,
+    /// Load steps; none: one step to the values as given.
+    pub steps: Vec<Step>,
     /// Tolerance and limits.
     pub controls: SolverControls,
     /// What the user should know already.
     pub warnings: Vec<Warning>,
+}
+
+/// A load level: factors on the values of the problem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Level {
+    /// On every indentation.
+    pub indentation: f64,
+    /// On every tangential displacement of an obstacle.
+    pub tangential_displacement: f64,
+    /// On all loads.
+    pub loads: f64,
+    /// On all prescribed displacements.
+    pub supports: f64,
+}
+
+impl Level {
+    /// Nothing.
+    pub const NOTHING: Level = Level {
+        indentation: 0.0,
+        tangential_displacement: 0.0,
+        loads: 0.0,
+        supports: 0.0,
+    };
+
+    /// Everything as given.
+    pub const FULL: Level = Level {
+        indentation: 1.0,
+        tangential_displacement: 1.0,
+        loads: 1.0,
+        supports: 1.0,
+    };
 }
 
 /// A contact boundary and what it faces.
@@ -47,14 +89,29 @@ pub struct ContactModel {
     pub name: String,
     /// JSON Pointer to the contact.
     pub pointer: String,
-    /// Γ_C.
+    /// Γ_C, with the normals that the contact uses.
     pub boundary: ContactBoundary,
-    /// Gap at each node: profile − indentation.
-    pub gap: Vec<f64>,
+    /// Profile of the obstacle at each node, along the contact's normal (length).
+    pub profile: Vec<f64>,
+    /// The obstacle's indentation at each node, along the contact's normal (length).
+    pub indentation: Vec<f64>,
     /// d, the obstacle's own tangential displacement.
     pub tangential_displacement: f64,
+    /// Whose normal it is.
+    pub normal: NormalOf,
+    /// What the obstacle does.
+    pub condition: Condition,
+    /// m where the profile is a power |c|^m: a contact's width then grows like δ^(1/m).
+    pub power: Option<f64>,
     /// Absent: frictionless.
     pub friction: Option<Friction>,
+}
+
+impl ContactModel {
+    /// Gap at a node (length) when the obstacle is pushed by `factor` times its indentation.
+    pub fn gap(&self, node: usize, factor: f64) -> f64 {
+        self.profile[node] - factor * self.indentation[node]
+    }
 }
 
 impl Model {
@@ -70,34 +127,40 @@ impl Model {
         if !findings.violations.is_empty() {
             return Err(findings.into_violations());
         }
-        findings.analysis(&problem.analysis);
-        let material = findings.materials(&problem.materials);
-        findings.controls(&problem.solver);
+        let analysis = problem.analysis;
+        findings.analysis(&analysis);
+        findings.controls(problem);
+        findings.thesis(problem);
+        findings.steps(&problem.steps);
         for (i, contact) in problem.contacts.iter().enumerate() {
-            findings.contact_numbers(contact, &format!("/contacts/{i}"));
+            findings.contact_numbers(&analysis, contact, &format!("/contacts/{i}"));
         }
-        let Some(mesh) = findings.mesh(&problem.mesh, &problem.analysis) else {
+        let Some(mesh) = findings.mesh(&problem.mesh, &analysis, problem.contacts.len()) else {
             return Err(findings.into_violations());
         };
-        let (e, nu) = material.map_or((1.0, 0.0), |m| (m.youngs_modulus, m.poissons_ratio));
-        let section = Section::new(problem.analysis, e, nu);
+        // wrong materials have been named; the checks that follow need only the theory
+        let section = findings
+            .section(analysis, &problem.materials, &mesh)
+            .unwrap_or_else(|| Section::uniform(analysis, Default::default()));
         let fixed = findings.supports(&mesh, &section, &problem.supports);
-        let pressures = findings.loads(&mesh, &problem.loads);
-        let contacts = findings.contacts(&mesh, &section, &problem.contacts, &fixed);
-        findings.freedom(&mesh, &section, &fixed);
+        let loads = findings.loads(&mesh, &section, &problem.loads);
+        let contacts = findings.contacts(&mesh, &section, problem, &fixed);
+        let held_by_contact = findings.freedom(&mesh, &section, &fixed, &contacts);
         if !findings.violations.is_empty() {
             return Err(findings.into_violations());
         }
         findings.doubts(&contacts);
-        let (controls, warnings) = (problem.solver, findings.warnings);
         Ok(Model {
             mesh,
             section,
+            quadrature: problem.quadrature,
             fixed,
-            pressures,
+            loads,
             contacts,
-            controls,
-            warnings,
+            held_by_contact,
+            steps: problem.steps.clone(),
+            controls: problem.solver.clone(),
+            warnings: findings.warnings,
         })
     }
 }

@@ -1,9 +1,11 @@
 //! Numbers by themselves: finite, and in their range.
 
 use super::findings::Findings;
-use crate::contact::obstacle;
 use crate::error::escape;
-use crate::problem::{Analysis, Contact, Material, Obstacle, Problem, SolverControls};
+use crate::problem::{
+    Algorithm, Analysis, Condition, Friction, FrictionPoints, History, Problem, Step,
+    ThesisPressure,
+};
 
 impl Findings {
     /// JSON has no other numbers, but protobuf has.
@@ -53,7 +55,10 @@ impl Findings {
             ("/supports", problem.supports.len()),
             ("/loads", problem.loads.len()),
             ("/contacts", problem.contacts.len()),
+            ("/materials", problem.materials.len()),
+            ("/steps", problem.steps.len()),
             ("/mesh/boundaries", problem.mesh.boundaries.len()),
+            ("/mesh/groups", problem.mesh.groups.len()),
         ] {
             if count > MOST {
                 self.say(
@@ -79,37 +84,26 @@ impl Findings {
         }
     }
 
-    pub(super) fn materials<'a>(&mut self, materials: &'a [Material]) -> Option<&'a Material> {
-        if materials.len() != 1 {
+    pub(super) fn controls(&mut self, problem: &Problem) {
+        let controls = &problem.solver;
+        if problem.quadrature != 2 && problem.quadrature != 3 {
             self.say(
-                "/materials",
-                "wrong_count",
-                format!("{} materials", materials.len()),
-                "exactly one material",
-                "The whole body has one material.",
+                "/quadrature",
+                "out_of_range",
+                problem.quadrature,
+                "3 or 2",
+                "Gauss points of an element in each direction.",
             );
         }
-        for (i, m) in materials.iter().enumerate() {
-            let at = |field: &str| format!("/materials/{i}/{field}");
-            self.require(
-                m.youngs_modulus > 0.0,
-                at("youngs_modulus"),
-                m.youngs_modulus,
-                "a stress > 0",
-                "Young's modulus E.",
-            );
-            self.require(
-                m.poissons_ratio > -1.0 && m.poissons_ratio < 0.5,
-                at("poissons_ratio"),
-                m.poissons_ratio,
-                "−1 < Poisson's ratio < 0.5",
-                "For a nearly incompressible body use a value such as 0.49.",
+        if controls.check_increments && problem.steps.is_empty() {
+            self.say(
+                "/solver/check_increments",
+                "not_used",
+                "true without steps",
+                "true with `steps` only",
+                "Without steps there are no increments to double.",
             );
         }
-        materials.first()
-    }
-
-    pub(super) fn controls(&mut self, controls: &SolverControls) {
         self.require(
             controls.tolerance >= 1e-14 && controls.tolerance < 1.0,
             "/solver/tolerance".into(),
@@ -126,53 +120,121 @@ impl Findings {
         );
     }
 
-    pub(super) fn contact_numbers(&mut self, contact: &Contact, pointer: &str) {
-        if let Obstacle::Circle { radius, .. } | Obstacle::Parabola { radius, .. } =
-            contact.obstacle
-        {
+    pub(super) fn steps(&mut self, steps: &[Step]) {
+        /// Far beyond any use, and still a bounded time.
+        const MOST_INCREMENTS: u32 = 10_000;
+        for (i, step) in steps.iter().enumerate() {
             self.require(
-                radius > 0.0,
-                format!("{pointer}/obstacle/radius"),
-                radius,
-                "a length > 0",
-                "The obstacle is convex towards the body.",
+                (1..=MOST_INCREMENTS).contains(&step.increments),
+                format!("/steps/{i}/increments"),
+                f64::from(step.increments),
+                &format!("1 … {MOST_INCREMENTS}"),
+                "1 is enough for the total law; the incremental law wants a few dozen for curved obstacles.",
             );
         }
-        if let (Some(from), Some(to), _) = obstacle::span(&contact.obstacle)
-            && from >= to
-        {
-            self.say(
-                format!("{pointer}/obstacle/to"),
-                "out_of_range",
-                to,
-                format!("more than `from`, {from}"),
-                "`from` and `to` are the ends of the obstacle.",
-            );
+    }
+
+    /// Choices of the thesis's own iteration, and what it can be used for.
+    pub(super) fn thesis(&mut self, problem: &Problem) {
+        let controls = &problem.solver;
+        if controls.algorithm != Algorithm::Thesis {
+            if controls.thesis.is_some() {
+                self.say(
+                    "/solver/thesis",
+                    "not_used",
+                    "choices for the thesis's iteration",
+                    "them with \"algorithm\": \"thesis\" only",
+                    "Choose that algorithm, or leave them out.",
+                );
+            }
+            return;
         }
-        let Some(friction) = &contact.friction else {
+        for (i, contact) in problem.contacts.iter().enumerate() {
+            if contact.condition != Condition::Unilateral {
+                self.say(
+                    format!("/contacts/{i}/condition"),
+                    "not_used",
+                    "another condition than `unilateral`",
+                    "unilateral contact",
+                    "The thesis's iteration knows no other; choose another algorithm.",
+                );
+            }
+            let incremental = |f: &Friction| f.history == History::Incremental;
+            if contact.friction.as_ref().is_some_and(incremental) {
+                self.say(
+                    format!("/contacts/{i}/friction/history"),
+                    "not_used",
+                    "`incremental`",
+                    "`total`",
+                    "The thesis's law remembers nothing; choose another algorithm.",
+                );
+            }
+        }
+        for (i, contact) in problem.contacts.iter().enumerate() {
+            let nodal = |f: &Friction| f.points == FrictionPoints::Nodal;
+            if contact.friction.as_ref().is_some_and(nodal) {
+                self.say(
+                    format!("/contacts/{i}/friction/points"),
+                    "not_used",
+                    "`nodal`",
+                    "`gauss3`",
+                    "The thesis evaluates friction at Gauss points; choose another algorithm.",
+                );
+            }
+        }
+        let Some(options) = &controls.thesis else {
             return;
         };
-        let at = |field: &str| format!("{pointer}/friction/{field}");
         self.require(
-            friction.coefficient >= 0.0,
-            at("coefficient"),
-            friction.coefficient,
-            "a number ≥ 0",
-            "Leave `friction` out for frictionless contact.",
+            options.relaxation > 0.0 && options.relaxation <= 1.0,
+            "/solver/thesis/relaxation".into(),
+            options.relaxation,
+            "0 < relaxation ≤ 1",
+            "1 takes the new friction force as it is.",
         );
         self.require(
-            friction.nonlocal_radius >= 0.0,
-            at("nonlocal_radius"),
-            friction.nonlocal_radius,
-            "a length ≥ 0",
-            "0 is Coulomb's local law.",
+            [1, 2].contains(&options.friction_force),
+            "/solver/thesis/friction_force".into(),
+            f64::from(options.friction_force),
+            "1 or 2",
+            "The two ways of thesis 3.2.",
         );
         self.require(
-            friction.elastic_slip > 0.0,
-            at("elastic_slip"),
-            friction.elastic_slip,
-            "a length > 0",
-            "About 1e-4 of the contact's width; below 1e-5 nothing physical changes.",
+            options.local_points <= 100,
+            "/solver/thesis/local_points".into(),
+            f64::from(options.local_points),
+            "0 … 100",
+            "0 averages nodal values without regard to the mesh.",
         );
+        if options.local_points > 0 && options.pressure == ThesisPressure::Lumped {
+            self.say(
+                "/solver/thesis/local_points",
+                "not_used",
+                options.local_points,
+                "0 with lumped pressure",
+                "Local Gauss points carry an extrapolated stress; choose that pressure.",
+            );
+        }
+        for (name, [s0, s1]) in &options.contact_guess {
+            let pointer = format!("/solver/thesis/contact_guess/{}", escape(name));
+            if !problem.contacts.iter().any(|c| c.boundary == *name) {
+                self.say(
+                    &pointer,
+                    "unknown_boundary",
+                    name,
+                    "the boundary of a contact",
+                    "Guess for the boundaries named under /contacts.",
+                );
+            }
+            if s0 >= s1 {
+                self.say(
+                    &pointer,
+                    "out_of_range",
+                    format!("[{s0}, {s1}]"),
+                    "a first end below the second",
+                    "Arc length from the first node of Γ_C.",
+                );
+            }
+        }
     }
 }

@@ -1,11 +1,67 @@
-//! Supports, loads, and whether the supports hold the body.
+//! Supports, and whether they (or contact) hold the body.
 
 use std::collections::BTreeMap;
 
 use super::findings::{ALIGNED, AXIS, Findings};
+use super::{ContactModel, Model};
 use crate::elasticity::Section;
 use crate::mesh::{Edge, Mesh};
-use crate::problem::{BoundaryValue, Load, Support};
+use crate::problem::{BoundaryValue, Condition, Friction, PrescribedBound, Support};
+
+/// What supports prescribe at a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Held {
+    /// The displacement along one direction.
+    Along {
+        /// Unit vector.
+        direction: [f64; 2],
+        /// Displacement along it (length).
+        value: f64,
+    },
+    /// The whole displacement along x and y.
+    Both([f64; 2]),
+}
+
+impl Held {
+    /// The displacement along a direction (unit vector), where it is prescribed.
+    pub fn along(&self, along: [f64; 2]) -> Option<f64> {
+        match *self {
+            Held::Both(u) => Some(u[0] * along[0] + u[1] * along[1]),
+            Held::Along { direction, value } => {
+                let cosine = direction[0] * along[0] + direction[1] * along[1];
+                parallel(direction, along).then(|| value * cosine.signum())
+            }
+        }
+    }
+
+    /// With one more prescribed displacement; `Err` has what is prescribed already and differs.
+    fn and(self, along: [f64; 2], value: f64, rounding: f64) -> Result<Self, f64> {
+        if let Some(known) = self.along(along) {
+            return if (known - value).abs() <= rounding {
+                Ok(self)
+            } else {
+                Err(known)
+            };
+        }
+        let Held::Along {
+            direction: [a, b],
+            value: first,
+        } = self
+        else {
+            return Ok(self);
+        };
+        let [c, d] = along;
+        let det = a * d - b * c;
+        Ok(Held::Both([
+            (first * d - value * b) / det,
+            (value * a - first * c) / det,
+        ]))
+    }
+}
+
+fn parallel(a: [f64; 2], b: [f64; 2]) -> bool {
+    (a[0] * b[1] - a[1] * b[0]).abs() <= ALIGNED
+}
 
 impl Findings {
     /// Prescribed displacements by node. A body of revolution cannot leave its axis: there u_r = 0
@@ -15,48 +71,79 @@ impl Findings {
         mesh: &Mesh,
         section: &Section,
         supports: &[Support],
-    ) -> BTreeMap<u32, [Option<f64>; 2]> {
-        let mut fixed: BTreeMap<u32, [Option<f64>; 2]> = BTreeMap::new();
+    ) -> BTreeMap<u32, Held> {
+        let mut fixed: BTreeMap<u32, Held> = BTreeMap::new();
         if section.axisymmetric() {
             let radius = mesh.nodes.iter().map(|[r, _]| *r).fold(0.0, f64::max);
             let on_axis = |n: &u32| mesh.nodes[*n as usize][0] <= AXIS * radius;
             for node in (0..mesh.nodes.len() as u32).filter(on_axis) {
-                fixed.insert(node, [Some(0.0), None]);
+                let (direction, value) = ([1.0, 0.0], 0.0);
+                fixed.insert(node, Held::Along { direction, value });
             }
         }
         let size = supports
             .iter()
-            .flat_map(|s| [s.ux, s.uy])
+            .flat_map(|s| [s.ux, s.uy, s.un, s.ut])
             .flatten()
             .map(largest)
             .fold(0.0, f64::max);
         for (i, support) in supports.iter().enumerate() {
             let pointer = format!("/supports/{i}");
-            if support.ux.is_none() && support.uy.is_none() {
+            let fields = [
+                ("ux", support.ux),
+                ("uy", support.uy),
+                ("un", support.un),
+                ("ut", support.ut),
+            ];
+            let named = fields.map(|(_, value)| value.is_some());
+            if named == [false; 4] {
                 self.say(
                     &pointer,
                     "empty",
-                    "neither `ux` nor `uy`",
+                    "neither `ux` nor `uy` nor `un` nor `ut`",
                     "at least one of them",
                     "Prescribe a displacement or remove the support.",
                 );
+            }
+            if (named[0] || named[1]) && (named[2] || named[3]) {
+                self.say(
+                    &pointer,
+                    "wrong_count",
+                    "displacements along x, y and along normal, tangent",
+                    "one pair of directions",
+                    "Write two supports where both are meant.",
+                );
+                continue;
             }
             let Some(edges) = self.boundary(mesh, &support.boundary, format!("{pointer}/boundary"))
             else {
                 continue;
             };
-            for (axis, (field, value)) in [("ux", support.ux), ("uy", support.uy)]
-                .into_iter()
-                .enumerate()
-            {
+            let normals = if named[2] || named[3] {
+                self.normals(mesh, edges, &format!("{pointer}/boundary"))
+            } else {
+                BTreeMap::new()
+            };
+            for (field, value) in fields {
                 let Some(value) = value else { continue };
                 let place = format!("{pointer}/{field}");
                 let mut conflict = None;
                 for (edge, values) in self.along(mesh, edges, value, place.clone()) {
                     for (node, value) in edge.into_iter().zip(values) {
-                        let known = fixed.entry(node).or_default()[axis].get_or_insert(value);
-                        if (*known - value).abs() > ALIGNED * size {
-                            conflict = Some((node, *known, value));
+                        let direction = match (field, normals.get(&node)) {
+                            ("ux", _) => [1.0, 0.0],
+                            ("uy", _) => [0.0, 1.0],
+                            ("un", Some(n)) => *n,
+                            ("ut", Some([x, y])) => [*y, -x],
+                            _ => continue,
+                        };
+                        let held = match fixed.get(&node) {
+                            None => Ok(Held::Along { direction, value }),
+                            Some(held) => held.and(direction, value, ALIGNED * size),
+                        };
+                        match held {
+                            Ok(held) => drop(fixed.insert(node, held)),
+                            Err(known) => conflict = Some((node, known, value)),
                         }
                     }
                 }
@@ -77,42 +164,128 @@ impl Findings {
         fixed
     }
 
-    pub(super) fn loads(&mut self, mesh: &Mesh, loads: &[Load]) -> Vec<(Edge, [f64; 3])> {
-        let mut pressures = Vec::new();
-        for (i, load) in loads.iter().enumerate() {
-            if let Some(edges) = self.boundary(mesh, &load.boundary, format!("/loads/{i}/boundary"))
-            {
-                pressures.extend(self.along(
-                    mesh,
-                    edges,
-                    load.pressure,
-                    format!("/loads/{i}/pressure"),
-                ));
+    /// Unit outward normals at the nodes of a boundary; the mean of both edges at a corner that is
+    /// hardly one.
+    fn normals(&mut self, mesh: &Mesh, edges: &[Edge], pointer: &str) -> BTreeMap<u32, [f64; 2]> {
+        /// |n₁ + n₂|/2 at a turn of 45°.
+        const SHARPEST: f64 = 0.923;
+        let mut sums: BTreeMap<u32, ([f64; 2], f64)> = BTreeMap::new();
+        for edge in edges {
+            let normals = crate::contact::edge_normals(&mesh.edge_nodes(edge));
+            for (node, [x, y]) in edge.iter().zip(normals) {
+                let (sum, count) = sums.entry(*node).or_default();
+                *sum = [sum[0] + x, sum[1] + y];
+                *count += 1.0;
             }
         }
-        pressures
+        let mut normals = BTreeMap::new();
+        let mut corner = None;
+        for (node, ([x, y], count)) in sums {
+            let length = x.hypot(y);
+            if length < SHARPEST * count {
+                corner = Some(node);
+            }
+            // + 0.0 turns −0 into 0, so that an axis-parallel normal is exactly that
+            normals.insert(node, [x / length + 0.0, y / length + 0.0]);
+        }
+        if let Some(node) = corner {
+            let [x, y] = mesh.nodes[node as usize];
+            self.say(
+                pointer,
+                "turns_corner",
+                format!("a boundary that turns by more than 45° at ({x}, {y})"),
+                "a boundary without corners: at one there is no normal",
+                "Give each side a support of its own, with names under /mesh/boundaries.",
+            );
+        }
+        normals
     }
 
-    /// Every part of the body must be held against its rigid motions by supports.
+    /// Every part of the body must be held against its rigid motions, by supports or at least by
+    /// contact (if it touches). True where it is contact that does so.
     pub(super) fn freedom(
         &mut self,
         mesh: &Mesh,
         section: &Section,
-        fixed: &BTreeMap<u32, [Option<f64>; 2]>,
-    ) {
+        fixed: &BTreeMap<u32, Held>,
+        contacts: &[ContactModel],
+    ) -> bool {
+        let held = directions(fixed);
+        let touched: Vec<(u32, [f64; 2])> = contacts.iter().flat_map(hindered).collect();
+        let mut by_contact = false;
         for part in mesh.connected_parts() {
-            if let Some((direction, node)) = free_motion(mesh, section, fixed, &part) {
-                let [x, y] = mesh.nodes[node as usize];
-                self.say(
-                    "/supports",
-                    "free_body",
-                    format!("a body free to move: {direction}, e.g. node {node} at ({x}, {y})"),
-                    "supports against every rigid motion (contact does not count: it may open)",
-                    "Add a support with `ux` or `uy`. Parts that touch in a corner only do not hold each other.",
-                );
+            if free_motion(mesh, section, &held, &part).is_none() {
+                continue;
+            }
+            let all: Vec<_> = held.iter().chain(&touched).copied().collect();
+            match free_motion(mesh, section, &all, &part) {
+                None => by_contact = true,
+                Some((direction, node)) => {
+                    let [x, y] = mesh.nodes[node as usize];
+                    self.say(
+                        "/supports",
+                        "free_body",
+                        format!("a body free to move: {direction}, e.g. node {node} at ({x}, {y})"),
+                        "supports or contacts against every rigid motion",
+                        "Add a support with `ux` or `uy`. Parts that touch in a corner only do not hold each other.",
+                    );
+                }
             }
         }
+        by_contact
     }
+}
+
+impl Model {
+    /// A rigid motion that neither supports nor the given nodes and directions hinder, in words, and
+    /// a node that moves.
+    pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(&'static str, u32)> {
+        let mut held = directions(&self.fixed);
+        held.extend(hindered);
+        let parts = self.mesh.connected_parts();
+        parts
+            .iter()
+            .find_map(|part| free_motion(&self.mesh, &self.section, &held, part))
+    }
+}
+
+/// Nodes and the directions they are held along.
+fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<(u32, [f64; 2])> {
+    let mut held = Vec::new();
+    for (&node, what) in fixed {
+        match what {
+            Held::Along { direction, .. } => held.push((node, *direction)),
+            Held::Both(_) => held.extend([(node, [1.0, 0.0]), (node, [0.0, 1.0])]),
+        }
+    }
+    held
+}
+
+/// The motions of its nodes that a contact hinders while it touches.
+fn hindered(contact: &ContactModel) -> Vec<(u32, [f64; 2])> {
+    let acts = |f: &Friction| {
+        f.coefficient.is_some_and(|mu| mu > 0.0)
+            || f.cohesion > 0.0
+            || match &f.bound {
+                Some(PrescribedBound::Constant(bound)) => *bound > 0.0,
+                Some(PrescribedBound::Table(table)) => table.bound.iter().any(|b| *b > 0.0),
+                None => false,
+            }
+    };
+    let normal = contact.condition != Condition::None;
+    let tangent =
+        contact.condition == Condition::Bonded || contact.friction.as_ref().is_some_and(acts);
+    let boundary = &contact.boundary;
+    let mut hindered = Vec::new();
+    for (i, &node) in boundary.nodes.iter().enumerate() {
+        if normal {
+            hindered.push((node, boundary.normals[i]));
+        }
+        if tangent {
+            hindered.push((node, boundary.tangent(i)));
+        }
+    }
+    hindered
 }
 
 fn largest(value: BoundaryValue) -> f64 {
@@ -125,11 +298,11 @@ fn largest(value: BoundaryValue) -> f64 {
 /// Displacement of a node.
 type Motion<'a> = Box<dyn Fn(u32) -> [f64; 2] + 'a>;
 
-/// A rigid motion of the nodes `part` that no support hinders, and the node that it moves most.
+/// A rigid motion of the nodes `part` that is not `held` (nodes and directions), and the node that it moves most.
 fn free_motion(
     mesh: &Mesh,
     section: &Section,
-    fixed: &BTreeMap<u32, [Option<f64>; 2]>,
+    held: &[(u32, [f64; 2])],
     part: &[u32],
 ) -> Option<(&'static str, u32)> {
     // Rotation is taken about the part's centre and scaled by its size, so that all motions compare.
@@ -162,17 +335,18 @@ fn free_motion(
             ),
         ]
     };
+    let own: std::collections::HashSet<u32> = part.iter().copied().collect();
     // Gram–Schmidt on the motions as seen by the supports: what has nothing left is free.
     let mut seen: Vec<(Vec<f64>, &'static str)> = Vec::new();
     for (name, motion) in &motions {
-        let mut values: Vec<f64> = Vec::new();
-        for &node in part {
-            let Some(fixed) = fixed.get(&node) else {
-                continue;
-            };
-            let u = motion(node);
-            values.extend((0..2).filter(|&a| fixed[a].is_some()).map(|a| u[a]));
-        }
+        let mut values: Vec<f64> = held
+            .iter()
+            .filter(|(node, _)| own.contains(node))
+            .map(|(node, [a, b])| {
+                let [x, y] = motion(*node);
+                a * x + b * y
+            })
+            .collect();
         for (other, _) in &seen {
             let dot: f64 = values.iter().zip(other).map(|(a, b)| a * b).sum();
             values

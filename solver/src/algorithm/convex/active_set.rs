@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::{AIM, Minimum, follow, free_dofs, gradient, newton_direction};
+use super::{AIM, Minimum, close, follow, free_dofs, gradient, newton_direction};
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 
@@ -29,7 +29,7 @@ pub(super) fn run(
         free.iter()
             .zip(&delta)
             .for_each(|(&dof, d)| state.v[dof] += d);
-        let changed = update_active(system, bound, &mut state);
+        let changed = update_active(system, &mut state);
         let residual = system.kkt_residual(&state, bound);
         // with the sets settled a step is exact but for rounding: what it does not gain is not there
         let settled = !changed && best.as_ref().is_some_and(|b| residual > 0.5 * b.residual);
@@ -54,24 +54,16 @@ pub(super) fn run(
     })
 }
 
-/// Puts active nodes onto the obstacle.
-fn close(system: &System<'_>, state: &mut State) {
-    for (node, active) in system.nodes.iter().zip(&state.active) {
-        if let (true, Dof::Free(dof)) = (active, node.normal) {
-            state.v[dof] = node.gap;
-        }
-    }
-}
-
 /// Keeps nodes that are pressed, adds nodes that have passed the obstacle; true on any change.
-fn update_active(system: &System<'_>, bound: &[f64], state: &mut State) -> bool {
-    let force = gradient(system, &state.v, bound);
+pub(in crate::algorithm) fn update_active(system: &System<'_>, state: &mut State) -> bool {
+    // friction acts along t only: it does not enter the reactions
+    let force = system.elastic_force(&state.v);
     let mut changed = false;
     for (i, node) in system.nodes.iter().enumerate() {
         let Dof::Free(dof) = node.normal else {
             continue;
         };
-        if node.follows.is_some() {
+        if !node.decides() {
             continue;
         }
         let active = if state.active[i] {

@@ -9,6 +9,9 @@
 mod active_set;
 mod projected_newton;
 
+pub(super) use active_set::update_active;
+pub(super) use projected_newton::least_along;
+
 use std::ops::ControlFlow;
 
 use crate::algorithm::system::{State, System};
@@ -51,8 +54,20 @@ pub fn minimise(
     }
 }
 
+/// Puts the nodes that are in contact onto the obstacle, and what is held along t where it is held.
+pub(super) fn close(system: &System<'_>, state: &mut State) {
+    for (node, active) in system.nodes.iter().zip(&state.active) {
+        if let (true, Dof::Free(dof)) = (active, node.normal) {
+            state.v[dof] = node.gap;
+        }
+        if let (Dof::Free(dof), Some(held)) = (node.tangent, node.held_tangent) {
+            state.v[dof] = held;
+        }
+    }
+}
+
 /// Nodes on the axis take the state of their neighbours; true on any change.
-fn follow(system: &System<'_>, active: &mut [bool]) -> bool {
+pub(super) fn follow(system: &System<'_>, active: &mut [bool]) -> bool {
     let mut changed = false;
     for (i, node) in system.nodes.iter().enumerate() {
         if let Some([next, _]) = node.follows {
@@ -66,22 +81,33 @@ fn follow(system: &System<'_>, active: &mut [bool]) -> bool {
 /// ∇J.
 fn gradient(system: &System<'_>, v: &[f64], bound: &[f64]) -> Vec<f64> {
     let mut force = system.elastic_force(v);
-    system.add_friction_force(v, bound, &mut force);
+    system.add_traction_force(&system.tractions(v, bound), &mut force);
     force
 }
 
-/// Unknowns that are not held: all tangential ones, and the normal ones of nodes not `held`.
-fn free_dofs(system: &System<'_>, held: impl Fn(usize) -> bool) -> Vec<usize> {
+/// Unknowns that are not held: the normal ones of nodes not `held`, and the tangential ones.
+pub(super) fn free_dofs(system: &System<'_>, held: impl Fn(usize) -> bool) -> Vec<usize> {
     let mut free = Vec::with_capacity(system.load.len());
     for (i, node) in system.nodes.iter().enumerate() {
         if let (Dof::Free(dof), false) = (node.normal, held(i)) {
             free.push(dof);
         }
-        if let Dof::Free(dof) = node.tangent {
+        if let (Dof::Free(dof), None) = (node.tangent, node.held_tangent) {
             free.push(dof);
         }
     }
     free
+}
+
+/// Added to the diagonal of H where Ŝ leaves rigid motions free: a step along one is then long but
+/// finite, until contact ends it. Where contact holds the body it costs a step or two, no accuracy:
+/// the gradient knows nothing of it.
+pub(super) fn semidefinite_shift(system: &System<'_>) -> f64 {
+    let size = system.stiffness.size().max(1);
+    let diagonal: f64 = (0..system.stiffness.size())
+        .map(|i| system.stiffness.at(i, i))
+        .sum();
+    1e-9 * diagonal / size as f64
 }
 
 /// −H⁻¹ ∇J on the free unknowns, H = Ŝ + Σ w τ φ′ h hᵀ.
@@ -111,7 +137,15 @@ fn newton_direction(
             }
         }
     }
-    let elastic = |i: usize, j: usize| system.stiffness.at(free[i], free[j]);
+    let shift = if system.semidefinite {
+        semidefinite_shift(system)
+    } else {
+        0.0
+    };
+    let elastic = |i: usize, j: usize| {
+        let shift = if i == j { shift } else { 0.0 };
+        system.stiffness.at(free[i], free[j]) + shift
+    };
     let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
     let direction = solve_positive_definite(free.len(), elastic, &friction, &rhs)?;
     direction.iter().all(|d| d.is_finite()).then_some(direction)

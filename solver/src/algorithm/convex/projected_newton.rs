@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::{AIM, Minimum, follow, free_dofs, gradient, newton_direction};
+use super::{AIM, Minimum, close, follow, free_dofs, gradient, newton_direction};
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::elasticity::Dof;
 use crate::friction::FrictionLaw;
@@ -34,7 +34,9 @@ pub(super) fn run(
     follow(system, &mut locked);
     let mut steps = 0;
     for _ in 0..4 {
-        let mut v = start.v.clone();
+        let mut begin = start.clone();
+        close(system, &mut begin);
+        let mut v = begin.v;
         project(system, &mut v, &locked);
         while steps < PROJECTED_STEPS {
             let mut force = gradient(system, &v, bound);
@@ -60,7 +62,7 @@ pub(super) fn run(
             let held = binding(system, &v, &force, &locked);
             for (i, node) in system.nodes.iter().enumerate() {
                 if let (true, Dof::Free(dof)) = (held[i], node.normal)
-                    && node.follows.is_none()
+                    && node.decides()
                 {
                     v[dof] = node.gap;
                 }
@@ -95,20 +97,20 @@ fn project(system: &System<'_>, v: &mut [f64], locked: &[bool]) {
         let Dof::Free(dof) = node.normal else {
             continue;
         };
-        match node.follows {
-            Some(_) if locked[i] => v[dof] = node.gap,
-            Some(_) => {}
-            None => v[dof] = v[dof].min(node.gap),
+        match node.decides() {
+            false if locked[i] => v[dof] = node.gap,
+            false => {}
+            true => v[dof] = v[dof].min(node.gap),
         }
     }
 }
 
 /// The active set that a point stands for: nodes on the obstacle and pressed against it.
 fn pressed(system: &System<'_>, v: &[f64], force: &[f64], locked: &[bool]) -> Vec<bool> {
-    let state = |(i, node): (usize, &ContactNode)| match (node.normal, node.follows) {
+    let state = |(i, node): (usize, &ContactNode)| match (node.normal, node.decides()) {
         (Dof::Fixed(_), _) => false,
-        (_, Some(_)) => locked[i],
-        (Dof::Free(dof), None) => v[dof] >= node.gap && -force[dof] >= 0.0,
+        (_, false) => locked[i],
+        (Dof::Free(dof), true) => v[dof] >= node.gap && -force[dof] >= 0.0,
     };
     system.nodes.iter().enumerate().map(state).collect()
 }
@@ -117,16 +119,16 @@ fn pressed(system: &System<'_>, v: &[f64], force: &[f64], locked: &[bool]) -> Ve
 fn binding(system: &System<'_>, v: &[f64], force: &[f64], locked: &[bool]) -> Vec<bool> {
     // nearness is measured by the natural residual: it shrinks as the solution is approached
     let mut natural: f64 = 0.0;
-    for node in system.nodes.iter().filter(|node| node.follows.is_none()) {
+    for node in system.nodes.iter().filter(|node| node.decides()) {
         if let Dof::Free(dof) = node.normal {
             let step = -force[dof] / system.stiffness.at(dof, dof);
             natural = natural.max(step.min(node.gap - v[dof]).abs());
         }
     }
-    let holds = |(i, node): (usize, &ContactNode)| match (node.normal, node.follows) {
+    let holds = |(i, node): (usize, &ContactNode)| match (node.normal, node.decides()) {
         (Dof::Fixed(_), _) => true,
-        (_, Some(_)) => locked[i],
-        (Dof::Free(dof), None) => {
+        (_, false) => locked[i],
+        (Dof::Free(dof), true) => {
             let near = natural.min(-force[dof] / system.stiffness.at(dof, dof));
             force[dof] < 0.0 && node.gap - v[dof] <= near
         }
@@ -151,7 +153,7 @@ fn line_search(
     let blocked_at = system
         .nodes
         .iter()
-        .filter(|node| node.follows.is_none())
+        .filter(|node| node.decides())
         .filter_map(|node| match node.normal {
             Dof::Free(dof) if d[dof] > 0.0 => Some((node.gap - v[dof]) / d[dof]),
             _ => None,
@@ -177,6 +179,22 @@ fn line_search(
         step *= 0.5;
     }
     false
+}
+
+/// The α in (0, 1] with the least J along v + α d; 1 where d does not lead downhill.
+pub(in crate::algorithm) fn least_along(
+    system: &System<'_>,
+    bound: &[f64],
+    v: &[f64],
+    d: &[f64],
+) -> f64 {
+    let force = gradient(system, v, bound);
+    let slope: f64 = force.iter().zip(d).map(|(g, d)| g * d).sum();
+    if slope < 0.0 {
+        Along::new(system, bound, v, d, slope).minimum(1.0)
+    } else {
+        1.0
+    }
 }
 
 /// J along a line v + α d.

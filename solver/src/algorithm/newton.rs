@@ -1,0 +1,204 @@
+//! One monolithic semi-smooth Newton iteration for contact, friction and averaging together,
+//! FORMULATION 4.3. The friction bound is a function of the displacements here,
+//!
+//!   τ(v) = bound(W p),   p = P R,   R = f̂_n − Ŝ_n v on active nodes,
+//!
+//! and is differentiated:
+//!
+//!   H = Ŝ + Σ_g w τ φ′ h hᵀ − Σ_g w φ τ′ h (W P Ŝ_n)_g
+//!
+//! Not symmetric. A step that does not lessen the residual is cut to the least energy along it, for
+//! the friction bound before it; beyond that there is no safeguard. Where it converges it takes four
+//! to twenty steps.
+
+use crate::algorithm::End;
+use crate::algorithm::convex::{
+    close, follow, free_dofs, least_along, semidefinite_shift, update_active,
+};
+use crate::algorithm::system::{Point, State, System};
+use crate::algorithm::track::{Measured, Row, Track};
+use crate::elasticity::Dof;
+use crate::friction::Source;
+use crate::linear::solve_general;
+use crate::solution::{Observer, Outcome, Stage};
+
+/// Steps without progress after which there will be none.
+const PATIENCE: u32 = 20;
+
+/// Iterates from a state; the best state reached comes back.
+pub(super) fn run(
+    track: &mut Track<'_, '_>,
+    start: &Measured,
+    most_steps: u32,
+    observe: &mut Observer<'_>,
+) -> End {
+    let system = track.system;
+    let tolerance = track.controls.tolerance;
+    let mut end = End {
+        measured: start.clone(),
+        stage: Stage::Newton,
+        outcome: Outcome::NotConverged,
+        cycle: None,
+        contraction: None,
+        exhausted: false,
+    };
+    let mut state = start.state.clone();
+    follow(system, &mut state.active);
+    let (mut best, mut residual_before) = (f64::INFINITY, f64::INFINITY);
+    let mut since_best = 0;
+    for _ in 0..most_steps {
+        close(system, &mut state);
+        let Some((measured, changed)) = next(system, &state, residual_before) else {
+            return end;
+        };
+        state = measured.state.clone();
+        let residual = measured.residuals.monolithic;
+        residual_before = residual;
+        let row = Row {
+            stage: Stage::Newton,
+            residual,
+            contraction: None,
+            inner: 1,
+            tractions: system.tractions(&measured.state.v, &measured.bound),
+            relaxation: 1.0,
+        };
+        let answer = track.tell(&measured, row, observe);
+        let converged = !changed && measured.within(tolerance);
+        since_best += 1;
+        if residual < 0.9 * best || converged {
+            (best, since_best) = (residual, 0);
+            end.measured = measured;
+        }
+        if converged {
+            end.outcome = Outcome::Converged;
+            return end;
+        }
+        if answer.is_break() {
+            end.outcome = Outcome::Canceled;
+            return end;
+        }
+        end.cycle = track.note(&state, residual);
+        if end.cycle.is_some() {
+            end.outcome = Outcome::ContactCycling;
+            return end;
+        }
+        if since_best >= PATIENCE {
+            break;
+        }
+    }
+    end
+}
+
+/// The state after a step: the whole of it where that lessens the residual, else the part with the
+/// least energy; and whether the contact set changed.
+fn next(system: &System<'_>, state: &State, residual: f64) -> Option<(Measured, bool)> {
+    let target = step(system, state)?;
+    let reach = |part: f64| {
+        let moved = state.v.iter().zip(&target).map(|(a, b)| a + part * (b - a));
+        let mut reached = State {
+            v: moved.collect(),
+            active: state.active.clone(),
+        };
+        let changed = update_active(system, &mut reached);
+        let bound = implied_bound(system, &reached);
+        (Measured::new(system, reached, bound), changed)
+    };
+    let whole = reach(1.0);
+    if whole.0.residuals.monolithic < residual {
+        return Some(whole);
+    }
+    let direction: Vec<f64> = target.iter().zip(&state.v).map(|(a, b)| a - b).collect();
+    let part = least_along(system, &implied_bound(system, state), &state.v, &direction);
+    Some(if part < 1.0 { reach(part) } else { whole })
+}
+
+fn implied_bound(system: &System<'_>, state: &State) -> Vec<f64> {
+    system.friction_bound(&system.pressures(&system.reactions(state)))
+}
+
+/// v after one Newton step; active nodes stay on the obstacle.
+fn step(system: &System<'_>, state: &State) -> Option<Vec<f64>> {
+    let free = free_dofs(system, |i| state.active[i]);
+    let mut place = vec![usize::MAX; system.load.len()];
+    free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
+    let pressures = system.pressures(&system.reactions(state));
+    let bound = system.friction_bound(&pressures);
+
+    let mut force = system.elastic_force(&state.v);
+    system.add_traction_force(&system.tractions(&state.v, &bound), &mut force);
+    let shift = if system.semidefinite {
+        semidefinite_shift(system)
+    } else {
+        0.0
+    };
+    let n = free.len();
+    let mut h: Vec<Vec<f64>> = (0..n)
+        .map(|j| {
+            let column = system.stiffness.column(free[j]);
+            free.iter().map(|&i| column[i]).collect()
+        })
+        .collect();
+    (0..n).for_each(|i| h[i][i] += shift);
+    for (point, tau) in system.points.iter().zip(&bound) {
+        let (law, slip) = (system.law(point), system.slip(&state.v, point));
+        let rows: Vec<(usize, f64)> = (0..3)
+            .filter_map(|i| match system.nodes[point.nodes[i]].tangent {
+                Dof::Free(dof) if place[dof] != usize::MAX => Some((place[dof], point.shape[i])),
+                _ => None,
+            })
+            .collect();
+        let stiffness = point.weight * tau * law.phi_slope(slip);
+        for &(row, a) in &rows {
+            for &(column, b) in &rows {
+                h[column][row] += stiffness * a * b;
+            }
+        }
+        let coupling = point.weight * law.phi(slip) * law.bound.slope(averaged(point, &pressures));
+        if coupling == 0.0 {
+            continue;
+        }
+        for (dof, weight) in reaction_weights(system, state, point) {
+            // dR/dv = −Ŝ: the row of Ŝ is its column
+            let column = system.stiffness.column(dof);
+            for (k, &free_dof) in free.iter().enumerate() {
+                let value = coupling * weight * column[free_dof];
+                rows.iter().for_each(|&(row, a)| h[k][row] -= a * value);
+            }
+        }
+    }
+    let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
+    let delta = solve_general(&h, &rhs).filter(|d| d.iter().all(|x| x.is_finite()))?;
+    let mut v = state.v.clone();
+    free.iter().zip(&delta).for_each(|(&dof, d)| v[dof] += d);
+    Some(v)
+}
+
+fn averaged(point: &Point, pressures: &[f64]) -> f64 {
+    point.source.nonlocal_pressure(pressures)
+}
+
+/// The averaged pressure of a point as a sum over reactions: normal unknowns of active nodes and
+/// their weights, W P.
+fn reaction_weights(system: &System<'_>, state: &State, point: &Point) -> Vec<(usize, f64)> {
+    let Source::Average(row) = &point.source else {
+        return Vec::new();
+    };
+    let mut weights: Vec<(usize, f64)> = Vec::with_capacity(row.weights.len());
+    let mut add = |node: usize, weight: f64| {
+        if let (Dof::Free(dof), true) = (system.nodes[node].normal, state.active[node]) {
+            weights.push((dof, weight / system.nodes[node].weight));
+        }
+    };
+    for (i, &weight) in row.weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+        let node = row.first + i;
+        match system.nodes[node].follows {
+            // as in System::pressures
+            Some([next, after]) => {
+                add(next, 4.0 / 3.0 * weight);
+                add(after, -weight / 3.0);
+            }
+            None => add(node, weight),
+        }
+    }
+    weights
+}

@@ -1,0 +1,231 @@
+//! The thesis's own iteration (3.1), to the letter.
+//!
+//! It stays because the thesis is our source, and because it shows what the other algorithms repair:
+//! at the thesis's parameters it does not solve the problem (FORMULATION 4). Friction enters as a
+//! load that is one iteration old, and the gain of that loop, μS/ε × tangential compliance, is in the
+//! hundreds. Without the sign it settles in a false state of full slip, friction pushing along the
+//! motion; with the sign it falls into a cycle of two. So the residuals that come back are those of
+//! the true problem, and the outcome says so when they are large.
+//!
+//! Readings: f̂ is a stress along t, so that K u = F − F̂ with σ_n < 0 pushes the body along +t; the
+//! pressure is `lumped` (R/∫h) or `extrapolated` from internal Gauss points (3.3, file `rows`); it is
+//! averaged by the mesh-free W, or with `local_points` as 3.4.2 says (file `average`); a Gauss point lies on Γ_C* where the nodes on either side of it do; R_F is divided by
+//! the relaxation factor.
+
+mod average;
+mod rows;
+
+use crate::algorithm::End;
+use crate::algorithm::convex::{close, follow, free_dofs};
+use crate::algorithm::system::{State, System};
+use crate::algorithm::track::{Measured, Row, Track, relative_change};
+use crate::elasticity::Dof;
+use crate::linear::solve_positive_definite;
+use crate::problem::{ThesisOptions, ThesisPressure};
+use crate::solution::{Observer, Outcome, Stage};
+use rows::Rows;
+
+/// Friction at every friction point.
+#[derive(Clone)]
+struct Friction {
+    /// τ = μ max(S, 0) (stress).
+    bound: Vec<f64>,
+    /// σ_t on the body, along t (stress); F̂ is its load with the opposite sign.
+    traction: Vec<f64>,
+}
+
+/// Iterates; the tractions that the final state was solved with come back beside it.
+pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End, Vec<f64>) {
+    let system = track.system;
+    let options = track.controls.thesis.clone().unwrap_or_default();
+    let rows = Rows::new(system);
+    let nothing = vec![0.0; system.points.len()];
+    let mut friction = Friction {
+        bound: nothing.clone(),
+        traction: nothing,
+    };
+    let mut state = first_guess(system, &options);
+    let mut normal_stress: Option<Vec<f64>> = None;
+    let mut end: Option<(End, Vec<f64>)> = None;
+    for _ in 0..track.controls.max_iterations {
+        // steps 1 and 2; a state that cannot be solved for is the end
+        let Some(v) = solve(system, &state.active, &friction.traction) else {
+            break;
+        };
+        state.v = v;
+        // step 3
+        let seen = rows.see(system, &state, &friction.traction, &options);
+        // step 4
+        let next = next_contact(system, &state, &seen.node_stress);
+        let unchanged = next == state.active;
+        // step 5
+        let new = new_friction(system, &state, &next, &seen, &options);
+        // step 6
+        let r_f = normal_stress
+            .as_ref()
+            .map(|before| relative_change(&seen.node_stress, before) / options.relaxation);
+        let settled = unchanged && r_f.is_some_and(|r_f| r_f <= track.controls.tolerance);
+        normal_stress = Some(seen.node_stress);
+
+        let measured = Measured::new(system, state.clone(), friction.bound.clone());
+        let row = Row {
+            stage: Stage::Thesis,
+            residual: measured.residuals.monolithic,
+            contraction: None,
+            inner: 1,
+            tractions: friction.traction.clone(),
+            relaxation: options.relaxation,
+        };
+        let answer = track.tell(&measured, row, observe);
+        // a slow approach passes the same states again and again; only a full step cycles
+        let cycle = if options.relaxation == 1.0 {
+            track.note(&state, r_f.unwrap_or(1.0))
+        } else {
+            None
+        };
+        let outcome = match (settled, answer.is_break(), &cycle) {
+            (true, _, _) if measured.residuals.monolithic <= track.controls.tolerance => {
+                Outcome::Converged
+            }
+            (true, _, _) => Outcome::FalseConvergence,
+            (_, true, _) => Outcome::Canceled,
+            (_, _, Some(_)) => Outcome::ContactCycling,
+            _ => Outcome::NotConverged,
+        };
+        let stop = outcome != Outcome::NotConverged;
+        let reached = End {
+            measured,
+            stage: Stage::Thesis,
+            outcome,
+            cycle,
+            contraction: None,
+            exhausted: true,
+        };
+        end = Some((reached, friction.traction.clone()));
+        if stop {
+            break;
+        }
+        relax(&mut friction, new, options.relaxation);
+        state.active = next;
+    }
+    end.unwrap_or_else(|| {
+        let measured = Measured::new(system, state, friction.bound);
+        let reached = End {
+            measured,
+            stage: Stage::Thesis,
+            outcome: Outcome::NotConverged,
+            cycle: None,
+            contraction: None,
+            exhausted: true,
+        };
+        (reached, friction.traction)
+    })
+}
+
+/// Γ_C*⁽¹⁾: the user's guess by arc length, else all of Γ_C.
+fn first_guess(system: &System<'_>, options: &ThesisOptions) -> State {
+    let mut state = system.rest();
+    for patch in &system.patches {
+        let guess = options.contact_guess.get(&patch.contact.name);
+        let s = &patch.contact.boundary.s;
+        for (i, node) in system.range(patch).enumerate() {
+            state.active[node] = guess.is_none_or(|[s0, s1]| (*s0..=*s1).contains(&s[i]));
+        }
+    }
+    follow(system, &mut state.active);
+    state
+}
+
+/// Steps 1 and 2. u_n = s on Γ_C*, σ_n = 0 off it, and K u = F − F̂.
+fn solve(system: &System<'_>, active: &[bool], traction: &[f64]) -> Option<Vec<f64>> {
+    let mut state = State {
+        v: vec![0.0; system.load.len()],
+        active: active.to_vec(),
+    };
+    close(system, &mut state);
+    let free = free_dofs(system, |i| active[i]);
+    let mut force = system.elastic_force(&state.v);
+    system.add_traction_force(traction, &mut force);
+    let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
+    let entry = |i: usize, j: usize| system.stiffness.at(free[i], free[j]);
+    let solved = solve_positive_definite(free.len(), entry, &[], &rhs)?;
+    free.iter()
+        .zip(solved)
+        .for_each(|(&dof, value)| state.v[dof] += value);
+    state.v.iter().all(|x| x.is_finite()).then_some(state.v)
+}
+
+/// Step 4. A node of Γ_C* with σ_n > 0 leaves it; a node off it with u_n ≥ s enters.
+fn next_contact(system: &System<'_>, state: &State, node_stress: &[f64]) -> Vec<bool> {
+    let stays = |(i, node): (usize, &crate::algorithm::ContactNode)| match node.normal {
+        Dof::Fixed(_) => false,
+        _ if state.active[i] => node_stress[i] <= 0.0,
+        Dof::Free(dof) => state.v[dof] >= node.gap,
+    };
+    let mut next: Vec<bool> = system.nodes.iter().enumerate().map(stays).collect();
+    follow(system, &mut next);
+    next
+}
+
+/// Step 5. f̂ = τ φ along Γ_C*, 0 off it; along +t, or against the motion where it has its sign.
+fn new_friction(
+    system: &System<'_>,
+    state: &State,
+    next: &[bool],
+    seen: &rows::Seen,
+    options: &ThesisOptions,
+) -> Friction {
+    let mut friction = match options.pressure {
+        ThesisPressure::Extrapolated if options.local_points > 0 => seen.friction(system, options),
+        _ => averaged(system, state, seen, options),
+    };
+    for (g, point) in system.points.iter().enumerate() {
+        let [start, end, middle] = point.nodes;
+        let xi = point.shape[1] - point.shape[0];
+        let touches = next[middle] && (xi >= 0.0 || next[start]) && (xi <= 0.0 || next[end]);
+        if !touches {
+            friction.bound[g] = 0.0;
+            friction.traction[g] = 0.0;
+        }
+    }
+    friction
+}
+
+/// τ by the mesh-free average of the nodal pressures at every friction point. φ is taken there (way 1 of 3.2) or carried from the two nearest rows of internal Gauss points (way 2).
+fn averaged(
+    system: &System<'_>,
+    state: &State,
+    seen: &rows::Seen,
+    options: &ThesisOptions,
+) -> Friction {
+    let pressures: Vec<f64> = seen.node_stress.iter().map(|stress| -stress).collect();
+    let bound = system.friction_bound(&pressures);
+    let traction = system.points.iter().zip(&bound).enumerate();
+    let traction = traction.map(|(g, (point, tau))| {
+        let phi = match options.friction_force {
+            1 => system.law(point).phi(system.slip(&state.v, point)),
+            _ => seen.phi[g],
+        };
+        tau * sense(phi, options)
+    });
+    Friction {
+        traction: traction.collect(),
+        bound,
+    }
+}
+
+/// σ_t / τ from φ with the sign of the motion.
+fn sense(phi: f64, options: &ThesisOptions) -> f64 {
+    if options.signed { -phi } else { phi.abs() }
+}
+
+/// Takes over a part of the new friction force.
+fn relax(friction: &mut Friction, new: Friction, part: f64) {
+    let mix = |old: &mut Vec<f64>, new: Vec<f64>| {
+        old.iter_mut()
+            .zip(new)
+            .for_each(|(old, new)| *old += part * (new - *old));
+    };
+    mix(&mut friction.bound, new.bound);
+    mix(&mut friction.traction, new.traction);
+}

@@ -1,0 +1,260 @@
+//! What every algorithm measures of its states, keeps of them and tells of them.
+
+use std::collections::HashMap;
+use std::ops::ControlFlow;
+
+use crate::algorithm::Place;
+use crate::algorithm::system::{State, System};
+use crate::problem::SolverControls;
+use crate::solution::{
+    ContactCount, ForcePair, FrictionCount, Iteration, Observer, Progress, Residuals, Stage,
+};
+
+/// A state with the friction bound it was found for, and what the two imply.
+#[derive(Clone)]
+pub(super) struct Measured {
+    pub(super) state: State,
+    /// τ at every friction point.
+    pub(super) bound: Vec<f64>,
+    /// τ that the state's own pressure implies.
+    pub(super) implied_bound: Vec<f64>,
+    pub(super) reactions: Vec<f64>,
+    pub(super) pressures: Vec<f64>,
+    /// kkt, friction and monolithic; equilibrium is the body's to say.
+    pub(super) residuals: Residuals,
+    /// max|τ − implied τ| (stress).
+    pub(super) bound_change: f64,
+}
+
+impl Measured {
+    pub(super) fn new(system: &System<'_>, state: State, bound: Vec<f64>) -> Self {
+        let reactions = system.reactions(&state);
+        let pressures = system.pressures(&reactions);
+        let implied_bound = system.friction_bound(&pressures);
+        let bound_change = largest_difference(&implied_bound, &bound);
+        // the largest bound, old or new: FORMULATION 4, guarded where one of them is nothing
+        let scale = implied_bound
+            .iter()
+            .chain(&bound)
+            .fold(0.0f64, |a, &b| a.max(b));
+        let residuals = Residuals {
+            kkt: system.kkt_residual(&state, &bound),
+            friction: if bound_change == 0.0 {
+                0.0
+            } else {
+                bound_change / scale
+            },
+            monolithic: system.kkt_residual(&state, &implied_bound),
+            equilibrium: 0.0,
+        };
+        Measured {
+            state,
+            bound,
+            implied_bound,
+            reactions,
+            pressures,
+            residuals,
+            bound_change,
+        }
+    }
+
+    /// Every residual at or below the tolerance.
+    pub(super) fn within(&self, tolerance: f64) -> bool {
+        let r = &self.residuals;
+        r.kkt <= tolerance && r.friction <= tolerance && r.monolithic <= tolerance
+    }
+}
+
+/// Residuals count as the same to this part: a cycle repeats them, an approach does not.
+const SAME: f64 = 0.01;
+
+/// What a row says beside its state.
+pub(super) struct Row {
+    pub(super) stage: Stage,
+    /// The residual that the stage itself works on.
+    pub(super) residual: f64,
+    pub(super) contraction: Option<f64>,
+    /// Newton steps inside.
+    pub(super) inner: u32,
+    /// σ_t at every friction point.
+    pub(super) tractions: Vec<f64>,
+    /// Part of a new friction force that was taken over: R_F is divided by it.
+    pub(super) relaxation: f64,
+}
+
+/// States that repeat.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cycle {
+    /// Iterations from one occurrence to the next.
+    pub period: u32,
+    /// Contact nodes that change between contact and gap, or whose friction points change between
+    /// stick and slip, numbered over all contacts.
+    pub nodes: Vec<usize>,
+}
+
+/// The history of one increment.
+pub(super) struct Track<'s, 'a> {
+    pub(super) system: &'s System<'a>,
+    pub(super) controls: &'s SolverControls,
+    pub(super) place: Place,
+    pub(super) history: Vec<Iteration>,
+    before: Option<(Vec<bool>, Vec<f64>)>,
+    /// Whether the last row's contact set differs from that of the row before.
+    pub(super) contact_changed: bool,
+    /// States met, with their number and the residual there.
+    met: HashMap<Vec<u8>, (usize, f64)>,
+    states: Vec<Vec<u8>>,
+}
+
+impl<'s, 'a> Track<'s, 'a> {
+    pub(super) fn new(system: &'s System<'a>, controls: &'s SolverControls, place: Place) -> Self {
+        Track {
+            system,
+            controls,
+            place,
+            history: Vec::new(),
+            before: None,
+            contact_changed: true,
+            met: HashMap::new(),
+            states: Vec::new(),
+        }
+    }
+
+    /// Adds a row and tells the observer.
+    pub(super) fn tell(
+        &mut self,
+        measured: &Measured,
+        row: Row,
+        observe: &mut Observer<'_>,
+    ) -> ControlFlow<()> {
+        let (system, active) = (self.system, &measured.state.active);
+        let none = vec![false; active.len()];
+        let previous = self.before.as_ref().map_or(&none, |(active, _)| active);
+        let changes = |from: bool| {
+            let pairs = previous.iter().zip(active);
+            pairs
+                .filter(|(before, after)| **before == from && **after != from)
+                .count() as u32
+        };
+        let contact = ContactCount {
+            active: active.iter().filter(|a| **a).count() as u32,
+            entered: changes(false),
+            left: changes(true),
+        };
+        let r_f = self
+            .before
+            .as_ref()
+            .map(|(_, pressures)| relative_change(&measured.pressures, pressures) / row.relaxation);
+        let (slip, stick) = slipping(system, &measured.state, &measured.implied_bound);
+        let points = system.points.iter().zip(&row.tractions);
+        let friction: f64 = points
+            .map(|(point, traction)| point.weight * traction)
+            .sum();
+        let held: f64 = system.tangential_reactions(&measured.state).iter().sum();
+        let mut iteration = Iteration {
+            k: self.place.rows + self.history.len() as u32 + 1,
+            stage: row.stage,
+            step: self.place.step,
+            increment: self.place.increment,
+            residual: row.residual,
+            friction_residual: measured.residuals.friction,
+            r_f,
+            tolerance: self.controls.tolerance,
+            contact,
+            friction: FrictionCount { slip, stick },
+            force: ForcePair {
+                normal: system.circumference * measured.reactions.iter().sum::<f64>(),
+                tangential: system.circumference * (friction + held),
+            },
+            contraction: row.contraction,
+            inner: row.inner,
+            wall_s: 0.0,
+        };
+        let answer = observe(Progress::Iteration(&mut iteration));
+        self.history.push(iteration);
+        self.contact_changed = contact.entered + contact.left > 0;
+        self.before = Some((active.clone(), measured.pressures.clone()));
+        answer
+    }
+
+    /// Notes contact and slip of a state. A cycle is a state met before, after others, with the same
+    /// residual as then.
+    pub(super) fn note(&mut self, state: &State, residual: f64) -> Option<Cycle> {
+        let code = code(self.system, state);
+        let now = self.states.len();
+        let mut cycle = None;
+        if let Some((before, residual_before)) = self.met.get(&code)
+            && (residual - residual_before).abs() <= SAME * residual_before
+        {
+            let between = &self.states[*before..];
+            let moves = |place: usize| between.iter().any(|other| other[place] != code[place]);
+            let mut nodes: Vec<usize> =
+                (0..self.system.nodes.len()).filter(|&i| moves(i)).collect();
+            for (g, point) in self.system.points.iter().enumerate() {
+                if moves(self.system.nodes.len() + g) {
+                    let nearest = (0..3).max_by(|&a, &b| point.shape[a].total_cmp(&point.shape[b]));
+                    nodes.extend(nearest.map(|i| point.nodes[i]));
+                }
+            }
+            nodes.sort_unstable();
+            nodes.dedup();
+            if !nodes.is_empty() {
+                let period = (now - before) as u32;
+                cycle = Some(Cycle { period, nodes });
+            }
+        }
+        self.met.insert(code.clone(), (now, residual));
+        self.states.push(code);
+        cycle
+    }
+
+    /// Forgets the states met: another method begins.
+    pub(super) fn forget(&mut self) {
+        self.met.clear();
+        self.states.clear();
+    }
+}
+
+/// Contact of every node and slip of every friction point: backward, stick or forward.
+fn code(system: &System<'_>, state: &State) -> Vec<u8> {
+    let contact = state.active.iter().map(|active| u8::from(*active));
+    let slip = system.points.iter().map(|point| {
+        let (slip, limit) = (system.slip(&state.v, point), system.law(point).elastic_slip);
+        match slip.abs() < limit {
+            true => 1,
+            false if slip < 0.0 => 0,
+            false => 2,
+        }
+    });
+    contact.chain(slip).collect()
+}
+
+/// Friction points with a bound that slip, and that stick.
+fn slipping(system: &System<'_>, state: &State, bound: &[f64]) -> (u32, u32) {
+    let (mut slip, mut stick) = (0, 0);
+    let points = system.points.iter().zip(bound);
+    for (point, _) in points.filter(|(_, tau)| **tau > 0.0) {
+        let slides = system.slip(&state.v, point).abs() >= system.law(point).elastic_slip;
+        *(if slides { &mut slip } else { &mut stick }) += 1;
+    }
+    (slip, stick)
+}
+
+/// R_F of thesis 3.5: ‖σ_n − σ_n′‖ / ‖σ_n′‖, guarded where nothing touched before.
+pub(super) fn relative_change(now: &[f64], before: &[f64]) -> f64 {
+    let change: f64 = now.iter().zip(before).map(|(a, b)| (a - b) * (a - b)).sum();
+    let scale: f64 = before.iter().map(|b| b * b).sum();
+    let own: f64 = now.iter().map(|a| a * a).sum();
+    if change == 0.0 {
+        0.0
+    } else {
+        (change / if scale > 0.0 { scale } else { own }).sqrt()
+    }
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
+}

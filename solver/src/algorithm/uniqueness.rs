@@ -1,0 +1,164 @@
+//! Whether the solution found is the only one that is easily found: once more from the bonded state.
+
+use std::ops::ControlFlow;
+
+use crate::algorithm::system::System;
+use crate::algorithm::track::{Measured, Track};
+use crate::algorithm::{End, Finished, Place, bonded_state, both, fixed_point};
+use crate::problem::SolverControls;
+use crate::solution::{Comparison, Observer, Outcome, Progress, Summary, Warning};
+
+/// A comparison with a second solution goes into the summary, and a warning with it where the two
+/// differ.
+pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
+    let warning = if !second.converged {
+        Some((
+            "uniqueness_unknown",
+            "Started from the bonded state the method does not converge: whether there is a second solution remains open.".to_owned(),
+        ))
+    } else if !second.agrees {
+        Some((
+            "not_unique",
+            format!(
+                "There is a second solution: started from the bonded state (u_t = d) the forces are Y = {:.6}, T = {:.6} instead of Y = {:.6}, T = {:.6}. Which one occurs depends on the history of loading; the incremental law with load steps can follow it.",
+                second.normal_force,
+                second.tangential_force,
+                summary.normal_force,
+                summary.tangential_force
+            ),
+        ))
+    } else {
+        None
+    };
+    if let Some((code, message)) = warning {
+        summary.warnings.push(Warning {
+            code: code.to_owned(),
+            pointer: "/solver/check_uniqueness".to_owned(),
+            message,
+        });
+    }
+    summary.uniqueness = Some(second);
+}
+
+/// The same for a solution with twice the increments.
+pub fn note_doubled_increments(summary: &mut Summary, mut second: Comparison, tolerance: f64) {
+    let first = [
+        summary.normal_force,
+        summary.tangential_force,
+        summary.friction_force,
+    ];
+    let other = [
+        second.normal_force,
+        second.tangential_force,
+        second.friction_force,
+    ];
+    second.change = force_change(first, other);
+    second.agrees = second.converged && second.change <= tolerance;
+    if !second.agrees {
+        summary.warnings.push(Warning {
+            code: "increments_matter".to_owned(),
+            pointer: "/steps".to_owned(),
+            message: format!(
+                "Twice the increments change the forces by {:.2e}{}.",
+                second.change,
+                if second.converged {
+                    ""
+                } else {
+                    " (and do not converge)"
+                }
+            ),
+        });
+    }
+    summary.doubled_increments = Some(second);
+}
+
+/// The forces of a state, to be compared with others.
+pub fn compared(system: &System<'_>, finished: Option<&Finished>, converged: bool) -> Comparison {
+    let forces = finished.map_or([0.0; 3], |finished| {
+        let (state, bound) = (finished.state.clone(), finished.bound.clone());
+        forces(system, &Measured::new(system, state, bound))
+    });
+    Comparison {
+        agrees: false,
+        converged,
+        normal_force: forces[0],
+        tangential_force: forces[1],
+        friction_force: forces[2],
+        change: 0.0,
+    }
+}
+
+/// Largest difference of forces, relative to the largest force.
+fn force_change(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let scale = a.iter().chain(&b).fold(0.0f64, |m, f| m.max(f.abs()));
+    (0..3)
+        .map(|k| relative(a[k], b[k], scale))
+        .fold(0.0, f64::max)
+}
+
+fn relative(a: f64, b: f64, scale: f64) -> f64 {
+    if a == b { 0.0 } else { (a - b).abs() / scale }
+}
+
+/// Solutions agree when forces and friction bounds do to this: far above what the tolerance leaves,
+/// far below what tells two states apart.
+const AGREES: f64 = 1e-6;
+
+/// Solves a system from the bonded state (u_t = d everywhere) and compares with `first`.
+pub fn other_solution(
+    system: &System<'_>,
+    controls: &SolverControls,
+    first: &Finished,
+    observe: &mut Observer<'_>,
+) -> Comparison {
+    let quiet: &mut Observer<'_> = &mut |progress| match progress {
+        Progress::Pulse => observe(progress),
+        _ => ControlFlow::Continue(()),
+    };
+    let (start, _) = bonded_state(system, controls, quiet);
+    let mut track = Track::new(system, controls, Place::default());
+    let mut end = both(&mut track, start, quiet);
+    if !end.ended() {
+        // there may be no state near the bonded one: let the sweeps wander off to where one is
+        track.forget();
+        end = fixed_point::run(&mut track, end.measured, false, quiet);
+    }
+    let End {
+        measured: second,
+        outcome,
+        ..
+    } = end;
+    let converged = outcome == Outcome::Converged;
+    let first = Measured::new(system, first.state.clone(), first.bound.clone());
+    let (a, b) = (forces(system, &first), forces(system, &second));
+    let change = force_change(a, b);
+    let most = first
+        .bound
+        .iter()
+        .chain(&second.bound)
+        .fold(0.0f64, |m, tau| m.max(*tau));
+    let bounds = first.bound.iter().zip(&second.bound);
+    let bound_change = bounds
+        .map(|(a, b)| relative(*a, *b, most))
+        .fold(0.0, f64::max);
+    Comparison {
+        agrees: change <= AGREES && bound_change <= AGREES,
+        converged,
+        normal_force: b[0],
+        tangential_force: b[1],
+        friction_force: b[2],
+        change,
+    }
+}
+
+/// ∫p, ∫σ_t and ∫|σ_t|.
+fn forces(system: &System<'_>, measured: &Measured) -> [f64; 3] {
+    let tractions = system.tractions(&measured.state.v, &measured.bound);
+    let (mut tangential, mut friction) = (0.0, 0.0);
+    for (point, traction) in system.points.iter().zip(&tractions) {
+        tangential += point.weight * traction;
+        friction += point.weight * traction.abs();
+    }
+    let normal: f64 = measured.reactions.iter().sum();
+    [normal, tangential, friction].map(|f| system.circumference * f)
+}

@@ -1,0 +1,116 @@
+//! σ_n and σ_t along contact boundaries, as thesis figs 4.3 … 4.16.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use super::figure::{Curve, Look, Panel, figure};
+use crate::solution::ContactProfile;
+
+/// For each contact boundary: σ_n above, σ_t with the friction bound ±τ below, against arc length.
+/// Stresses are negative in compression. `Err` says why a figure could not be drawn.
+pub fn profile_svg(
+    title: &str,
+    profiles: &BTreeMap<String, ContactProfile>,
+) -> Result<String, String> {
+    if profiles.is_empty() {
+        return Err("there is no contact boundary to draw".to_owned());
+    }
+    let panels: Vec<Panel> = profiles
+        .iter()
+        .flat_map(|(name, profile)| panels(name, profile))
+        .collect();
+    figure(title, &panels)
+}
+
+fn panels(name: &str, profile: &ContactProfile) -> [Panel; 2] {
+    let shown = stressed(profile);
+    let curve = |label: &str, look: Look, values: &[f64]| Curve {
+        label: label.to_owned(),
+        look,
+        points: shown.clone().map(|i| (profile.s[i], values[i])).collect(),
+    };
+    let opposite: Vec<f64> = profile.friction_bound.iter().map(|tau| -tau).collect();
+    let panel = |curves: Vec<Curve>| Panel {
+        x: format!("arc length s along `{name}`"),
+        y: "stress".to_owned(),
+        curves,
+    };
+    [
+        panel(vec![curve("σ_n", Look::Line(0), &profile.normal_stress)]),
+        panel(vec![
+            curve(
+                "±τ, friction bound",
+                Look::Reference,
+                &profile.friction_bound,
+            ),
+            curve("", Look::Reference, &opposite),
+            curve("σ_t", Look::Line(1), &profile.tangential_stress),
+        ]),
+    ]
+}
+
+/// The nodes under stress and a margin of a fifth on each side: a contact is often a small part of
+/// the boundary that faces the obstacle. All nodes where nothing is under stress.
+fn stressed(profile: &ContactProfile) -> Range<usize> {
+    let nodes = profile.s.len();
+    let loaded = |&i: &usize| profile.normal_stress[i] != 0.0 || profile.friction_bound[i] != 0.0;
+    let (Some(first), Some(last)) = ((0..nodes).find(loaded), (0..nodes).rfind(loaded)) else {
+        return 0..nodes;
+    };
+    let margin = 0.2 * (profile.s[last] - profile.s[first]);
+    let low = profile
+        .s
+        .partition_point(|s| *s < profile.s[first] - margin);
+    let high = profile
+        .s
+        .partition_point(|s| *s <= profile.s[last] + margin);
+    // one node beyond, so that the curves are seen to return to zero
+    low.min(first.saturating_sub(1))..high.max(last + 2).min(nodes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_holds_its_curves_and_survives_a_flat_profile() {
+        let profile = ContactProfile {
+            s: vec![0.0, 0.5, 1.0],
+            normal_stress: vec![-1.0, -2.0, -4.0],
+            tangential_stress: vec![0.0, 0.3, 0.5],
+            friction_bound: vec![0.3, 0.6, 1.2],
+            ..ContactProfile::default()
+        };
+        let two = BTreeMap::from([
+            ("left".to_owned(), profile.clone()),
+            ("top".to_owned(), profile),
+        ]);
+        let svg = profile_svg("Punch", &two).unwrap();
+        assert!(svg.starts_with("<svg") && svg.contains("Punch") && svg.contains("`left`"));
+        assert!(svg.matches("<polyline").count() >= 8);
+        let flat = ContactProfile {
+            s: vec![0.0, 1.0],
+            normal_stress: vec![0.0; 2],
+            tangential_stress: vec![0.0; 2],
+            friction_bound: vec![0.0; 2],
+            ..ContactProfile::default()
+        };
+        assert!(profile_svg("", &BTreeMap::from([("top".to_owned(), flat)])).is_ok());
+        assert!(profile_svg("", &BTreeMap::new()).is_err());
+    }
+
+    #[test]
+    fn a_small_contact_on_a_long_boundary_fills_the_figure() {
+        let mut profile = ContactProfile {
+            s: (0..400).map(f64::from).collect(),
+            normal_stress: vec![0.0; 400],
+            friction_bound: vec![0.0; 400],
+            ..ContactProfile::default()
+        };
+        assert_eq!(stressed(&profile), 0..400);
+        profile.normal_stress[100..=110].fill(-5.0);
+        assert_eq!(stressed(&profile), 98..113);
+        profile.normal_stress[0] = -1.0;
+        assert_eq!(stressed(&profile), 0..133);
+    }
+}

@@ -1,0 +1,252 @@
+//! Obstacles and friction laws by themselves: every number in its range, no two choices that exclude
+//! each other.
+
+use super::findings::Findings;
+use crate::problem::{
+    Analysis, Condition, Contact, Friction, History, Measure, Obstacle, PrescribedBound, Transition,
+};
+
+impl Findings {
+    pub(super) fn contact_numbers(
+        &mut self,
+        analysis: &Analysis,
+        contact: &Contact,
+        pointer: &str,
+    ) {
+        self.obstacle_numbers(&contact.obstacle, &format!("{pointer}/obstacle"));
+        match (&contact.friction, contact.condition) {
+            (Some(_), Condition::Bonded) => self.say(
+                format!("{pointer}/friction"),
+                "not_used",
+                "friction on a bonded contact",
+                "none: what is bonded does not slide",
+                "Leave `friction` out, or choose another `condition`.",
+            ),
+            (friction, Condition::None) if friction.as_ref().is_none_or(|f| f.bound.is_none()) => {
+                self.say(
+                    format!("{pointer}/friction/bound"),
+                    "missing",
+                    "nothing",
+                    "a prescribed friction bound",
+                    "Without an obstacle there is no pressure that a bound could follow from.",
+                );
+            }
+            _ => {}
+        }
+        if let Some(friction) = &contact.friction {
+            self.friction_numbers(analysis, friction, &format!("{pointer}/friction"));
+        }
+    }
+
+    fn obstacle_numbers(&mut self, obstacle: &Obstacle, pointer: &str) {
+        let at = |field: &str| format!("{pointer}/{field}");
+        let lengths = "a length > 0";
+        match obstacle {
+            Obstacle::Circle { radius, .. }
+            | Obstacle::Parabola { radius, .. }
+            | Obstacle::RoundedFlat { radius, .. } => {
+                let hint = "The obstacle is convex towards the body.";
+                self.require(*radius > 0.0, at("radius"), *radius, lengths, hint);
+            }
+            Obstacle::Wedge { angle, .. } | Obstacle::Cone { angle, .. } => self.require(
+                *angle > 0.0 && *angle < 90.0,
+                at("angle"),
+                *angle,
+                "0 < angle < 90 degrees",
+                "Between the obstacle's face and the surface of the body.",
+            ),
+            Obstacle::Power {
+                coefficient,
+                exponent,
+                ..
+            } => {
+                let hint = "The obstacle is convex towards the body.";
+                self.require(
+                    *coefficient > 0.0,
+                    at("coefficient"),
+                    *coefficient,
+                    "> 0",
+                    hint,
+                );
+                self.require(*exponent >= 1.0, at("exponent"), *exponent, "≥ 1", hint);
+            }
+            Obstacle::Table { x, gap, .. } => {
+                self.table(&at("x"), x, &at("gap"), gap, "profile");
+            }
+            Obstacle::Polyline { points, .. } => {
+                if points.len() < 2 {
+                    self.say(
+                        at("points"),
+                        "too_few",
+                        format!("{} point(s)", points.len()),
+                        "at least two points",
+                        "Give the two ends of the line.",
+                    );
+                }
+                if let Some(i) = (1..points.len()).find(|&i| points[i] == points[i - 1]) {
+                    self.say(
+                        format!("{pointer}/points/{i}"),
+                        "repeated_point",
+                        format!("{:?} twice", points[i]),
+                        "points that differ from those before them",
+                        "Remove one of them.",
+                    );
+                }
+            }
+            Obstacle::Flat { .. } | Obstacle::Tilted { .. } | Obstacle::Line { .. } => {}
+        }
+        if let Obstacle::RoundedFlat { half_width, .. } = obstacle {
+            self.require(
+                *half_width >= 0.0,
+                at("half_width"),
+                *half_width,
+                "a length ≥ 0",
+                "Half the width of the flat part.",
+            );
+        }
+        if let (Some(from), Some(to), _) = obstacle.span()
+            && from >= to
+        {
+            self.say(
+                at("to"),
+                "out_of_range",
+                to,
+                format!("more than `from`, {from}"),
+                "`from` and `to` are the ends of the obstacle.",
+            );
+        }
+    }
+
+    /// Places that grow, and as many values.
+    fn table(&mut self, x_at: &str, x: &[f64], y_at: &str, y: &[f64], what: &str) {
+        if x.len() < 2 {
+            self.say(
+                x_at,
+                "too_few",
+                format!("{} point(s)", x.len()),
+                "at least two points",
+                format!("The {what} is linear between them."),
+            );
+        }
+        if let Some(i) = (1..x.len()).find(|&i| x[i] <= x[i - 1]) {
+            self.say(
+                format!("{x_at}/{i}"),
+                "not_increasing",
+                format!("{} after {}", x[i], x[i - 1]),
+                "strictly increasing places",
+                "Sort the points and remove repeated ones.",
+            );
+        }
+        if x.len() != y.len() {
+            self.say(
+                y_at,
+                "wrong_length",
+                format!("{} values", y.len()),
+                format!("{}, one for each place", x.len()),
+                "Give one value for each place.",
+            );
+        }
+    }
+
+    fn friction_numbers(&mut self, analysis: &Analysis, friction: &Friction, pointer: &str) {
+        let at = |field: &str| format!("{pointer}/{field}");
+        let prescribed = friction.bound.is_some();
+        let numbers = [
+            (
+                "coefficient",
+                friction.coefficient,
+                "a number ≥ 0",
+                "Leave `friction` out for frictionless contact.",
+            ),
+            (
+                "nonlocal_radius",
+                friction.nonlocal_radius,
+                "a length ≥ 0",
+                "0 is Coulomb's local law.",
+            ),
+        ];
+        for (name, value, expected, hint) in numbers {
+            match value {
+                None if !prescribed => self.say(
+                    at(name),
+                    "missing",
+                    "nothing",
+                    format!("{expected}, or a `bound`"),
+                    hint,
+                ),
+                Some(_) if prescribed => self.excluded(&at(name)),
+                Some(value) => self.require(value >= 0.0, at(name), value, expected, hint),
+                None => {}
+            }
+        }
+        self.require(
+            friction.elastic_slip > 0.0,
+            at("elastic_slip"),
+            friction.elastic_slip,
+            "a length > 0",
+            "About 1e-4 of the contact's width; below 1e-5 nothing physical changes.",
+        );
+        self.require(
+            friction.cohesion >= 0.0,
+            at("cohesion"),
+            friction.cohesion,
+            "a stress ≥ 0",
+            "It is added to the friction bound in contact.",
+        );
+        if let Some(cap) = friction.shear_cap {
+            let hint = "The largest tangential stress that the surface bears.";
+            self.require(cap > 0.0, at("shear_cap"), cap, "a stress > 0", hint);
+        }
+        if prescribed && friction.cohesion != 0.0 {
+            self.excluded(&at("cohesion"));
+        }
+        if prescribed && friction.shear_cap.is_some() {
+            self.excluded(&at("shear_cap"));
+        }
+        match &friction.bound {
+            Some(PrescribedBound::Constant(bound)) => {
+                let hint = "The tangential stress at which the surface slips.";
+                self.require(*bound >= 0.0, at("bound"), *bound, "a stress ≥ 0", hint);
+            }
+            Some(PrescribedBound::Table(table)) => {
+                let (s, bound) = (at("bound/s"), at("bound/bound"));
+                self.table(&s, &table.s, &bound, &table.bound, "friction bound");
+                if let Some(i) = table.bound.iter().position(|b| *b < 0.0) {
+                    let hint = "The tangential stress at which the surface slips.";
+                    let place = format!("{bound}/{i}");
+                    self.require(false, place, table.bound[i], "a stress ≥ 0", hint);
+                }
+            }
+            None => {}
+        }
+        if friction.history == History::Incremental && friction.transition != Transition::Linear {
+            self.say(
+                at("transition"),
+                "not_used",
+                "`tanh` with the incremental history",
+                "`linear`",
+                "The incremental law is defined for the linear transition only.",
+            );
+        }
+        let round = matches!(analysis, Analysis::Axisymmetric {});
+        if friction.measure == Measure::Surface && !round {
+            self.say(
+                at("measure"),
+                "not_used",
+                "`surface`",
+                "`line`, but in axisymmetry",
+                "In the plane there is no surface to integrate over.",
+            );
+        }
+    }
+
+    fn excluded(&mut self, pointer: &str) {
+        self.say(
+            pointer,
+            "not_used",
+            "a value beside `bound`",
+            "one of the two",
+            "A prescribed bound knows nothing of pressure; remove this field or `bound`.",
+        );
+    }
+}

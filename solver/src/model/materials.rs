@@ -1,0 +1,209 @@
+//! Materials, and which elements are made of them.
+
+use std::collections::BTreeMap;
+
+use super::findings::Findings;
+use crate::elasticity::{self, Moduli, Section};
+use crate::mesh::Mesh;
+use crate::problem::{Analysis, Material};
+
+impl Findings {
+    /// The theory with the materials of all elements, or `None` after saying why not.
+    pub(super) fn section(
+        &mut self,
+        analysis: Analysis,
+        materials: &[Material],
+        mesh: &Mesh,
+    ) -> Option<Section> {
+        let before = self.violations.len();
+        if materials.is_empty() {
+            self.say(
+                "/materials",
+                "too_few",
+                "no material",
+                "at least one",
+                "Give youngs_modulus and poissons_ratio.",
+            );
+        }
+        let found: Vec<Option<Moduli>> = materials
+            .iter()
+            .enumerate()
+            .map(|(i, material)| self.moduli(&analysis, material, &format!("/materials/{i}")))
+            .collect();
+        let material_of = self.elements_of(materials, mesh);
+        if self.violations.len() > before {
+            return None;
+        }
+        let moduli: Vec<Moduli> = found.into_iter().flatten().collect();
+        Some(match moduli[..] {
+            [only] => Section::uniform(analysis, only),
+            _ => Section::by_element(analysis, moduli, material_of),
+        })
+    }
+
+    fn moduli(&mut self, analysis: &Analysis, m: &Material, pointer: &str) -> Option<Moduli> {
+        let before = self.violations.len();
+        let at = |field: &str| format!("{pointer}/{field}");
+        if let Some(material) = &m.orthotropic {
+            for (name, value) in [
+                ("youngs_modulus", m.youngs_modulus),
+                ("poissons_ratio", m.poissons_ratio),
+            ] {
+                if value.is_some() {
+                    self.say(
+                        at(name),
+                        "wrong_count",
+                        "an isotropic constant beside `orthotropic`",
+                        "one of the two forms",
+                        "Remove it, or remove `orthotropic`.",
+                    );
+                }
+            }
+            let sheet = matches!(analysis, Analysis::PlaneStress { .. });
+            for (name, value) in [
+                ("e3", material.e3),
+                ("nu13", material.nu13),
+                ("nu23", material.nu23),
+            ] {
+                if value.is_none() && !sheet {
+                    self.say(
+                        at(&format!("orthotropic/{name}")),
+                        "missing",
+                        "nothing",
+                        format!("a value for `{name}`"),
+                        "Only in plane stress the third direction does not matter.",
+                    );
+                }
+            }
+            let moduli = [
+                ("e1", Some(material.e1)),
+                ("e2", Some(material.e2)),
+                ("g12", Some(material.g12)),
+                ("e3", material.e3),
+            ];
+            for (name, value) in moduli {
+                if let Some(value) = value {
+                    let place = at(&format!("orthotropic/{name}"));
+                    self.require(value > 0.0, place, value, "a stress > 0", "A modulus.");
+                }
+            }
+            if self.violations.len() > before {
+                return None;
+            }
+            let moduli = elasticity::orthotropic(analysis, material);
+            if moduli.is_none() {
+                self.say(
+                    at("orthotropic"),
+                    "out_of_range",
+                    format!("nu12 = {}, nu13 = {:?}, nu23 = {:?}", material.nu12, material.nu13, material.nu23),
+                    "constants of a stable material, e.g. nu12² < e1/e2",
+                    "Some strain would cost no energy. Check which of nu12 and nu21 is meant: nu12 = −ε_2/ε_1 under σ_1.",
+                );
+            }
+            return moduli;
+        }
+        let mut given = |name: &str, value: Option<f64>| {
+            if value.is_none() {
+                self.say(
+                    at(name),
+                    "missing",
+                    "nothing",
+                    format!("a value for `{name}`"),
+                    "Or give `orthotropic`.",
+                );
+            }
+            value
+        };
+        let (e, nu) = (
+            given("youngs_modulus", m.youngs_modulus),
+            given("poissons_ratio", m.poissons_ratio),
+        );
+        if let Some(e) = e {
+            let place = at("youngs_modulus");
+            self.require(e > 0.0, place, e, "a stress > 0", "Young's modulus E.");
+        }
+        if let Some(nu) = nu {
+            self.require(
+                nu > -1.0 && nu < 0.5,
+                at("poissons_ratio"),
+                nu,
+                "−1 < Poisson's ratio < 0.5",
+                "For a nearly incompressible body use a value such as 0.49.",
+            );
+        }
+        Some(elasticity::isotropic(analysis, e?, nu?))
+    }
+
+    /// The material of every element: that of its group, else the one without a group.
+    fn elements_of(&mut self, materials: &[Material], mesh: &Mesh) -> Vec<u16> {
+        const NONE: u16 = u16::MAX;
+        let mut material_of = vec![NONE; mesh.elements.len()];
+        for (i, material) in materials.iter().enumerate() {
+            let Some(name) = &material.group else {
+                continue;
+            };
+            let pointer = format!("/materials/{i}/group");
+            let Some(elements) = mesh.groups.get(name) else {
+                self.say(
+                    pointer,
+                    "unknown_group",
+                    name,
+                    known(&mesh.groups),
+                    "Check the spelling, or name a group under /mesh/groups.",
+                );
+                continue;
+            };
+            let taken = elements.iter().find(|&&e| material_of[e as usize] != NONE);
+            if let Some(e) = taken {
+                self.say(
+                    pointer,
+                    "overlap",
+                    format!(
+                        "element {e}, which is made of material {} already",
+                        material_of[*e as usize]
+                    ),
+                    "one material for every element",
+                    "Let the groups of materials not overlap.",
+                );
+            }
+            elements
+                .iter()
+                .for_each(|&e| material_of[e as usize] = i as u16);
+        }
+        let mut rest = (0..materials.len()).filter(|&i| materials[i].group.is_none());
+        let (first, second) = (rest.next(), rest.next());
+        if let Some(second) = second {
+            self.say(
+                format!("/materials/{second}/group"),
+                "wrong_count",
+                "a second material without a group",
+                "one material at most for all that the others do not name",
+                "Name the group of elements that is made of it.",
+            );
+        }
+        let bare = material_of.iter().position(|m| *m == NONE);
+        match (first, bare) {
+            (Some(i), _) => material_of
+                .iter_mut()
+                .filter(|m| **m == NONE)
+                .for_each(|m| *m = i as u16),
+            (None, Some(e)) if !materials.is_empty() => self.say(
+                "/materials",
+                "missing",
+                format!("no material for element {e}"),
+                "a material for every element",
+                "Give one material without `group`: it is taken for the rest.",
+            ),
+            _ => {}
+        }
+        material_of
+    }
+}
+
+fn known(groups: &BTreeMap<String, Vec<u32>>) -> String {
+    if groups.is_empty() {
+        return "a group; this mesh has none".to_owned();
+    }
+    let names: Vec<String> = groups.keys().map(|name| format!("`{name:.80}`")).collect();
+    format!("one of {}", names.join(", "))
+}

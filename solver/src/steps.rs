@@ -1,0 +1,303 @@
+//! Load steps and their increments: the incremental law (FORMULATION 1), and results along a history
+//! of loading for either law.
+
+use std::ops::ControlFlow;
+
+use crate::algorithm::{self, Finished, Place, Reported, System, report};
+use crate::body::ElasticBody;
+use crate::error::SolveError;
+use crate::model::{Level, Model};
+use crate::problem::{Algorithm, Spacing, Step};
+use crate::solution::{
+    Comparison, Iteration, Observer, Outcome, Phase, Progress, Solution, StepSolution,
+};
+
+/// An increment that does not converge is halved this often before the step ends there.
+const MOST_HALVINGS: u32 = 6;
+
+/// Runs all steps; the end of the last one is the solution. A step that does not converge is the last.
+pub fn run(
+    model: &Model,
+    body: &ElasticBody,
+    observe: &mut Observer<'_>,
+) -> Result<Solution, SolveError> {
+    let whole = [Step::whole()];
+    let steps = if model.steps.is_empty() {
+        &whole[..]
+    } else {
+        &model.steps
+    };
+    let mut march = March::new(model, body);
+    let (mut history, mut ends) = (Vec::new(), Vec::new());
+    let mut last: Option<Reported> = None;
+    for (number, step) in steps.iter().enumerate() {
+        let _ = observe(Progress::Phase(Phase::Iterate));
+        let (finished, rows) = march.step(number as u32, step, 1, observe);
+        // the last state is kept also when the observer broke off: its answer no longer matters
+        let _ = observe(Progress::Phase(Phase::Recover));
+        let mut reported = report(model, body, &march.system, &finished)?;
+        let summary = &mut reported.summary;
+        if model.controls.check_uniqueness && summary.converged {
+            let (system, controls) = (&march.system, &model.controls);
+            let second = algorithm::other_solution(system, controls, &finished, observe);
+            algorithm::note_uniqueness(summary, second);
+        }
+        summary.increments = march.increments;
+        summary.cut_backs = march.cut_backs;
+        summary.iterations = rows.len() as u32;
+        let (outcome, converged) = (summary.outcome, summary.converged);
+        ends.push(StepSolution {
+            name: step
+                .name
+                .clone()
+                .unwrap_or_else(|| (number + 1).to_string()),
+            summary: summary.clone(),
+            history: rows.clone(),
+            profiles: reported.profiles.clone(),
+        });
+        history.extend(rows);
+        last = Some(reported);
+        if !converged && outcome != Outcome::FalseConvergence {
+            break;
+        }
+    }
+    let Some(mut last) = last else {
+        return Err(SolveError::NonFinite { phase: "steps" });
+    };
+    if model.controls.check_increments && last.summary.converged {
+        let second = doubled(model, body, steps, observe);
+        algorithm::note_doubled_increments(&mut last.summary, second, model.controls.tolerance);
+    }
+    last.summary.iterations = history.len() as u32;
+    if model.steps.is_empty() {
+        ends.clear();
+    }
+    Ok(Solution {
+        summary: last.summary,
+        history,
+        profiles: last.profiles,
+        steps: ends,
+        fields: last.fields,
+    })
+}
+
+/// The forces that twice the increments lead to, without a word to the observer.
+fn doubled(
+    model: &Model,
+    body: &ElasticBody,
+    steps: &[Step],
+    observe: &mut Observer<'_>,
+) -> Comparison {
+    let quiet: &mut Observer<'_> = &mut |progress| match progress {
+        Progress::Iteration(_) => observe(Progress::Pulse),
+        Progress::Pulse => observe(progress),
+        _ => ControlFlow::Continue(()),
+    };
+    let mut march = March::new(model, body);
+    let mut converged = true;
+    for (number, step) in steps.iter().enumerate() {
+        let (finished, _) = march.step(number as u32, step, 2, quiet);
+        converged = finished.outcome == Outcome::Converged;
+        if !converged {
+            break;
+        }
+    }
+    algorithm::compared(&march.system, march.last.as_ref(), converged)
+}
+
+/// The way through the steps.
+struct March<'a> {
+    model: &'a Model,
+    system: System<'a>,
+    /// The end of the last increment, and its level.
+    last: Option<Finished>,
+    level: Level,
+    /// Whether the anchors have moved since.
+    remembered: bool,
+    rows: Vec<Iteration>,
+    row_count: u32,
+    increments: u32,
+    cut_backs: u32,
+}
+
+impl<'a> March<'a> {
+    fn new(model: &'a Model, body: &'a ElasticBody) -> Self {
+        March {
+            model,
+            system: System::new(model, body),
+            last: None,
+            level: Level::NOTHING,
+            remembered: true,
+            rows: Vec::new(),
+            row_count: 0,
+            increments: 0,
+            cut_backs: 0,
+        }
+    }
+
+    /// One step in `multiple` times its increments: its end, and its rows.
+    fn step(
+        &mut self,
+        number: u32,
+        step: &Step,
+        multiple: u32,
+        observe: &mut Observer<'_>,
+    ) -> (Finished, Vec<Iteration>) {
+        let path = Path {
+            from: self.level,
+            step,
+            power: self.model.contacts.iter().find_map(|c| c.power),
+        };
+        let count = multiple * step.increments;
+        let mut increment = 0;
+        for k in 1..=count {
+            let (from, to) = (
+                f64::from(k - 1) / f64::from(count),
+                f64::from(k) / f64::from(count),
+            );
+            let place = (number, &mut increment);
+            let finished = self.advance(&path, place, from, to, 0, observe);
+            if finished.outcome != Outcome::Converged || k == count {
+                return (finished, std::mem::take(&mut self.rows));
+            }
+        }
+        unreachable!("a step has an increment at least: Model::new has seen to it")
+    }
+
+    /// From one part of a step to another, in halves where that is too far.
+    fn advance(
+        &mut self,
+        path: &Path<'_>,
+        (step, increment): (u32, &mut u32),
+        from: f64,
+        to: f64,
+        halvings: u32,
+        observe: &mut Observer<'_>,
+    ) -> Finished {
+        let finished = self.increment(path, (step, *increment), to, observe);
+        let hopeful = !self.model.steps.is_empty()
+            && self.model.controls.algorithm != Algorithm::Thesis
+            && halvings < MOST_HALVINGS;
+        match finished.outcome {
+            Outcome::NotConverged | Outcome::ContactCycling if hopeful => {
+                self.cut_backs += 1;
+                let middle = 0.5 * (from + to);
+                let half =
+                    self.advance(path, (step, increment), from, middle, halvings + 1, observe);
+                if half.outcome != Outcome::Converged {
+                    return half;
+                }
+                self.advance(path, (step, increment), middle, to, halvings + 1, observe)
+            }
+            _ => {
+                *increment += 1;
+                finished
+            }
+        }
+    }
+
+    /// Solves at one level; a converged end is where the next increment begins.
+    fn increment(
+        &mut self,
+        path: &Path<'_>,
+        (step, increment): (u32, u32),
+        to: f64,
+        observe: &mut Observer<'_>,
+    ) -> Finished {
+        if let (Some(last), false) = (&self.last, self.remembered) {
+            self.system.remember(&last.state.v, &last.bound);
+            self.remembered = true;
+        }
+        let level = path.level(to);
+        self.system.set_level(level);
+        let place = Place {
+            step,
+            increment,
+            rows: self.row_count,
+        };
+        let controls = &self.model.controls;
+        let finished = algorithm::run(&self.system, controls, place, self.last.as_ref(), observe);
+        self.row_count += finished.history.len() as u32;
+        self.rows.extend(finished.history.iter().cloned());
+        if finished.outcome == Outcome::Converged {
+            self.increments += 1;
+            self.level = level;
+            self.last = Some(finished.clone());
+            self.remembered = false;
+        }
+        finished
+    }
+}
+
+/// From the level before a step to its end.
+struct Path<'a> {
+    from: Level,
+    step: &'a Step,
+    /// Power of the first obstacle's profile, where it has one.
+    power: Option<f64>,
+}
+
+impl Path<'_> {
+    /// The level at a part of the step, 0 … 1.
+    fn level(&self, part: f64) -> Level {
+        let between = |from: f64, to: f64| match part {
+            1.0 => to,
+            _ => from + part * (to - from),
+        };
+        let Level {
+            indentation,
+            tangential_displacement,
+            loads,
+            supports,
+        } = self.from;
+        let grown = match (self.step.spacing, self.power) {
+            // a contact's width grows like the root of the indentation
+            (Spacing::ContactWidth, Some(power))
+                if indentation >= 0.0 && self.step.indentation >= 0.0 && part < 1.0 =>
+            {
+                let width = |factor: f64| factor.powf(1.0 / power);
+                between(width(indentation), width(self.step.indentation)).powf(power)
+            }
+            _ => between(indentation, self.step.indentation),
+        };
+        Level {
+            indentation: grown,
+            tangential_displacement: between(
+                tangential_displacement,
+                self.step.tangential_displacement,
+            ),
+            loads: between(loads, self.step.loads),
+            supports: between(supports, self.step.supports),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn widths_or_indentations_grow_evenly_and_end_exactly() {
+        let mut step = Step {
+            indentation: 0.9,
+            tangential_displacement: 0.3,
+            ..Step::whole()
+        };
+        let at = |step: &Step, power, part| {
+            let path = Path {
+                from: Level::NOTHING,
+                step,
+                power,
+            };
+            path.level(part)
+        };
+        let half = at(&step, Some(2.0), 0.5);
+        assert_eq!((half.indentation, half.loads), (0.45, 0.5));
+        step.spacing = Spacing::ContactWidth;
+        let half = at(&step, Some(2.0), 0.5);
+        assert!((half.indentation - 0.225).abs() < 1e-15);
+        assert_eq!(half.tangential_displacement, 0.15);
+        assert_eq!(at(&step, None, 0.5).indentation, 0.45);
+        assert_eq!(at(&step, Some(2.0), 1.0).indentation, 0.9);
+    }
+}

@@ -1,0 +1,96 @@
+//! Adaptive refinement: the mesh-converged values of FORMULATION 5 without a hand on the mesh.
+
+use solver::problem::{AdaptiveRefine, Refine};
+
+use crate::record::held;
+use crate::support::{example, solve};
+
+/// The tolerance asked for is what the peak is held to.
+#[test]
+fn example_1_reaches_its_peak_by_itself() {
+    let mut problem = example("rectangular_punch");
+    problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.01 });
+    let summary = solve(&problem).summary;
+    let peak = summary.contacts["top"].peak_tangential_stress.unwrap();
+    let mesh = format!(
+        "adaptive to .01: {} meshes, {} unknowns",
+        summary.refinements.len(),
+        summary.dofs
+    );
+    held(
+        0,
+        "example 1, ρ = .01: max σ_t",
+        &mesh,
+        peak.value,
+        249.6,
+        0.01,
+    );
+    held(
+        0,
+        "example 1, ρ = .01: Y",
+        &mesh,
+        summary.normal_force,
+        95.267,
+        0.01,
+    );
+    held(
+        0,
+        "example 1, ρ = .01: T",
+        &mesh,
+        summary.tangential_force,
+        14.231,
+        0.01,
+    );
+    // the sequence is told, and begins with the user's own mesh
+    assert_eq!(summary.refinements[0].elements, 56);
+    assert!((summary.refinements[0].peak_tangential_stress - 443.0).abs() < 1.0);
+    assert!(
+        summary
+            .refinements
+            .windows(2)
+            .all(|pair| pair[1].elements > pair[0].elements)
+    );
+}
+
+#[test]
+fn a_smooth_contact_reaches_its_values_too() {
+    let mut problem = example("cylinder");
+    problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.005 });
+    let summary = solve(&problem).summary;
+    let mesh = format!("adaptive to .005: {} unknowns", summary.dofs);
+    held(
+        0,
+        "example 2, ρ = .03: Y",
+        &mesh,
+        summary.normal_force,
+        312.870,
+        0.005,
+    );
+    held(
+        0,
+        "example 2, ρ = .03: T",
+        &mesh,
+        summary.tangential_force,
+        39.070,
+        0.005,
+    );
+    let [_, half_width] = summary.contacts["top"].contact[0];
+    held(
+        0,
+        "example 2: contact half-width",
+        &mesh,
+        half_width,
+        2.1375,
+        0.01,
+    );
+}
+
+#[test]
+fn what_cannot_be_refined_is_refused() {
+    let mut problem = example("cylinder");
+    problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 1.5 });
+    problem.contacts.clear();
+    let found = solver::check(&problem).unwrap_err();
+    let pointers: Vec<_> = found.iter().map(|v| v.pointer.as_str()).collect();
+    assert_eq!(pointers, ["/mesh/refine/tolerance", "/mesh/refine"]);
+}
