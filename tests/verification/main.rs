@@ -13,6 +13,8 @@ mod invariance;
 mod patch;
 mod record;
 mod robustness;
+mod sliding;
+mod stick;
 mod support;
 mod thesis;
 mod thick_cylinder;
