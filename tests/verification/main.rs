@@ -8,6 +8,7 @@ mod balance;
 mod cylinder;
 mod examples;
 mod flat_punch;
+mod held_by_contact;
 mod input;
 mod invariance;
 mod patch;
