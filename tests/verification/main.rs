@@ -13,6 +13,7 @@ mod input;
 mod invariance;
 mod patch;
 mod record;
+mod refusals;
 mod robustness;
 mod support;
 mod thesis;
