@@ -5,12 +5,17 @@
 
 mod adaptive;
 mod balance;
+mod contact_patch;
+mod cook;
 mod cylinder;
+mod disc_pressure;
 mod examples;
 mod flat_punch;
 mod held_by_contact;
 mod input;
 mod invariance;
+mod manufactured;
+mod oblique;
 mod patch;
 mod record;
 mod refusals;
