@@ -4,14 +4,17 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod adaptive;
+mod annular_punch;
 mod balance;
 mod contact_patch;
 mod cook;
 mod cylinder;
 mod disc_pressure;
+mod even_profiles;
 mod examples;
 mod flat_punch;
 mod held_by_contact;
+mod hertz_sphere;
 mod input;
 mod invariance;
 mod manufactured;
