@@ -76,7 +76,7 @@ fn nodal_forces_are_whole_and_of_whole_rings() {
             analysis["thickness"].as_f64().unwrap_or(1.0),
         );
         let r: Vec<f64> = (0..=4).map(|k| 1.0 + 0.5 * f64::from(k)).collect();
-        let mut shares = vec![0.0; 9];
+        let mut shares = [0.0; 9];
         for k in 0..4 {
             let length = 0.5 * 1.25f64.sqrt();
             let parts = if round {

@@ -31,36 +31,53 @@ const NU: f64 = 0.3;
 const G: f64 = E / (2.0 * (1.0 + NU));
 const LAMBDA: f64 = E * NU / ((1.0 + NU) * (1.0 - 2.0 * NU));
 
-/// A field at a place: displacement; ∂u_i/∂x_j; body force.
-type Exact = fn([f64; 2]) -> ([f64; 2], [[f64; 2]; 2], [f64; 2]);
+/// A field at a place.
+struct At {
+    /// Displacement.
+    u: [f64; 2],
+    /// ∂u_i/∂x_j.
+    gradient: [[f64; 2]; 2],
+    /// The body force that belongs to it.
+    force: [f64; 2],
+}
 
-fn plane([x, y]: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2], [f64; 2]) {
+type Exact = fn([f64; 2]) -> At;
+
+/// What is done at an integration point: with its element, map, place and weight.
+type Visit<'a> = dyn FnMut(&[u32; 8], &quad8::Mapped, [f64; 2], f64) + 'a;
+
+#[rustfmt::skip]
+fn plane([x, y]: [f64; 2]) -> At {
     let pi = std::f64::consts::PI;
     let ((sx, cx), (sy, cy)) = ((pi * x).sin_cos(), (pi * y).sin_cos());
     let a = 3.0 * (LAMBDA + G);
-    (
-        [sx * cy, 2.0 * cx * sy],
-        [
-            [pi * cx * cy, -pi * sx * sy],
-            [-2.0 * pi * sx * sy, 2.0 * pi * cx * cy],
+    At {
+        u: [sx * cy, 2.0 * cx * sy],
+        gradient: [
+            [ pi * cx * cy,       -pi * sx * sy],
+            [-2.0 * pi * sx * sy,  2.0 * pi * cx * cy],
         ],
-        [
+        force: [
             pi * pi * (a + 2.0 * G) * sx * cy,
             pi * pi * (a + 4.0 * G) * cx * sy,
         ],
-    )
+    }
 }
 
-fn round([r, z]: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2], [f64; 2]) {
+#[rustfmt::skip]
+fn round([r, z]: [f64; 2]) -> At {
     let (s, c) = z.sin_cos();
-    (
-        [r * r * s, r * r * c],
-        [[2.0 * r * s, r * r * c], [2.0 * r * c, -r * r * s]],
-        [
+    At {
+        u: [r * r * s, r * r * c],
+        gradient: [
+            [2.0 * r * s,  r * r * c],
+            [2.0 * r * c, -r * r * s],
+        ],
+        force: [
             -((LAMBDA + G) * (3.0 - 2.0 * r) + G * (3.0 - r * r)) * s,
             -((LAMBDA + G) * (3.0 * r - r * r) + G * (4.0 - r * r)) * c,
         ],
-    )
+    }
 }
 
 /// A coarse mesh whose inner corners are out of place, split `times` times. Splitting makes the elements
@@ -109,7 +126,7 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, exact: Exact) -> [f64; 2
         outside[*node as usize] = true;
     }
     for (node, on_boundary) in outside.iter().enumerate() {
-        let u = exact(mesh.nodes[node]).0;
+        let u = exact(mesh.nodes[node]).u;
         map.dofs[node] = if *on_boundary {
             u.map(Dof::Fixed)
         } else {
@@ -122,7 +139,7 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, exact: Exact) -> [f64; 2
         assemble_stiffness(mesh, &section, gauss::of_order(points), &map, &graph);
     // a rule finer than the element's own: integration of f and of the error is not what is tested
     let fine = gauss::rule(6);
-    let at_points = |visit: &mut dyn FnMut(&[u32; 8], &quad8::Mapped, [f64; 2], f64)| {
+    let at_points = |visit: &mut Visit<'_>| {
         for element in &mesh.elements {
             let nodes = mesh.element_nodes(element);
             for &(eta, w_eta) in &fine {
@@ -136,7 +153,7 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, exact: Exact) -> [f64; 2
         }
     };
     at_points(&mut |element, m, place, weight| {
-        let force = exact(place).2;
+        let force = exact(place).force;
         for (i, node) in element.iter().enumerate() {
             for (dof, f) in map.dofs[*node as usize].iter().zip(force) {
                 if let Dof::Free(k) = dof {
@@ -164,7 +181,11 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, exact: Exact) -> [f64; 2
     let u = map.displacements(&load, 1.0);
     let (mut off, mut size) = ([0.0; 2], [0.0; 2]);
     at_points(&mut |element, m, place, weight| {
-        let (u_exact, gradient, _) = exact(place);
+        let At {
+            u: u_exact,
+            gradient,
+            ..
+        } = exact(place);
         for a in 0..2 {
             let sum = |of: &dyn Fn(usize) -> f64| {
                 (0..8)
