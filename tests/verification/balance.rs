@@ -9,7 +9,7 @@ use solver::element::gauss::GAUSS_3;
 use solver::linear::Graph;
 use solver::model::Model;
 
-use crate::support::{example, solve};
+use crate::support::{example, quiet, solve};
 
 const EXAMPLES: [&str; 5] = [
     "rectangular_punch",
@@ -18,10 +18,6 @@ const EXAMPLES: [&str; 5] = [
     "cylinder_on_end",
     "sheet",
 ];
-
-fn quiet(_: solver::solution::Progress<'_>) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
 
 fn with_solved(name: &str, check: impl FnOnce(&Model, &ElasticBody, &System<'_>, &Finished)) {
     let model = Model::new(&example(name)).unwrap();

@@ -5,7 +5,7 @@ use solver::problem::Problem;
 
 use crate::support::{example, problem, solve};
 
-fn violations(problem: &Problem) -> Vec<(String, String)> {
+pub(crate) fn violations(problem: &Problem) -> Vec<(String, String)> {
     let list = solver::check(problem).expect_err("a faulty problem was accepted");
     list.iter().for_each(|Violation { expected, hint, .. }| {
         assert!(!expected.is_empty() && !hint.is_empty())
@@ -13,7 +13,7 @@ fn violations(problem: &Problem) -> Vec<(String, String)> {
     list.into_iter().map(|v| (v.pointer, v.reason)).collect()
 }
 
-fn pair(pointer: &str, reason: &str) -> (String, String) {
+pub(crate) fn pair(pointer: &str, reason: &str) -> (String, String) {
     (pointer.to_owned(), reason.to_owned())
 }
 

@@ -4,14 +4,27 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod adaptive;
+mod annular_punch;
 mod balance;
+mod contact_patch;
+mod cook;
 mod cylinder;
+mod disc_pressure;
+mod error_estimate;
+mod even_profiles;
 mod examples;
 mod flat_punch;
+mod held_by_contact;
+mod hertz_sphere;
 mod input;
 mod invariance;
+mod loads;
+mod manufactured;
+mod oblique;
+mod obstacle_normals;
 mod patch;
 mod record;
+mod refusals;
 mod robustness;
 mod sliding;
 mod stick;

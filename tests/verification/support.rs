@@ -18,9 +18,14 @@ pub(crate) fn problem(json: &str) -> Problem {
 
 /// Solves a problem that must converge.
 pub(crate) fn solve(problem: &Problem) -> Solution {
-    let solution = solver::solve(problem, &mut |_| ControlFlow::Continue(())).unwrap();
+    let solution = solver::solve(problem, &mut quiet).unwrap();
     assert!(solution.summary.converged, "{:#?}", solution.summary);
     solution
+}
+
+/// An observer that lets everything go on.
+pub(crate) fn quiet(_: solver::solution::Progress<'_>) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 /// Asserts |got − expected| ≤ tolerance · |expected|.

@@ -1,6 +1,6 @@
 //! The only door from a [`Problem`] to something that can be solved.
 //!
-//! `Model::new` findings everything and reports all violations at once; what it lets through is
+//! `Model::new` checks everything and reports all violations at once; what it lets through is
 //! numbered and can be trusted by every room above.
 
 mod boundaries;

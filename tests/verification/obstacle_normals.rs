@@ -1,0 +1,157 @@
+//! `normal: obstacle`: gap and displacement along the obstacle's own normal, FORMULATION 1 and the API.
+
+use serde_json::{Value, json};
+use solver::model::{ContactModel, Model};
+
+use crate::support::{problem, solve};
+
+/// The top of a block (y = 1, 0 ≤ x ≤ 4) under an obstacle.
+fn top(obstacle: Value, normal: &str) -> ContactModel {
+    let text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [0, 1, 2, 3, 4], "y": [0, 1]}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [{"boundary": "top", "obstacle": obstacle, "indentation": 0.2, "normal": normal}],
+    });
+    Model::new(&problem(&text.to_string()))
+        .unwrap()
+        .contacts
+        .remove(0)
+}
+
+#[track_caller]
+fn near(a: f64, b: f64) {
+    assert!((a - b).abs() < 1e-12, "{a}, not {b}");
+}
+
+/// A straight line at 30° through (0, 1.5): along the body's normal it is at 0.5 + x tan 30°; the
+/// perpendicular distance of a node is that times cos 30°. The line pushed down by .2 is nearer by
+/// .2 cos 30°.
+#[test]
+fn the_gap_to_a_line_is_its_perpendicular_distance() {
+    let line = json!({"kind": "line", "point": [0, 1.5], "angle": 30});
+    let (s, c) = 30f64.to_radians().sin_cos();
+    let (body, own) = (top(line.clone(), "body"), top(line, "obstacle"));
+    for i in 0..9 {
+        let distance = 0.5 + body.boundary.positions[i][0] * s / c;
+        near(body.profile[i], distance);
+        near(body.gap(i, 0.5), distance - 0.1);
+        near(own.profile[i], distance * c);
+        near(own.gap(i, 0.5), (distance - 0.1) * c);
+        let (n, t) = (own.boundary.normals[i], own.boundary.tangent(i));
+        near(n[0], -s);
+        near(n[1], c);
+        near(t[0], c);
+        near(t[1], s);
+    }
+}
+
+/// The same line as a slope, a table and a polyline.
+#[test]
+fn one_face_in_four_ways_is_one_obstacle() {
+    let slope = 30f64.to_radians().tan();
+    let at = |x: f64| 0.5 + slope * x;
+    let line = top(
+        json!({"kind": "line", "point": [0, 1.5], "angle": 30}),
+        "obstacle",
+    );
+    for other in [
+        json!({"kind": "tilted", "slope": slope, "center": -0.5 / slope}),
+        json!({"kind": "table", "x": [0, 1.7, 4], "gap": [at(0.0), at(1.7), at(4.0)]}),
+        json!({"kind": "polyline", "points": [[0, 1.0 + at(0.0)], [1.7, 1.0 + at(1.7)], [4, 1.0 + at(4.0)]]}),
+    ] {
+        let other = top(other, "obstacle");
+        for i in 0..9 {
+            near(other.profile[i], line.profile[i]);
+            near(other.indentation[i], line.indentation[i]);
+            (0..2).for_each(|a| near(other.boundary.normals[i][a], line.boundary.normals[i][a]));
+        }
+    }
+}
+
+/// On a circle of centre (2, 1 + R) the obstacle's normal out of the body points at the centre; the
+/// tangent at the foot of the body's normal is at (R − √(R² − c²)) · cos of the turn.
+#[test]
+fn the_normal_of_a_circle_points_at_its_centre() {
+    let radius = 5.0;
+    let contact = top(
+        json!({"kind": "circle", "radius": radius, "center": 2}),
+        "obstacle",
+    );
+    for i in 0..9 {
+        let c = contact.boundary.positions[i][0] - 2.0;
+        let root = f64::sqrt(radius * radius - c * c);
+        let [x, y] = contact.boundary.normals[i];
+        near(x, -c / radius);
+        near(y, root / radius);
+        near(contact.profile[i], (radius - root) * root / radius);
+    }
+    assert_eq!(contact.power, Some(2.0));
+}
+
+/// At the apex of a wedge, between its two faces, the mean of their slopes: the body's own normal.
+#[test]
+fn a_wedge_has_the_bodys_normal_at_its_apex() {
+    let contact = top(
+        json!({"kind": "wedge", "angle": 20, "center": 2}),
+        "obstacle",
+    );
+    assert_eq!(contact.boundary.normals[4], [0.0, 1.0]);
+    let (s, c) = 20f64.to_radians().sin_cos();
+    for (i, sign) in [(3, 1.0), (5, -1.0)] {
+        near(contact.boundary.normals[i][0], sign * s);
+        near(contact.boundary.normals[i][1], c);
+    }
+    assert_eq!(contact.power, Some(1.0));
+}
+
+/// A boundary that runs against x: the bottom's t is −x, and the slope of its profile turns sign with it.
+#[test]
+fn a_lower_boundary_turns_its_normal_the_other_way() {
+    let text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [0, 1, 2], "y": [0, 1]}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "top", "ux": 0, "uy": 0}],
+        "contacts": [{"boundary": "bottom", "obstacle": {"kind": "tilted", "slope": 0.75}, "normal": "obstacle"}],
+    });
+    let contact = Model::new(&problem(&text.to_string()))
+        .unwrap()
+        .contacts
+        .remove(0);
+    // the obstacle falls away downwards to the right: its face is the line y = −.75 x
+    for i in 0..5 {
+        near(contact.boundary.normals[i][0], -0.6);
+        near(contact.boundary.normals[i][1], -0.8);
+        near(contact.profile[i], 0.6 * contact.boundary.positions[i][0]);
+    }
+}
+
+/// Forces of a sloping face lie along its own normal: a block pressed down on an incline of slope 3/4
+/// without friction, kept from sliding by a roller on its right, weighs W = Y cos α on it, and the
+/// roller bears Y sin α. With the body's normal it would be Y = W.
+#[test]
+fn a_block_on_an_incline_is_pushed_sideways() {
+    let force = |normal: &str| {
+        let text = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": [0, 1, 1.5, 2], "y": [0, 1]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "right", "ux": 0}],
+            "loads": [{"body_force": [0, -4]}],
+            "contacts": [{"boundary": "bottom", "obstacle": {"kind": "tilted", "slope": -0.75, "to": 1.5}, "normal": normal}],
+        });
+        solve(&problem(&text.to_string())).summary
+    };
+    let weight = 8.0;
+    for (normal, exact) in [("obstacle", weight / 0.8), ("body", weight)] {
+        let summary = force(normal);
+        assert!(
+            (summary.normal_force / exact - 1.0).abs() < 1e-10,
+            "{normal}: {}",
+            summary.normal_force
+        );
+        assert!(summary.residuals.equilibrium < 1e-10, "{normal}");
+    }
+}

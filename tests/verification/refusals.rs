@@ -1,0 +1,401 @@
+//! What `Model::new` refuses of materials, groups, supports, loads and obstacles, each with its pointer.
+
+use serde_json::{Value, json};
+
+use crate::input::{pair, violations};
+use crate::support::{problem, solve};
+
+/// Two by two elements on a clamped base, with one field (by its JSON Pointer) replaced.
+fn with(changes: &[(&str, Value)]) -> solver::problem::Problem {
+    let mut value = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [0, 1, 2], "y": [0, 1, 2]}, "groups": {}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "loads": [], "contacts": [],
+    });
+    for (pointer, new) in changes {
+        *value.pointer_mut(pointer).unwrap() = new.clone();
+    }
+    problem(&value.to_string())
+}
+
+/// Asserts that exactly these violations (pointer, reason) come back, in any order.
+#[track_caller]
+fn refused(changes: &[(&str, Value)], expected: &[(&str, &str)]) {
+    let mut found = violations(&with(changes));
+    let mut expected: Vec<_> = expected.iter().map(|(p, r)| pair(p, r)).collect();
+    found.sort();
+    expected.sort();
+    assert_eq!(found, expected);
+}
+
+fn steel(group: Option<&str>) -> Value {
+    let mut material = json!({"youngs_modulus": 1000, "poissons_ratio": 0.3});
+    if let Some(group) = group {
+        material["group"] = json!(group);
+    }
+    material
+}
+
+#[test]
+fn every_element_has_exactly_one_material() {
+    let groups = json!({"left": {"x": [0, 1]}, "low": {"y": [0, 1]}, "right": {"x": [1, 2]}});
+    let refused = |materials: Value, expected: &[(&str, &str)]| {
+        refused(
+            &[("/mesh/groups", groups.clone()), ("/materials", materials)],
+            expected,
+        );
+    };
+    let (left, low, right) = (Some("left"), Some("low"), Some("right"));
+    refused(json!([]), &[("/materials", "too_few")]);
+    refused(json!([steel(left)]), &[("/materials", "missing")]);
+    refused(
+        json!([steel(left), steel(low), steel(None)]),
+        &[("/materials/1/group", "overlap")],
+    );
+    refused(
+        json!([steel(left), steel(None), steel(None)]),
+        &[("/materials/2/group", "wrong_count")],
+    );
+    refused(
+        json!([steel(Some("lefft")), steel(None)]),
+        &[("/materials/0/group", "unknown_group")],
+    );
+    let list = solver::check(&with(&[
+        ("/mesh/groups", groups.clone()),
+        ("/materials", json!([steel(Some("lefft")), steel(None)])),
+    ]))
+    .unwrap_err();
+    for name in ["left", "low", "right"] {
+        assert!(list[0].expected.contains(name), "{}", list[0].expected);
+    }
+    for materials in [
+        json!([steel(left), steel(right)]),
+        json!([steel(left), steel(None)]),
+    ] {
+        let accepted = with(&[("/mesh/groups", groups.clone()), ("/materials", materials)]);
+        assert!(solver::check(&accepted).is_ok());
+    }
+}
+
+#[test]
+fn a_material_has_one_complete_form() {
+    let refused = |material: Value, expected: &[(&str, &str)]| {
+        refused(&[("/materials/0", material)], expected);
+    };
+    refused(
+        json!({}),
+        &[
+            ("/materials/0/youngs_modulus", "missing"),
+            ("/materials/0/poissons_ratio", "missing"),
+        ],
+    );
+    let wood = json!({"e1": 100, "e2": 10, "nu12": 0.3, "g12": 5});
+    refused(
+        json!({"orthotropic": wood, "youngs_modulus": 5}),
+        &[
+            ("/materials/0/youngs_modulus", "wrong_count"),
+            ("/materials/0/orthotropic/e3", "missing"),
+            ("/materials/0/orthotropic/nu13", "missing"),
+            ("/materials/0/orthotropic/nu23", "missing"),
+        ],
+    );
+    let mut whole = wood.clone();
+    (whole["e3"], whole["nu13"], whole["nu23"]) = (json!(8), json!(0.25), json!(0.4));
+    (whole["g12"], whole["e2"]) = (json!(-5), json!(0));
+    refused(
+        json!({"orthotropic": whole}),
+        &[
+            ("/materials/0/orthotropic/e2", "out_of_range"),
+            ("/materials/0/orthotropic/g12", "out_of_range"),
+        ],
+    );
+    // a third direction that is not needed
+    let sheet = json!({"kind": "plane_stress", "thickness": 1});
+    let accepted = with(&[
+        ("/analysis", sheet),
+        ("/materials/0", json!({"orthotropic": wood})),
+    ]);
+    assert!(solver::check(&accepted).is_ok());
+    // nu12² > e1/e2: some strain would cost no energy
+    let mut unstable = whole;
+    (unstable["g12"], unstable["e2"], unstable["nu12"]) = (json!(5), json!(10), json!(4));
+    refused(
+        json!({"orthotropic": unstable}),
+        &[("/materials/0/orthotropic", "out_of_range")],
+    );
+}
+
+#[test]
+fn groups_have_a_name_of_their_own_and_an_element() {
+    refused(
+        &[("/mesh/groups", json!({"thin": {"x": [0.2, 0.8]}}))],
+        &[("/mesh/groups/thin", "empty_group")],
+    );
+    let inline = json!({
+        "nodes": [[0,0],[1,0],[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]],
+        "elements": [[0,1,2,3,4,5,6,7]], "boundaries": {"bottom": [[0,1,4]]}, "groups": {"all": [0]},
+    });
+    refused(
+        &[("/mesh", json!({"inline": inline, "groups": {"all": {}}}))],
+        &[("/mesh/groups/all", "name_taken")],
+    );
+    let mut stray = inline;
+    stray["groups"]["all"] = json!([0, 1]);
+    let found = violations(&with(&[("/mesh", json!({"inline": stray}))]));
+    assert!(
+        found[0].0.starts_with("/mesh/inline/groups/all"),
+        "{found:?}"
+    );
+}
+
+/// Refinement gives every group the children of its elements: a stiff half stays that half.
+#[test]
+fn refinement_carries_groups() {
+    let bar = |mesh: Value, refine: u32| {
+        let mut mesh = mesh;
+        mesh["refine"] = json!(refine);
+        // stretched side by side: the stress follows the material
+        let fields = solve(&with(&[
+            ("/mesh", mesh),
+            (
+                "/materials",
+                json!([
+                    {"youngs_modulus": 1000, "poissons_ratio": 0},
+                    {"youngs_modulus": 3000, "poissons_ratio": 0, "group": "stiff"}
+                ]),
+            ),
+            (
+                "/supports",
+                json!([{"boundary": "left", "ux": 0, "uy": 0}, {"boundary": "right", "ux": 0.02, "uy": 0}]),
+            ),
+        ]))
+        .fields;
+        let count = fields.elements.len();
+        let stiff = (0..count).filter(|e| {
+            let points = 9 * e..9 * e + 9;
+            let stress = &fields.gauss.stress_xx[points.clone()];
+            let upper = fields.gauss.y[9 * e] > 1.0;
+            assert!(
+                stress
+                    .iter()
+                    .all(|s| (s - if upper { 30.0 } else { 10.0 }).abs() < 1e-10)
+            );
+            upper
+        });
+        (stiff.count(), count)
+    };
+    let ranges =
+        json!({"grid": {"x": [0, 1, 2], "y": [0, 1, 2]}, "groups": {"stiff": {"y": [1, 2]}}});
+    let lattice = crate::support::Lattice::new(2, 2, |i, j| [0.5 * i as f64, 0.5 * j as f64]);
+    let inline = json!({"inline": {
+        "nodes": lattice.nodes, "elements": lattice.elements, "groups": {"stiff": [2, 3]},
+        "boundaries": {"left": lattice.edges(2, |k| (0, k)), "right": lattice.edges(2, |k| (4, 4 - k))},
+    }});
+    for refine in 0..3 {
+        let count = 4 << (2 * refine);
+        assert_eq!(bar(ranges.clone(), refine), (count / 2, count));
+        assert_eq!(bar(inline.clone(), refine), (count / 2, count));
+    }
+}
+
+#[test]
+fn only_3_or_2_gauss_points_are_offered() {
+    let mut p = with(&[]);
+    for order in [0, 1, 4] {
+        p.quadrature = order;
+        assert_eq!(violations(&p), [pair("/quadrature", "out_of_range")]);
+    }
+    p.quadrature = 2;
+    assert!(solver::check(&p).is_ok());
+}
+
+#[test]
+fn supports_name_one_pair_of_directions_and_no_corner() {
+    let refused = |support: Value, expected: &[(&str, &str)]| {
+        let base = json!({"boundary": "bottom", "ux": 0, "uy": 0});
+        refused(&[("/supports", json!([base, support]))], expected);
+    };
+    refused(json!({"boundary": "top"}), &[("/supports/1", "empty")]);
+    refused(
+        json!({"boundary": "top", "ux": 0, "un": 0}),
+        &[("/supports/1", "wrong_count")],
+    );
+    // the side shares its lower node with the base
+    refused(
+        json!({"boundary": "left", "un": 0.1}),
+        &[("/supports/1/un", "conflict")],
+    );
+    let corner = json!({"inline": {
+        "nodes": [[0,0],[1,0],[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]], "elements": [[0,1,2,3,4,5,6,7]],
+        "boundaries": {"bottom": [[1,0,4]], "round": [[3,2,6], [2,1,5]]},
+    }});
+    let supports = json!([
+        {"boundary": "bottom", "ux": 0, "uy": 0}, {"boundary": "round", "un": 0}
+    ]);
+    let found = violations(&with(&[("/mesh", corner), ("/supports", supports)]));
+    assert!(
+        found.contains(&pair("/supports/1/boundary", "turns_corner")),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn a_load_has_one_form_and_its_boundary() {
+    let refused = |load: Value, expected: &[(&str, &str)]| {
+        refused(&[("/loads", json!([load]))], expected);
+    };
+    let one = [("/loads/0", "wrong_count")];
+    refused(json!({"boundary": "top"}), &one);
+    refused(
+        json!({"boundary": "top", "pressure": 1, "traction": [0, 1]}),
+        &one,
+    );
+    refused(
+        json!({"boundary": "top", "pressure": 1, "tangential": 1}),
+        &one,
+    );
+    refused(
+        json!({"boundary": "top", "body_force": [0, 1]}),
+        &[("/loads/0/boundary", "not_used")],
+    );
+    refused(json!({"normal": 1}), &[("/loads/0/boundary", "missing")]);
+    refused(
+        json!({"boundary": "roof", "nodal": [[0, 1]]}),
+        &[("/loads/0/boundary", "unknown_boundary")],
+    );
+    refused(
+        json!({"boundary": "top", "nodal": [[0, 1], [0, 1]]}),
+        &[("/loads/0/nodal", "wrong_length")],
+    );
+}
+
+#[test]
+fn every_obstacle_has_its_numbers_checked() {
+    let refused = |obstacle: Value, expected: &[(&str, &str)]| {
+        let contact = json!({"boundary": "top", "obstacle": obstacle});
+        let expected: Vec<_> = expected
+            .iter()
+            .map(|(field, reason)| (format!("/contacts/0/obstacle/{field}"), *reason))
+            .collect();
+        let expected: Vec<_> = expected.iter().map(|(p, r)| (&p[..], *r)).collect();
+        refused(&[("/contacts", json!([contact]))], &expected);
+    };
+    let range = "out_of_range";
+    for kind in ["circle", "parabola"] {
+        refused(json!({"kind": kind, "radius": 0}), &[("radius", range)]);
+    }
+    refused(
+        json!({"kind": "rounded_flat", "radius": -1, "half_width": -1}),
+        &[("radius", range), ("half_width", range)],
+    );
+    for kind in ["wedge", "cone"] {
+        for angle in [0, 90, -10] {
+            refused(json!({"kind": kind, "angle": angle}), &[("angle", range)]);
+        }
+    }
+    refused(
+        json!({"kind": "power", "coefficient": 0, "exponent": 0.5}),
+        &[("coefficient", range), ("exponent", range)],
+    );
+    refused(
+        json!({"kind": "table", "x": [0, 2, 2], "gap": [0, 1]}),
+        &[("x/2", "not_increasing"), ("gap", "wrong_length")],
+    );
+    refused(
+        json!({"kind": "table", "x": [0], "gap": [0]}),
+        &[("x", "too_few")],
+    );
+    refused(
+        json!({"kind": "polyline", "points": [[0, 3]]}),
+        &[("points", "too_few")],
+    );
+    refused(
+        json!({"kind": "polyline", "points": [[0, 3], [1, 3], [1, 3]]}),
+        &[("points/2", "repeated_point")],
+    );
+    refused(
+        json!({"kind": "flat", "from": 1, "to": 1}),
+        &[("to", range)],
+    );
+}
+
+#[test]
+fn a_contact_without_an_obstacle_needs_a_bound_and_a_bonded_one_no_friction() {
+    let refused = |changes: Value, expected: &[(&str, &str)]| {
+        let mut contact = json!({"boundary": "top", "obstacle": {"kind": "flat"}});
+        for (name, value) in changes.as_object().unwrap() {
+            contact[name] = value.clone();
+        }
+        refused(&[("/contacts", json!([contact]))], expected);
+    };
+    let coulomb = json!({"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4});
+    let missing = [("/contacts/0/friction/bound", "missing")];
+    refused(json!({"condition": "none"}), &missing);
+    refused(json!({"condition": "none", "friction": coulomb}), &missing);
+    refused(
+        json!({"condition": "bonded", "friction": coulomb}),
+        &[("/contacts/0/friction", "not_used")],
+    );
+}
+
+/// A support that leaves the body outside the obstacle at the end of one step and not of another.
+#[test]
+fn a_supported_contact_node_stays_outside_the_obstacle_at_every_step() {
+    let contact = json!([{"boundary": "top", "obstacle": {"kind": "flat"}, "indentation": 0.1}]);
+    let held = |u_y: f64, steps: Value| {
+        let mut p = with(&[
+            ("/contacts", contact.clone()),
+            (
+                "/supports",
+                json!([{"boundary": "bottom", "ux": 0, "uy": 0}, {"boundary": "top", "uy": u_y}]),
+            ),
+        ]);
+        p.steps = serde_json::from_value(steps).unwrap();
+        p
+    };
+    let impossible = [pair("/contacts/0/indentation", "impossible")];
+    assert!(solver::check(&held(-0.15, json!([]))).is_ok());
+    assert_eq!(violations(&held(-0.05, json!([]))), impossible);
+    let half = json!({"indentation": 0.5});
+    assert!(solver::check(&held(-0.15, json!([half, {}]))).is_ok());
+    let more = json!({"indentation": 2});
+    assert_eq!(
+        violations(&held(-0.15, json!([half, more, {}]))),
+        impossible
+    );
+    let lifted = json!({"supports": 0.5});
+    assert_eq!(violations(&held(-0.15, json!([{}, lifted]))), impossible);
+}
+
+#[test]
+fn adaptive_refinement_wants_a_tolerance_a_grid_and_a_contact() {
+    let contacts = json!([{"boundary": "top", "obstacle": {"kind": "flat"}}]);
+    let grid = json!({"x": [0, 1, 2], "y": [0, 1, 2]});
+    for tolerance in [0.0, 1.0, -0.1] {
+        let mesh = json!({"grid": grid, "refine": {"tolerance": tolerance}});
+        refused(
+            &[("/mesh", mesh), ("/contacts", contacts.clone())],
+            &[("/mesh/refine/tolerance", "out_of_range")],
+        );
+    }
+    let mesh = json!({"grid": grid, "refine": {"tolerance": 0.01}});
+    refused(&[("/mesh", mesh.clone())], &[("/mesh/refine", "not_used")]);
+    let accepted = with(&[("/mesh", mesh), ("/contacts", contacts.clone())]);
+    assert!(solver::check(&accepted).is_ok());
+    let inline = json!({
+        "nodes": [[0,0],[1,0],[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]], "elements": [[0,1,2,3,4,5,6,7]],
+        "boundaries": {"bottom": [[1,0,4]], "top": [[3,2,6]]},
+    });
+    refused(
+        &[
+            (
+                "/mesh",
+                json!({"inline": inline, "refine": {"tolerance": 0.01}}),
+            ),
+            ("/contacts", contacts),
+        ],
+        &[("/mesh/refine", "not_used")],
+    );
+}
