@@ -5,6 +5,7 @@ use solver::elasticity::{Section, assemble_element, isotropic};
 use solver::element::gauss::{GAUSS_2, GAUSS_3};
 use solver::problem::{Analysis, Problem};
 
+use crate::record::held;
 use crate::support::{Lattice, problem, solve};
 
 /// Row 1. Nine distorted elements on a unit square at r ≥ 1, its boundary driven by a linear
@@ -128,6 +129,15 @@ fn a_distorted_patch_reproduces_constant_strain() {
     ];
     for (analysis, ux, uy, stress, size) in cases {
         let (of_u, of_stress) = errors(analysis, ux, uy, stress);
+        let kind: &str = analysis.split('"').nth(3).unwrap_or(analysis);
+        held(
+            1,
+            &format!("patch test, {kind}: error of u"),
+            "distorted patch",
+            of_u,
+            0.0,
+            1e-12,
+        );
         assert!(
             of_u <= 1e-12 && of_stress <= 1e-12 * size,
             "{analysis}: u {of_u:.1e}, σ/E {of_stress:.1e}"
@@ -159,15 +169,37 @@ fn an_element_has_its_rigid_modes_and_no_others() {
         values.iter().filter(|v| v.abs() < 1e-12 * largest).count()
     };
     let (strain, round) = (Analysis::PlaneStrain {}, Analysis::Axisymmetric {});
-    assert_eq!(zero_modes(strain, &GAUSS_3), 3);
-    assert_eq!(
-        zero_modes(Analysis::PlaneStress { thickness: 0.5 }, &GAUSS_3),
-        3
-    );
-    assert_eq!(zero_modes(round, &GAUSS_3), 1);
-    assert_eq!(
-        zero_modes(strain, &GAUSS_2),
-        4,
-        "the 2 × 2 rule leaves one more"
-    );
+    let sheet = Analysis::PlaneStress { thickness: 0.5 };
+    for (what, modes, expected) in [
+        (
+            "zero modes, plane strain, 3 × 3",
+            zero_modes(strain, &GAUSS_3),
+            3,
+        ),
+        (
+            "zero modes, plane stress, 3 × 3",
+            zero_modes(sheet, &GAUSS_3),
+            3,
+        ),
+        (
+            "zero modes, axisymmetric, 3 × 3",
+            zero_modes(round, &GAUSS_3),
+            1,
+        ),
+        // one more than the rigid ones
+        (
+            "zero modes, plane strain, 2 × 2",
+            zero_modes(strain, &GAUSS_2),
+            4,
+        ),
+    ] {
+        held(
+            2,
+            what,
+            "one distorted element",
+            modes as f64,
+            f64::from(expected),
+            0.0,
+        );
+    }
 }
