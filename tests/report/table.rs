@@ -1,0 +1,177 @@
+//! The rows of VERIFICATION.md and the robustness grid.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
+
+use serde_json::Value;
+
+/// What the rows are about; a row without a title is none.
+const TITLES: [&str; 26] = [
+    "Published values beside the rows",
+    "Patch test",
+    "Rigid modes",
+    "Thick cylinder",
+    "Cook's membrane",
+    "Manufactured solutions",
+    "Pressure on a disc",
+    "Contact patch test",
+    "Flat punch, plane",
+    "Hertz, cylinder",
+    "Hertz, sphere",
+    "Flat punch, axisymmetric",
+    "Annular punches",
+    "Even profiles",
+    "NAFEMS CGS-4, block on an incline",
+    "Bonded flat punch",
+    "Sliding flat punch",
+    "Cattaneo and Mindlin",
+    "Stick radius of the flat punch",
+    "Total and incremental law",
+    "Thin strip on a frictional base",
+    "Moments of the averaging operator",
+    "Averaged pressure of a flat punch",
+    "Limits of the nonlocal radius",
+    "Invariances",
+    "Balance and variational inequality",
+];
+
+/// Of more lines than this the worst are shown.
+const MOST_SHOWN: usize = 16;
+
+/// All rows as one table each. Panics when one is missing.
+pub(crate) fn rows(records: &Path) -> String {
+    let text = std::fs::read_to_string(records.join("lines.jsonl")).unwrap();
+    let mut rows: BTreeMap<u64, Vec<Value>> = BTreeMap::new();
+    for line in text.lines() {
+        let line: Value = serde_json::from_str(line).unwrap();
+        rows.entry(line["row"].as_u64().unwrap())
+            .or_default()
+            .push(line);
+    }
+    let missing: Vec<u64> = (1..=25).filter(|row| !rows.contains_key(row)).collect();
+    assert!(missing.is_empty(), "rows without a line: {missing:?}");
+    let mut out = String::new();
+    // the rows first, what has no row after them
+    for row in (1..=25).chain([0]) {
+        let title = TITLES[row as usize];
+        match row {
+            0 => writeln!(out, "## {title}\n").unwrap(),
+            _ => writeln!(out, "## {row}. {title}\n").unwrap(),
+        }
+        let lines = &mut rows.get_mut(&row).unwrap();
+        let count = lines.len();
+        if count > MOST_SHOWN {
+            lines.sort_by(|a, b| used(b).total_cmp(&used(a)));
+            lines.truncate(MOST_SHOWN);
+            writeln!(
+                out,
+                "The {MOST_SHOWN} of {count} lines that come nearest to what is allowed.\n"
+            )
+            .unwrap();
+        }
+        // tests run side by side: their lines come in any order
+        lines.sort_by_key(|line| line["what"].to_string() + &line["mesh"].to_string());
+        out += &table(lines);
+    }
+    out
+}
+
+/// Error in parts of what is allowed.
+fn used(line: &Value) -> f64 {
+    let (error, allowed) = (
+        line["error"].as_f64().unwrap(),
+        line["allowed"].as_f64().unwrap(),
+    );
+    if allowed > 0.0 {
+        error / allowed
+    } else {
+        error
+    }
+}
+
+fn table(lines: &[Value]) -> String {
+    let mut out = String::from(
+        "| quantity | expected | computed | error | allowed | order | mesh |\n|---|---|---|---|---|---|---|\n",
+    );
+    for line in lines {
+        let number = |name: &str| line[name].as_f64().unwrap();
+        let order = line["order"]
+            .as_f64()
+            .map_or(String::new(), |o| format!("{o:.2}"));
+        let computed = match number("expected") {
+            // rounding differs from machine to machine
+            0.0 if number("computed").abs() < 1e-12 => "< 1e-12".to_owned(),
+            _ => digits(number("computed")),
+        };
+        writeln!(
+            out,
+            "| {} | {} | {computed} | {} | {} | {order} | {} |",
+            line["what"].as_str().unwrap().replace('|', "\\|"),
+            digits(number("expected")),
+            small(number("error")),
+            small(number("allowed")),
+            line["mesh"].as_str().unwrap(),
+        )
+        .unwrap();
+    }
+    out + "\n"
+}
+
+/// Seven digits at most.
+pub(crate) fn digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-3..1e6).contains(&value.abs()) {
+        return format!("{value:.4e}");
+    }
+    let before = value.abs().log10().floor() as i32 + 1;
+    let text = format!("{value:.*}", (7 - before).clamp(1, 10) as usize);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+fn small(value: f64) -> String {
+    match value {
+        0.0 => "0".to_owned(),
+        v if v.abs() < 1e-12 => "< 1e-12".to_owned(),
+        v => format!("{v:.1e}"),
+    }
+}
+
+/// Rows needed by `auto` on the robustness grid.
+pub(crate) fn robustness(records: &Path) -> String {
+    let text = std::fs::read_to_string(records.join("robustness.jsonl")).unwrap();
+    let grid: Value = serde_json::from_str(text.lines().last().unwrap()).unwrap();
+    let mut out = format!(
+        "## Robustness\n\nExamples 1 to 4, ε = 1e-2 … 1e-8, μ = .1, .3, 1, 4, ρ = 0, 1 and 10 times the value of the examples,\nthesis mesh and two refinements, friction at Gauss points and at nodes: {} cases, all of which `auto`\nsolves. On the refined meshes ∫|σ_t| for ε < 1e-5 differs by more than 1 % from its value at 1e-5 in\n{} cases, all at Gauss points and all with the warning `oscillating_stick`; {} cases have the warning\nbesides. Iterations (frictionless solution and sweeps):\n\n| example | ε | cases | least | median | most |\n|---|---|---|---|---|---|\n",
+        grid["cases"], grid["oscillating"], grid["warned_besides"]
+    );
+    let mut lines: Vec<&Value> = grid["iterations"].as_array().unwrap().iter().collect();
+    let slip = |line: &Value| {
+        line["elastic_slip"]
+            .as_str()
+            .unwrap()
+            .parse::<f64>()
+            .unwrap()
+    };
+    lines.sort_by(|a, b| {
+        let name = |v: &Value| v["example"].to_string();
+        name(a).cmp(&name(b)).then(slip(b).total_cmp(&slip(a)))
+    });
+    for line in lines {
+        let text = |name: &str| line[name].as_str().unwrap().to_owned();
+        writeln!(
+            out,
+            "| {} | {} | {} | {} | {} | {} |",
+            text("example").replace('_', " "),
+            text("elastic_slip"),
+            line["cases"],
+            line["least"],
+            line["median"],
+            line["most"]
+        )
+        .unwrap();
+    }
+    out + "\n"
+}
