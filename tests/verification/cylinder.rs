@@ -79,3 +79,28 @@ fn a_cylinder_presses_as_hertz_says() {
     );
     assert!(fine < 0.5 * coarse, "{coarse:.2e} → {fine:.2e}");
 }
+
+/// What `mesh_too_coarse_for_contact` says of the peak holds for every place of the contact's end
+/// between the nodes: .28/n², n elements across.
+#[test]
+fn the_peak_of_a_coarse_contact_is_off_by_no_more_than_the_warning_says() {
+    for n in [1.0, 2.0, 3.0, 5.0] {
+        for shift in [0.0, 0.3, 0.6, 0.9] {
+            let solution = cylinder(0.38, 1.0 / (n + shift));
+            let contact = &solution.summary.contacts["top"];
+            let load = 2.0 * solution.summary.normal_force;
+            let exact = (load * 1000.0 / 0.91 / (std::f64::consts::PI * 8.0)).sqrt();
+            let off = (-contact.peak_normal_stress.unwrap().value / exact - 1.0).abs();
+            let told = solution.summary.warnings.iter();
+            let told = told.filter(|w| w.code == "mesh_too_coarse_for_contact");
+            let message = &told.last().expect("no warning").message;
+            let percent = message
+                .split("up to ")
+                .nth(1)
+                .and_then(|m| m.split(' ').next());
+            let said: f64 = percent.unwrap().parse().unwrap();
+            // the block is no half-space: a few tenths of a percent
+            assert!(100.0 * off <= said + 0.3, "{off} against: {message}");
+        }
+    }
+}

@@ -286,7 +286,12 @@ fn a_contact_that_never_engages_is_said_with_its_smallest_gap() {
         .iter()
         .find(|w| w.code == "no_contact")
         .expect("no warning");
-    assert!(warning.message.contains("1.25"), "{}", warning.message);
+    let (gap, needed) = ("gap is 1.250000e-1", "above 0.000000e0");
+    assert!(
+        warning.message.contains(gap) && warning.message.contains(needed),
+        "{}",
+        warning.message
+    );
     assert!(solution.summary.contacts["top"].contact.is_empty());
 }
 

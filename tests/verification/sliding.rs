@@ -141,17 +141,18 @@ fn a_sliding_punch_presses_harder_at_its_trailing_edge() {
 
 /// Row 17. Cattaneo and Mindlin: c/a = √(1 − Q/(μP)) under a drag; back again, counter-slip down to
 /// c′/a = √(1 − (Q_max − Q)/(2μP)), and a force that is left at d = 0. ν = .49 uncouples normal and
-/// tangential problem all but for .01; half an element of the contact's width is 1 %: 2 % of c/a.
+/// tangential problem but for β = .02: few increments, for each locks in a little shear that the
+/// theory does not have. 1 %.
 #[test]
 fn a_drag_and_its_reversal_slip_as_cattaneo_and_mindlin_say() {
-    let (mu, h) = (0.3, 0.02);
-    let x: Vec<f64> = (0..=60).map(|k| f64::from(k) * h).collect();
+    let (mu, h) = (0.3, 0.0125);
+    let x: Vec<f64> = (0..=96).map(|k| f64::from(k) * h).collect();
     let solve = |history: &str| {
         let contact = json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8, "from": -1.2, "to": 1.2},
             "indentation": 0.4, "tangential_displacement": 0.12,
             "friction": {"coefficient": mu, "nonlocal_radius": 0, "elastic_slip": 1e-6, "history": history, "points": "nodal"}});
         let steps = json!([
-            {"name": "indent", "increments": 8, "spacing": "contact_width"},
+            {"name": "indent", "increments": 4, "spacing": "contact_width"},
             {"name": "drag", "tangential_displacement": 1, "increments": 4},
             {"name": "half back", "tangential_displacement": 0.5, "increments": 4},
             {"name": "back", "tangential_displacement": 0, "increments": 4},
@@ -169,7 +170,7 @@ fn a_drag_and_its_reversal_slip_as_cattaneo_and_mindlin_say() {
             width(&contact.stick) / width(&contact.contact),
         )
     };
-    let mesh = "block of 200 a, 100 elements across";
+    let mesh = "block of 200 a, 170 elements across";
     let (drag, load, stick) = step(&with_memory, 1);
     assert!(
         drag > 0.3 * mu * load && drag < 0.9 * mu * load,
@@ -182,7 +183,7 @@ fn a_drag_and_its_reversal_slip_as_cattaneo_and_mindlin_say() {
         mesh,
         stick,
         (1.0 - drag / (mu * load)).sqrt(),
-        0.02,
+        0.01,
     );
     for (k, name) in [(2, "half back"), (3, "back")] {
         let (force, load, stick) = step(&with_memory, k);
@@ -193,7 +194,7 @@ fn a_drag_and_its_reversal_slip_as_cattaneo_and_mindlin_say() {
             mesh,
             stick,
             exact,
-            0.02,
+            0.01,
         );
     }
     let (left, ..) = step(&with_memory, 3);
