@@ -307,7 +307,7 @@ impl Failure {
         let title = match reason {
             Reason::NotConverged => "The iteration did not converge",
             Reason::ContactCycling => "The contact set repeats itself without settling",
-            Reason::FalseConvergence => "The iteration settled, but the forces do not balance",
+            Reason::FalseConvergence => "The iteration settled, but not in a solution",
             Reason::SingularSystem => "The stiffness matrix is singular",
             Reason::NonFinite => "A number that is not finite came up",
             Reason::ResourceExhausted => "The job needs more than there is",

@@ -48,7 +48,8 @@ pub enum Outcome {
     NotConverged,
     /// The contact set repeats itself without settling.
     ContactCycling,
-    /// The method's own tests are met, but the forces on the body do not balance.
+    /// The method's own tests are met, but the forces on the body do not balance, or (by the thesis's
+    /// own iteration) the true residual is above the tolerance.
     FalseConvergence,
     /// The observer asked to stop; the last state is kept.
     Canceled,

@@ -155,3 +155,100 @@ fn a_block_on_an_incline_is_pushed_sideways() {
         assert!(summary.residuals.equilibrium < 1e-10, "{normal}");
     }
 }
+
+/// A cylinder of R = 8 pushed by .1 into a block [0, 4] × [−8, 0], half of it; `friction` as JSON.
+fn cylinder(normal: &str, friction: Value) -> solver::solution::Solution {
+    let mut x: Vec<f64> = (0..=70).map(|k| f64::from(k) * 0.02).collect();
+    x.extend(&crate::support::graded(1.4, 4.0, 0.02, 1.3)[1..]);
+    let y: Vec<f64> = crate::support::graded(0.0, -8.0, 0.02, 1.3)
+        .into_iter()
+        .rev()
+        .collect();
+    let mut p = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": x, "y": y}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
+        "contacts": [{"boundary": "top", "normal": normal, "indentation": 0.1,
+            "obstacle": {"kind": "circle", "radius": 8, "from": 0, "to": 1.4}}],
+    });
+    if !friction.is_null() {
+        p["contacts"][0]["friction"] = friction;
+    }
+    solve(&problem(&p.to_string()))
+}
+
+/// The vertical load as an independent finite element program (GetFEM) finds it with either normal, full
+/// load: a tenth of a percent, for its mesh is another.
+#[test]
+fn a_peer_finds_the_same_vertical_loads_with_either_normal() {
+    let friction =
+        json!({"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-6, "points": "nodal"});
+    for (normal, friction, published) in [
+        ("body", Value::Null, 49.602),
+        ("body", friction.clone(), 50.038),
+        ("obstacle", Value::Null, 49.954),
+        ("obstacle", friction, 50.251),
+    ] {
+        let name = if friction.is_null() {
+            "frictionless"
+        } else {
+            "μ = .3"
+        };
+        let solution = cylinder(normal, friction);
+        let profile = &solution.profiles["top"];
+        // the vertical part of p m and σ_t t, by Simpson's rule
+        let vertical = |i: usize| {
+            let slope = match normal {
+                "body" => 0.0,
+                _ => profile.x[i] / (64.0 - profile.x[i] * profile.x[i]).sqrt(),
+            };
+            (-profile.normal_stress[i] - profile.tangential_stress[i] * slope) / slope.hypot(1.0)
+        };
+        let load: f64 = (0..profile.s.len() - 1)
+            .step_by(2)
+            .map(|k| {
+                (profile.s[k + 2] - profile.s[k]) / 6.0
+                    * (vertical(k) + 4.0 * vertical(k + 1) + vertical(k + 2))
+            })
+            .sum();
+        let what = format!("cylinder, normal of the {normal}, {name}: vertical load");
+        crate::record::held(
+            0,
+            &what,
+            "block 4 × 8, h = .02",
+            2.0 * load,
+            published,
+            1e-3,
+        );
+    }
+}
+
+/// The obstacle moves straight down, and what sticks to its sloping face with it; before that a node
+/// meets the face along the face's normal. Only the elastic slip lies between.
+#[test]
+fn what_sticks_to_a_sloping_face_moves_with_it() {
+    let friction =
+        json!({"coefficient": 50, "nonlocal_radius": 0, "elastic_slip": 1e-6, "points": "nodal"});
+    let solution = cylinder("obstacle", friction);
+    let (fields, profile) = (&solution.fields, &solution.profiles["top"]);
+    let mut stuck = 0;
+    for i in 0..profile.s.len() {
+        if profile.state[i] != solver::solution::NodeState::Stick {
+            continue;
+        }
+        let (x, sine) = (profile.x[i], profile.x[i] / 8.0);
+        let distance = profile.gap[i] + 0.1 * (1.0 - sine * sine).sqrt();
+        let node = (0..fields.x.len())
+            .find(|&n| fields.x[n] == x && fields.y[n] == 0.0)
+            .unwrap();
+        assert!(
+            (fields.ux[node] + distance * sine).abs() < 1.001e-6,
+            "x = {x}: u_x = {}, met at {}",
+            fields.ux[node],
+            -distance * sine
+        );
+        stuck += 1;
+    }
+    assert!(stuck > 20, "{stuck}");
+}

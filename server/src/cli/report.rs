@@ -39,7 +39,9 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
         Outcome::Converged => "converged",
         Outcome::NotConverged => "NOT CONVERGED",
         Outcome::ContactCycling => "NOT CONVERGED: the contact set repeats itself",
-        Outcome::FalseConvergence => "NOT CONVERGED: it settled, but the forces do not balance",
+        Outcome::FalseConvergence => {
+            "NOT CONVERGED: it settled, but not in a solution; see the residuals"
+        }
         Outcome::Canceled => "CANCELED",
     };
     let mut text = String::new();

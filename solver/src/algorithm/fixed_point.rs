@@ -200,7 +200,7 @@ pub(super) fn stuck(system: &System<'_>, state: &State) -> State {
     for patch in system.patches.iter().filter(|patch| patch.law.is_some()) {
         for node in &system.nodes[system.range(patch)] {
             if let Dof::Free(dof) = node.tangent {
-                state.v[dof] = patch.obstacle_displacement;
+                state.v[dof] = node.drag;
             }
         }
     }

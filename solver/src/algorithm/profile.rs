@@ -19,7 +19,7 @@ const SMOOTH_PEAK: f64 = 0.28;
 const OSCILLATING: f64 = 3e-3;
 
 /// One edge may hold this part of it for the sake of a motion that turns there.
-const TURN: f64 = 0.01;
+const TURN: f64 = 0.02;
 
 /// Fewer edges than this across a contact say little about its pressure.
 const FEWEST_EDGES: usize = 6;
@@ -144,11 +144,10 @@ impl<'a> PatchView<'a> {
 
     /// e = u_t − d − g along an edge.
     fn slip_at(&self, edge: usize, xi: f64) -> f64 {
-        let u_t = edge_nodes(edge).map(|i| self.u_t(i));
+        let drag = |i: usize| self.system.nodes[self.patch.first + i].drag;
+        let relative = edge_nodes(edge).map(|i| self.u_t(i) - drag(i));
         let h = edge3::shape(xi);
-        edge3::interpolate(&h, &u_t)
-            - edge3::interpolate(&h, &self.anchors[edge])
-            - self.patch.obstacle_displacement
+        edge3::interpolate(&h, &relative) - edge3::interpolate(&h, &self.anchors[edge])
     }
 
     fn own_pressures(&self) -> &[f64] {
@@ -540,8 +539,21 @@ impl<'a> PatchView<'a> {
         };
         let total: f64 = own.iter().map(|force| force.abs()).sum();
         let mut canceling: f64 = own.chunks(3).map(cancels).sum();
-        // the motion may turn once, within a coarse edge, where friction is small
-        let turn = own.chunks(3).map(cancels).fold(0.0, f64::max);
+        // the motion may turn once, within a coarse edge; but not from the full bound one way to the
+        // full bound the other way
+        let reached: Vec<bool> = self
+            .system
+            .points
+            .iter()
+            .zip(self.finished.tractions.iter().zip(&self.finished.bound))
+            .filter(|(point, _)| point.patch == self.p)
+            .map(|(_, (traction, tau))| traction.abs() >= *tau)
+            .collect();
+        let turns = own.chunks(3).zip(reached.chunks(3));
+        let turn = turns
+            .filter(|(_, reached)| reached.iter().filter(|r| **r).count() < 2)
+            .map(|(edge, _)| cancels(edge))
+            .fold(0.0, f64::max);
         if turn < TURN * total {
             canceling -= turn;
         }

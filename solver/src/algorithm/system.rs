@@ -51,6 +51,8 @@ pub struct ContactNode {
     pub gap: f64,
     /// u_n = gap, whatever the reaction.
     pub bonded: bool,
+    /// d: the obstacle's own displacement along t at this level.
+    pub drag: f64,
     /// u_t where it is held.
     pub held_tangent: Option<f64>,
     /// ∫ h_i.
@@ -104,8 +106,6 @@ pub struct Patch<'a> {
     pub first: usize,
     /// Its friction law; none: frictionless.
     pub law: Option<FrictionLaw>,
-    /// d at this level.
-    pub obstacle_displacement: f64,
 }
 
 /// A state of the system.
@@ -168,6 +168,7 @@ impl<'a> System<'a> {
                 tangent,
                 gap: 0.0,
                 bonded: contact.condition == Condition::Bonded,
+                drag: 0.0,
                 held_tangent: None,
                 weight: boundary.weights[i],
                 follows,
@@ -220,7 +221,6 @@ impl<'a> System<'a> {
             contact,
             first,
             law,
-            obstacle_displacement: 0.0,
         });
     }
 
@@ -228,10 +228,8 @@ impl<'a> System<'a> {
     pub fn set_level(&mut self, level: Level) {
         self.level = level;
         self.load = self.body.load(&level);
-        for patch in &mut self.patches {
+        for patch in &self.patches {
             let contact = patch.contact;
-            patch.obstacle_displacement =
-                level.tangential_displacement * contact.tangential_displacement;
             for (i, node) in self.nodes[patch.first..].iter_mut().enumerate() {
                 if i >= contact.boundary.nodes.len() {
                     break;
@@ -246,7 +244,8 @@ impl<'a> System<'a> {
                     Condition::None => f64::INFINITY,
                     _ => contact.gap(i, level.indentation),
                 };
-                node.held_tangent = node.bonded.then_some(patch.obstacle_displacement);
+                node.drag = contact.drag(i, &level);
+                node.held_tangent = node.bonded.then_some(node.drag);
             }
         }
     }
@@ -257,7 +256,7 @@ impl<'a> System<'a> {
         for patch in bonded.patches.iter().filter(|patch| patch.law.is_some()) {
             let count = patch.contact.boundary.nodes.len();
             for node in &mut bonded.nodes[patch.first..patch.first + count] {
-                node.held_tangent = Some(patch.obstacle_displacement);
+                node.held_tangent = Some(node.drag);
             }
         }
         bonded.points.clear();
@@ -270,12 +269,11 @@ impl<'a> System<'a> {
         let largest = bound.iter().fold(0.0f64, |a, b| a.max(*b));
         for (g, tau) in bound.iter().enumerate() {
             let point = &self.points[g];
-            let (slip, u_t) = (self.slip(v, point), self.displacement(v, point));
+            let (slip, relative) = (self.slip(v, point), self.relative_displacement(v, point));
             let open = *tau <= OPEN * largest;
-            let d = self.patches[point.patch].obstacle_displacement;
             let forgotten = self.law(point).anchor_move(slip, open);
             self.points[g].anchor += forgotten;
-            self.points[g].past_displacement = u_t - d;
+            self.points[g].past_displacement = relative;
         }
     }
 
@@ -290,9 +288,8 @@ impl<'a> System<'a> {
             match law.history {
                 History::Total => total += force * slip,
                 History::Incremental => {
-                    let d = self.patches[point.patch].obstacle_displacement;
-                    increment +=
-                        force * (self.displacement(v, point) - d - point.past_displacement);
+                    let relative = self.relative_displacement(v, point);
+                    increment += force * (relative - point.past_displacement);
                 }
             }
         }
@@ -325,17 +322,17 @@ impl<'a> System<'a> {
         value(self.nodes[node].tangent, v)
     }
 
-    /// u_t at a friction point.
-    fn displacement(&self, v: &[f64], point: &Point) -> f64 {
+    /// u_t − d at a friction point.
+    fn relative_displacement(&self, v: &[f64], point: &Point) -> f64 {
+        let relative = |node: usize| self.tangential_displacement(v, node) - self.nodes[node].drag;
         (0..3)
-            .map(|i| point.shape[i] * self.tangential_displacement(v, point.nodes[i]))
+            .map(|i| point.shape[i] * relative(point.nodes[i]))
             .sum()
     }
 
     /// e = u_t − d − g at a friction point: what friction answers to.
     pub fn slip(&self, v: &[f64], point: &Point) -> f64 {
-        let d = self.patches[point.patch].obstacle_displacement;
-        self.displacement(v, point) - d - point.anchor
+        self.relative_displacement(v, point) - point.anchor
     }
 
     /// The law at a friction point.

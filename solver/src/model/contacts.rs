@@ -92,6 +92,13 @@ impl Findings {
                 profile: along(&|i| run.profile[i].distance),
                 indentation: along(&|_| contact.indentation),
                 tangential_displacement: contact.tangential_displacement,
+                // the obstacle moves by −δ n, and n·t is the sine of the slope
+                indentation_drag: match contact.normal {
+                    NormalOf::Body => vec![0.0; cosines.len()],
+                    NormalOf::Obstacle => {
+                        along(&|i| -contact.indentation * run.profile[i].slope + 0.0)
+                    }
+                },
                 normal: contact.normal,
                 condition: contact.condition,
                 power: power(&contact.obstacle),

@@ -95,7 +95,7 @@ impl Findings {
                 self.say(
                     at("orthotropic"),
                     "out_of_range",
-                    format!("nu12 = {}, nu13 = {:?}, nu23 = {:?}", material.nu12, material.nu13, material.nu23),
+                    format!("nu12 = {}{}{}", material.nu12, named("nu13", material.nu13), named("nu23", material.nu23)),
                     "constants of a stable material, e.g. nu12² < e1/e2",
                     "Some strain would cost no energy. Check which of nu12 and nu21 is meant: nu12 = −ε_2/ε_1 under σ_1.",
                 );
@@ -198,6 +198,11 @@ impl Findings {
         }
         material_of
     }
+}
+
+/// A constant with its name, where it is given.
+fn named(name: &str, value: Option<f64>) -> String {
+    value.map_or(String::new(), |value| format!(", {name} = {value}"))
 }
 
 fn known(groups: &BTreeMap<String, Vec<u32>>) -> String {

@@ -95,8 +95,11 @@ pub struct ContactModel {
     pub profile: Vec<f64>,
     /// The obstacle's indentation at each node, along the contact's normal (length).
     pub indentation: Vec<f64>,
-    /// d, the obstacle's own tangential displacement.
+    /// The obstacle's own displacement along the contact's t (length).
     pub tangential_displacement: f64,
+    /// What its indentation moves it along the contact's t at each node (length): nothing with the
+    /// body's normal, but along a face that slopes.
+    pub indentation_drag: Vec<f64>,
     /// Whose normal it is.
     pub normal: NormalOf,
     /// What the obstacle does.
@@ -111,6 +114,12 @@ impl ContactModel {
     /// Gap at a node (length) when the obstacle is pushed by `factor` times its indentation.
     pub fn gap(&self, node: usize, factor: f64) -> f64 {
         self.profile[node] - factor * self.indentation[node]
+    }
+
+    /// d: the obstacle's displacement along the contact's t at a node (length).
+    pub fn drag(&self, node: usize, level: &Level) -> f64 {
+        level.tangential_displacement * self.tangential_displacement
+            + level.indentation * self.indentation_drag[node]
     }
 }
 

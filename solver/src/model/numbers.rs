@@ -3,7 +3,7 @@
 use super::findings::Findings;
 use crate::error::escape;
 use crate::problem::{
-    Algorithm, Analysis, Condition, Friction, FrictionPoints, History, Problem, Step,
+    Algorithm, Analysis, Condition, Friction, FrictionPoints, History, NormalOf, Problem, Step,
     ThesisPressure,
 };
 
@@ -171,6 +171,24 @@ impl Findings {
             }
         }
         for (i, contact) in problem.contacts.iter().enumerate() {
+            if contact.normal == NormalOf::Obstacle {
+                self.say(
+                    format!("/contacts/{i}/normal"),
+                    "not_used",
+                    "`obstacle`",
+                    "`body`",
+                    "The thesis knows the body's normal only; choose another algorithm.",
+                );
+            }
+            if contact.friction.as_ref().is_some_and(|f| f.bound.is_some()) {
+                self.say(
+                    format!("/contacts/{i}/friction/bound"),
+                    "not_used",
+                    "a prescribed bound",
+                    "a coefficient and a nonlocal radius",
+                    "The thesis's bound follows from the pressure; choose another algorithm.",
+                );
+            }
             let nodal = |f: &Friction| f.points == FrictionPoints::Nodal;
             if contact.friction.as_ref().is_some_and(nodal) {
                 self.say(

@@ -168,7 +168,8 @@ impl Rows {
                 stress[row].push(xx * nx * nx + 2.0 * xy * nx * ny + yy * ny * ny);
                 let h = quad8::shape(xi, eta);
                 let u_t: f64 = (0..8).map(|i| h[i] * (u[i][0] * tx + u[i][1] * ty)).sum();
-                let slip = u_t - patch.obstacle_displacement;
+                let drag = edge_nodes(rows.edge).map(|i| system.nodes[patch.first + i].drag);
+                let slip = u_t - edge3::interpolate(&edge3::shape(zeta), &drag);
                 phi[row].push(patch.law.as_ref().map_or(0.0, |law| law.phi(slip)));
             }
         }
