@@ -263,7 +263,7 @@ fn under_peaks(
             continue;
         };
         for (e, element) in fields.elements.iter().enumerate() {
-            for [a, b, _] in crate::element::quad8::SIDES {
+            for &[a, b, _] in element.family().sides() {
                 let place = |local: usize| {
                     let node = element[local] as usize;
                     [fields.x[node], fields.y[node]]

@@ -7,7 +7,6 @@
 use std::ops::ControlFlow;
 
 use crate::elasticity::{self, Dof, DofMap};
-use crate::element::gauss;
 use crate::error::SolveError;
 use crate::linear::{Dense, Factor, FactorError, Graph, Ordering, SparseSymmetric};
 use crate::model::{Held, Level, Model};
@@ -50,11 +49,15 @@ impl ElasticBody {
             model.mesh.nodes.len(),
             model.mesh.elements.iter().map(|e| &e[..]),
         );
-        let rule = gauss::of_order(model.quadrature);
-        let (mut matrix, of_supports) =
-            elasticity::assemble_stiffness(&model.mesh, &model.section, rule, &map, &graph);
+        let (mut matrix, of_supports) = elasticity::assemble_stiffness(
+            &model.mesh,
+            &model.section,
+            model.quadrature,
+            &map,
+            &graph,
+        );
         let nodal_loads =
-            elasticity::assemble_loads(&model.mesh, &model.section, rule, &model.loads);
+            elasticity::assemble_loads(&model.mesh, &model.section, model.quadrature, &model.loads);
         let of_loads = on_unknowns(&map, &nodal_loads);
         let right_hand_sides = [of_loads, of_supports];
         let finite = |forces: &Vec<f64>| forces.iter().all(|f| f.is_finite());

@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::element::Element;
+
 /// A contact problem in linear elasticity. Units are the client's own, used consistently.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -18,7 +20,7 @@ pub struct Problem {
     pub title: Option<String>,
     /// The two-dimensional theory.
     pub analysis: Analysis,
-    /// The body, cut into 8-node quadrilaterals.
+    /// The body, cut into 8-node quadrilaterals and 6-node triangles.
     pub mesh: MeshInput,
     /// The materials of the body: one, or one for each group of elements.
     pub materials: Vec<Material>,
@@ -140,9 +142,8 @@ pub struct Grid {
 pub struct InlineMesh {
     /// Node positions `[x, y]` (length).
     pub nodes: Vec<[f64; 2]>,
-    /// Eight node numbers per element, from 0: four corners counter-clockwise, then the midsides
-    /// of the sides 1–2, 2–3, 3–4, 4–1.
-    pub elements: Vec<[u32; 8]>,
+    /// Quadrilaterals and triangles.
+    pub elements: Vec<Element>,
     /// Named boundaries: element sides as `[corner, corner, midside]`.
     #[serde(default)]
     pub boundaries: BTreeMap<String, Vec<[u32; 3]>>,

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::element::Element;
 use crate::problem::NormalOf;
 
 /// A solved problem, converged or not.
@@ -369,16 +370,16 @@ pub struct Fields {
     pub stress_xy: Vec<f64>,
     /// Recovered out-of-plane stress σ_zz (the hoop stress σ_θθ in axisymmetry).
     pub stress_zz: Vec<f64>,
-    /// Eight node numbers per element: corners counter-clockwise, then midsides.
-    pub elements: Vec<[u32; 8]>,
+    /// Eight or six node numbers per element: corners counter-clockwise, then midsides.
+    pub elements: Vec<Element>,
     /// Estimated error of each element (see [`ErrorEstimate`]).
     pub element_error: Vec<f64>,
     /// Stresses at the integration points of every element, not averaged.
     pub gauss: GaussFields,
 }
 
-/// Values at the integration points, element by element; within one the first local coordinate runs
-/// fastest.
+/// Values at the integration points, element by element. A quadrilateral has order × order of them, the
+/// first local coordinate running fastest; a triangle 7 for order 3 and 3 for order 2.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GaussFields {
     /// Points of an element in each direction.

@@ -19,7 +19,7 @@
 //! that is curved, so the test works with the library's own assembly and factorisation.
 
 use solver::elasticity::{Dof, DofMap, Section, assemble_stiffness, isotropic};
-use solver::element::{gauss, quad8};
+use solver::element::{Element, Family, GaussPoint, Mapped, gauss};
 use solver::linear::{Factor, Graph, Ordering};
 use solver::mesh::{Mesh, grid_mesh, refine};
 use solver::problem::{Analysis, Grid};
@@ -44,7 +44,7 @@ struct At {
 type Exact = fn([f64; 2]) -> At;
 
 /// What is done at an integration point: with its element, map, place and weight.
-type Visit<'a> = dyn FnMut(&[u32; 8], &quad8::Mapped, [f64; 2], f64) + 'a;
+type Visit<'a> = dyn FnMut(&Element, &Mapped, [f64; 2], f64) + 'a;
 
 #[rustfmt::skip]
 fn plane([x, y]: [f64; 2]) -> At {
@@ -106,11 +106,56 @@ fn mesh(width: f64, height: f64, times: usize) -> Mesh {
         mesh.nodes[*n][1] += 0.07 * height * angle.sin();
     }
     for element in mesh.elements.clone() {
-        for [a, b, middle] in quad8::SIDES.map(|side| side.map(|i| element[i] as usize)) {
+        for [a, b, middle] in element.sides().map(|side| side.map(|i| i as usize)) {
             mesh.nodes[middle] = [0, 1].map(|i| 0.5 * (mesh.nodes[a][i] + mesh.nodes[b][i]));
         }
     }
     (0..times).fold(mesh, |mesh, _| refine(&mesh))
+}
+
+/// The same mesh of triangles: every quadrilateral is cut along a diagonal, one way or the other in turn.
+fn triangles(mesh: &Mesh) -> Mesh {
+    let mut cut = mesh.clone();
+    cut.elements.clear();
+    for (e, p) in mesh.elements.iter().enumerate() {
+        let centre = cut.nodes.len() as u32;
+        let (from, to) = if e % 2 == 0 { (0, 2) } else { (1, 3) };
+        let [a, b] = [p[from], p[to]].map(|n| mesh.nodes[n as usize]);
+        cut.nodes.push([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]);
+        let halves = match from {
+            0 => [
+                [p[0], p[1], p[2], p[4], p[5], centre],
+                [p[0], p[2], p[3], centre, p[6], p[7]],
+            ],
+            _ => [
+                [p[0], p[1], p[3], p[4], centre, p[7]],
+                [p[1], p[2], p[3], p[5], p[6], centre],
+            ],
+        };
+        cut.elements.extend(halves.map(Element::Triangle));
+    }
+    cut
+}
+
+/// 6 × 6 points; for a triangle on a square whose one side is drawn together (Duffy).
+fn fine_rule(family: Family) -> Vec<GaussPoint> {
+    let line = gauss::rule(6);
+    let pairs = line.iter().flat_map(|a| line.iter().map(move |b| (*a, *b)));
+    pairs
+        .map(|((xi, w_xi), (eta, w_eta))| match family {
+            Family::Quad => GaussPoint {
+                place: [xi, eta],
+                weight: w_xi * w_eta,
+            },
+            Family::Triangle => {
+                let left = 0.5 * (1.0 - xi);
+                GaussPoint {
+                    place: [0.5 * (1.0 + xi), 0.5 * (1.0 + eta) * left],
+                    weight: 0.25 * w_xi * w_eta * left,
+                }
+            }
+        })
+        .collect()
 }
 
 /// Norms of the error of u (L2) and of its gradient (H1 seminorm; in axisymmetry with u_r/r), relative.
@@ -135,20 +180,17 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, exact: Exact) -> [f64; 2
         };
     }
     let graph = Graph::from_cliques(mesh.nodes.len(), mesh.elements.iter().map(|e| &e[..]));
-    let (matrix, mut load) =
-        assemble_stiffness(mesh, &section, gauss::of_order(points), &map, &graph);
+    let (matrix, mut load) = assemble_stiffness(mesh, &section, points, &map, &graph);
     // a rule finer than the element's own: integration of f and of the error is not what is tested
-    let fine = gauss::rule(6);
+    let fine = [Family::Quad, Family::Triangle].map(fine_rule);
     let at_points = |visit: &mut Visit<'_>| {
         for element in &mesh.elements {
-            let nodes = mesh.element_nodes(element);
-            for &(eta, w_eta) in &fine {
-                for &(xi, w_xi) in &fine {
-                    let m = quad8::map(&nodes, xi, eta);
-                    let y = (0..8).map(|i| m.shape[i] * nodes[i][1]).sum();
-                    let weight = w_xi * w_eta * m.det * section.depth(m.x);
-                    visit(element, &m, [m.x, y], weight);
-                }
+            let (family, nodes) = (element.family(), mesh.element_nodes(element));
+            for point in &fine[family as usize] {
+                let m = family.map(&nodes, point.place);
+                let y = (0..8).map(|i| m.shape[i] * nodes[i][1]).sum();
+                let weight = point.weight * m.det * section.depth(m.x);
+                visit(element, &m, [m.x, y], weight);
             }
         }
     };
@@ -188,7 +230,7 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, exact: Exact) -> [f64; 2
         } = exact(place);
         for a in 0..2 {
             let sum = |of: &dyn Fn(usize) -> f64| {
-                (0..8)
+                (0..element.len())
                     .map(|i| of(i) * u[element[i] as usize][a])
                     .sum::<f64>()
             };
@@ -211,9 +253,22 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, exact: Exact) -> [f64; 2
 /// Rates 3 and 2 between the last two of four meshes, less .1 for what is left of the distortion; the
 /// errors themselves at most about three times what was measured.
 fn rates(kind: &str, analysis: Analysis, size: [f64; 2], exact: Exact) {
-    for points in [3, 2] {
+    for (family, points) in [
+        (Family::Quad, 3),
+        (Family::Quad, 2),
+        (Family::Triangle, 3),
+        (Family::Triangle, 2),
+    ] {
+        let of_size = |times: usize| match family {
+            Family::Quad => mesh(size[0], size[1], times),
+            Family::Triangle => triangles(&mesh(size[0], size[1], times)),
+        };
+        let (rule, meshes) = match family {
+            Family::Quad => (format!("{points} × {points} points"), "2304 distorted Q8"),
+            Family::Triangle => (format!("{} points", family.rule(points).len()), "4608 T6"),
+        };
         let all: Vec<[f64; 2]> = (1..=4)
-            .map(|times| errors(analysis, &mesh(size[0], size[1], times), points, exact))
+            .map(|times| errors(analysis, &of_size(times), points, exact))
             .collect();
         for (norm, rate, most) in [(0, 3.0, 1e-5), (1, 2.0, 5e-4)] {
             let order = |pair: &[[f64; 2]]| (pair[0][norm] / pair[1][norm]).log2();
@@ -221,16 +276,16 @@ fn rates(kind: &str, analysis: Analysis, size: [f64; 2], exact: Exact) {
             let order = orders[orders.len() - 1];
             assert!(
                 (order - rate).abs() < 0.1,
-                "{kind}, {points} × {points}: orders {orders:.3?} of {all:?}"
+                "{kind}, {rule}: orders {orders:.3?} of {all:?}"
             );
             let what = format!(
-                "manufactured solution, {kind}, {points} × {points} points: relative error in {}",
+                "manufactured solution, {kind}, {rule}: relative error in {}",
                 ["L2", "H1"][norm]
             );
             Line {
                 row: 5,
                 what: &what,
-                mesh: "2304 distorted Q8",
+                mesh: meshes,
                 expected: 0.0,
                 computed: all[3][norm],
                 allowed: most,

@@ -2,14 +2,15 @@
 
 use faer::Side;
 use solver::elasticity::{Section, assemble_element, isotropic};
-use solver::element::gauss::{GAUSS_2, GAUSS_3};
+use solver::element::Family;
 use solver::problem::{Analysis, Problem};
 
 use crate::record::held;
 use crate::support::{Lattice, problem, solve};
 
 /// Row 1. Nine distorted elements on a unit square at r ≥ 1, its boundary driven by a linear
-/// displacement: every node must follow, and the stress be one and the same.
+/// displacement: every node must follow, and the stress be one and the same. Of triangles, each
+/// quadrilateral is cut in two; curved: the inner midsides lie off the middle.
 ///
 /// ```text
 ///   +---+----+--+      inner corners are displaced at random-looking amounts; midsides lie on the
@@ -18,7 +19,7 @@ use crate::support::{Lattice, problem, solve};
 ///   |   /    \  |
 ///   +---+----+--+
 /// ```
-fn distorted_patch(analysis: &str, ux: [f64; 3], uy: [f64; 3]) -> Problem {
+fn distorted_patch(analysis: &str, patch: &Patch, ux: [f64; 3], uy: [f64; 3]) -> Problem {
     // displacement c0 + c1 x + c2 y, linear along each side
     let shift = |i: usize, j: usize| match (i, j) {
         (1, 1) => [0.06, -0.05],
@@ -33,7 +34,17 @@ fn distorted_patch(analysis: &str, ux: [f64; 3], uy: [f64; 3]) -> Problem {
     };
     let lattice = Lattice::new(3, 3, |i, j| {
         let (a, b) = (corner(i / 2, j / 2), corner(i.div_ceil(2), j.div_ceil(2)));
-        [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]
+        let middle = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
+        let inner = (1..6).contains(&i) && (1..6).contains(&j) && (i + j) % 2 == 1;
+        match inner && patch.curved {
+            true => [middle[0] + 0.02, middle[1] - 0.015],
+            false => middle,
+        }
+    });
+    let (nodes, elements) = lattice.cut(|e| match patch.elements {
+        "Q8" => false,
+        "T6" => true,
+        _ => e % 2 == 1,
     });
     let u = |c: [f64; 3], x: f64, y: f64| c[0] + c[1] * x + c[2] * y;
     // a boundary runs with the body on its right: bottom from right to left, and so on round
@@ -52,19 +63,32 @@ fn distorted_patch(analysis: &str, ux: [f64; 3], uy: [f64; 3]) -> Problem {
         .collect();
     let json = serde_json::json!({
         "analysis": serde_json::from_str::<serde_json::Value>(analysis).unwrap(),
-        "mesh": {"inline": {"nodes": lattice.nodes, "elements": lattice.elements, "boundaries": {
+        "mesh": {"inline": {"nodes": nodes, "elements": elements, "boundaries": {
             "bottom": lattice.edges(3, |k| (k, 0)), "top": lattice.edges(3, |k| (k, 6)),
             "left": lattice.edges(3, |k| (0, k)), "right": lattice.edges(3, |k| (6, k)),
         }}},
         "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
         "supports": supports,
+        "quadrature": patch.quadrature,
     });
     problem(&json.to_string())
 }
 
+struct Patch {
+    elements: &'static str,
+    curved: bool,
+    quadrature: u32,
+}
+
 /// Largest errors of displacement and of stress against a linear field with constant stress.
-fn errors(analysis: &str, ux: [f64; 3], uy: [f64; 3], stress: [f64; 4]) -> (f64, f64) {
-    let fields = solve(&distorted_patch(analysis, ux, uy)).fields;
+fn errors(
+    analysis: &str,
+    patch: &Patch,
+    ux: [f64; 3],
+    uy: [f64; 3],
+    stress: [f64; 4],
+) -> (f64, f64) {
+    let fields = solve(&distorted_patch(analysis, patch, ux, uy)).fields;
     let (mut of_u, mut of_stress): (f64, f64) = (0.0, 0.0);
     for k in 0..fields.x.len() {
         let (x, y) = (fields.x[k], fields.y[k]);
@@ -128,27 +152,47 @@ fn a_distorted_patch_reproduces_constant_strain() {
         ),
     ];
     for (analysis, ux, uy, stress, size) in cases {
-        let (of_u, of_stress) = errors(analysis, ux, uy, stress);
         let kind: &str = analysis.split('"').nth(3).unwrap_or(analysis);
-        held(
-            1,
-            &format!("patch test, {kind}: error of u"),
-            "distorted patch",
-            of_u,
-            0.0,
-            1e-12,
-        );
-        assert!(
-            of_u <= 1e-12 && of_stress <= 1e-12 * size,
-            "{analysis}: u {of_u:.1e}, σ/E {of_stress:.1e}"
-        );
+        let patches = ["Q8", "T6", "Q8 and T6"].into_iter().flat_map(|elements| {
+            [(false, 3), (true, 3), (true, 2)].map(|(curved, quadrature)| Patch {
+                elements,
+                curved,
+                quadrature,
+            })
+        });
+        for patch in patches {
+            // the smaller rules do not integrate a curved quadrilateral's B exactly, nor r times it
+            let smooth = patch.elements == "T6" && kind != "axisymmetric";
+            if patch.curved && patch.quadrature == 2 && !smooth {
+                continue;
+            }
+            let (of_u, of_stress) = errors(analysis, &patch, ux, uy, stress);
+            let mesh = format!(
+                "{} {}, quadrature {}",
+                if patch.curved { "curved" } else { "distorted" },
+                patch.elements,
+                patch.quadrature
+            );
+            held(
+                1,
+                &format!("patch test, {kind}: error of u"),
+                &mesh,
+                of_u,
+                0.0,
+                1e-12,
+            );
+            assert!(
+                of_u <= 1e-12 && of_stress <= 1e-12 * size,
+                "{analysis}, {mesh}: u {of_u:.1e}, σ/E {of_stress:.1e}"
+            );
+        }
     }
 }
 
 /// Row 2. Eigenvalues of one element's stiffness that are zero to rounding.
 #[test]
 fn an_element_has_its_rigid_modes_and_no_others() {
-    let distorted = [
+    let quad = [
         [1.0, 0.0],
         [2.0, 0.1],
         [2.2, 1.0],
@@ -158,38 +202,65 @@ fn an_element_has_its_rigid_modes_and_no_others() {
         [1.6, 0.95],
         [1.0, 0.45],
     ];
-    let zero_modes = |analysis: Analysis, rule: &[(f64, f64)]| {
+    let triangle = [
+        [1.0, 0.0],
+        [2.0, 0.1],
+        [1.2, 1.0],
+        [1.5, 0.0],
+        [1.7, 0.6],
+        [1.1, 0.45],
+        [0.0; 2],
+        [0.0; 2],
+    ];
+    let zero_modes = |(family, nodes): (Family, [[f64; 2]; 8]), analysis: Analysis, rule: u32| {
         let moduli = isotropic(&analysis, 1000.0, 0.3);
         let section = Section::uniform(analysis, moduli);
-        let k = assemble_element(&distorted, &section, &moduli, rule);
-        let values = faer::Mat::from_fn(16, 16, |i, j| k[i][j])
+        let k = assemble_element(family, &nodes, &section, &moduli, rule);
+        let size = 2 * family.nodes();
+        let values = faer::Mat::from_fn(size, size, |i, j| k[i][j])
             .self_adjoint_eigenvalues(Side::Lower)
             .unwrap();
         let largest = values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
         values.iter().filter(|v| v.abs() < 1e-12 * largest).count()
     };
+    let (quad, triangle) = ((Family::Quad, quad), (Family::Triangle, triangle));
     let (strain, round) = (Analysis::PlaneStrain {}, Analysis::Axisymmetric {});
     let sheet = Analysis::PlaneStress { thickness: 0.5 };
     for (what, modes, expected) in [
         (
             "zero modes, plane strain, 3 × 3",
-            zero_modes(strain, &GAUSS_3),
+            zero_modes(quad, strain, 3),
             3,
         ),
         (
             "zero modes, plane stress, 3 × 3",
-            zero_modes(sheet, &GAUSS_3),
+            zero_modes(quad, sheet, 3),
             3,
         ),
         (
             "zero modes, axisymmetric, 3 × 3",
-            zero_modes(round, &GAUSS_3),
+            zero_modes(quad, round, 3),
+            1,
+        ),
+        (
+            "zero modes, triangle, plane strain, 7 points",
+            zero_modes(triangle, strain, 3),
+            3,
+        ),
+        (
+            "zero modes, triangle, plane strain, 3 points",
+            zero_modes(triangle, strain, 2),
+            3,
+        ),
+        (
+            "zero modes, triangle, axisymmetric, 7 points",
+            zero_modes(triangle, round, 3),
             1,
         ),
         // one more than the rigid ones
         (
             "zero modes, plane strain, 2 × 2",
-            zero_modes(strain, &GAUSS_2),
+            zero_modes(quad, strain, 2),
             4,
         ),
     ] {

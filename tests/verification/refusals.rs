@@ -399,3 +399,23 @@ fn adaptive_refinement_wants_a_tolerance_a_grid_and_a_contact() {
         &[("/mesh/refine", "not_used")],
     );
 }
+
+#[test]
+fn the_thesis_has_no_triangles_and_an_element_no_seven_nodes() {
+    let mesh = json!({"inline": {"nodes": [[0,0],[1,0],[0,1],[0.5,0],[0.5,0.5],[0,0.5]], "elements": [[0,1,2,3,4,5]],
+        "boundaries": {"bottom": [[1,0,3]], "left": [[0,2,5]]}}});
+    let contacts = json!([{"boundary": "left", "obstacle": {"kind": "flat"}}]);
+    let with_triangle = [("/mesh", mesh.clone()), ("/contacts", contacts)];
+    assert!(solver::check(&with(&with_triangle)).is_ok());
+    let mut thesis = with(&with_triangle);
+    thesis.solver.algorithm = solver::problem::Algorithm::Thesis;
+    assert_eq!(violations(&thesis), [pair("/solver/algorithm", "not_used")]);
+    let text = serde_json::to_string(&with(&with_triangle)).unwrap();
+    let violations = solver::parse(&text.replace("[0,1,2,3,4,5]", "[0,1,2,3,4,5,5]")).unwrap_err();
+    assert_eq!(violations[0].pointer, "/mesh/inline/elements/0");
+    assert!(
+        violations[0].got.contains("7 nodes"),
+        "{}",
+        violations[0].got
+    );
+}

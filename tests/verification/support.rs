@@ -93,6 +93,22 @@ impl Lattice {
         }
     }
 
+    /// Nodes and elements with those quadrilaterals that `which` names cut in two triangles.
+    pub(crate) fn cut(&self, which: impl Fn(usize) -> bool) -> (Vec<[f64; 2]>, Vec<Vec<usize>>) {
+        let (mut nodes, mut elements) = (self.nodes.clone(), Vec::new());
+        for (e, p) in self.elements.iter().enumerate() {
+            if !which(e) {
+                elements.push(p.to_vec());
+                continue;
+            }
+            let ([a, b], centre) = ([p[0], p[2]].map(|n| self.nodes[n]), nodes.len());
+            nodes.push([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]);
+            elements.push(vec![p[0], p[1], p[2], p[4], p[5], centre]);
+            elements.push(vec![p[0], p[2], p[3], centre, p[6], p[7]]);
+        }
+        (nodes, elements)
+    }
+
     /// Edges [start, end, midside] of `count` elements along a line of nodes; `at(k)`: half-steps.
     pub(crate) fn edges(
         &self,

@@ -8,7 +8,6 @@ use crate::algorithm::profile::{Forces, PatchView};
 use crate::algorithm::system::System;
 use crate::body::ElasticBody;
 use crate::elasticity::{Dof, Recovered, StressError, recover, stress_error};
-use crate::element::gauss;
 use crate::error::SolveError;
 use crate::model::Model;
 use crate::solution::{
@@ -57,9 +56,13 @@ pub fn report(
     };
     let contact_force = contact_force(system, finished, &forces);
     let displacements = body.displacements(&contact_force, v, &system.level);
-    let rule = gauss::of_order(model.quadrature);
-    let recovered = recover(&model.mesh, &model.section, rule, &displacements);
-    let error = stress_error(&model.mesh, &model.section, rule, &recovered);
+    let recovered = recover(
+        &model.mesh,
+        &model.section,
+        model.quadrature,
+        &displacements,
+    );
+    let error = stress_error(&model.mesh, &model.section, model.quadrature, &recovered);
     let circumference = system.circumference;
 
     let mut warnings = model.warnings.clone();

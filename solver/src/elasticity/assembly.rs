@@ -3,7 +3,7 @@
 use crate::elasticity::Section;
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::element::gauss::GAUSS_3;
-use crate::element::{edge3, quad8};
+use crate::element::{Family, edge3};
 use crate::linear::{Graph, SparseSymmetric};
 use crate::mesh::{Edge, Mesh};
 
@@ -52,31 +52,31 @@ impl DofMap {
     }
 }
 
-/// Element stiffness k_ij = ∫ B_iᵀ D B_j, along x and y; 16 × 16, symmetric.
+/// Element stiffness k_ij = ∫ B_iᵀ D B_j, along x and y; 16 × 16, symmetric. The last four rows and
+/// columns of a triangle are zero.
 ///
-/// `rule`: points and weights in each direction. Three points leave no more than the rigid modes
-/// without stiffness; two leave one mode more, which neighbours may suppress or not.
+/// `quadrature`: 3 leaves no more than the rigid modes without stiffness; 2 leaves a quadrilateral one
+/// mode more, which neighbours may suppress or not.
 pub fn assemble_element(
+    family: Family,
     nodes: &[[f64; 2]; 8],
     section: &Section,
     moduli: &Moduli,
-    rule: &[(f64, f64)],
+    quadrature: u32,
 ) -> [[f64; 16]; 16] {
     let mut k = [[0.0; 16]; 16];
-    for &(eta, w_eta) in rule {
-        for &(xi, w_xi) in rule {
-            let m = quad8::map(nodes, xi, eta);
-            let weight = w_xi * w_eta * m.det * section.depth(m.x);
-            let b: [_; 8] = std::array::from_fn(|i| section.strain(m.shape[i], m.gradient[i], m.x));
-            for j in 0..8 {
-                for q in 0..2 {
-                    let strain: [f64; COMPONENTS] = std::array::from_fn(|c| b[j][c][q]);
-                    let stress = stress(moduli, &strain);
-                    for i in 0..=j {
-                        for p in 0..2 {
-                            let work: f64 = (0..COMPONENTS).map(|c| b[i][c][p] * stress[c]).sum();
-                            k[2 * i + p][2 * j + q] += weight * work;
-                        }
+    for point in family.rule(quadrature) {
+        let m = family.map(nodes, point.place);
+        let weight = point.weight * m.det * section.depth(m.x);
+        let b: [_; 8] = std::array::from_fn(|i| section.strain(m.shape[i], m.gradient[i], m.x));
+        for j in 0..family.nodes() {
+            for q in 0..2 {
+                let strain: [f64; COMPONENTS] = std::array::from_fn(|c| b[j][c][q]);
+                let stress = stress(moduli, &strain);
+                for i in 0..=j {
+                    for p in 0..2 {
+                        let work: f64 = (0..COMPONENTS).map(|c| b[i][c][p] * stress[c]).sum();
+                        k[2 * i + p][2 * j + q] += weight * work;
                     }
                 }
             }
@@ -92,11 +92,11 @@ pub fn assemble_element(
 
 /// The stiffness of the unknowns, and the load −K_fp u_p of the prescribed displacements on them.
 ///
-/// `rule`: as in `assemble_element`; `graph`: neighbours among the nodes.
+/// `quadrature`: as in `assemble_element`; `graph`: neighbours among the nodes.
 pub fn assemble_stiffness(
     mesh: &Mesh,
     section: &Section,
-    rule: &[(f64, f64)],
+    quadrature: u32,
     map: &DofMap,
     graph: &Graph,
 ) -> (SparseSymmetric, Vec<f64>) {
@@ -123,16 +123,22 @@ pub fn assemble_stiffness(
     let mut load = vec![0.0; map.unknowns];
     for (e, element) in mesh.elements.iter().enumerate() {
         let nodes = mesh.element_nodes(element);
-        let mut k = assemble_element(&nodes, section, section.moduli(e), rule);
+        let mut k = assemble_element(
+            element.family(),
+            &nodes,
+            section,
+            section.moduli(e),
+            quadrature,
+        );
         for (i, &node) in element.iter().enumerate() {
             if let Some(axes) = map.axes[node as usize] {
                 rotate(&mut k, i, axes);
             }
         }
         let dof = |local: usize| map.dofs[element[local / 2] as usize][local % 2];
-        for i in 0..16 {
+        for i in 0..2 * element.len() {
             let Dof::Free(row) = dof(i) else { continue };
-            for j in 0..16 {
+            for j in 0..2 * element.len() {
                 match dof(j) {
                     Dof::Free(column) if column <= row => stiffness.add(row, column, k[i][j]),
                     Dof::Free(_) => {}
@@ -192,7 +198,7 @@ pub enum LoadAxes {
 pub fn assemble_loads(
     mesh: &Mesh,
     section: &Section,
-    rule: &[(f64, f64)],
+    quadrature: u32,
     loads: &Loads,
 ) -> Vec<[f64; 2]> {
     let mut forces = vec![[0.0; 2]; mesh.nodes.len()];
@@ -201,15 +207,13 @@ pub fn assemble_loads(
     }
     if loads.body_force != [0.0; 2] {
         for element in &mesh.elements {
-            let nodes = mesh.element_nodes(element);
-            for &(eta, w_eta) in rule {
-                for &(xi, w_xi) in rule {
-                    let m = quad8::map(&nodes, xi, eta);
-                    let weight = w_xi * w_eta * m.det * section.depth(m.x);
-                    for (i, &node) in element.iter().enumerate() {
-                        for a in 0..2 {
-                            forces[node as usize][a] += weight * m.shape[i] * loads.body_force[a];
-                        }
+            let (family, nodes) = (element.family(), mesh.element_nodes(element));
+            for point in family.rule(quadrature) {
+                let m = family.map(&nodes, point.place);
+                let weight = point.weight * m.det * section.depth(m.x);
+                for (i, &node) in element.iter().enumerate() {
+                    for a in 0..2 {
+                        forces[node as usize][a] += weight * m.shape[i] * loads.body_force[a];
                     }
                 }
             }
@@ -246,6 +250,7 @@ fn add_edge_load(mesh: &Mesh, section: &Section, load: &EdgeLoad, forces: &mut [
 mod tests {
     use super::*;
     use crate::elasticity::isotropic;
+    use crate::element::Element;
     use crate::problem::Analysis;
 
     const SQUARE: [[f64; 2]; 8] = [
@@ -265,7 +270,7 @@ mod tests {
             let moduli = isotropic(&analysis, 1000.0, 0.3);
             let section = Section::uniform(analysis, moduli);
             let u: Vec<f64> = SQUARE.iter().flat_map(|&x| motion(x)).collect();
-            for row in assemble_element(&SQUARE, &section, &moduli, &GAUSS_3) {
+            for row in assemble_element(Family::Quad, &SQUARE, &section, &moduli, 3) {
                 let force: f64 = row.iter().zip(&u).map(|(a, b)| a * b).sum();
                 assert!(force.abs() < 1e-11, "{force}");
             }
@@ -303,7 +308,7 @@ mod tests {
                 LoadAxes::Fixed => [4.0, -2.0],
                 LoadAxes::Edge => [-2.0, 4.0],
             };
-            let forces = assemble_loads(&mesh, &sheet(), &GAUSS_3, &loads);
+            let forces = assemble_loads(&mesh, &sheet(), 3, &loads);
             for (node, share) in [(0, 1.0 / 6.0), (1, 1.0 / 6.0), (2, 4.0 / 6.0)] {
                 assert!((forces[node][0] - x * 1.5 * share).abs() < 1e-14);
                 assert!((forces[node][1] - y * 1.5 * share).abs() < 1e-14);
@@ -315,7 +320,7 @@ mod tests {
     fn a_body_force_weighs_the_body() {
         let mesh = Mesh {
             nodes: SQUARE.to_vec(),
-            elements: vec![[0, 1, 2, 3, 4, 5, 6, 7]],
+            elements: vec![Element::Quad([0, 1, 2, 3, 4, 5, 6, 7])],
             ..Mesh::default()
         };
         let loads = Loads {
@@ -323,7 +328,7 @@ mod tests {
             nodal: vec![(2, [7.0, 0.0])],
             ..Loads::default()
         };
-        let forces = assemble_loads(&mesh, &sheet(), &GAUSS_3, &loads);
+        let forces = assemble_loads(&mesh, &sheet(), 3, &loads);
         let total: f64 = forces.iter().map(|f| f[1]).sum();
         // straight sides: the shoelace formula
         let corners = [0, 1, 2, 3].map(|i| SQUARE[i]);

@@ -5,7 +5,7 @@
 
 use crate::elasticity::material::{COMPONENTS, Moduli, inverse};
 use crate::elasticity::{Recovered, Section};
-use crate::element::quad8;
+use crate::element::Element;
 use crate::mesh::Mesh;
 
 /// The estimate, without 2π.
@@ -18,11 +18,11 @@ pub struct StressError {
 
 /// Compares recovered and element stresses at the integration points.
 ///
-/// `rule`: the one that `recovered` was made with.
+/// `quadrature`: the one that `recovered` was made with.
 pub fn stress_error(
     mesh: &Mesh,
     section: &Section,
-    rule: &[(f64, f64)],
+    quadrature: u32,
     recovered: &Recovered,
 ) -> StressError {
     let compliances: Vec<Moduli> = section
@@ -30,29 +30,26 @@ pub fn stress_error(
         .iter()
         .map(|moduli| inverse(moduli).unwrap_or_default())
         .collect();
-    let per_element = rule.len() * rule.len();
-    let square = |(e, element): (usize, &[u32; 8])| {
-        let nodes = mesh.element_nodes(element);
+    let mut stresses = recovered.point_stress.iter();
+    let square = |(e, element): (usize, &Element)| {
+        let (family, nodes) = (element.family(), mesh.element_nodes(element));
         let (smooth, compliance) = (
             &recovered.element_stress[e],
             &compliances[section.material_of(e)],
         );
         let mut square = 0.0;
-        for (q, &(eta, w_eta)) in rule.iter().enumerate() {
-            for (p, &(xi, w_xi)) in rule.iter().enumerate() {
-                let m = quad8::map(&nodes, xi, eta);
-                let own = recovered.point_stress[e * per_element + q * rule.len() + p];
-                let difference: [f64; COMPONENTS] = std::array::from_fn(|c| {
-                    (0..8).map(|i| m.shape[i] * smooth[i][c]).sum::<f64>() - own[c]
-                });
-                let mut density = 0.0;
-                for i in 0..COMPONENTS {
-                    for j in 0..COMPONENTS {
-                        density += difference[i] * compliance[i][j] * difference[j];
-                    }
+        for (point, own) in family.rule(quadrature).iter().zip(&mut stresses) {
+            let m = family.map(&nodes, point.place);
+            let difference: [f64; COMPONENTS] = std::array::from_fn(|c| {
+                (0..8).map(|i| m.shape[i] * smooth[i][c]).sum::<f64>() - own[c]
+            });
+            let mut density = 0.0;
+            for i in 0..COMPONENTS {
+                for j in 0..COMPONENTS {
+                    density += difference[i] * compliance[i][j] * difference[j];
                 }
-                square += w_xi * w_eta * m.det * section.depth(m.x) * density;
             }
+            square += point.weight * m.det * section.depth(m.x) * density;
         }
         square.max(0.0)
     };

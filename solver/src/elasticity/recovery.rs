@@ -2,8 +2,7 @@
 
 use crate::elasticity::Section;
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
-use crate::element::gauss::GAUSS_2;
-use crate::element::quad8::{self, Mapped};
+use crate::element::{Family, Mapped};
 use crate::mesh::Mesh;
 
 /// What the displacements mean for the body.
@@ -12,7 +11,7 @@ pub struct Recovered {
     pub stress: Vec<[f64; COMPONENTS]>,
     /// Stress at every element's nodes, averaged over the elements of its own material.
     pub element_stress: Vec<[[f64; COMPONENTS]; 8]>,
-    /// Positions of the integration points, element by element; ξ runs fastest.
+    /// Positions of the integration points, element by element, as in [`Family::rule`].
     pub points: Vec<[f64; 2]>,
     /// Stress there, not averaged.
     pub point_stress: Vec<[f64; COMPONENTS]>,
@@ -22,45 +21,45 @@ pub struct Recovered {
     pub strain_energy: f64,
 }
 
-/// Stresses at nodes are taken at the 2 × 2 superconvergent points of each element, carried to its
-/// nodes by the bilinear map, and averaged over the elements that meet there.
+/// Stresses at nodes are taken at the superconvergent points of each element (2 × 2 of a
+/// quadrilateral), carried to its nodes linearly, and averaged over the elements that meet there.
 ///
-/// `rule`: as in `assemble_element`.
+/// `quadrature`: as in `assemble_element`.
 pub fn recover(
     mesh: &Mesh,
     section: &Section,
-    rule: &[(f64, f64)],
+    quadrature: u32,
     displacements: &[[f64; 2]],
 ) -> Recovered {
     let mut own = Vec::with_capacity(mesh.elements.len());
     let mut internal_force = vec![[0.0; 2]; mesh.nodes.len()];
     let mut strain_energy = 0.0;
-    let count = mesh.elements.len() * rule.len() * rule.len();
-    let (mut points, mut point_stress) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let (mut points, mut point_stress) = (Vec::new(), Vec::new());
     for (e, element) in mesh.elements.iter().enumerate() {
         let (nodes, moduli) = (mesh.element_nodes(element), section.moduli(e));
-        let u = element.map(|n| displacements[n as usize]);
-        for &(eta, w_eta) in rule {
-            for &(xi, w_xi) in rule {
-                let m = quad8::map(&nodes, xi, eta);
-                let strain = strain_at(section, &m, &u);
-                let stress = stress(moduli, &strain);
-                let weight = w_xi * w_eta * m.det * section.depth(m.x);
-                strain_energy +=
-                    0.5 * weight * (0..COMPONENTS).map(|c| stress[c] * strain[c]).sum::<f64>();
-                for (i, &node) in element.iter().enumerate() {
-                    let b = section.strain(m.shape[i], m.gradient[i], m.x);
-                    for p in 0..2 {
-                        internal_force[node as usize][p] +=
-                            weight * (0..COMPONENTS).map(|c| b[c][p] * stress[c]).sum::<f64>();
-                    }
+        let (family, u) = (
+            element.family(),
+            element.gather(|n| displacements[n as usize]),
+        );
+        for point in family.rule(quadrature) {
+            let m = family.map(&nodes, point.place);
+            let strain = strain_at(section, &m, &u);
+            let stress = stress(moduli, &strain);
+            let weight = point.weight * m.det * section.depth(m.x);
+            strain_energy +=
+                0.5 * weight * (0..COMPONENTS).map(|c| stress[c] * strain[c]).sum::<f64>();
+            for (i, &node) in element.iter().enumerate() {
+                let b = section.strain(m.shape[i], m.gradient[i], m.x);
+                for p in 0..2 {
+                    internal_force[node as usize][p] +=
+                        weight * (0..COMPONENTS).map(|c| b[c][p] * stress[c]).sum::<f64>();
                 }
-                let y = (0..8).map(|i| m.shape[i] * nodes[i][1]).sum();
-                points.push([m.x, y]);
-                point_stress.push(stress);
             }
+            let y = (0..8).map(|i| m.shape[i] * nodes[i][1]).sum();
+            points.push([m.x, y]);
+            point_stress.push(stress);
         }
-        own.push(at_nodes(section, moduli, &nodes, &u));
+        own.push(at_nodes(section, moduli, family, &nodes, &u));
     }
     let averaged = |of_material: Option<usize>| average(mesh, section, &own, of_material);
     let stress = averaged(None);
@@ -75,7 +74,7 @@ pub fn recover(
         let nodal = of_material.as_ref().unwrap_or(&stress);
         for (e, element) in mesh.elements.iter().enumerate() {
             if section.material_of(e) == material {
-                element_stress[e] = element.map(|n| nodal[n as usize]);
+                element_stress[e] = element.gather(|n| nodal[n as usize]);
             }
         }
     }
@@ -115,11 +114,12 @@ fn average(
 pub fn stress_at(
     section: &Section,
     moduli: &Moduli,
+    family: Family,
     nodes: &[[f64; 2]; 8],
     displacements: &[[f64; 2]; 8],
-    [xi, eta]: [f64; 2],
+    place: [f64; 2],
 ) -> [f64; COMPONENTS] {
-    let m = quad8::map(nodes, xi, eta);
+    let m = family.map(nodes, place);
     stress(moduli, &strain_at(section, &m, displacements))
 }
 
@@ -132,29 +132,22 @@ fn strain_at(section: &Section, m: &Mapped, u: &[[f64; 2]; 8]) -> [f64; COMPONEN
     strain
 }
 
-/// One element's stresses at its nodes: bilinear through the four superconvergent points.
+/// One element's stresses at its nodes, carried from its superconvergent points.
 fn at_nodes(
     section: &Section,
     moduli: &Moduli,
+    family: Family,
     nodes: &[[f64; 2]; 8],
     u: &[[f64; 2]; 8],
 ) -> [[f64; COMPONENTS]; 8] {
-    let g = GAUSS_2[1].0;
-    let points: [[[f64; COMPONENTS]; 2]; 2] = std::array::from_fn(|b| {
-        std::array::from_fn(|a| {
-            let m = quad8::map(nodes, GAUSS_2[a].0, GAUSS_2[b].0);
-            stress(moduli, &strain_at(section, &m, u))
-        })
-    });
-    quad8::NODES.map(|[xi, eta]| {
-        let (p, q) = (
-            [0.5 * (1.0 - xi / g), 0.5 * (1.0 + xi / g)],
-            [0.5 * (1.0 - eta / g), 0.5 * (1.0 + eta / g)],
-        );
-        std::array::from_fn(|c| {
-            (0..2)
-                .map(|b| (0..2).map(|a| p[a] * q[b] * points[b][a][c]).sum::<f64>())
-                .sum()
-        })
-    })
+    let mut points = [[0.0; COMPONENTS]; 4];
+    for (stress, point) in points.iter_mut().zip(family.stress_points()) {
+        *stress = stress_at(section, moduli, family, nodes, u, point.place);
+    }
+    let mut at_nodes = [[0.0; COMPONENTS]; 8];
+    for (stress, &place) in at_nodes.iter_mut().zip(family.places()) {
+        let weights = family.from_stress_points(place);
+        *stress = std::array::from_fn(|c| (0..4).map(|k| weights[k] * points[k][c]).sum());
+    }
+    at_nodes
 }

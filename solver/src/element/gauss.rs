@@ -1,4 +1,6 @@
-//! Gauss–Legendre integration on [−1, 1], thesis 2.3.
+//! Gauss–Legendre integration on [−1, 1], thesis 2.3, and on the master elements.
+
+use super::GaussPoint;
 
 /// Points and weights of the 3-point rule, exact for polynomials of degree 5.
 #[rustfmt::skip]
@@ -19,6 +21,62 @@ pub const GAUSS_2: [(f64, f64); 2] = [
 /// The rule of 2 or 3 points, thesis 2.3.
 pub fn of_order(order: u32) -> &'static [(f64, f64)] {
     if order == 2 { &GAUSS_2 } else { &GAUSS_3 }
+}
+
+/// 3 × 3 points of a quadrilateral, ξ running fastest.
+pub const QUAD_3: [GaussPoint; 9] = product(&GAUSS_3);
+
+/// 2 × 2 points of a quadrilateral, ξ running fastest.
+pub const QUAD_2: [GaussPoint; 4] = product(&GAUSS_2);
+
+const fn product<const N: usize, const M: usize>(rule: &[(f64, f64); N]) -> [GaussPoint; M] {
+    let mut points = [GaussPoint {
+        place: [0.0; 2],
+        weight: 0.0,
+    }; M];
+    let mut k = 0;
+    while k < M {
+        let ((xi, w_xi), (eta, w_eta)) = (rule[k % N], rule[k / N]);
+        points[k] = GaussPoint {
+            place: [xi, eta],
+            weight: w_xi * w_eta,
+        };
+        k += 1;
+    }
+    points
+}
+
+/// 3 points of a triangle, exact for polynomials of degree 2; points of best stresses.
+pub const TRIANGLE_2: [GaussPoint; 3] = [
+    at(1.0 / 6.0, 1.0 / 6.0, 1.0 / 6.0),
+    at(2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0),
+    at(1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0),
+];
+
+/// 7 points of a triangle (Radon), exact for polynomials of degree 5: the centre, and on each median
+/// at (6 ± √15)/21 with the weights (155 ± √15)/2400.
+pub const TRIANGLE_3: [GaussPoint; 7] = {
+    const ROOT: f64 = 3.872_983_346_207_417;
+    const NEAR: f64 = (6.0 - ROOT) / 21.0;
+    const FAR: f64 = (6.0 + ROOT) / 21.0;
+    const W_NEAR: f64 = (155.0 - ROOT) / 2400.0;
+    const W_FAR: f64 = (155.0 + ROOT) / 2400.0;
+    [
+        at(1.0 / 3.0, 1.0 / 3.0, 9.0 / 80.0),
+        at(NEAR, NEAR, W_NEAR),
+        at(1.0 - 2.0 * NEAR, NEAR, W_NEAR),
+        at(NEAR, 1.0 - 2.0 * NEAR, W_NEAR),
+        at(FAR, FAR, W_FAR),
+        at(1.0 - 2.0 * FAR, FAR, W_FAR),
+        at(FAR, 1.0 - 2.0 * FAR, W_FAR),
+    ]
+};
+
+const fn at(xi: f64, eta: f64, weight: f64) -> GaussPoint {
+    GaussPoint {
+        place: [xi, eta],
+        weight,
+    }
 }
 
 /// Points and weights of the n-point rule.
@@ -83,5 +141,21 @@ mod tests {
             assert!((x - x3).abs() < 1e-15 && (w - w3).abs() < 1e-15);
         }
         assert!((rule(2)[1].0 - GAUSS_2[1].0).abs() < 1e-15);
+    }
+
+    /// ∫ ξ^a η^b over the master triangle is a! b! / (a + b + 2)!.
+    #[test]
+    fn the_rules_of_a_triangle_are_exact_to_their_degree() {
+        let factorial = |n: i32| (1..=n).map(f64::from).product::<f64>();
+        for (rule, degree) in [(&TRIANGLE_2[..], 2), (&TRIANGLE_3[..], 5)] {
+            for a in 0..=degree {
+                for b in 0..=degree - a {
+                    let exact = factorial(a) * factorial(b) / factorial(a + b + 2);
+                    let term = |p: &GaussPoint| p.weight * p.place[0].powi(a) * p.place[1].powi(b);
+                    let sum: f64 = rule.iter().map(term).sum();
+                    assert!((sum - exact).abs() < 1e-15, "{a}, {b}: {sum} for {exact}");
+                }
+            }
+        }
     }
 }

@@ -3,3 +3,346 @@
 pub mod edge3;
 pub mod gauss;
 pub mod quad8;
+pub mod tri6;
+
+use std::ops::Deref;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// An element by its nodes, from 0: corners counter-clockwise, then the midsides from the side
+/// 1–2 on. In JSON a list of eight or six numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<u32>", into = "Vec<u32>")]
+pub enum Element {
+    /// The 8-node quadrilateral.
+    Quad([u32; 8]),
+    /// The 6-node triangle.
+    Triangle([u32; 6]),
+}
+
+/// Values at the nodes of an element; the last two of a triangle are nothing.
+pub type AtNodes<T> = [T; 8];
+
+/// The family of an element: what does not depend on its nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Family {
+    /// Eight nodes, ξ and η from −1 to 1.
+    Quad,
+    /// Six nodes, ξ, η ≥ 0 and ξ + η ≤ 1.
+    Triangle,
+}
+
+/// A place of integration in master coordinates, with its weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GaussPoint {
+    /// ξ and η.
+    pub place: [f64; 2],
+    /// The weights of all points add up to the area of the master element.
+    pub weight: f64,
+}
+
+/// What an integral over a real element needs at one of its points.
+#[derive(Clone, Copy, Debug)]
+pub struct Mapped {
+    /// h_i.
+    pub shape: AtNodes<f64>,
+    /// dh_i/dx and dh_i/dy.
+    pub gradient: AtNodes<[f64; 2]>,
+    /// det J of the map; ≤ 0 where the element is inverted.
+    pub det: f64,
+    /// First coordinate: x, or the radius r.
+    pub x: f64,
+}
+
+impl Element {
+    /// What kind it is.
+    pub fn family(&self) -> Family {
+        match self {
+            Element::Quad(_) => Family::Quad,
+            Element::Triangle(_) => Family::Triangle,
+        }
+    }
+
+    /// Values at its nodes.
+    pub fn gather<T: Copy + Default>(&self, value: impl Fn(u32) -> T) -> AtNodes<T> {
+        let mut values = [T::default(); 8];
+        for (slot, &node) in values.iter_mut().zip(self.iter()) {
+            *slot = value(node);
+        }
+        values
+    }
+
+    /// The same element with other node numbers.
+    pub fn map_nodes(&self, number: impl Fn(u32) -> u32) -> Element {
+        match self {
+            Element::Quad(nodes) => Element::Quad(nodes.map(number)),
+            Element::Triangle(nodes) => Element::Triangle(nodes.map(number)),
+        }
+    }
+
+    /// Its sides as nodes of the mesh (corner, corner, midside), counter-clockwise.
+    pub fn sides(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        let side = |side: &[usize; 3]| side.map(|i| self[i]);
+        self.family().sides().iter().map(side)
+    }
+}
+
+impl Deref for Element {
+    type Target = [u32];
+
+    fn deref(&self) -> &[u32] {
+        match self {
+            Element::Quad(nodes) => nodes,
+            Element::Triangle(nodes) => nodes,
+        }
+    }
+}
+
+impl TryFrom<Vec<u32>> for Element {
+    type Error = String;
+
+    fn try_from(nodes: Vec<u32>) -> Result<Self, String> {
+        if let Ok(quad) = nodes[..].try_into() {
+            return Ok(Element::Quad(quad));
+        }
+        if let Ok(triangle) = nodes[..].try_into() {
+            return Ok(Element::Triangle(triangle));
+        }
+        Err(format!(
+            "{} nodes, where an element has 8 (quadrilateral) or 6 (triangle)",
+            nodes.len()
+        ))
+    }
+}
+
+impl From<Element> for Vec<u32> {
+    fn from(element: Element) -> Self {
+        element.to_vec()
+    }
+}
+
+impl JsonSchema for Element {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Element".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({
+            "description": "Node numbers from 0: eight of a quadrilateral or six of a triangle; corners counter-clockwise, then the midsides from the side 1–2 on.",
+            "type": "array",
+            "items": generator.subschema_for::<u32>(),
+            "minItems": 6,
+            "maxItems": 8,
+        })
+    }
+}
+
+impl Family {
+    /// Corners, and as many sides.
+    pub fn corners(self) -> usize {
+        match self {
+            Family::Quad => 4,
+            Family::Triangle => 3,
+        }
+    }
+
+    /// Nodes.
+    pub fn nodes(self) -> usize {
+        2 * self.corners()
+    }
+
+    /// Master coordinates of the nodes.
+    pub fn places(self) -> &'static [[f64; 2]] {
+        match self {
+            Family::Quad => &quad8::NODES,
+            Family::Triangle => &tri6::NODES,
+        }
+    }
+
+    /// Sides as local nodes (corner, corner, midside), counter-clockwise.
+    pub fn sides(self) -> &'static [[usize; 3]] {
+        match self {
+            Family::Quad => &quad8::SIDES,
+            Family::Triangle => &tri6::SIDES,
+        }
+    }
+
+    /// h_i(ξ, η).
+    pub fn shape(self, [xi, eta]: [f64; 2]) -> AtNodes<f64> {
+        match self {
+            Family::Quad => quad8::shape(xi, eta),
+            Family::Triangle => tri6::shape(xi, eta),
+        }
+    }
+
+    /// The rule of thesis 2.3 for quadrilaterals, 3 × 3 or 2 × 2 points, ξ running fastest; of the
+    /// same use for triangles 7 points (degree 5) or 3 points (degree 2).
+    pub fn rule(self, order: u32) -> &'static [GaussPoint] {
+        match (self, order) {
+            (Family::Quad, 2) => &gauss::QUAD_2,
+            (Family::Quad, _) => &gauss::QUAD_3,
+            (Family::Triangle, 2) => &gauss::TRIANGLE_2,
+            (Family::Triangle, _) => &gauss::TRIANGLE_3,
+        }
+    }
+
+    /// Where stresses are better than elsewhere in the element: they are carried linearly from these
+    /// points to the nodes (bilinearly in a quadrilateral).
+    pub fn stress_points(self) -> &'static [GaussPoint] {
+        self.rule(2)
+    }
+
+    /// Weights of the stress points in the linear map to a place.
+    pub fn from_stress_points(self, [xi, eta]: [f64; 2]) -> [f64; 4] {
+        match self {
+            Family::Quad => {
+                let g = gauss::GAUSS_2[1].0;
+                let (p, q) = (
+                    [0.5 * (1.0 - xi / g), 0.5 * (1.0 + xi / g)],
+                    [0.5 * (1.0 - eta / g), 0.5 * (1.0 + eta / g)],
+                );
+                [p[0] * q[0], p[1] * q[0], p[0] * q[1], p[1] * q[1]]
+            }
+            // 1 at its own point, 0 at the other two
+            Family::Triangle => [
+                5.0 / 3.0 - 2.0 * (xi + eta),
+                2.0 * xi - 1.0 / 3.0,
+                2.0 * eta - 1.0 / 3.0,
+                0.0,
+            ],
+        }
+    }
+
+    /// The map T_e of thesis (2.8) at a place, for an element with node positions `nodes`.
+    pub fn map(self, nodes: &AtNodes<[f64; 2]>, place: [f64; 2]) -> Mapped {
+        let [xi, eta] = place;
+        let (shape, local) = match self {
+            Family::Quad => (quad8::shape(xi, eta), quad8::derivative(xi, eta)),
+            Family::Triangle => (tri6::shape(xi, eta), tri6::derivative(xi, eta)),
+        };
+        let mut jacobian = [[0.0; 2]; 2]; // jacobian[a][b] = dx_b / dξ_a
+        for i in 0..self.nodes() {
+            for a in 0..2 {
+                for b in 0..2 {
+                    jacobian[a][b] += local[i][a] * nodes[i][b];
+                }
+            }
+        }
+        let [[j00, j01], [j10, j11]] = jacobian;
+        let det = j00 * j11 - j01 * j10;
+        let gradient = local.map(|[p, q]| [(j11 * p - j01 * q) / det, (j00 * q - j10 * p) / det]);
+        let x = (0..self.nodes()).map(|i| shape[i] * nodes[i][0]).sum();
+        Mapped {
+            shape,
+            gradient,
+            det,
+            x,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FAMILIES: [Family; 2] = [Family::Quad, Family::Triangle];
+
+    #[test]
+    fn shapes_are_one_at_their_own_node_and_zero_at_the_others() {
+        for family in FAMILIES {
+            for (i, &place) in family.places().iter().enumerate() {
+                for (j, h) in family.shape(place).into_iter().enumerate() {
+                    assert_eq!(h, if i == j { 1.0 } else { 0.0 }, "{family:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn shapes_sum_to_one_and_derivatives_match_differences() {
+        let (xi, eta, step) = (0.3, 0.4, 1e-6);
+        for family in FAMILIES {
+            let sum: f64 = family.shape([xi, eta]).iter().sum();
+            assert!((sum - 1.0).abs() < 1e-15);
+            let exact = match family {
+                Family::Quad => quad8::derivative(xi, eta),
+                Family::Triangle => tri6::derivative(xi, eta),
+            };
+            for a in 0..2 {
+                let shifted = |by: f64| {
+                    let mut place = [xi, eta];
+                    place[a] += by;
+                    family.shape(place)
+                };
+                let (plus, minus) = (shifted(step), shifted(-step));
+                for i in 0..8 {
+                    let difference = (plus[i] - minus[i]) / (2.0 * step);
+                    assert!((exact[i][a] - difference).abs() < 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_of_a_distorted_element_reproduce_a_linear_field() {
+        let quad = [
+            [0.0, 0.0],
+            [2.0, 0.1],
+            [2.3, 1.7],
+            [-0.2, 1.5],
+            [1.0, -0.1],
+            [2.2, 0.9],
+            [1.0, 1.7],
+            [-0.1, 0.8],
+        ];
+        let triangle = [
+            [0.0, 0.0],
+            [2.0, 0.1],
+            [0.3, 1.7],
+            [1.0, -0.1],
+            [1.2, 1.0],
+            [0.1, 0.8],
+            [0.0; 2],
+            [0.0; 2],
+        ];
+        for (family, nodes) in [(Family::Quad, quad), (Family::Triangle, triangle)] {
+            let m = family.map(&nodes, [0.2, 0.4]);
+            let d = |b: usize| {
+                (0..family.nodes())
+                    .map(|i| m.gradient[i][b] * (3.0 * nodes[i][0] - 2.0 * nodes[i][1]))
+                    .sum::<f64>()
+            };
+            assert!((d(0) - 3.0).abs() < 1e-14 && (d(1) + 2.0).abs() < 1e-14);
+            assert!(m.det > 0.0);
+        }
+    }
+
+    #[test]
+    fn a_linear_stress_is_carried_to_every_place() {
+        let linear = |[xi, eta]: [f64; 2]| 3.0 - 2.0 * xi + 0.7 * eta;
+        for family in FAMILIES {
+            for &place in family.places() {
+                let weights = family.from_stress_points(place);
+                let carried: f64 = family
+                    .stress_points()
+                    .iter()
+                    .zip(weights)
+                    .map(|(point, w)| w * linear(point.place))
+                    .sum();
+                assert!((carried - linear(place)).abs() < 1e-14, "{family:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_element_is_a_list_of_eight_or_six_numbers() {
+        let quad: Element = serde_json::from_str("[0,1,2,3,4,5,6,7]").unwrap();
+        assert_eq!(quad.family(), Family::Quad);
+        let triangle: Element = serde_json::from_str("[0,1,2,3,4,5]").unwrap();
+        assert_eq!(triangle.sides().last(), Some([2, 0, 5]));
+        assert_eq!(serde_json::to_string(&triangle).unwrap(), "[0,1,2,3,4,5]");
+        let error = serde_json::from_str::<Element>("[0,1,2,3,4,5,6]").unwrap_err();
+        assert!(error.to_string().contains("7 nodes"));
+    }
+}

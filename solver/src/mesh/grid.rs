@@ -1,5 +1,6 @@
 //! Grids of lines, and strips between two polylines.
 
+use crate::element::Element;
 use crate::error::Violation;
 use crate::mesh::Mesh;
 use crate::problem::Grid;
@@ -37,7 +38,7 @@ pub fn grid_mesh(grid: &Grid) -> Mesh {
     let mut elements = Vec::with_capacity(nx * ny);
     for j in (0..2 * ny).step_by(2) {
         for i in (0..2 * nx).step_by(2) {
-            elements.push([
+            elements.push(Element::Quad([
                 node(i, j),
                 node(i + 2, j),
                 node(i + 2, j + 2),
@@ -46,7 +47,7 @@ pub fn grid_mesh(grid: &Grid) -> Mesh {
                 node(i + 2, j + 1),
                 node(i + 1, j + 2),
                 node(i, j + 1),
-            ]);
+            ]));
         }
     }
     // with the body on the right: bottom runs along −x, left along +y, top along +x, right along −y

@@ -2,7 +2,6 @@
 
 use std::collections::{HashMap, HashSet};
 
-use crate::element::quad8;
 use crate::error::{Violation, escape};
 use crate::mesh::Mesh;
 use crate::problem::InlineMesh;
@@ -24,7 +23,7 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
             "too_few",
             "no element",
             "at least one",
-            "Give the elements as lists of eight nodes.",
+            "Give the elements as lists of eight or six nodes.",
         );
     }
     let mut used = vec![false; input.nodes.len()];
@@ -44,7 +43,7 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
                     &place(),
                     "repeated_node",
                     node,
-                    "eight different nodes",
+                    "different nodes",
                     "Collapsed elements are not supported.",
                 );
             } else {
@@ -164,8 +163,7 @@ struct Side {
 fn surface(input: &InlineMesh, found: &mut Faults) -> HashMap<(u32, u32), Side> {
     let mut sides: HashMap<(u32, u32), Side> = HashMap::with_capacity(2 * input.elements.len());
     for (e, element) in input.elements.iter().enumerate() {
-        for (k, [a, b, m]) in quad8::SIDES.into_iter().enumerate() {
-            let (a, b, mid) = (element[a], element[b], element[m]);
+        for (k, [a, b, mid]) in element.sides().enumerate() {
             let side = sides.entry(key(a, b)).or_insert(Side {
                 elements: 0,
                 mid,
@@ -174,7 +172,7 @@ fn surface(input: &InlineMesh, found: &mut Faults) -> HashMap<(u32, u32), Side> 
             side.elements += 1;
             if side.mid != mid {
                 found.say(
-                    &format!("/elements/{e}/{}", 4 + k),
+                    &format!("/elements/{e}/{}", element.family().corners() + k),
                     "nonconforming",
                     format!("midside {mid}"),
                     &format!("midside {}, as the neighbour has it", side.mid),
@@ -240,6 +238,7 @@ impl Faults<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::element::Element;
     use std::collections::BTreeMap;
 
     fn square() -> InlineMesh {
@@ -254,7 +253,7 @@ mod tests {
                 [0.5, 1.0],
                 [0.0, 0.5],
             ],
-            elements: vec![[0, 1, 2, 3, 4, 5, 6, 7]],
+            elements: vec![Element::Quad([0, 1, 2, 3, 4, 5, 6, 7])],
             boundaries: BTreeMap::from([("top".to_owned(), vec![[3, 2, 6]])]),
             groups: BTreeMap::new(),
         }
@@ -275,8 +274,7 @@ mod tests {
     #[test]
     fn unknown_and_repeated_nodes_and_foreign_edges_are_named() {
         let mut input = square();
-        input.elements[0][2] = 99;
-        input.elements[0][3] = 1;
+        input.elements[0] = Element::Quad([0, 1, 99, 1, 4, 5, 6, 7]);
         let pointers: Vec<_> = inline_mesh(&input, "/mesh/inline")
             .unwrap_err()
             .into_iter()

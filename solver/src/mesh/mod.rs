@@ -1,4 +1,4 @@
-//! The body as nodes, 8-node elements and named boundaries.
+//! The body as nodes, elements and named boundaries.
 
 mod grid;
 mod inline;
@@ -10,8 +10,7 @@ pub use refine::refine;
 
 use std::collections::BTreeMap;
 
-use crate::element::gauss::GAUSS_3;
-use crate::element::quad8;
+use crate::element::Element;
 
 /// A side of an element on the surface of the body: start, end, midside node, so directed that the
 /// body lies on the right (a top edge runs along +x). The outward normal is the direction turned
@@ -23,8 +22,8 @@ pub type Edge = [u32; 3];
 pub struct Mesh {
     /// Positions.
     pub nodes: Vec<[f64; 2]>,
-    /// Eight nodes each, as in `element::quad8`.
-    pub elements: Vec<[u32; 8]>,
+    /// Quadrilaterals and triangles.
+    pub elements: Vec<Element>,
     /// Surface edges by name.
     pub boundaries: BTreeMap<String, Vec<Edge>>,
     /// Elements by the name of their group.
@@ -33,8 +32,8 @@ pub struct Mesh {
 
 impl Mesh {
     /// Node positions of an element.
-    pub fn element_nodes(&self, element: &[u32; 8]) -> [[f64; 2]; 8] {
-        element.map(|n| self.nodes[n as usize])
+    pub fn element_nodes(&self, element: &Element) -> [[f64; 2]; 8] {
+        element.gather(|n| self.nodes[n as usize])
     }
 
     /// Largest minus smallest coordinate along an axis (0: x, 1: y).
@@ -52,26 +51,24 @@ impl Mesh {
         edge.map(|n| self.nodes[n as usize])
     }
 
-    /// Elements that are inverted somewhere: number, place, det J. Looked at are the nine Gauss points
-    /// and, with `at_nodes`, the nodes: a midside far off its middle folds the corner first.
+    /// Elements that are inverted somewhere: number, place, det J. Looked at are the Gauss points of
+    /// the larger rule and, with `at_nodes`, the nodes: a midside far off its middle folds the corner
+    /// first.
     pub fn inverted_elements(&self, at_nodes: bool) -> Vec<(usize, String, f64)> {
-        let places = if at_nodes { 17 } else { 9 };
-        let inverted = |(e, element): (usize, &[u32; 8])| {
-            let nodes = self.element_nodes(element);
-            let det = |place: usize| {
-                let [xi, eta] = match place {
-                    0..9 => [GAUSS_3[place % 3].0, GAUSS_3[place / 3].0],
-                    _ => quad8::NODES[place - 9],
-                };
-                quad8::map(&nodes, xi, eta).det
+        let inverted = |(e, element): (usize, &Element)| {
+            let (family, nodes) = (element.family(), self.element_nodes(element));
+            let points = family.rule(3).iter().map(|point| point.place);
+            let corners = family.places().iter().copied().filter(|_| at_nodes);
+            let (place, det) = points
+                .chain(corners)
+                .map(|place| family.map(&nodes, place).det)
+                .enumerate()
+                .find(|(_, det)| det.is_nan() || *det <= 0.0)?;
+            let name = match place.checked_sub(family.rule(3).len()) {
+                None => format!("Gauss point {place}"),
+                Some(node) => format!("its node {node}"),
             };
-            let folded = |place: &usize| det(*place).is_nan() || det(*place) <= 0.0;
-            let place = (0..places).find(folded)?;
-            let name = match place {
-                0..9 => format!("Gauss point {place}"),
-                _ => format!("its node {}", place - 9),
-            };
-            Some((e, name, det(place)))
+            Some((e, name, det))
         };
         self.elements
             .iter()
@@ -87,8 +84,8 @@ impl Mesh {
         let mut parent: Vec<u32> = (0..self.elements.len() as u32).collect();
         let mut first_with_side = vec![u32::MAX; self.nodes.len()];
         for (e, element) in self.elements.iter().enumerate() {
-            for [_, _, mid] in quad8::SIDES {
-                let first = &mut first_with_side[element[mid] as usize];
+            for [_, _, mid] in element.sides() {
+                let first = &mut first_with_side[mid as usize];
                 if *first == u32::MAX {
                     *first = e as u32;
                 } else {
@@ -107,7 +104,7 @@ impl Mesh {
                 parts.push(Vec::new());
             }
             let part = number[root];
-            for &node in element {
+            for &node in element.iter() {
                 if seen_by[node as usize] != part {
                     seen_by[node as usize] = part;
                     parts[part].push(node);
@@ -166,10 +163,10 @@ mod tests {
     #[test]
     fn squares_that_share_a_corner_are_two_parts_and_a_strip_is_one() {
         let square = |o: f64, n: [u32; 8], nodes: &mut Vec<[f64; 2]>| {
-            for (node, [x, y]) in n.iter().zip(quad8::NODES) {
+            for (node, [x, y]) in n.iter().zip(crate::element::quad8::NODES) {
                 nodes[*node as usize] = [o + 0.5 * (1.0 + x), o + 0.5 * (1.0 + y)];
             }
-            n
+            Element::Quad(n)
         };
         let mut mesh = Mesh {
             nodes: vec![[0.0; 2]; 15],

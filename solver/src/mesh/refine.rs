@@ -1,10 +1,13 @@
-//! Splitting every element in two in each direction.
+//! Splitting every element in four, every side in two.
 
-use crate::element::{edge3, quad8};
+use crate::element::{Element, edge3};
 use crate::mesh::{Edge, Mesh};
 
 /// New nodes lie half-way between the old ones, in master coordinates.
 const STEP: f64 = 0.5;
+
+/// And a quarter from the sides of a triangle.
+const QUARTER: f64 = 0.25;
 
 /// Every element becomes four, every edge two; new nodes lie on the parent's own map, so that
 /// curved sides stay the curves they are.
@@ -28,24 +31,43 @@ pub fn refine(mesh: &Mesh) -> Mesh {
     };
     let mut elements = Vec::with_capacity(4 * mesh.elements.len());
     for parent in &mesh.elements {
-        let positions = parent.map(|n| nodes[n as usize]);
-        let inside = |nodes: &mut Vec<[f64; 2]>, xi: f64, eta: f64| {
-            let h = quad8::shape(xi, eta);
-            let at = |a: usize| (0..8).map(|i| h[i] * positions[i][a]).sum();
+        let (family, positions) = (parent.family(), parent.gather(|n| nodes[n as usize]));
+        let inside = |nodes: &mut Vec<[f64; 2]>, place: [f64; 2]| {
+            let h = family.shape(place);
+            let at = |a: usize| (0..family.nodes()).map(|i| h[i] * positions[i][a]).sum();
             nodes.push([at(0), at(1)]);
             nodes.len() as u32 - 1
         };
-        let [south, east, north, west] =
-            quad8::SIDES.map(|[a, b, m]| split(&mut nodes, [parent[a], parent[b], parent[m]]));
-        let centre = inside(&mut nodes, 0.0, 0.0);
-        let [to_south, to_east, to_north, to_west] =
-            [(0.0, -STEP), (STEP, 0.0), (0.0, STEP), (-STEP, 0.0)]
-                .map(|(xi, eta)| inside(&mut nodes, xi, eta));
-        let p = parent;
-        elements.push([p[0], p[4], centre, p[7], south.0, to_south, to_west, west.1]);
-        elements.push([p[4], p[1], p[5], centre, south.1, east.0, to_east, to_south]);
-        elements.push([centre, p[5], p[2], p[6], to_east, east.1, north.0, to_north]);
-        elements.push([p[7], centre, p[6], p[3], to_west, to_north, north.1, west.0]);
+        let halves: Vec<(u32, u32)> = parent.sides().map(|side| split(&mut nodes, side)).collect();
+        match (parent, &halves[..]) {
+            (Element::Quad(p), &[south, east, north, west]) => {
+                let centre = inside(&mut nodes, [0.0, 0.0]);
+                let [to_south, to_east, to_north, to_west] =
+                    [[0.0, -STEP], [STEP, 0.0], [0.0, STEP], [-STEP, 0.0]]
+                        .map(|place| inside(&mut nodes, place));
+                #[rustfmt::skip]
+                elements.extend([
+                    [p[0], p[4], centre, p[7], south.0, to_south, to_west, west.1],
+                    [p[4], p[1], p[5], centre, south.1, east.0, to_east, to_south],
+                    [centre, p[5], p[2], p[6], to_east, east.1, north.0, to_north],
+                    [p[7], centre, p[6], p[3], to_west, to_north, north.1, west.0],
+                ].map(Element::Quad));
+            }
+            (Element::Triangle(p), &[first, second, third]) => {
+                // the sides of the triangle in the middle, each across one corner
+                let [across_0, across_1, across_2] =
+                    [[QUARTER, QUARTER], [STEP, QUARTER], [QUARTER, STEP]]
+                        .map(|place| inside(&mut nodes, place));
+                #[rustfmt::skip]
+                elements.extend([
+                    [p[0], p[3], p[5], first.0, across_0, third.1],
+                    [p[3], p[1], p[4], first.1, second.0, across_1],
+                    [p[5], p[4], p[2], across_2, second.1, third.0],
+                    [p[3], p[4], p[5], across_1, across_2, across_0],
+                ].map(Element::Triangle));
+            }
+            _ => unreachable!("a quadrilateral has four sides, a triangle three"),
+        }
     }
     let boundaries = mesh
         .boundaries

@@ -147,6 +147,7 @@ impl Model {
         let Some(mesh) = findings.mesh(&problem.mesh, &analysis, problem.contacts.len()) else {
             return Err(findings.into_violations());
         };
+        findings.thesis_elements(problem, &mesh);
         // wrong materials have been named; the checks that follow need only the theory
         let section = findings
             .section(analysis, &problem.materials, &mesh)

@@ -1,7 +1,9 @@
 //! Numbers by themselves: finite, and in their range.
 
 use super::findings::Findings;
+use crate::element::{Element, Family};
 use crate::error::escape;
+use crate::mesh::Mesh;
 use crate::problem::{
     Algorithm, Analysis, Condition, Friction, FrictionPoints, History, NormalOf, Problem, Step,
     ThesisPressure,
@@ -130,6 +132,22 @@ impl Findings {
                 f64::from(step.increments),
                 &format!("1 … {MOST_INCREMENTS}"),
                 "1 is enough for the total law; the incremental law wants a few dozen for curved obstacles.",
+            );
+        }
+    }
+
+    /// The thesis carries stresses to the boundary along rows of Gauss points, which triangles lack.
+    pub(super) fn thesis_elements(&mut self, problem: &Problem, mesh: &Mesh) {
+        let triangle = |element: &Element| element.family() == Family::Triangle;
+        if problem.solver.algorithm == Algorithm::Thesis
+            && let Some(e) = mesh.elements.iter().position(triangle)
+        {
+            self.say(
+                "/solver/algorithm",
+                "not_used",
+                format!("`thesis` with triangles (element {e} is one)"),
+                "a mesh of quadrilaterals",
+                "Its rows of Gauss points exist in quadrilaterals only; choose another algorithm.",
             );
         }
     }

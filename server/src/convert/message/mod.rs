@@ -154,7 +154,7 @@ fn mesh_to_pb(mesh: &MeshInput) -> pb::Mesh {
         elements: inline
             .elements
             .iter()
-            .map(|nodes| pb::Quad8 {
+            .map(|nodes| pb::Element {
                 nodes: nodes.to_vec(),
             })
             .collect(),

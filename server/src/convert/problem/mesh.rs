@@ -1,6 +1,7 @@
 //! Meshes.
 
 use solver::{
+    element::Element,
     error::escape,
     problem::{AdaptiveRefine, BoundaryPart, ElementRange, Grid, InlineMesh, MeshInput, Refine},
 };
@@ -67,6 +68,19 @@ impl Reader {
         }
     }
 
+    fn element(&mut self, at: &str, nodes: Vec<u32>) -> Element {
+        let found = nodes.len();
+        Element::try_from(nodes).unwrap_or_else(|_| {
+            self.wrong(
+                at,
+                "wrong_length",
+                format!("{found} node numbers"),
+                "8 or 6 node numbers",
+            );
+            Element::Triangle([0; 6])
+        })
+    }
+
     fn inline(
         &mut self,
         pb::InlineMesh {
@@ -80,7 +94,7 @@ impl Reader {
         let elements = elements
             .into_iter()
             .enumerate()
-            .map(|(i, element)| self.indices(&format!("/mesh/inline/elements/{i}"), element.nodes))
+            .map(|(i, element)| self.element(&format!("/mesh/inline/elements/{i}"), element.nodes))
             .collect();
         let boundaries = boundaries
             .into_iter()

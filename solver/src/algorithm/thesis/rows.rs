@@ -18,7 +18,7 @@ use super::{Friction, average, sense};
 use crate::algorithm::system::{State, System};
 use crate::contact::edge_nodes;
 use crate::elasticity::{self, Dof};
-use crate::element::{edge3, gauss, quad8};
+use crate::element::{Family, edge3, gauss, quad8};
 use crate::problem::{ThesisOptions, ThesisPressure};
 
 /// The elements that Γ_C runs along.
@@ -66,7 +66,7 @@ impl Rows {
         // an edge on the surface has one element, known by the midside
         let mut owner = vec![None; mesh.nodes.len()];
         for (e, element) in mesh.elements.iter().enumerate() {
-            for side in quad8::SIDES {
+            for &side in element.family().sides() {
                 owner[element[side[2]] as usize] = Some((e, side));
             }
         }
@@ -152,7 +152,7 @@ impl Rows {
         let patch = &system.patches[rows.patch];
         let element = &model.mesh.elements[rows.element];
         let nodes = model.mesh.element_nodes(element);
-        let u = element.map(|n| displacements[n as usize]);
+        let u = element.gather(|n| displacements[n as usize]);
         let positions = edge_nodes(rows.edge).map(|i| patch.contact.boundary.positions[i]);
         let moduli = model.section.moduli(rows.element);
         let (mut stress, mut phi) = ([vec![], vec![]], [vec![], vec![]]);
@@ -163,8 +163,14 @@ impl Rows {
                 let length = dx.hypot(dy);
                 let ([tx, ty], [nx, ny]) =
                     ([dx / length, dy / length], [-dy / length, dx / length]);
-                let [xx, yy, xy, _] =
-                    elasticity::stress_at(&model.section, moduli, &nodes, &u, [xi, eta]);
+                let [xx, yy, xy, _] = elasticity::stress_at(
+                    &model.section,
+                    moduli,
+                    Family::Quad,
+                    &nodes,
+                    &u,
+                    [xi, eta],
+                );
                 stress[row].push(xx * nx * nx + 2.0 * xy * nx * ny + yy * ny * ny);
                 let h = quad8::shape(xi, eta);
                 let u_t: f64 = (0..8).map(|i| h[i] * (u[i][0] * tx + u[i][1] * ty)).sum();
