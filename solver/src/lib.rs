@@ -38,6 +38,7 @@ pub mod steps;
 pub mod adapt;
 
 use error::{SolveError, Violation};
+use mesh::Mesh;
 use model::Model;
 use problem::{Problem, Refine};
 use solution::{Observer, Phase, Progress, Solution, Warning};
@@ -47,19 +48,35 @@ use solution::{Observer, Phase, Progress, Solution, Warning};
 /// `observe` is told every phase and iteration and may break off: then the last state comes back
 /// as `Outcome::Canceled`, or `SolveError::Stopped` when there is none yet.
 pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
+    solve_on(problem, None, observe)
+}
+
+/// Solves a problem that may name a stored mesh: `stored` is that mesh.
+pub fn solve_on(
+    problem: &Problem,
+    stored: Option<&Mesh>,
+    observe: &mut Observer<'_>,
+) -> Result<Solution, SolveError> {
     match problem.mesh.refine {
-        Refine::Times(_) => solve_once(problem, observe),
+        Refine::Times(_) => solve_once(problem, stored, observe),
         Refine::Adaptive(goal) => {
-            check(problem).map_err(SolveError::Invalid)?;
-            adapt::run(problem, &goal, &solve_once, observe)
+            check(problem, stored).map_err(SolveError::Invalid)?;
+            // only grids are refined so, and a grid is never stored
+            let solve =
+                |problem: &Problem, observe: &mut Observer<'_>| solve_once(problem, None, observe);
+            adapt::run(problem, &goal, &solve, observe)
         }
     }
 }
 
 /// On one mesh.
-fn solve_once(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
+fn solve_once(
+    problem: &Problem,
+    stored: Option<&Mesh>,
+    observe: &mut Observer<'_>,
+) -> Result<Solution, SolveError> {
     begin(observe, Phase::Mesh)?;
-    let model = Model::new(problem).map_err(SolveError::Invalid)?;
+    let model = Model::new(problem, stored).map_err(SolveError::Invalid)?;
     for warning in &model.warnings {
         begin_warning(observe, warning)?;
     }
@@ -68,8 +85,8 @@ fn solve_once(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution,
 }
 
 /// Checks a problem without solving it: its warnings, or everything that is wrong with it.
-pub fn check(problem: &Problem) -> Result<Vec<Warning>, Vec<Violation>> {
-    Model::new(problem).map(|model| model.warnings)
+pub fn check(problem: &Problem, stored: Option<&Mesh>) -> Result<Vec<Warning>, Vec<Violation>> {
+    Model::new(problem, stored).map(|model| model.warnings)
 }
 
 fn begin(observe: &mut Observer<'_>, phase: Phase) -> Result<(), SolveError> {

@@ -61,7 +61,7 @@ pub enum Analysis {
     Axisymmetric {},
 }
 
-/// Where the elements come from: exactly one of `grid` and `inline`.
+/// Where the elements come from: exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshInput {
@@ -71,6 +71,18 @@ pub struct MeshInput {
     /// Nodes and elements, written out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inline: Option<InlineMesh>,
+    /// The text of a Gmsh mesh (MSH 2.2 or 4.1, ASCII): physical curves become boundaries, physical
+    /// surfaces groups, physical points node sets.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gmsh: Option<String>,
+    /// The text of an Abaqus or CalculiX deck: surfaces and, where their nodes span edges, node sets
+    /// become boundaries, element sets groups, node sets node sets. What it says of the analysis is
+    /// not used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub abaqus: Option<String>,
+    /// The hash of a mesh that was uploaded to the service, `sha256:…`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stored: Option<String>,
     /// How often every element is split, or the tolerance that a grid is refined to.
     #[serde(default)]
     pub refine: Refine,
@@ -150,20 +162,33 @@ pub struct InlineMesh {
     /// Named groups of elements, by their numbers from 0.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub groups: BTreeMap<String, Vec<u32>>,
+    /// Named sets of nodes, by their numbers from 0.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub node_sets: BTreeMap<String, Vec<u32>>,
 }
 
-/// The sides of a named boundary that lie within a range of x and of y, ends included.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// The sides of the body's surface that fit every condition given, ends included.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundaryPart {
-    /// The boundary to take a part of.
-    pub side: String,
+    /// The boundary to take a part of; absent: the whole surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub side: Option<String>,
     /// All three nodes of a side lie within this range of x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x: Option<[f64; 2]>,
     /// All three nodes of a side lie within this range of y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub y: Option<[f64; 2]>,
+    /// All three nodes of a side lie within this box, `[[x, y], [x, y]]`: two opposite corners.
+    #[serde(default, skip_serializing_if = "Option::is_none", rename = "box")]
+    pub corners: Option<[[f64; 2]; 2]>,
+    /// The outward normal of a side points this way `[x, y]` at all three nodes, to `angle`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f64; 2]>,
+    /// Largest angle between a side's normal and `normal`; 1 when absent (degrees).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle: Option<f64>,
 }
 
 /// Linear elasticity: isotropic (`youngs_modulus` and `poissons_ratio`) or `orthotropic`.
@@ -225,13 +250,17 @@ pub enum BoundaryValue {
     Linear([f64; 2]),
 }
 
-/// Prescribed displacements on a boundary, along x and y or along normal and tangent; what is not
-/// named stays free.
+/// Prescribed displacements on a boundary or a set of nodes, along x and y or (on a boundary) along
+/// normal and tangent; what is not named stays free.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
     /// Name of the boundary.
-    pub boundary: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub boundary: Option<String>,
+    /// Name of a set of nodes instead.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nodes: Option<String>,
     /// Displacement along x (length).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ux: Option<BoundaryValue>,
@@ -247,13 +276,16 @@ pub struct Support {
 }
 
 /// A load in one of its forms: on a boundary `pressure`, or `traction`, or `normal` and
-/// `tangential`, or `nodal`; on the whole body `body_force`.
+/// `tangential`, or `nodal`; on a set of nodes `force`; on the whole body `body_force`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Load {
     /// Name of the boundary; none for a body force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub boundary: Option<String>,
+    /// Name of a set of nodes, for `force`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nodes: Option<String>,
     /// Stress against the outward normal: positive pushes into the body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pressure: Option<BoundaryValue>,
@@ -270,6 +302,9 @@ pub struct Load {
     /// axisymmetry on the whole ring.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nodal: Option<Vec<[f64; 2]>>,
+    /// Force `[fx, fy]` on each node of the set; in axisymmetry on the whole ring.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force: Option<[f64; 2]>,
     /// Force per volume along x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_force: Option<[f64; 2]>,

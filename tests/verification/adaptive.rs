@@ -90,7 +90,7 @@ fn what_cannot_be_refined_is_refused() {
     let mut problem = example("cylinder");
     problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 1.5 });
     problem.contacts.clear();
-    let found = solver::check(&problem).unwrap_err();
+    let found = solver::check(&problem, None).unwrap_err();
     let pointers: Vec<_> = found.iter().map(|v| v.pointer.as_str()).collect();
     assert_eq!(pointers, ["/mesh/refine/tolerance", "/mesh/refine"]);
 }

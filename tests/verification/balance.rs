@@ -21,7 +21,7 @@ const EXAMPLES: [&str; 5] = [
 ];
 
 fn with_solved(name: &str, check: impl FnOnce(&Model, &ElasticBody, &System<'_>, &Finished)) {
-    let model = Model::new(&example(name)).unwrap();
+    let model = Model::new(&example(name), None).unwrap();
     let body = ElasticBody::new(&model, &mut quiet).unwrap();
     let system = System::new(&model, &body);
     let finished = run(&system, &model.controls, Place::default(), None, &mut quiet);

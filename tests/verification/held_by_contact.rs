@@ -21,7 +21,7 @@ fn block(analysis: &Value, supports: &Value) -> Model {
         "loads": [{"boundary": "right", "pressure": [2, 5]}, {"body_force": [0.5, -1]}],
         "contacts": [{"boundary": "bottom", "obstacle": {"kind": "flat"}, "condition": "bonded"}],
     });
-    Model::new(&problem(&text.to_string())).unwrap()
+    Model::new(&problem(&text.to_string()), None).unwrap()
 }
 
 fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {

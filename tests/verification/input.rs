@@ -6,7 +6,7 @@ use solver::problem::Problem;
 use crate::support::{example, problem, solve};
 
 pub(crate) fn violations(problem: &Problem) -> Vec<(String, String)> {
-    let list = solver::check(problem).expect_err("a faulty problem was accepted");
+    let list = solver::check(problem, None).expect_err("a faulty problem was accepted");
     list.iter().for_each(|Violation { expected, hint, .. }| {
         assert!(!expected.is_empty() && !hint.is_empty())
     });
@@ -30,7 +30,7 @@ fn every_number_out_of_range_is_named_at_once() {
         friction.nonlocal_radius,
         friction.elastic_slip,
     ) = (Some(-0.1), Some(-1.0), 0.0);
-    p.supports[0].boundary = "lfet".to_owned();
+    p.supports[0].boundary = Some("lfet".to_owned());
     let found = violations(&p);
     for pointer in [
         "/materials/0/youngs_modulus",
@@ -69,7 +69,7 @@ fn a_body_free_to_move_is_refused_with_node_and_direction() {
     let mut p = example("rectangular_punch");
     p.supports.remove(1); // the base: now only ux at the side
     p.contacts.clear();
-    let list = solver::check(&p).unwrap_err();
+    let list = solver::check(&p, None).unwrap_err();
     assert_eq!(list.len(), 1);
     assert!(
         list[0].got.contains("along y") && list[0].got.contains("node"),
@@ -80,7 +80,7 @@ fn a_body_free_to_move_is_refused_with_node_and_direction() {
     round.supports.remove(1);
     round.contacts.clear();
     assert!(
-        solver::check(&round).unwrap_err()[0]
+        solver::check(&round, None).unwrap_err()[0]
             .got
             .contains("along the axis")
     );
@@ -95,7 +95,7 @@ fn a_body_free_to_move_is_refused_with_node_and_direction() {
     pinned.supports.clear();
     pinned.contacts.clear();
     assert!(
-        solver::check(&pinned).unwrap_err()[0]
+        solver::check(&pinned, None).unwrap_err()[0]
             .got
             .contains("along x")
     );
@@ -111,7 +111,7 @@ fn a_body_that_contact_could_hold_and_does_not_is_an_error_with_its_motion() {
     ] {
         let mut p = example(name);
         p.supports.remove(1);
-        assert!(solver::check(&p).is_ok(), "{name}");
+        assert!(solver::check(&p, None).is_ok(), "{name}");
         match solver::solve(&p, &mut |_| std::ops::ControlFlow::Continue(())) {
             Err(SolveError::Unheld { motion: found, .. }) => assert_eq!(found, motion, "{name}"),
             other => panic!("{name}: {:?}", other.map(|s| s.summary)),
@@ -180,7 +180,7 @@ fn an_obstacle_that_covers_no_node_is_refused_and_one_that_cuts_an_edge_is_warne
         [pair("/contacts/0/obstacle", "covers_nothing")]
     );
     p.contacts[0].obstacle = obstacle(r#"{"kind": "flat", "from": 0, "to": 0.55}"#);
-    let codes: Vec<_> = solver::check(&p)
+    let codes: Vec<_> = solver::check(&p, None)
         .unwrap()
         .into_iter()
         .map(|w| w.code)
@@ -201,14 +201,14 @@ fn a_contact_that_turns_a_corner_is_warned_of() {
         (None, Some(vec![[0.0, 1.0], [2.0, 0.4], [5.0, 1.0]]));
     p.contacts[0].obstacle =
         serde_json::from_str(r#"{"kind": "flat", "from": 0.5, "to": 4}"#).unwrap();
-    let warnings = solver::check(&p).unwrap();
+    let warnings = solver::check(&p, None).unwrap();
     let turn = warnings
         .iter()
         .find(|w| w.code == "contact_turns")
         .expect("no warning");
     assert!(turn.message.contains("28° at (2, 0.4)"), "{}", turn.message);
     assert!(
-        solver::check(&example("sheet"))
+        solver::check(&example("sheet"), None)
             .unwrap()
             .iter()
             .all(|w| w.code != "contact_turns")
@@ -224,7 +224,7 @@ fn inverted_elements_are_named_with_their_gauss_point() {
                 "elements": [[0,3,2,1,7,6,5,4]], "boundaries": {"b": [[0,1,4]]}}},
             "supports": [{"boundary": "b", "ux": 0, "uy": 0}]}"#,
     );
-    let list = solver::check(&p).unwrap_err();
+    let list = solver::check(&p, None).unwrap_err();
     assert_eq!(
         (&list[0].pointer[..], &list[0].reason[..]),
         ("/mesh/inline/elements/0", "inverted_element")
@@ -476,11 +476,11 @@ fn contacts_without_area_normal_or_coordinate_are_refused() {
 fn endless_lists_of_faults_are_cut_short() {
     let mut p = example("rectangular_punch");
     let stray = solver::problem::Support {
-        boundary: "nowhere".to_owned(),
+        boundary: Some("nowhere".to_owned()),
         ..p.supports[0].clone()
     };
     p.supports.extend(std::iter::repeat_n(stray.clone(), 500));
-    let list = solver::check(&p).unwrap_err();
+    let list = solver::check(&p, None).unwrap_err();
     assert_eq!(list.len(), 100);
     assert!(list[99].hint.contains("400 more"), "{}", list[99].hint);
     p.supports.extend(std::iter::repeat_n(stray, 5000));

@@ -14,6 +14,7 @@ mod error_estimate;
 mod even_profiles;
 mod examples;
 mod flat_punch;
+mod gmsh_files;
 mod held_by_contact;
 mod hertz_sphere;
 mod input;

@@ -14,7 +14,7 @@ fn top(obstacle: Value, normal: &str) -> ContactModel {
         "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
         "contacts": [{"boundary": "top", "obstacle": obstacle, "indentation": 0.2, "normal": normal}],
     });
-    Model::new(&problem(&text.to_string()))
+    Model::new(&problem(&text.to_string()), None)
         .unwrap()
         .contacts
         .remove(0)
@@ -116,7 +116,7 @@ fn a_lower_boundary_turns_its_normal_the_other_way() {
         "supports": [{"boundary": "top", "ux": 0, "uy": 0}],
         "contacts": [{"boundary": "bottom", "obstacle": {"kind": "tilted", "slope": 0.75}, "normal": "obstacle"}],
     });
-    let contact = Model::new(&problem(&text.to_string()))
+    let contact = Model::new(&problem(&text.to_string()), None)
         .unwrap()
         .contacts
         .remove(0);

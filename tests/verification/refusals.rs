@@ -62,10 +62,13 @@ fn every_element_has_exactly_one_material() {
         json!([steel(Some("lefft")), steel(None)]),
         &[("/materials/0/group", "unknown_group")],
     );
-    let list = solver::check(&with(&[
-        ("/mesh/groups", groups.clone()),
-        ("/materials", json!([steel(Some("lefft")), steel(None)])),
-    ]))
+    let list = solver::check(
+        &with(&[
+            ("/mesh/groups", groups.clone()),
+            ("/materials", json!([steel(Some("lefft")), steel(None)])),
+        ]),
+        None,
+    )
     .unwrap_err();
     for name in ["left", "low", "right"] {
         assert!(list[0].expected.contains(name), "{}", list[0].expected);
@@ -75,7 +78,7 @@ fn every_element_has_exactly_one_material() {
         json!([steel(left), steel(None)]),
     ] {
         let accepted = with(&[("/mesh/groups", groups.clone()), ("/materials", materials)]);
-        assert!(solver::check(&accepted).is_ok());
+        assert!(solver::check(&accepted, None).is_ok());
     }
 }
 
@@ -117,7 +120,7 @@ fn a_material_has_one_complete_form() {
         ("/analysis", sheet),
         ("/materials/0", json!({"orthotropic": wood})),
     ]);
-    assert!(solver::check(&accepted).is_ok());
+    assert!(solver::check(&accepted, None).is_ok());
     // nu12² > e1/e2: some strain would cost no energy
     let mut unstable = whole;
     (unstable["g12"], unstable["e2"], unstable["nu12"]) = (json!(5), json!(10), json!(4));
@@ -208,7 +211,7 @@ fn only_3_or_2_gauss_points_are_offered() {
         assert_eq!(violations(&p), [pair("/quadrature", "out_of_range")]);
     }
     p.quadrature = 2;
-    assert!(solver::check(&p).is_ok());
+    assert!(solver::check(&p, None).is_ok());
 }
 
 #[test]
@@ -356,10 +359,10 @@ fn a_supported_contact_node_stays_outside_the_obstacle_at_every_step() {
         p
     };
     let impossible = [pair("/contacts/0/indentation", "impossible")];
-    assert!(solver::check(&held(-0.15, json!([]))).is_ok());
+    assert!(solver::check(&held(-0.15, json!([])), None).is_ok());
     assert_eq!(violations(&held(-0.05, json!([]))), impossible);
     let half = json!({"indentation": 0.5});
-    assert!(solver::check(&held(-0.15, json!([half, {}]))).is_ok());
+    assert!(solver::check(&held(-0.15, json!([half, {}])), None).is_ok());
     let more = json!({"indentation": 2});
     assert_eq!(
         violations(&held(-0.15, json!([half, more, {}]))),
@@ -383,7 +386,7 @@ fn adaptive_refinement_wants_a_tolerance_a_grid_and_a_contact() {
     let mesh = json!({"grid": grid, "refine": {"tolerance": 0.01}});
     refused(&[("/mesh", mesh.clone())], &[("/mesh/refine", "not_used")]);
     let accepted = with(&[("/mesh", mesh), ("/contacts", contacts.clone())]);
-    assert!(solver::check(&accepted).is_ok());
+    assert!(solver::check(&accepted, None).is_ok());
     let inline = json!({
         "nodes": [[0,0],[1,0],[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]], "elements": [[0,1,2,3,4,5,6,7]],
         "boundaries": {"bottom": [[1,0,4]], "top": [[3,2,6]]},
@@ -406,7 +409,7 @@ fn the_thesis_has_no_triangles_and_an_element_no_seven_nodes() {
         "boundaries": {"bottom": [[1,0,3]], "left": [[0,2,5]]}}});
     let contacts = json!([{"boundary": "left", "obstacle": {"kind": "flat"}}]);
     let with_triangle = [("/mesh", mesh.clone()), ("/contacts", contacts)];
-    assert!(solver::check(&with(&with_triangle)).is_ok());
+    assert!(solver::check(&with(&with_triangle), None).is_ok());
     let mut thesis = with(&with_triangle);
     thesis.solver.algorithm = solver::problem::Algorithm::Thesis;
     assert_eq!(violations(&thesis), [pair("/solver/algorithm", "not_used")]);

@@ -171,7 +171,7 @@ fn a_first_guess_is_taken_and_misuse_is_refused() {
     let mut wrong = punch.clone();
     wrong.solver.thesis = Some(options.clone());
     let pointers = |problem: &Problem| -> Vec<String> {
-        let list = solver::check(problem).unwrap_err();
+        let list = solver::check(problem, None).unwrap_err();
         list.into_iter().map(|v| v.pointer).collect()
     };
     assert_eq!(pointers(&wrong), ["/solver/thesis"]);

@@ -105,7 +105,7 @@ fn affordable(problem: &Problem, budget_bytes: u64) -> Result<Estimate, ApiError
 }
 
 fn check(problem: &Problem) -> Result<Vec<Warning>, Vec<Violation>> {
-    solver::check(problem).map_err(|violations| prefixed(AT, violations))
+    solver::check(problem, None).map_err(|violations| prefixed(AT, violations))
 }
 
 /// Moves violations to where their subject stands in a request.

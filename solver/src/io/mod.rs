@@ -1,4 +1,7 @@
-//! What comes in and what goes out: text and `String`s, never paths.
+//! What comes in and what goes out: readers and `String`s, never paths.
 
+pub mod gmsh;
 pub mod json;
 pub mod plot;
+mod source;
+pub use source::ReadError;

@@ -89,6 +89,7 @@ pub fn grid_mesh(grid: &Grid) -> Mesh {
         elements,
         boundaries,
         groups: Default::default(),
+        node_sets: Default::default(),
     }
 }
 

@@ -74,6 +74,17 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
             }
         }
     }
+    for (name, set) in &input.node_sets {
+        for (i, node) in set.iter().enumerate().filter(|(_, n)| **n >= count) {
+            found.say(
+                &format!("/node_sets/{}/{i}", escape(name)),
+                "unknown_node",
+                node,
+                &format!("a node below {count}"),
+                "Nodes are numbered from 0.",
+            );
+        }
+    }
     for (name, edges) in &input.boundaries {
         if edges.is_empty() {
             found.say(
@@ -146,6 +157,7 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
             elements: input.elements.clone(),
             boundaries,
             groups: input.groups.clone(),
+            node_sets: input.node_sets.clone(),
         })
     } else {
         Err(found.into_list())
@@ -256,6 +268,7 @@ mod tests {
             elements: vec![Element::Quad([0, 1, 2, 3, 4, 5, 6, 7])],
             boundaries: BTreeMap::from([("top".to_owned(), vec![[3, 2, 6]])]),
             groups: BTreeMap::new(),
+            node_sets: BTreeMap::new(),
         }
     }
 

@@ -1,9 +1,11 @@
 //! The body as nodes, elements and named boundaries.
 
+mod build;
 mod grid;
 mod inline;
 mod refine;
 
+pub use build::{NO_NODE, RawMesh, build};
 pub use grid::{grid_mesh, grid_violations, largest_cut};
 pub use inline::inline_mesh;
 pub use refine::refine;
@@ -28,6 +30,8 @@ pub struct Mesh {
     pub boundaries: BTreeMap<String, Vec<Edge>>,
     /// Elements by the name of their group.
     pub groups: BTreeMap<String, Vec<u32>>,
+    /// Nodes by the name of their set.
+    pub node_sets: BTreeMap<String, Vec<u32>>,
 }
 
 impl Mesh {

@@ -15,12 +15,14 @@ pub fn refine(mesh: &Mesh) -> Mesh {
     let mut nodes = mesh.nodes.clone();
     // An edge is known by its midside node: halves[mid] = (start corner, first half's midside, second's).
     let mut halves: Vec<Option<(u32, u32, u32)>> = vec![None; mesh.nodes.len()];
+    let mut sets = Sets::new(mesh);
     let mut split = |nodes: &mut Vec<[f64; 2]>, [a, b, mid]: Edge| -> (u32, u32) {
         let (start, first, second) = *halves[mid as usize].get_or_insert_with(|| {
             let ends = [a, b, mid].map(|n| nodes[n as usize]);
             let number = nodes.len() as u32;
             nodes.push(edge3::map(&ends, -STEP).0);
             nodes.push(edge3::map(&ends, STEP).0);
+            sets.inherit(&[a, b, mid], number..number + 2);
             (a, number, number + 1)
         });
         if start == a {
@@ -30,6 +32,7 @@ pub fn refine(mesh: &Mesh) -> Mesh {
         }
     };
     let mut elements = Vec::with_capacity(4 * mesh.elements.len());
+    let mut inner = Vec::with_capacity(mesh.elements.len());
     for parent in &mesh.elements {
         let (family, positions) = (parent.family(), parent.gather(|n| nodes[n as usize]));
         let inside = |nodes: &mut Vec<[f64; 2]>, place: [f64; 2]| {
@@ -39,6 +42,7 @@ pub fn refine(mesh: &Mesh) -> Mesh {
             nodes.len() as u32 - 1
         };
         let halves: Vec<(u32, u32)> = parent.sides().map(|side| split(&mut nodes, side)).collect();
+        let first_inside = nodes.len() as u32;
         match (parent, &halves[..]) {
             (Element::Quad(p), &[south, east, north, west]) => {
                 let centre = inside(&mut nodes, [0.0, 0.0]);
@@ -68,6 +72,7 @@ pub fn refine(mesh: &Mesh) -> Mesh {
             }
             _ => unreachable!("a quadrilateral has four sides, a triangle three"),
         }
+        inner.push(first_inside..nodes.len() as u32);
     }
     let boundaries = mesh
         .boundaries
@@ -80,6 +85,9 @@ pub fn refine(mesh: &Mesh) -> Mesh {
             (name.clone(), children.collect())
         })
         .collect();
+    for (parent, inside) in mesh.elements.iter().zip(inner) {
+        sets.inherit(parent, inside);
+    }
     // the children of an element follow one another
     let four = |e: &u32| (0..4).map(|child| 4 * e + child).collect::<Vec<u32>>();
     let groups = mesh.groups.iter();
@@ -91,6 +99,45 @@ pub fn refine(mesh: &Mesh) -> Mesh {
         elements,
         boundaries,
         groups,
+        node_sets: sets.into_named(mesh),
+    }
+}
+
+/// Which sets each node is in: a new node is in those that hold all nodes of its side or element.
+struct Sets {
+    of_node: std::collections::HashMap<u32, Vec<usize>>,
+}
+
+impl Sets {
+    fn new(mesh: &Mesh) -> Self {
+        let mut of_node: std::collections::HashMap<u32, Vec<usize>> = Default::default();
+        for (k, set) in mesh.node_sets.values().enumerate() {
+            for node in set {
+                of_node.entry(*node).or_default().push(k);
+            }
+        }
+        Sets { of_node }
+    }
+
+    fn inherit(&mut self, parents: &[u32], children: std::ops::Range<u32>) {
+        let Some(sets) = self.of_node.get(&parents[0]) else {
+            return;
+        };
+        let holds = |k: &usize, node: &u32| self.of_node.get(node).is_some_and(|s| s.contains(k));
+        let all = |k: &&usize| parents.iter().all(|node| holds(k, node));
+        let common: Vec<usize> = sets.iter().filter(all).copied().collect();
+        for child in children.filter(|_| !common.is_empty()) {
+            self.of_node.insert(child, common.clone());
+        }
+    }
+
+    fn into_named(self, mesh: &Mesh) -> std::collections::BTreeMap<String, Vec<u32>> {
+        let mut sets = vec![Vec::new(); mesh.node_sets.len()];
+        for (node, of) in self.of_node {
+            of.into_iter().for_each(|k| sets[k].push(node));
+        }
+        sets.iter_mut().for_each(|set| set.sort_unstable());
+        mesh.node_sets.keys().cloned().zip(sets).collect()
     }
 }
 

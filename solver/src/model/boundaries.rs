@@ -1,11 +1,14 @@
 //! The mesh with all its names, and values along named boundaries.
 
-use std::collections::BTreeMap;
-
 use super::findings::{ALIGNED, Findings};
-use crate::error::escape;
+use crate::error::{Violation, escape};
+use crate::io::{ReadError, gmsh};
 use crate::mesh::{self, Edge, Mesh};
-use crate::problem::{AdaptiveRefine, Analysis, BoundaryValue, MeshInput, Refine};
+use crate::problem::{AdaptiveRefine, Analysis, BoundaryPart, BoundaryValue, MeshInput, Refine};
+use crate::solution::Warning;
+
+/// Sides face one way when their normals differ by no more (degrees).
+const SAME_DIRECTION: f64 = 1.0;
 
 /// More refinements than this overflow any machine; the size itself is bounded by the caller.
 const MOST_REFINEMENTS: u32 = 20;
@@ -15,35 +18,12 @@ impl Findings {
     pub(super) fn mesh(
         &mut self,
         input: &MeshInput,
+        stored: Option<&Mesh>,
         analysis: &Analysis,
         contacts: usize,
     ) -> Option<Mesh> {
         let before = self.violations.len();
-        let mut mesh = match (&input.grid, &input.inline) {
-            (Some(grid), None) => {
-                self.violations
-                    .extend(mesh::grid_violations(grid, "/mesh/grid"));
-                (self.violations.len() == before).then(|| mesh::grid_mesh(grid))
-            }
-            (None, Some(inline)) => mesh::inline_mesh(inline, "/mesh/inline")
-                .map_err(|v| self.violations.extend(v))
-                .ok(),
-            (grid, _) => {
-                let got = if grid.is_some() {
-                    "both `grid` and `inline`"
-                } else {
-                    "neither `grid` nor `inline`"
-                };
-                self.say(
-                    "/mesh",
-                    "wrong_count",
-                    got,
-                    "exactly one of `grid` and `inline`",
-                    "Give the mesh in one of the two forms.",
-                );
-                None
-            }
-        };
+        let mut mesh = self.source(input, stored);
         let refine = match input.refine {
             Refine::Times(times) => times,
             Refine::Adaptive(goal) => {
@@ -63,16 +43,25 @@ impl Findings {
         }
         let mut mesh = mesh?;
         // straight-sided grids need no look at their corners, and stay what they are when refined
-        let inline = input.inline.is_some();
-        self.inverted(&mesh, inline, "");
+        let free = input.grid.is_none();
+        self.inverted(
+            &mesh,
+            free,
+            if input.inline.is_some() {
+                "/mesh/inline/elements"
+            } else {
+                ""
+            },
+            "",
+        );
         if matches!(analysis, Analysis::Axisymmetric {})
             && let Some(node) = mesh.nodes.iter().position(|[r, _]| *r < 0.0)
         {
             self.say(
-                if input.inline.is_some() {
-                    format!("/mesh/inline/nodes/{node}")
-                } else {
-                    "/mesh/grid/x".to_owned()
+                match (&input.inline, &input.grid) {
+                    (Some(_), _) => format!("/mesh/inline/nodes/{node}"),
+                    (None, Some(_)) => "/mesh/grid/x".to_owned(),
+                    _ => "/mesh".to_owned(),
                 },
                 "out_of_range",
                 format!("r = {}", mesh.nodes[node][0]),
@@ -93,8 +82,8 @@ impl Findings {
         for _ in 0..refine {
             mesh = mesh::refine(&mesh);
         }
-        if inline && refine > 0 {
-            self.inverted(&mesh, false, " of the refined mesh");
+        if free && refine > 0 {
+            self.inverted(&mesh, false, "", " of the refined mesh");
         }
         if self.violations.len() > before {
             return None;
@@ -171,11 +160,101 @@ impl Findings {
         }
     }
 
-    fn inverted(&mut self, mesh: &Mesh, inline: bool, of: &str) {
-        for (e, place, det) in mesh.inverted_elements(inline).into_iter().take(20) {
-            let pointer = match (inline, of) {
-                (true, "") => format!("/mesh/inline/elements/{e}"),
-                _ => "/mesh".to_owned(),
+    /// The mesh as it is given, before it is refined.
+    fn source(&mut self, input: &MeshInput, stored: Option<&Mesh>) -> Option<Mesh> {
+        let forms = [
+            ("grid", input.grid.is_some()),
+            ("inline", input.inline.is_some()),
+            ("gmsh", input.gmsh.is_some()),
+            ("abaqus", input.abaqus.is_some()),
+            ("stored", input.stored.is_some()),
+        ];
+        let given: Vec<String> = forms
+            .iter()
+            .filter(|form| form.1)
+            .map(|form| format!("`{}`", form.0))
+            .collect();
+        if given.len() != 1 {
+            let got = match given.len() {
+                0 => "none of them".to_owned(),
+                _ => given.join(" and "),
+            };
+            self.say(
+                "/mesh",
+                "wrong_count",
+                got,
+                "exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`",
+                "Give the mesh in one form.",
+            );
+            return None;
+        }
+        if let Some(grid) = &input.grid {
+            let faults = mesh::grid_violations(grid, "/mesh/grid");
+            let sound = faults.is_empty();
+            self.violations.extend(faults);
+            return sound.then(|| mesh::grid_mesh(grid));
+        }
+        if let Some(inline) = &input.inline {
+            return mesh::inline_mesh(inline, "/mesh/inline")
+                .map_err(|v| self.violations.extend(v))
+                .ok();
+        }
+        if let Some(text) = &input.gmsh {
+            return self.file("/mesh/gmsh", gmsh::read(text.as_bytes()));
+        }
+        if stored.is_none() {
+            self.say(
+                "/mesh/stored",
+                "unknown_mesh",
+                input.stored.as_deref().unwrap_or_default(),
+                "a mesh that this service has stored",
+                "Upload it first (POST /v1/meshes); `signorini solve` has no store: give the mesh itself.",
+            );
+        }
+        stored.cloned()
+    }
+
+    /// What was read from a file, with its warnings.
+    fn file(
+        &mut self,
+        pointer: &str,
+        read: Result<(Mesh, Vec<Warning>), ReadError>,
+    ) -> Option<Mesh> {
+        match read {
+            Ok((mesh, notes)) => {
+                for note in notes {
+                    self.warn(&note.code, pointer, note.message);
+                }
+                Some(mesh)
+            }
+            Err(ReadError::Invalid(faults)) => {
+                let here = |fault| Violation {
+                    pointer: pointer.to_owned(),
+                    ..fault
+                };
+                self.violations.extend(faults.into_iter().map(here));
+                None
+            }
+            // a text in memory can always be read
+            Err(ReadError::Io(error)) => {
+                self.say(
+                    pointer,
+                    "malformed",
+                    error,
+                    "a readable text",
+                    "Send it again.",
+                );
+                None
+            }
+        }
+    }
+
+    /// `list`: pointer to the list that an element's number counts in, where there is one.
+    fn inverted(&mut self, mesh: &Mesh, at_nodes: bool, list: &str, of: &str) {
+        for (e, place, det) in mesh.inverted_elements(at_nodes).into_iter().take(20) {
+            let pointer = match list {
+                "" => "/mesh".to_owned(),
+                _ => format!("{list}/{e}"),
             };
             self.say(
                 pointer,
@@ -194,6 +273,7 @@ impl Findings {
             .map(|axis| mesh.extent(axis))
             .into_iter()
             .fold(0.0, f64::max);
+        let mut surface = None;
         for (name, part) in &input.boundaries {
             let pointer = format!("/mesh/boundaries/{}", escape(name));
             if original.contains_key(name) {
@@ -202,25 +282,41 @@ impl Findings {
                     "name_taken",
                     name,
                     "a name that the mesh does not have yet",
-                    format!("It has {}.", names(&original)),
+                    format!("It has {}.", names(original.keys())),
                 );
                 continue;
             }
-            let Some(edges) = original.get(&part.side) else {
-                self.say(
-                    format!("{pointer}/side"),
-                    "unknown_boundary",
-                    &part.side,
-                    format!("one of {}", names(&original)),
-                    "Check the spelling.",
-                );
-                continue;
+            let edges = match &part.side {
+                None => surface.get_or_insert_with(|| mesh.surface()),
+                Some(side) => {
+                    let Some(edges) = original.get(side) else {
+                        self.say(
+                            format!("{pointer}/side"),
+                            "unknown_boundary",
+                            side,
+                            format!("one of {}", names(original.keys())),
+                            "Check the spelling.",
+                        );
+                        continue;
+                    };
+                    edges
+                }
             };
+            if !self.direction(part, &pointer) {
+                continue;
+            }
+            let ranges = part.corners.map(|[[x0, y0], [x1, y1]]| {
+                [
+                    Some([x0.min(x1), x0.max(x1)]),
+                    Some([y0.min(y1), y0.max(y1)]),
+                ]
+            });
             let holds = |edge: &&Edge| {
                 let nodes = mesh.edge_nodes(edge);
-                nodes
-                    .iter()
-                    .all(|place| within(&[part.x, part.y], place, size))
+                nodes.iter().all(|place| {
+                    within(&[part.x, part.y], place, size)
+                        && ranges.is_none_or(|ranges| within(&ranges, place, size))
+                }) && faces(part, &nodes)
             };
             let part: Vec<Edge> = edges.iter().filter(holds).copied().collect();
             if part.is_empty() {
@@ -228,12 +324,72 @@ impl Findings {
                     &pointer,
                     "empty_boundary",
                     "no edge",
-                    "at least one edge whose three nodes lie in the range",
-                    "Put grid lines on the ends of the part.",
+                    "at least one edge of the surface that fits all conditions at its three nodes",
+                    "Put grid lines on the ends of the part; check the direction of the normal.",
                 );
             }
             mesh.boundaries.insert(name.clone(), part);
         }
+    }
+
+    /// The conditions of a part that can be wrong by themselves.
+    fn direction(&mut self, part: &BoundaryPart, pointer: &str) -> bool {
+        if part.normal == Some([0.0, 0.0]) {
+            self.say(
+                format!("{pointer}/normal"),
+                "out_of_range",
+                "[0, 0]",
+                "a direction",
+                "E.g. [0, 1] for sides that face up.",
+            );
+            return false;
+        }
+        if part.normal.is_none() && part.angle.is_some() {
+            self.say(
+                format!("{pointer}/angle"),
+                "not_used",
+                "an angle without a `normal`",
+                "both or neither",
+                "It says how far a side may turn away from `normal`.",
+            );
+            return false;
+        }
+        let angle = part.angle.unwrap_or(SAME_DIRECTION);
+        if !(0.0..=180.0).contains(&angle) {
+            self.say(
+                format!("{pointer}/angle"),
+                "out_of_range",
+                angle,
+                "0 … 180 degrees",
+                "The largest angle between a side's normal and `normal`.",
+            );
+            return false;
+        }
+        true
+    }
+
+    /// The nodes of a named set.
+    pub(super) fn node_set<'a>(
+        &mut self,
+        mesh: &'a Mesh,
+        name: &str,
+        pointer: String,
+    ) -> Option<&'a [u32]> {
+        let found = mesh.node_sets.get(name);
+        if found.is_none() {
+            let expected = match mesh.node_sets.is_empty() {
+                true => "a set of nodes; this mesh has none".to_owned(),
+                false => format!("one of {}", names(mesh.node_sets.keys())),
+            };
+            self.say(
+                pointer,
+                "unknown_node_set",
+                name,
+                expected,
+                "Inline meshes have `node_sets`, Gmsh files physical points, decks *NSET.",
+            );
+        }
+        found.map(|nodes| &nodes[..])
     }
 
     /// The edges of a named boundary.
@@ -249,7 +405,7 @@ impl Findings {
                 pointer,
                 "unknown_boundary",
                 name,
-                format!("one of {}", names(&mesh.boundaries)),
+                format!("one of {}", names(mesh.boundaries.keys())),
                 "Check the spelling, or name a part under /mesh/boundaries.",
             );
         }
@@ -299,15 +455,26 @@ fn within(ranges: &[Option<[f64; 2]>; 2], place: &[f64; 2], size: f64) -> bool {
     })
 }
 
+/// Whether a side faces the way that its part asks for.
+fn faces(part: &BoundaryPart, nodes: &[[f64; 2]; 3]) -> bool {
+    let Some([x, y]) = part.normal else {
+        return true;
+    };
+    let least = part.angle.unwrap_or(SAME_DIRECTION).to_radians().cos();
+    crate::contact::edge_normals(nodes)
+        .iter()
+        .all(|[nx, ny]| (nx * x + ny * y) / x.hypot(y) >= least - ALIGNED)
+}
+
 /// The names that exist, or the first of them.
-fn names(boundaries: &BTreeMap<String, Vec<Edge>>) -> String {
+fn names<'a>(known: impl ExactSizeIterator<Item = &'a String>) -> String {
     const SHOWN: usize = 20;
-    let shown: Vec<String> = boundaries
-        .keys()
+    let count = known.len();
+    let shown: Vec<String> = known
         .take(SHOWN)
         .map(|name| format!("`{name:.80}`"))
         .collect();
-    match boundaries.len().saturating_sub(SHOWN) {
+    match count.saturating_sub(SHOWN) {
         0 => shown.join(", "),
         more => format!("{} and {more} more", shown.join(", ")),
     }

@@ -80,7 +80,8 @@ fn contact_dofs(problem: &Problem, side: f64) -> f64 {
     let name = |boundary: &str| {
         mesh.boundaries
             .get(boundary)
-            .map_or_else(|| boundary.to_owned(), |part| part.side.clone())
+            .and_then(|part| part.side.clone())
+            .unwrap_or_else(|| boundary.to_owned())
     };
     problem
         .contacts

@@ -18,13 +18,21 @@ impl Findings {
                 found.body_force[1] += y;
                 continue;
             }
-            let Some(name) = &load.boundary else {
+            if let Some(force) = load.force {
+                self.forces(mesh, section, load, force, &pointer, &mut found);
+                continue;
+            }
+            let Some(name) = load.boundary.as_ref().filter(|_| load.nodes.is_none()) else {
+                let (field, got) = match load.nodes {
+                    Some(_) => ("nodes", "a set of nodes for a load that is no `force`"),
+                    None => ("boundary", "nothing"),
+                };
                 self.say(
-                    format!("{pointer}/boundary"),
-                    "missing",
-                    "nothing",
+                    format!("{pointer}/{field}"),
+                    if load.nodes.is_some() { "not_used" } else { "missing" },
+                    got,
                     "the name of a boundary",
-                    "Only a body force needs none.",
+                    "Stresses act on a boundary, a `force` on `nodes`, a body force on the whole body.",
                 );
                 continue;
             };
@@ -60,6 +68,33 @@ impl Findings {
         found
     }
 
+    /// The same force on every node of a set.
+    fn forces(
+        &mut self,
+        mesh: &Mesh,
+        section: &Section,
+        load: &Load,
+        [x, y]: [f64; 2],
+        pointer: &str,
+        found: &mut Loads,
+    ) {
+        let (Some(name), None) = (&load.nodes, &load.boundary) else {
+            self.say(
+                format!("{pointer}/nodes"),
+                "missing",
+                "no set of nodes",
+                "the name of a set of nodes, and no boundary",
+                "A `force` acts on each node of a set; on a boundary give `nodal` forces or a traction.",
+            );
+            return;
+        };
+        if let Some(nodes) = self.node_set(mesh, name, format!("{pointer}/nodes")) {
+            let ring = section.circumference();
+            let force = [x / ring, y / ring];
+            found.nodal.extend(nodes.iter().map(|node| (*node, force)));
+        }
+    }
+
     fn one_form(&mut self, load: &Load, pointer: &str) -> bool {
         let forms = [
             ("pressure", load.pressure.is_some()),
@@ -69,6 +104,7 @@ impl Findings {
                 load.normal.is_some() || load.tangential.is_some(),
             ),
             ("nodal", load.nodal.is_some()),
+            ("force", load.force.is_some()),
             ("body_force", load.body_force.is_some()),
         ];
         let given: Vec<&str> = forms.iter().filter(|f| f.1).map(|f| f.0).collect();
@@ -81,16 +117,21 @@ impl Findings {
                 pointer,
                 "wrong_count",
                 got,
-                "exactly one of `pressure`, `traction`, `normal` and `tangential`, `nodal`, `body_force`",
+                "exactly one of `pressure`, `traction`, `normal` and `tangential`, `nodal`, `force`, `body_force`",
                 "Write a load for each.",
             );
             return false;
         }
-        if load.body_force.is_some() && load.boundary.is_some() {
+        if load.body_force.is_some() && (load.boundary.is_some() || load.nodes.is_some()) {
+            let field = if load.boundary.is_some() {
+                "boundary"
+            } else {
+                "nodes"
+            };
             self.say(
-                format!("{pointer}/boundary"),
+                format!("{pointer}/{field}"),
                 "not_used",
-                "a boundary for a body force",
+                "a place for a body force",
                 "none: it acts on the whole body",
                 "Remove it, or give a traction.",
             );

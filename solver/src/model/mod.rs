@@ -124,8 +124,8 @@ impl ContactModel {
 }
 
 impl Model {
-    /// Checks and numbers a problem.
-    pub fn new(problem: &Problem) -> Result<Model, Vec<Violation>> {
+    /// Checks and numbers a problem; `stored`: the mesh that it names by its hash, where it does.
+    pub fn new(problem: &Problem, stored: Option<&Mesh>) -> Result<Model, Vec<Violation>> {
         let mut findings = Findings::default();
         findings.finite(problem);
         // numbers that are not finite would make nonsense of every later check
@@ -144,7 +144,8 @@ impl Model {
         for (i, contact) in problem.contacts.iter().enumerate() {
             findings.contact_numbers(&analysis, contact, &format!("/contacts/{i}"));
         }
-        let Some(mesh) = findings.mesh(&problem.mesh, &analysis, problem.contacts.len()) else {
+        let Some(mesh) = findings.mesh(&problem.mesh, stored, &analysis, problem.contacts.len())
+        else {
             return Err(findings.into_violations());
         };
         findings.thesis_elements(problem, &mesh);

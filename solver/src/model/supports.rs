@@ -8,6 +8,12 @@ use crate::elasticity::Section;
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{BoundaryValue, Condition, Friction, PrescribedBound, Support};
 
+/// Where a support holds.
+enum Place<'a> {
+    Edges(&'a [Edge]),
+    Nodes(&'a [u32]),
+}
+
 /// What supports prescribe at a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Held {
@@ -115,42 +121,50 @@ impl Findings {
                 );
                 continue;
             }
-            let Some(edges) = self.boundary(mesh, &support.boundary, format!("{pointer}/boundary"))
-            else {
+            let Some(place) = self.place(mesh, support, &pointer) else {
                 continue;
             };
-            let normals = if named[2] || named[3] {
-                self.normals(mesh, edges, &format!("{pointer}/boundary"))
-            } else {
-                BTreeMap::new()
+            let normals = match place {
+                Place::Edges(edges) if named[2] || named[3] => {
+                    self.normals(mesh, edges, &format!("{pointer}/boundary"))
+                }
+                Place::Nodes(_) if named[2] || named[3] => {
+                    self.say(
+                        format!("{pointer}/nodes"),
+                        "not_used",
+                        "`un` or `ut` on a set of nodes",
+                        "`ux` and `uy`",
+                        "A set of nodes has no normal; name a boundary.",
+                    );
+                    continue;
+                }
+                _ => BTreeMap::new(),
             };
             for (field, value) in fields {
                 let Some(value) = value else { continue };
-                let place = format!("{pointer}/{field}");
+                let at = format!("{pointer}/{field}");
                 let mut conflict = None;
-                for (edge, values) in self.along(mesh, edges, value, place.clone()) {
-                    for (node, value) in edge.into_iter().zip(values) {
-                        let direction = match (field, normals.get(&node)) {
-                            ("ux", _) => [1.0, 0.0],
-                            ("uy", _) => [0.0, 1.0],
-                            ("un", Some(n)) => *n,
-                            ("ut", Some([x, y])) => [*y, -x],
-                            _ => continue,
-                        };
-                        let held = match fixed.get(&node) {
-                            None => Ok(Held::Along { direction, value }),
-                            Some(held) => held.and(direction, value, ALIGNED * size),
-                        };
-                        match held {
-                            Ok(held) => drop(fixed.insert(node, held)),
-                            Err(known) => conflict = Some((node, known, value)),
-                        }
+                for (node, value) in self.at_nodes(mesh, &place, value, &at) {
+                    let direction = match (field, normals.get(&node)) {
+                        ("ux", _) => [1.0, 0.0],
+                        ("uy", _) => [0.0, 1.0],
+                        ("un", Some(n)) => *n,
+                        ("ut", Some([x, y])) => [*y, -x],
+                        _ => continue,
+                    };
+                    let held = match fixed.get(&node) {
+                        None => Ok(Held::Along { direction, value }),
+                        Some(held) => held.and(direction, value, ALIGNED * size),
+                    };
+                    match held {
+                        Ok(held) => drop(fixed.insert(node, held)),
+                        Err(known) => conflict = Some((node, known, value)),
                     }
                 }
                 if let Some((node, known, value)) = conflict {
                     let [x, y] = mesh.nodes[node as usize];
                     self.say(
-                        place,
+                        at,
                         "conflict",
                         value,
                         format!(
@@ -162,6 +176,62 @@ impl Findings {
             }
         }
         fixed
+    }
+
+    /// The boundary or the set of nodes that a support names.
+    fn place<'a>(&mut self, mesh: &'a Mesh, support: &Support, pointer: &str) -> Option<Place<'a>> {
+        match (&support.boundary, &support.nodes) {
+            (Some(name), None) => self
+                .boundary(mesh, name, format!("{pointer}/boundary"))
+                .map(Place::Edges),
+            (None, Some(name)) => self
+                .node_set(mesh, name, format!("{pointer}/nodes"))
+                .map(Place::Nodes),
+            (boundary, _) => {
+                let got = match boundary {
+                    Some(_) => "both `boundary` and `nodes`",
+                    None => "neither `boundary` nor `nodes`",
+                };
+                self.say(
+                    pointer,
+                    "wrong_count",
+                    got,
+                    "exactly one of `boundary` and `nodes`",
+                    "Say where the support is.",
+                );
+                None
+            }
+        }
+    }
+
+    /// A value at every node of the place; nodes of two edges come twice.
+    fn at_nodes(
+        &mut self,
+        mesh: &Mesh,
+        place: &Place<'_>,
+        value: BoundaryValue,
+        pointer: &str,
+    ) -> Vec<(u32, f64)> {
+        match (place, value) {
+            (Place::Edges(edges), _) => self
+                .along(mesh, edges, value, pointer.to_owned())
+                .into_iter()
+                .flat_map(|(edge, values)| edge.into_iter().zip(values))
+                .collect(),
+            (Place::Nodes(nodes), BoundaryValue::Constant(value)) => {
+                nodes.iter().map(|node| (*node, value)).collect()
+            }
+            (Place::Nodes(_), BoundaryValue::Linear(_)) => {
+                self.say(
+                    pointer,
+                    "not_used",
+                    "a value from start to end on a set of nodes",
+                    "one number",
+                    "A set of nodes has no start; name a boundary.",
+                );
+                Vec::new()
+            }
+        }
     }
 
     /// Unit outward normals at the nodes of a boundary; the mean of both edges at a corner that is

@@ -68,7 +68,8 @@ fn material_to_pb(m: &Material) -> pb::Material {
 
 fn support_to_pb(s: &Support) -> pb::Support {
     pb::Support {
-        boundary: s.boundary.clone(),
+        boundary: s.boundary.clone().unwrap_or_default(),
+        nodes: s.nodes.clone(),
         ux: s.ux.map(value_to_pb),
         uy: s.uy.map(value_to_pb),
         un: s.un.map(value_to_pb),
@@ -92,6 +93,8 @@ fn load_to_pb(l: &Load) -> pb::Load {
             forces: forces.iter().map(vector).collect(),
         }),
         body_force: l.body_force.as_ref().map(vector),
+        nodes: l.nodes.clone(),
+        force: l.force.as_ref().map(vector),
     }
 }
 
@@ -179,16 +182,31 @@ fn mesh_to_pb(mesh: &MeshInput) -> pb::Mesh {
                 (name.clone(), pb::ElementList { elements })
             })
             .collect(),
+        node_sets: inline
+            .node_sets
+            .iter()
+            .map(|(name, nodes)| {
+                let nodes = nodes.clone();
+                (name.clone(), pb::NodeList { nodes })
+            })
+            .collect(),
     };
-    let source = match (&mesh.grid, &mesh.inline) {
-        (Some(g), _) => Some(pb::mesh::Source::Grid(grid(g))),
-        (None, Some(i)) => Some(pb::mesh::Source::Inline(inline(i))),
-        (None, None) => None,
-    };
+    use pb::mesh::Source;
+    let source = mesh.grid.as_ref().map(|g| Source::Grid(grid(g)));
+    let source = source.or_else(|| mesh.inline.as_ref().map(|i| Source::Inline(inline(i))));
+    let source = source.or_else(|| mesh.gmsh.clone().map(Source::Gmsh));
+    let source = source.or_else(|| mesh.abaqus.clone().map(Source::Abaqus));
+    let source = source.or_else(|| mesh.stored.clone().map(Source::Stored));
     let part = |part: &BoundaryPart| pb::BoundaryPart {
-        side: part.side.clone(),
+        side: part.side.clone().unwrap_or_default(),
         x: part.x.map(range_to_pb),
         y: part.y.map(range_to_pb),
+        r#box: part.corners.map(|corners| {
+            let [from, to] = corners.map(|[x, y]| Some(pb::Point { x, y }));
+            pb::Box { from, to }
+        }),
+        normal: part.normal.map(|[x, y]| pb::Vector { x, y }),
+        angle: part.angle,
     };
     let boundaries = mesh
         .boundaries

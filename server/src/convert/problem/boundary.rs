@@ -62,9 +62,11 @@ impl Reader {
             uy,
             un,
             ut,
+            nodes,
         } = message;
         Some(Support {
-            boundary,
+            boundary: Some(boundary).filter(|name| !name.is_empty()),
+            nodes,
             ux: self.some_value(&format!("{at}/ux"), ux),
             uy: self.some_value(&format!("{at}/uy"), uy),
             un: self.some_value(&format!("{at}/un"), un),
@@ -81,6 +83,8 @@ impl Reader {
             tangential,
             nodal,
             body_force,
+            nodes,
+            force,
         } = message;
         let traction = match traction {
             None => None,
@@ -107,11 +111,13 @@ impl Reader {
             normal: self.some_value(&format!("{at}/normal"), normal),
             tangential: self.some_value(&format!("{at}/tangential"), tangential),
             nodal,
+            nodes,
+            force: force.map(|force| self.vector(&format!("{at}/force"), force)),
             body_force: body_force.map(|force| self.vector(&format!("{at}/body_force"), force)),
         })
     }
 
-    fn vector(&mut self, at: &str, pb::Vector { x, y }: pb::Vector) -> [f64; 2] {
+    pub(super) fn vector(&mut self, at: &str, pb::Vector { x, y }: pb::Vector) -> [f64; 2] {
         if x.is_finite() && y.is_finite() {
             return [x, y];
         }

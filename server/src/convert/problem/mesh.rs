@@ -27,16 +27,18 @@ impl Reader {
             },
             ..MeshInput::default()
         };
-        match self.need("/mesh", source, "one of grid, inline") {
-            Some(pb::mesh::Source::Grid(grid)) => mesh.grid = Some(self.grid(grid)),
-            Some(pb::mesh::Source::Inline(inline)) => mesh.inline = Some(self.inline(inline)),
+        use pb::mesh::Source;
+        match self.need("/mesh", source, "one of grid, inline, gmsh, abaqus, stored") {
+            Some(Source::Grid(grid)) => mesh.grid = Some(self.grid(grid)),
+            Some(Source::Inline(inline)) => mesh.inline = Some(self.inline(inline)),
+            Some(Source::Gmsh(text)) => mesh.gmsh = Some(text),
+            Some(Source::Abaqus(text)) => mesh.abaqus = Some(text),
+            Some(Source::Stored(hash)) => mesh.stored = Some(hash),
             None => return None,
         }
-        for (name, pb::BoundaryPart { side, x, y }) in boundaries {
-            let at = format!("/mesh/boundaries/{}", escape(&name));
-            let x = x.map(|range| self.range(&format!("{at}/x"), range));
-            let y = y.map(|range| self.range(&format!("{at}/y"), range));
-            mesh.boundaries.insert(name, BoundaryPart { side, x, y });
+        for (name, part) in boundaries {
+            let part = self.part(&format!("/mesh/boundaries/{}", escape(&name)), part);
+            mesh.boundaries.insert(name, part);
         }
         for (name, pb::ElementRange { x, y }) in groups {
             let at = format!("/mesh/groups/{}", escape(&name));
@@ -68,6 +70,31 @@ impl Reader {
         }
     }
 
+    fn part(&mut self, at: &str, message: pb::BoundaryPart) -> BoundaryPart {
+        let pb::BoundaryPart {
+            side,
+            x,
+            y,
+            r#box,
+            normal,
+            angle,
+        } = message;
+        let corners = r#box.and_then(|pb::Box { from, to }| {
+            let from = self.need(&format!("{at}/box/0"), from, "a corner")?;
+            let to = self.need(&format!("{at}/box/1"), to, "a corner")?;
+            let corners = self.points(&format!("{at}/box"), vec![from, to]);
+            corners.try_into().ok()
+        });
+        BoundaryPart {
+            side: Some(side).filter(|side| !side.is_empty()),
+            x: x.map(|range| self.range(&format!("{at}/x"), range)),
+            y: y.map(|range| self.range(&format!("{at}/y"), range)),
+            corners,
+            normal: normal.map(|normal| self.vector(&format!("{at}/normal"), normal)),
+            angle: self.some_number(&format!("{at}/angle"), angle),
+        }
+    }
+
     fn element(&mut self, at: &str, nodes: Vec<u32>) -> Element {
         let found = nodes.len();
         Element::try_from(nodes).unwrap_or_else(|_| {
@@ -88,6 +115,7 @@ impl Reader {
             elements,
             boundaries,
             groups,
+            node_sets,
         }: pb::InlineMesh,
     ) -> InlineMesh {
         let nodes = self.points("/mesh/inline/nodes", nodes);
@@ -114,6 +142,10 @@ impl Reader {
             groups: groups
                 .into_iter()
                 .map(|(name, list)| (name, list.elements))
+                .collect(),
+            node_sets: node_sets
+                .into_iter()
+                .map(|(name, list)| (name, list.nodes))
                 .collect(),
         }
     }

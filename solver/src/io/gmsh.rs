@@ -1,0 +1,571 @@
+//! Meshes from Gmsh: MSH 2.2 and 4.1, ASCII and binary.
+//!
+//! Written by hand: the crate for this format reads 4.1 only and wants the whole file in memory; here a
+//! file streams through, and of its dozen sections we need five.
+//!
+//! Physical curves become boundaries, physical surfaces groups of elements, physical points sets of
+//! nodes, all by their names (or numbers, where they have none).
+
+use std::collections::BTreeMap;
+use std::io::BufRead;
+
+use super::source::{Labels, Plane, ReadError, Source};
+use crate::element::Element;
+use crate::mesh::{self, Mesh, NO_NODE, RawMesh};
+use crate::solution::Warning;
+
+/// What Gmsh calls the kinds of elements that we read, with their nodes.
+const KINDS: [(i64, usize, Kind); 8] = [
+    (1, 2, Kind::Line),
+    (8, 3, Kind::Line),
+    (2, 3, Kind::Triangle),
+    (9, 6, Kind::Triangle),
+    (3, 4, Kind::Quad),
+    (16, 8, Kind::Quad),
+    (10, 9, Kind::Quad),
+    (15, 1, Kind::Point),
+];
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Point,
+    Line,
+    Triangle,
+    Quad,
+}
+
+/// Reads a mesh, with what was changed on the way.
+pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
+    let mut file = File::new(reader);
+    file.sections()?;
+    let mut faults: Vec<_> = file.plane.fault().into_iter().collect();
+    match mesh::build(file.raw) {
+        Ok(built) if faults.is_empty() => Ok(built),
+        Ok(_) => Err(ReadError::Invalid(faults)),
+        Err(found) => {
+            faults.extend(found);
+            Err(ReadError::Invalid(faults))
+        }
+    }
+}
+
+/// Physical tags of an entity, by dimension and number.
+type Entities = BTreeMap<(u8, i64), Vec<i64>>;
+
+struct File<R> {
+    source: Source<R>,
+    version: Version,
+    binary: bool,
+    /// Names of physical groups by dimension and tag.
+    names: BTreeMap<(u8, i64), String>,
+    entities: Entities,
+    labels: Labels,
+    plane: Plane,
+    raw: RawMesh,
+    seen: Seen,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Version {
+    Two,
+    Four,
+}
+
+#[derive(Default)]
+struct Seen {
+    nodes: bool,
+    elements: bool,
+}
+
+impl<R: BufRead> File<R> {
+    fn new(reader: R) -> Self {
+        File {
+            source: Source::new(reader),
+            version: Version::Four,
+            binary: false,
+            names: BTreeMap::new(),
+            entities: Entities::new(),
+            labels: Labels::default(),
+            plane: Plane::default(),
+            raw: RawMesh::default(),
+            seen: Seen::default(),
+        }
+    }
+
+    fn sections(&mut self) -> Result<(), ReadError> {
+        self.format()?;
+        while self.source.advance()? {
+            let line = self.source.text().trim().to_owned();
+            match &line[..] {
+                "" => {}
+                "$PhysicalNames" => self.physical_names()?,
+                "$Entities" if self.version == Version::Four => {
+                    self.entities()?;
+                    self.end("$EndEntities")?;
+                }
+                "$PartitionedEntities" => {
+                    return Err(self.source.fault(
+                        "unsupported",
+                        "a partitioned mesh",
+                        "a mesh in one part",
+                        "Save it without partitions (Mesh.PartitionOldStyleMsh2 and $PartitionedEntities are not read).",
+                    ));
+                }
+                "$Nodes" => {
+                    self.once(self.seen.nodes, "$Nodes")?;
+                    self.seen.nodes = true;
+                    match self.version {
+                        Version::Two => self.nodes_2()?,
+                        Version::Four => self.nodes_4()?,
+                    }
+                    self.end("$EndNodes")?;
+                }
+                "$Elements" => {
+                    self.once(self.seen.elements, "$Elements")?;
+                    if !self.seen.nodes {
+                        return Err(self.source.fault(
+                            "malformed",
+                            "$Elements before $Nodes",
+                            "the nodes first",
+                            "Save the mesh with Gmsh itself.",
+                        ));
+                    }
+                    self.seen.elements = true;
+                    match self.version {
+                        Version::Two => self.elements_2()?,
+                        Version::Four => self.elements_4()?,
+                    }
+                    self.end("$EndElements")?;
+                }
+                section if section.starts_with('$') => {
+                    let end = format!("$End{}", &section[1..]);
+                    self.skip_to(&end)?;
+                }
+                _ => {
+                    let got = format!("`{line:.40}`");
+                    return Err(self.source.fault(
+                        "malformed",
+                        &got,
+                        "a section, $…",
+                        "Save the mesh again.",
+                    ));
+                }
+            }
+        }
+        if !self.seen.elements {
+            return Err(self.source.fault(
+                "truncated",
+                "the end of the file",
+                "the sections $Nodes and $Elements",
+                "Mesh the geometry before saving (gmsh -2), and send the whole file.",
+            ));
+        }
+        Ok(())
+    }
+
+    fn once(&self, seen: bool, section: &str) -> Result<(), ReadError> {
+        if seen {
+            let got = format!("{section} once more");
+            return Err(self.source.fault(
+                "malformed",
+                &got,
+                "each section once",
+                "Save the mesh again.",
+            ));
+        }
+        Ok(())
+    }
+
+    fn format(&mut self) -> Result<(), ReadError> {
+        self.source.advance()?;
+        let first = self.source.text().trim().to_owned();
+        if first != "$MeshFormat" {
+            return Err(self.source.fault(
+                "malformed",
+                &format!("`{first:.40}`"),
+                "$MeshFormat in the first line",
+                "A Gmsh mesh (.msh) is expected, not its geometry (.geo).",
+            ));
+        }
+        let version = self.source.word("a version")?.to_owned();
+        self.version = match &version[..] {
+            "2" | "2.1" | "2.2" => Version::Two,
+            "4.1" => Version::Four,
+            _ => {
+                return Err(self.source.fault(
+                    "unsupported",
+                    &format!("MSH {version:.20}"),
+                    "MSH 2.2 or 4.1",
+                    "Save with gmsh -format msh41 (or msh22).",
+                ));
+            }
+        };
+        self.binary = self.source.number::<u8>("0 (ASCII) or 1 (binary)")? == 1;
+        let size: u8 = self.source.number("the size of a number")?;
+        if size != 8 {
+            let got = format!("numbers of {size} bytes");
+            return Err(self
+                .source
+                .fault("unsupported", &got, "8 bytes", "Save the mesh again."));
+        }
+        if self.binary {
+            let one = i32::from_le_bytes(self.source.bytes("the number 1")?);
+            self.source.swapped = one == 1i32.swap_bytes();
+            if one != 1 && !self.source.swapped {
+                return Err(self.source.fault(
+                    "malformed",
+                    "another number",
+                    "the number 1",
+                    "Was the file sent as text?",
+                ));
+            }
+        }
+        self.end("$EndMeshFormat")
+    }
+
+    /// The end of a section; a binary one leaves a line end behind.
+    fn end(&mut self, end: &str) -> Result<(), ReadError> {
+        let found = self.source.word(end)?;
+        if found == end {
+            return Ok(());
+        }
+        let got = format!("`{found:.40}`");
+        Err(self.source.fault(
+            "malformed",
+            &got,
+            end,
+            "A count in the section's head does not hold.",
+        ))
+    }
+
+    fn skip_to(&mut self, end: &str) -> Result<(), ReadError> {
+        let first = self.source.line;
+        // a binary section may hold anything, so its bytes are not taken for text
+        loop {
+            match self.source.advance() {
+                Ok(true) if self.source.text().trim_end().ends_with(end) => return Ok(()),
+                Ok(true) | Err(ReadError::Invalid(_)) => {}
+                Ok(false) => {
+                    self.source.line = first;
+                    return Err(self.source.fault(
+                        "truncated",
+                        "a section without its end",
+                        end,
+                        "Send the whole file.",
+                    ));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    fn physical_names(&mut self) -> Result<(), ReadError> {
+        let count: u64 = self.source.number("the number of names")?;
+        for _ in 0..count {
+            let dimension: u8 = self.source.number("a dimension")?;
+            let tag: i64 = self.source.number("a physical tag")?;
+            let text = self.source.text().to_owned();
+            let quoted = text
+                .split_once('"')
+                .and_then(|(_, rest)| rest.rsplit_once('"'));
+            let Some((name, _)) = quoted else {
+                return Err(self.source.fault(
+                    "malformed",
+                    &format!("`{text:.40}`"),
+                    "a name in quotes",
+                    "Correct that line.",
+                ));
+            };
+            self.names.insert((dimension, tag), name.to_owned());
+        }
+        self.end("$EndPhysicalNames")
+    }
+
+    fn int(&mut self, what: &str) -> Result<i64, ReadError> {
+        match self.binary {
+            true => Ok(i64::from(i32::from_le_bytes(self.source.bytes(what)?))),
+            false => self.source.number(what),
+        }
+    }
+
+    fn size(&mut self, what: &str) -> Result<u64, ReadError> {
+        match self.binary {
+            true => Ok(u64::from_le_bytes(self.source.bytes(what)?)),
+            false => self.source.number(what),
+        }
+    }
+
+    fn float(&mut self, what: &str) -> Result<f64, ReadError> {
+        let value = match self.binary {
+            true => f64::from_le_bytes(self.source.bytes(what)?),
+            false => self.source.number(what)?,
+        };
+        if value.is_finite() {
+            return Ok(value);
+        }
+        Err(self.source.fault(
+            "non_finite",
+            &format!("{value}"),
+            "a finite number",
+            "Correct the mesh.",
+        ))
+    }
+
+    fn entities(&mut self) -> Result<(), ReadError> {
+        let mut counts = [0; 4];
+        for count in &mut counts {
+            *count = self.size("the number of entities")?;
+        }
+        for (dimension, count) in (0u8..).zip(counts) {
+            for _ in 0..count {
+                let tag = self.int("an entity's tag")?;
+                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                    self.float("a coordinate")?;
+                }
+                let mut physical = Vec::new();
+                for _ in 0..self.size("the number of physical tags")? {
+                    physical.push(self.int("a physical tag")?.abs());
+                }
+                if dimension > 0 {
+                    for _ in 0..self.size("the number of bounding entities")? {
+                        self.int("a bounding entity")?;
+                    }
+                }
+                self.entities.insert((dimension, tag), physical);
+            }
+        }
+        Ok(())
+    }
+
+    fn node(&mut self, label: u64, place: [f64; 3]) -> Result<(), ReadError> {
+        if self.raw.nodes.len() >= NO_NODE as usize {
+            return Err(self.source.fault(
+                "too_many",
+                "more nodes than can be numbered",
+                "fewer",
+                "Coarsen the mesh.",
+            ));
+        }
+        if !self.labels.add(label) {
+            return Err(self.source.fault(
+                "repeated_node",
+                &format!("node {label} once more"),
+                "each node once",
+                "Save the mesh again.",
+            ));
+        }
+        self.plane.add(label, place);
+        self.raw.nodes.push([place[0], place[1]]);
+        self.raw.node_labels.push(label);
+        Ok(())
+    }
+
+    /// Room for what the file promises, but no more than a file of any sane size holds.
+    fn reserve(&mut self, count: u64) {
+        const SANE: u64 = 1 << 20;
+        let count = count.min(SANE) as usize;
+        self.raw.nodes.reserve_exact(count);
+        self.raw.node_labels.reserve_exact(count);
+    }
+
+    fn nodes_2(&mut self) -> Result<(), ReadError> {
+        let count: u64 = self.source.number("the number of nodes")?;
+        self.reserve(count);
+        for _ in 0..count {
+            let label = self.int("a node number")?;
+            let place = [self.float("x")?, self.float("y")?, self.float("z")?];
+            self.node(label as u64, place)?;
+        }
+        Ok(())
+    }
+
+    fn nodes_4(&mut self) -> Result<(), ReadError> {
+        let blocks = self.size("the number of blocks")?;
+        let count = self.size("the number of nodes")?;
+        self.size("the least node number")?;
+        self.size("the largest node number")?;
+        self.reserve(count);
+        let mut labels = Vec::new();
+        for _ in 0..blocks {
+            let dimension = self.int("a dimension")?;
+            self.int("an entity's tag")?;
+            let parametric = self.int("0 or 1")? == 1;
+            labels.clear();
+            for _ in 0..self.size("the number of nodes in the block")? {
+                labels.push(self.size("a node number")?);
+            }
+            for &label in &labels {
+                let place = [self.float("x")?, self.float("y")?, self.float("z")?];
+                for _ in 0..if parametric { dimension } else { 0 } {
+                    self.float("a parametric coordinate")?;
+                }
+                self.node(label, place)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn elements_2(&mut self) -> Result<(), ReadError> {
+        let count: u64 = self.source.number("the number of elements")?;
+        let mut read = 0;
+        while read < count {
+            // in binary a head stands before a run of elements of one kind
+            let (label, kind, run, tags) = if self.binary {
+                let kind = self.int("a kind of element")?;
+                (
+                    0,
+                    kind,
+                    self.int("a number of elements")?.max(1) as u64,
+                    self.int("a number of tags")?,
+                )
+            } else {
+                let label: u64 = self.source.number("an element number")?;
+                (
+                    label,
+                    self.source.number("a kind of element")?,
+                    1,
+                    self.source.number("a number of tags")?,
+                )
+            };
+            let (size, kind) = self.kind(kind)?;
+            for _ in 0..run {
+                let label = if self.binary {
+                    self.int("an element number")? as u64
+                } else {
+                    label
+                };
+                let mut physical = 0;
+                for tag in 0..tags {
+                    let value = self.int("a tag")?;
+                    if tag == 0 {
+                        physical = value.abs();
+                    }
+                }
+                // 0: in no physical group
+                let group = [physical];
+                self.element(label, kind, size, if physical == 0 { &[] } else { &group })?;
+            }
+            read += run;
+        }
+        Ok(())
+    }
+
+    fn elements_4(&mut self) -> Result<(), ReadError> {
+        let blocks = self.size("the number of blocks")?;
+        for what in [
+            "the number of elements",
+            "the least element number",
+            "the largest element number",
+        ] {
+            self.size(what)?;
+        }
+        for _ in 0..blocks {
+            let dimension = self.int("a dimension")?;
+            let entity = self.int("an entity's tag")?;
+            let kind = self.int("a kind of element")?;
+            let (size, kind) = self.kind(kind)?;
+            let physical = u8::try_from(dimension)
+                .ok()
+                .and_then(|d| self.entities.get(&(d, entity)));
+            let physical = physical.cloned().unwrap_or_default();
+            for _ in 0..self.size("the number of elements in the block")? {
+                let label = self.size("an element number")?;
+                self.element(label, kind, size, &physical)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Nodes and kind of what Gmsh numbers so.
+    fn kind(&self, number: i64) -> Result<(usize, Kind), ReadError> {
+        let known = KINDS.iter().find(|kind| kind.0 == number);
+        if let Some((_, size, kind)) = known {
+            return Ok((*size, *kind));
+        }
+        let (got, hint) = match number {
+            4..=7 | 11..=14 | 17..=19 | 29..=34 => (
+                format!("elements of three dimensions (Gmsh's kind {number})"),
+                "Mesh the surface only (gmsh -2), or give physical groups to surfaces only.",
+            ),
+            _ => (
+                format!("elements of Gmsh's kind {number}"),
+                "Mesh with first or second order (gmsh -order 2; Mesh.SecondOrderIncomplete = 1 for 8 nodes).",
+            ),
+        };
+        Err(self.source.fault(
+            "unsupported",
+            &got,
+            "triangles of 3 or 6 nodes, quadrilaterals of 4, 8 or 9, lines of 2 or 3, points",
+            hint,
+        ))
+    }
+
+    fn element(
+        &mut self,
+        label: u64,
+        kind: Kind,
+        size: usize,
+        physical: &[i64],
+    ) -> Result<(), ReadError> {
+        let mut nodes = [NO_NODE; 9];
+        for slot in &mut nodes[..size] {
+            let node = self.size_or_int()?;
+            *slot = self.labels.get(node).ok_or_else(|| {
+                self.source.fault(
+                    "unknown_node",
+                    &format!("node {node} in element {label}"),
+                    "a node of $Nodes",
+                    "Save the mesh again, with all its nodes.",
+                )
+            })?;
+        }
+        let place = self.raw.elements.len() as u32;
+        let dimension = match kind {
+            Kind::Point => 0,
+            Kind::Line => 1,
+            _ => 2,
+        };
+        match (kind, nodes) {
+            (Kind::Triangle, [a, b, c, ab, bc, ca, ..]) => {
+                self.raw
+                    .elements
+                    .push(Element::Triangle([a, b, c, ab, bc, ca]));
+            }
+            (Kind::Quad, [a, b, c, d, ab, bc, cd, da, _]) => {
+                self.raw.without_centre += usize::from(size == 9);
+                self.raw
+                    .elements
+                    .push(Element::Quad([a, b, c, d, ab, bc, cd, da]));
+            }
+            _ => {}
+        }
+        if dimension == 2 {
+            self.raw.element_labels.push(label);
+        }
+        for tag in physical {
+            let name = match self.names.get(&(dimension, *tag)) {
+                Some(name) => name.clone(),
+                None => tag.to_string(),
+            };
+            match kind {
+                Kind::Point => self.raw.node_sets.entry(name).or_default().push(nodes[0]),
+                Kind::Line => self
+                    .raw
+                    .lines
+                    .entry(name)
+                    .or_default()
+                    .push([nodes[0], nodes[1]]),
+                _ => self.raw.groups.entry(name).or_default().push(place),
+            }
+        }
+        Ok(())
+    }
+
+    /// A node of an element: version 2 has 4 bytes, version 4 has 8.
+    fn size_or_int(&mut self) -> Result<u64, ReadError> {
+        match self.version {
+            Version::Two => Ok(self.int("a node number")? as u64),
+            Version::Four => self.size("a node number"),
+        }
+    }
+}

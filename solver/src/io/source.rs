@@ -1,0 +1,264 @@
+//! Reading a file of mesh data: by lines, by words, or by bytes, always knowing the line.
+
+use std::io::{self, BufRead};
+use std::str::FromStr;
+
+use crate::error::Violation;
+
+/// No line of a mesh file is longer; a file that is no text shall not fill the memory.
+const LONGEST_LINE: u64 = 1 << 20;
+
+/// Why a mesh could not be read.
+#[derive(Debug)]
+pub enum ReadError {
+    /// The bytes could not be had.
+    Io(io::Error),
+    /// What is wrong with them; pointers are empty, for only the caller knows where they came from.
+    Invalid(Vec<Violation>),
+}
+
+/// A reader that counts lines.
+pub(super) struct Source<R> {
+    reader: R,
+    /// The current line without its end.
+    text: String,
+    /// Where in it the next word begins.
+    at: usize,
+    /// Its number, from 1; in binary sections the number of the section's first line.
+    pub(super) line: u64,
+    /// Bytes are in the other order than this machine's.
+    pub(super) swapped: bool,
+}
+
+impl<R: BufRead> Source<R> {
+    pub(super) fn new(reader: R) -> Self {
+        Source {
+            reader,
+            text: String::new(),
+            at: 0,
+            line: 0,
+            swapped: false,
+        }
+    }
+
+    /// Goes to the next line; false at the end of the file.
+    pub(super) fn advance(&mut self) -> Result<bool, ReadError> {
+        let mut bytes = std::mem::take(&mut self.text).into_bytes();
+        bytes.clear();
+        self.at = 0;
+        let mut limited = io::Read::take(&mut self.reader, LONGEST_LINE);
+        let read = limited
+            .read_until(b'\n', &mut bytes)
+            .map_err(ReadError::Io)?;
+        if read == 0 {
+            return Ok(false);
+        }
+        self.line += 1;
+        let whole = bytes.last() == Some(&b'\n');
+        while matches!(bytes.last(), Some(b'\n' | b'\r')) {
+            bytes.pop();
+        }
+        if !whole && read as u64 == LONGEST_LINE {
+            return Err(self.fault(
+                "malformed",
+                "a line of more than a MiB",
+                "a mesh file",
+                "Is it one?",
+            ));
+        }
+        self.text = String::from_utf8(bytes).map_err(|_| {
+            self.fault(
+                "malformed",
+                "bytes that are no text",
+                "text here",
+                "Save the file again; a binary file must be sent as it is.",
+            )
+        })?;
+        Ok(true)
+    }
+
+    /// The current line; its words are taken.
+    pub(super) fn text(&mut self) -> &str {
+        self.at = self.text.len();
+        &self.text
+    }
+
+    /// The next word, on this line or a later one.
+    pub(super) fn word(&mut self, what: &str) -> Result<&str, ReadError> {
+        loop {
+            let rest = &self.text[self.at..];
+            let trimmed = rest.trim_start();
+            if !trimmed.is_empty() {
+                let start = self.text.len() - trimmed.len();
+                let length = trimmed.find(char::is_whitespace).unwrap_or(trimmed.len());
+                self.at = start + length;
+                return Ok(&self.text[start..start + length]);
+            }
+            if !self.advance()? {
+                return Err(self.fault(
+                    "truncated",
+                    "the end of the file",
+                    what,
+                    "The file is cut off; save or send it again.",
+                ));
+            }
+        }
+    }
+
+    /// The next word as a number.
+    pub(super) fn number<T: FromStr>(&mut self, what: &str) -> Result<T, ReadError> {
+        let word = self.word(what)?;
+        match word.parse() {
+            Ok(number) => Ok(number),
+            Err(_) => {
+                let got = format!("`{word:.40}`");
+                Err(self.fault("malformed", &got, what, "Correct that line."))
+            }
+        }
+    }
+
+    /// The next bytes of a binary section.
+    pub(super) fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N], ReadError> {
+        let mut bytes = [0; N];
+        match self.reader.read_exact(&mut bytes) {
+            Ok(()) => {
+                if self.swapped {
+                    bytes.reverse();
+                }
+                Ok(bytes)
+            }
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Err(self.fault(
+                "truncated",
+                "the end of the file",
+                what,
+                "The file is cut off; save or send it again.",
+            )),
+            Err(error) => Err(ReadError::Io(error)),
+        }
+    }
+
+    /// An error at the current line.
+    pub(super) fn fault(&self, reason: &str, got: &str, expected: &str, hint: &str) -> ReadError {
+        ReadError::Invalid(vec![Violation {
+            pointer: String::new(),
+            reason: reason.to_owned(),
+            got: format!("line {}: {got}", self.line),
+            expected: expected.to_owned(),
+            hint: hint.to_owned(),
+        }])
+    }
+}
+
+/// Nodes by the file's own numbers. These are mostly dense, so a list does; what lies far beyond goes
+/// into a map, so that one large number does not fill the memory.
+#[derive(Default)]
+pub(super) struct Labels {
+    dense: Vec<u32>,
+    sparse: std::collections::HashMap<u64, u32>,
+    count: u32,
+}
+
+impl Labels {
+    /// The next node has this number; false if another has it already.
+    pub(super) fn add(&mut self, label: u64) -> bool {
+        let place = self.count;
+        let taken = match usize::try_from(label) {
+            Ok(label) if label <= 4 * place as usize + 1024 => {
+                if self.dense.len() <= label {
+                    self.dense.resize(label + 1, u32::MAX);
+                }
+                let old = std::mem::replace(&mut self.dense[label], place);
+                old != u32::MAX || self.sparse.contains_key(&(label as u64))
+            }
+            _ => self.sparse.insert(label, place).is_some(),
+        };
+        self.count += 1;
+        !taken
+    }
+
+    /// The place of a node in the file.
+    pub(super) fn get(&self, label: u64) -> Option<u32> {
+        let dense = usize::try_from(label).ok().and_then(|l| self.dense.get(l));
+        dense
+            .copied()
+            .filter(|place| *place != u32::MAX)
+            .or_else(|| self.sparse.get(&label).copied())
+    }
+}
+
+/// The plane that the nodes must lie in: z is the same for all.
+pub(super) struct Plane {
+    lowest: (f64, u64),
+    highest: (f64, u64),
+    extent: f64,
+}
+
+impl Default for Plane {
+    fn default() -> Self {
+        Plane {
+            lowest: (f64::INFINITY, 0),
+            highest: (f64::NEG_INFINITY, 0),
+            extent: 0.0,
+        }
+    }
+}
+
+impl Plane {
+    pub(super) fn add(&mut self, label: u64, [x, y, z]: [f64; 3]) {
+        if z < self.lowest.0 {
+            self.lowest = (z, label);
+        }
+        if z > self.highest.0 {
+            self.highest = (z, label);
+        }
+        self.extent = self.extent.max(x.abs()).max(y.abs());
+    }
+
+    /// What is wrong, if the nodes do not lie in one plane z = const.
+    pub(super) fn fault(&self) -> Option<Violation> {
+        /// Rounding of a file with some nine digits.
+        const FLAT: f64 = 1e-9;
+        let ((low, at_low), (high, at_high)) = (self.lowest, self.highest);
+        (high - low > FLAT * self.extent.max(high.abs())).then(|| Violation {
+            pointer: String::new(),
+            reason: "not_plane".to_owned(),
+            got: format!("z = {low} at node {at_low} and {high} at node {at_high}"),
+            expected: "one z for all nodes".to_owned(),
+            hint:
+                "The body lies in the plane of x and y (axisymmetric: x is r, y is z of the body)."
+                    .to_owned(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_run_over_lines_and_faults_know_theirs() {
+        let mut source = Source::new(&b"1 2\r\n\n  x 4"[..]);
+        assert_eq!(source.number::<u32>("a number").unwrap(), 1);
+        assert_eq!(source.number::<u32>("a number").unwrap(), 2);
+        let Err(ReadError::Invalid(list)) = source.number::<u32>("a node number") else {
+            panic!("x is no number");
+        };
+        assert_eq!(list[0].got, "line 3: `x`");
+        assert_eq!(source.number::<f64>("a number").unwrap(), 4.0);
+        assert!(source.word("more").is_err());
+    }
+
+    #[test]
+    fn labels_may_be_dense_or_wild_and_come_once() {
+        let mut labels = Labels::default();
+        for label in [1, 2, 3, u64::MAX, 1 << 40] {
+            assert!(labels.add(label), "{label}");
+        }
+        assert!(!labels.add(2) && !labels.add(u64::MAX));
+        assert_eq!(
+            [3, u64::MAX].map(|l| labels.get(l)),
+            [Some(2), Some(3)].map(|x| x)
+        );
+        assert_eq!(labels.get(77), None);
+    }
+}

@@ -1,0 +1,458 @@
+//! From the nodes and elements of a file to a mesh: second order, counter-clockwise, only what is used.
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::{Edge, Mesh};
+use crate::element::Element;
+use crate::error::Violation;
+use crate::solution::Warning;
+
+/// Stands for the midsides of an element that has none yet.
+pub const NO_NODE: u32 = u32::MAX;
+
+/// More violations of one kind than this say nothing new.
+const MOST_LISTED: usize = 20;
+
+/// A mesh as a file has it. Labels are the file's own numbers, for messages.
+#[derive(Debug, Default)]
+pub struct RawMesh {
+    /// Positions.
+    pub nodes: Vec<[f64; 2]>,
+    /// Label of every node.
+    pub node_labels: Vec<u64>,
+    /// Nodes by their place in `nodes`; all midsides are [`NO_NODE`] where the file has corners only.
+    pub elements: Vec<Element>,
+    /// Label of every element.
+    pub element_labels: Vec<u64>,
+    /// Named lines as pairs of corners.
+    pub lines: BTreeMap<String, Vec<[u32; 2]>>,
+    /// Named groups of elements, by their places in `elements`.
+    pub groups: BTreeMap<String, Vec<u32>>,
+    /// Named sets of nodes.
+    pub node_sets: BTreeMap<String, Vec<u32>>,
+    /// 9-node quadrilaterals that lost their centre node.
+    pub without_centre: usize,
+}
+
+/// The mesh and what was changed on the way, or everything that is wrong with it. Pointers are empty:
+/// only the caller knows where the file came from.
+pub fn build(mut raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
+    let mut found = Faults::default();
+    if raw.elements.is_empty() {
+        found.say(
+            "too_few",
+            "no element of two dimensions".to_owned(),
+            "at least one quadrilateral or triangle",
+            "Mesh the surface, and save its elements (in Gmsh: put it in a physical group).",
+        );
+        return Err(found.list);
+    }
+    let mut notes = Vec::new();
+    let mut note = |code: &str, message: String| {
+        notes.push(Warning {
+            code: code.to_owned(),
+            pointer: String::new(),
+            message,
+        })
+    };
+    if raw.without_centre > 0 {
+        note(
+            "centre_nodes_dropped",
+            format!(
+                "{} 9-node quadrilaterals lost their centre node and became 8-node elements.",
+                raw.without_centre
+            ),
+        );
+    }
+    distinct(&raw, &mut found);
+    found.end()?;
+    let reversed = counter_clockwise(&mut raw);
+    if reversed > 0 {
+        note(
+            "elements_reversed",
+            format!("{reversed} elements were numbered clockwise and have been turned over."),
+        );
+    }
+    let raised = second_order(&mut raw);
+    if raised > 0 {
+        note(
+            "raised_to_second_order",
+            format!(
+                "{raised} elements had corners only: midside nodes were put half-way between them. A curved side stays the polygon it was."
+            ),
+        );
+    }
+    drop_unused(&mut raw);
+    let owners = Owners::new(&raw, &mut found);
+    found.end()?;
+    let surface = owners.surface(&raw.elements);
+    let by_corners = by_corners(&surface, &owners, &raw, &mut found);
+    found.end()?;
+    let mut boundaries = BTreeMap::new();
+    for (name, lines) in std::mem::take(&mut raw.lines) {
+        let mut edges: Vec<Edge> = Vec::with_capacity(lines.len());
+        let mut inside = 0;
+        for [a, b] in lines {
+            match by_corners.binary_search_by_key(&key(a, b), |(corners, _)| *corners) {
+                Ok(place) => edges.push(surface[by_corners[place].1 as usize]),
+                Err(_) => inside += 1,
+            }
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        if inside > 0 {
+            note(
+                "lines_inside",
+                format!(
+                    "{inside} lines of `{name}` are not sides of the body's surface and are left out."
+                ),
+            );
+        }
+        if !edges.is_empty() {
+            boundaries.insert(name, edges);
+        }
+    }
+    let mesh = Mesh {
+        nodes: raw.nodes,
+        elements: raw.elements,
+        boundaries,
+        groups: raw.groups,
+        node_sets: raw.node_sets,
+    };
+    for (e, place, det) in mesh.inverted_elements(true) {
+        found.say(
+            "inverted_element",
+            format!(
+                "element {} with det J = {det:.3e} at {place}",
+                raw.element_labels[e]
+            ),
+            "det J > 0 at all Gauss points and at the nodes",
+            "Move its nodes; a midside far off the middle of its side folds the element.",
+        );
+    }
+    found.end()?;
+    Ok((mesh, notes))
+}
+
+fn distinct(raw: &RawMesh, found: &mut Faults) {
+    for (element, label) in raw.elements.iter().zip(&raw.element_labels) {
+        let repeated = (1..element.len())
+            .find(|&i| element[i] != NO_NODE && element[..i].contains(&element[i]));
+        if let Some(i) = repeated {
+            found.say(
+                "repeated_node",
+                format!(
+                    "node {} twice in element {label}",
+                    raw.node_labels[element[i] as usize]
+                ),
+                "different nodes",
+                "Collapsed elements are not supported; use triangles.",
+            );
+        }
+    }
+}
+
+/// Turns over what runs clockwise; says how many.
+fn counter_clockwise(raw: &mut RawMesh) -> usize {
+    let mut reversed = 0;
+    for element in &mut raw.elements {
+        let corners = element.family().corners();
+        let at = |i: usize| raw.nodes[element[i % corners] as usize];
+        let area: f64 = (0..corners)
+            .map(|i| at(i)[0] * at(i + 1)[1] - at(i + 1)[0] * at(i)[1])
+            .sum();
+        if area < 0.0 {
+            *element = match *element {
+                Element::Quad([a, b, c, d, ab, bc, cd, da]) => {
+                    Element::Quad([a, d, c, b, da, cd, bc, ab])
+                }
+                Element::Triangle([a, b, c, ab, bc, ca]) => {
+                    Element::Triangle([a, c, b, ca, bc, ab])
+                }
+            };
+            reversed += 1;
+        }
+    }
+    reversed
+}
+
+/// Puts midsides where there are none, shared with the neighbours; says how many elements had none.
+fn second_order(raw: &mut RawMesh) -> usize {
+    let lacks = |element: &Element| element[element.len() - 1] == NO_NODE;
+    let lacking = raw.elements.iter().filter(|e| lacks(e)).count();
+    if lacking == 0 {
+        return 0;
+    }
+    // neighbours of second order have midsides already
+    let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
+    for element in raw.elements.iter().filter(|e| !lacks(e)) {
+        for [a, b, mid] in element.sides() {
+            middles.insert(key(a, b), mid);
+        }
+    }
+    for element in raw.elements.iter_mut().filter(|e| lacks(e)) {
+        let corners = element.family().corners();
+        let old = *element;
+        let nodes: &mut [u32] = match element {
+            Element::Quad(nodes) => nodes,
+            Element::Triangle(nodes) => nodes,
+        };
+        for k in 0..corners {
+            let (a, b) = (old[k], old[(k + 1) % corners]);
+            nodes[corners + k] = *middles.entry(key(a, b)).or_insert_with(|| {
+                let [p, q] = [a, b].map(|n| raw.nodes[n as usize]);
+                raw.nodes.push([0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]);
+                raw.node_labels.push(0); // no line of the file has it
+                raw.nodes.len() as u32 - 1
+            });
+        }
+    }
+    lacking
+}
+
+/// Leaves out the nodes of no element: points of the geometry, centres of 9-node elements.
+fn drop_unused(raw: &mut RawMesh) {
+    let mut number = vec![NO_NODE; raw.nodes.len()];
+    for &node in raw.elements.iter().flat_map(|e| e.iter()) {
+        number[node as usize] = 0;
+    }
+    let mut used = 0;
+    for node in 0..number.len() {
+        if number[node] != NO_NODE {
+            number[node] = used;
+            raw.nodes[used as usize] = raw.nodes[node];
+            raw.node_labels[used as usize] = raw.node_labels[node];
+            used += 1;
+        }
+    }
+    raw.nodes.truncate(used as usize);
+    raw.node_labels.truncate(used as usize);
+    for element in &mut raw.elements {
+        *element = element.map_nodes(|n| number[n as usize]);
+    }
+    for line in raw.lines.values_mut().flatten() {
+        *line = line.map(|n| number[n as usize]);
+    }
+    for set in raw.node_sets.values_mut() {
+        set.iter_mut().for_each(|n| *n = number[*n as usize]);
+        set.retain(|n| *n != NO_NODE);
+        set.sort_unstable();
+        set.dedup();
+    }
+    raw.node_sets.retain(|_, set| !set.is_empty());
+}
+
+/// The elements on each side, known by its midside node.
+struct Owners {
+    /// How many elements have this node as a midside.
+    count: Vec<u8>,
+    /// The first of them.
+    first: Vec<u32>,
+}
+
+impl Owners {
+    fn new(raw: &RawMesh, found: &mut Faults) -> Self {
+        let mut owners = Owners {
+            count: vec![0; raw.nodes.len()],
+            first: vec![0; raw.nodes.len()],
+        };
+        for (e, element) in raw.elements.iter().enumerate() {
+            for [a, b, mid] in element.sides() {
+                let mid = mid as usize;
+                if owners.count[mid] == 0 {
+                    owners.first[mid] = e as u32;
+                } else {
+                    let first = owners.first[mid] as usize;
+                    // the neighbour runs along the same side the other way
+                    let shared = raw.elements[first].sides().any(|s| s == [b, a, mid as u32]);
+                    if owners.count[mid] >= 2 || !shared {
+                        found.nonconforming(raw, first, e);
+                    }
+                }
+                owners.count[mid] = owners.count[mid].saturating_add(1);
+            }
+        }
+        owners
+    }
+
+    /// Sides with one element, directed with the body on the right; in the order of the elements.
+    fn surface(&self, elements: &[Element]) -> Vec<Edge> {
+        elements
+            .iter()
+            .flat_map(Element::sides)
+            .filter(|[_, _, mid]| self.count[*mid as usize] == 1)
+            .map(|[a, b, mid]| [b, a, mid])
+            .collect()
+    }
+}
+
+/// Corners of the surface's sides and their places in it, in order. Two sides between the same corners
+/// are neighbours that do not share their midside.
+fn by_corners(
+    surface: &[Edge],
+    owners: &Owners,
+    raw: &RawMesh,
+    found: &mut Faults,
+) -> Vec<((u32, u32), u32)> {
+    let mut sorted: Vec<((u32, u32), u32)> = surface
+        .iter()
+        .enumerate()
+        .map(|(i, [a, b, _])| (key(*a, *b), i as u32))
+        .collect();
+    sorted.sort_unstable();
+    for pair in sorted.windows(2) {
+        if pair[0].0 == pair[1].0 {
+            let owner = |i: u32| owners.first[surface[i as usize][2] as usize] as usize;
+            found.nonconforming(raw, owner(pair[0].1), owner(pair[1].1));
+        }
+    }
+    sorted
+}
+
+fn key(a: u32, b: u32) -> (u32, u32) {
+    (a.min(b), a.max(b))
+}
+
+impl Mesh {
+    /// The sides of the body's surface, directed with the body on the right.
+    pub fn surface(&self) -> Vec<Edge> {
+        let mut count = vec![0u8; self.nodes.len()];
+        for [_, _, mid] in self.elements.iter().flat_map(Element::sides) {
+            count[mid as usize] = count[mid as usize].saturating_add(1);
+        }
+        let first = Vec::new();
+        Owners { count, first }.surface(&self.elements)
+    }
+}
+
+#[derive(Default)]
+struct Faults {
+    list: Vec<Violation>,
+}
+
+impl Faults {
+    fn say(&mut self, reason: &str, got: String, expected: &str, hint: &str) {
+        let same = self.list.iter().filter(|v| v.reason == reason).count();
+        if same < MOST_LISTED {
+            self.list.push(Violation {
+                pointer: String::new(),
+                reason: reason.to_owned(),
+                got,
+                expected: expected.to_owned(),
+                hint: hint.to_owned(),
+            });
+        }
+    }
+
+    fn nonconforming(&mut self, raw: &RawMesh, first: usize, second: usize) {
+        let [a, b] = [first, second].map(|e| raw.element_labels[e]);
+        self.say(
+            "nonconforming",
+            format!("elements {a} and {b}, which do not share a whole side"),
+            "at most two elements on a side, with all three of its nodes in common",
+            "Merge coincident nodes (in Gmsh: Coherence), and remove elements that overlap.",
+        );
+    }
+
+    fn end(&mut self) -> Result<(), Vec<Violation>> {
+        if self.list.is_empty() {
+            Ok(())
+        } else {
+            Err(std::mem::take(&mut self.list))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two unit squares side by side, corners only; the right one runs clockwise.
+    fn two_squares() -> RawMesh {
+        const NONE: u32 = NO_NODE;
+        RawMesh {
+            nodes: vec![
+                [9.0, 9.0],
+                [0.0, 0.0],
+                [1.0, 0.0],
+                [2.0, 0.0],
+                [0.0, 1.0],
+                [1.0, 1.0],
+                [2.0, 1.0],
+            ],
+            node_labels: (10..17).collect(),
+            elements: vec![
+                Element::Quad([1, 2, 5, 4, NONE, NONE, NONE, NONE]),
+                Element::Quad([2, 5, 6, 3, NONE, NONE, NONE, NONE]),
+            ],
+            element_labels: vec![100, 200],
+            lines: BTreeMap::from([("top".to_owned(), vec![[4, 5], [6, 5], [5, 4], [2, 5]])]),
+            node_sets: BTreeMap::from([("corner".to_owned(), vec![1, 0])]),
+            ..RawMesh::default()
+        }
+    }
+
+    #[test]
+    fn corners_get_shared_midsides_and_the_unused_node_goes() {
+        let (mesh, notes) = build(two_squares()).unwrap();
+        assert_eq!(mesh.nodes.len(), 13);
+        assert_eq!(mesh.connected_parts().len(), 1);
+        assert_eq!(mesh.boundaries["top"].len(), 2);
+        for edge in &mesh.boundaries["top"] {
+            let [[x0, y0], [x1, y1], [xm, _]] = mesh.edge_nodes(edge);
+            assert!(y0 == 1.0 && y1 == 1.0 && x1 > x0 && xm == 0.5 * (x0 + x1));
+        }
+        assert_eq!(mesh.node_sets["corner"], [0]);
+        let codes: Vec<&str> = notes.iter().map(|w| &w.code[..]).collect();
+        assert_eq!(
+            codes,
+            [
+                "elements_reversed",
+                "raised_to_second_order",
+                "lines_inside"
+            ]
+        );
+        assert_eq!(mesh.surface().len(), 6);
+    }
+
+    #[test]
+    fn a_triangle_of_second_order_lends_its_midside_to_a_square_without() {
+        let mut raw = two_squares();
+        raw.nodes.extend([[1.5, 0.0], [1.6, 0.5], [1.0, 0.55]]);
+        raw.node_labels.extend([17, 18, 19]);
+        raw.elements[1] = Element::Triangle([2, 3, 5, 7, 8, 9]);
+        let (mesh, _) = build(raw).unwrap();
+        assert_eq!(mesh.connected_parts().len(), 1);
+        // the side they share bends
+        assert!(mesh.nodes.contains(&[1.0, 0.55]) && !mesh.nodes.contains(&[1.0, 0.5]));
+    }
+
+    #[test]
+    fn what_cannot_be_a_mesh_is_named_with_the_files_numbers() {
+        let said = |raw: RawMesh| {
+            let list = build(raw).unwrap_err();
+            (list[0].reason.clone(), list[0].got.clone())
+        };
+        let mut raw = two_squares();
+        raw.elements[0] = raw.elements[0].map_nodes(|n| if n == 4 { 1 } else { n });
+        assert_eq!(
+            said(raw),
+            (
+                "repeated_node".to_owned(),
+                "node 11 twice in element 100".to_owned()
+            )
+        );
+        let mut raw = two_squares();
+        raw.elements.push(raw.elements[0]);
+        raw.element_labels.push(300);
+        let (reason, got) = said(raw);
+        assert!(
+            reason == "nonconforming" && got.contains("100") && got.contains("300"),
+            "{got}"
+        );
+        let mut raw = two_squares();
+        raw.nodes[5] = [-1.0, -1.0];
+        assert_eq!(said(raw).0, "inverted_element");
+        assert_eq!(said(RawMesh::default()).0, "too_few");
+    }
+}

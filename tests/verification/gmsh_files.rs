@@ -1,0 +1,345 @@
+//! Meshes that Gmsh itself has written (`tests/data/gmsh`, with the script that made them): every
+//! family of elements in every form of the format.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+use solver::element::Family;
+use solver::io::gmsh;
+use solver::mesh::Mesh;
+use solver::problem::Problem;
+
+use crate::record::held;
+use crate::support::{problem, quiet};
+
+const FAMILIES: [&str; 3] = ["quad8", "tri6", "mixed"];
+const FORMS: [&str; 4] = ["msh22-ascii", "msh22-binary", "msh41-ascii", "msh41-binary"];
+
+fn bytes(name: &str) -> Vec<u8> {
+    let path = format!("{}/data/gmsh/{name}.msh", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+fn read(name: &str) -> (Mesh, Vec<String>) {
+    let (mesh, notes) =
+        gmsh::read(&bytes(name)[..]).unwrap_or_else(|error| panic!("{name}: {error:#?}"));
+    (mesh, notes.into_iter().map(|note| note.code).collect())
+}
+
+fn area(mesh: &Mesh) -> f64 {
+    let of_element = |element: &solver::element::Element| {
+        let (family, nodes) = (element.family(), mesh.element_nodes(element));
+        let points = family.rule(3).iter();
+        points
+            .map(|p| p.weight * family.map(&nodes, p.place).det)
+            .sum::<f64>()
+    };
+    mesh.elements.iter().map(of_element).sum()
+}
+
+/// Four forms of one mesh are one mesh; its area is that of the drawing (the parabola through the three
+/// nodes of a side is off a quarter circle by some 1e-5 of it), its boundaries are as long as drawn.
+#[test]
+fn every_form_of_a_file_holds_the_same_mesh() {
+    // 2 × 2 and 2 × 1, and the corner that the fillet fills
+    let radius: f64 = 0.5;
+    let drawn = 6.0 + radius * radius * (1.0 - std::f64::consts::FRAC_PI_4);
+    for (geometry, exact, allowed) in [("fillet", drawn, 3e-5), ("sheet", 3.5, 1e-12)] {
+        for family in FAMILIES {
+            let meshes = FORMS.map(|form| read(&format!("{geometry}-{family}-{form}")));
+            for ((mesh, notes), form) in meshes.iter().zip(FORMS) {
+                let name = format!("{geometry}-{family}-{form}");
+                held(
+                    0,
+                    &format!("{name}: area"),
+                    "written by Gmsh",
+                    area(mesh),
+                    exact,
+                    allowed,
+                );
+                let quads = mesh
+                    .elements
+                    .iter()
+                    .filter(|e| e.family() == Family::Quad)
+                    .count();
+                let all = mesh.elements.len();
+                match family {
+                    "quad8" => assert_eq!(quads, all, "{name}"),
+                    "tri6" => assert_eq!(quads, 0, "{name}"),
+                    _ => assert!(0 < quads && quads < all, "{name}"),
+                }
+                assert_eq!(mesh.connected_parts().len(), 1);
+                if geometry == "fillet" {
+                    let names: Vec<&String> = mesh.boundaries.keys().collect();
+                    assert_eq!(names, ["bottom", "fillet", "left", "right end", "top"]);
+                    assert_eq!(mesh.groups.keys().collect::<Vec<_>>(), ["thick", "thin"]);
+                    assert_eq!(mesh.groups.values().map(Vec::len).sum::<usize>(), all);
+                    assert_eq!(mesh.nodes[mesh.node_sets["corner"][0] as usize], [0.0, 0.0]);
+                    // the seam lies inside
+                    assert_eq!(notes, &["lines_inside"], "{name}");
+                    for node in mesh.boundaries["fillet"].iter().flatten() {
+                        let [x, y] = mesh.nodes[*node as usize];
+                        assert!(((x - 2.5).hypot(y - 1.5) - radius).abs() < 1e-12);
+                    }
+                }
+            }
+            let [(a, _), (b, _), (c, _), (d, _)] = meshes;
+            // Gmsh writes 16 digits in ASCII
+            let near = |p: &Vec<[f64; 2]>, q: &Vec<[f64; 2]>| {
+                let close = |(p, q): (&[f64; 2], &[f64; 2])| {
+                    (p[0] - q[0]).abs() < 1e-14 && (p[1] - q[1]).abs() < 1e-14
+                };
+                p.len() == q.len() && p.iter().zip(q).all(close)
+            };
+            for (ascii, binary) in [(&a, &b), (&c, &d)] {
+                assert!(near(&ascii.nodes, &binary.nodes), "{geometry}-{family}");
+                assert_eq!(ascii.elements, binary.elements, "{geometry}-{family}");
+                assert_eq!(ascii.boundaries, binary.boundaries, "{geometry}-{family}");
+            }
+            // 2.2 and 4.1 number the nodes differently
+            let sums = [&a, &c].map(|mesh| {
+                let sum = |axis: usize| mesh.nodes.iter().map(|x| x[axis]).sum::<f64>();
+                [sum(0), sum(1)]
+            });
+            assert_eq!(a.nodes.len(), c.nodes.len());
+            for axis in 0..2 {
+                assert!(
+                    (sums[0][axis] - sums[1][axis]).abs() < 1e-10,
+                    "{geometry}-{family}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn nine_nodes_lose_their_centre_and_corners_get_midsides() {
+    let (mesh, notes) = read("fillet-quad9-msh22-ascii");
+    assert_eq!(notes, ["centre_nodes_dropped", "lines_inside"]);
+    assert_eq!(
+        mesh.elements.len(),
+        read("fillet-quad8-msh22-ascii").0.elements.len()
+    );
+    let (mesh, notes) = read("fillet-mixed1-msh41-ascii");
+    assert_eq!(notes, ["raised_to_second_order", "lines_inside"]);
+    // the fillet is a polygon now
+    assert!((area(&mesh) - 6.0537).abs() > 1e-4 && (area(&mesh) - 6.0537).abs() < 0.02);
+}
+
+/// The mesh as it would be written out in a problem, its surface driven node by node.
+fn driven(mesh: &Mesh, u: impl Fn([f64; 2]) -> [f64; 2]) -> Problem {
+    let mut sets: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+    let mut supports: Vec<Value> = Vec::new();
+    for node in mesh.surface().into_iter().flatten() {
+        let name = node.to_string();
+        if sets.insert(name.clone(), vec![node]).is_none() {
+            let [ux, uy] = u(mesh.nodes[node as usize]);
+            supports.push(json!({"nodes": name, "ux": ux, "uy": uy}));
+        }
+    }
+    problem(
+        &json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"inline": {"nodes": mesh.nodes, "elements": mesh.elements, "node_sets": sets}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": supports,
+        })
+        .to_string(),
+    )
+}
+
+/// Patch test: a linear displacement on the surface, curved sides included, is one inside too.
+#[test]
+fn every_family_reproduces_constant_strain_on_the_curved_mesh() {
+    let u = |[x, y]: [f64; 2]| [0.01 * x + 0.02 * y, 0.01 * x - 0.02 * y];
+    for family in FAMILIES {
+        let (mesh, _) = read(&format!("fillet-{family}-msh41-ascii"));
+        let solution = solver::solve(&driven(&mesh, u), &mut quiet).unwrap();
+        let fields = &solution.fields;
+        let error = (0..fields.x.len())
+            .map(|n| {
+                let [ux, uy] = u([fields.x[n], fields.y[n]]);
+                (fields.ux[n] - ux).abs().max((fields.uy[n] - uy).abs())
+            })
+            .fold(0.0, f64::max);
+        let what = format!("patch test, {family} of a plate with a fillet: error of u");
+        held(1, &what, "written by Gmsh", error, 0.0, 1e-12);
+    }
+}
+
+fn on_file(file: &str) -> Value {
+    let text = String::from_utf8(bytes(file)).unwrap();
+    json!({"gmsh": text})
+}
+
+/// Contact on each family. The forces of three coarse meshes of one body agree to their own error.
+#[test]
+fn a_block_pressed_on_gmshs_plate_bears_the_same_on_every_family() {
+    let forces: Vec<[f64; 2]> = FAMILIES
+        .iter()
+        .map(|family| {
+            let mut mesh = on_file(&format!("fillet-{family}-msh22-ascii"));
+            mesh["refine"] = json!(1);
+            let text = json!({
+                "analysis": {"kind": "plane_strain"},
+                "mesh": mesh,
+                "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+                "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+                "contacts": [{"boundary": "top", "obstacle": {"kind": "parabola", "radius": 5, "center": 1},
+                    "indentation": 0.05, "tangential_displacement": 0.01,
+                    "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}}],
+            });
+            let summary = crate::support::solve(&problem(&text.to_string())).summary;
+            assert!(summary.residuals.equilibrium < 1e-9);
+            [summary.normal_force, summary.tangential_force]
+        })
+        .collect();
+    for pair in forces.windows(2) {
+        for k in 0..2 {
+            assert!((pair[0][k] / pair[1][k] - 1.0).abs() < 0.02, "{forces:?}");
+        }
+    }
+}
+
+/// Hertz's cylinder on unstructured triangles: from the load found, half-width and peak pressure follow,
+/// a = √(4PR/πE*), p₀ = √(PE*/πR), and p = p₀ √(1 − x²/a²).
+#[test]
+fn hertz_on_an_unstructured_mesh_of_triangles() {
+    let (mesh, notes) = read("hertz-tri6-msh41-binary");
+    // its outline runs clockwise, and so do its elements
+    assert_eq!(notes, ["elements_reversed"]);
+    let inline =
+        json!({"nodes": mesh.nodes, "elements": mesh.elements, "boundaries": mesh.boundaries});
+    let text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"inline": inline},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "axis", "ux": 0}, {"boundary": "base", "ux": 0, "uy": 0}],
+        "contacts": [{"boundary": "contact", "indentation": 0.2, "obstacle": {"kind": "parabola", "radius": 8}}],
+    });
+    let solution = crate::support::solve(&problem(&text.to_string()));
+    let (modulus, radius, pi) = (1000.0 / 0.91, 8.0, std::f64::consts::PI);
+    let load = 2.0 * solution.summary.normal_force;
+    let half_width = f64::sqrt(4.0 * load * radius / (pi * modulus));
+    let p0 = f64::sqrt(load * modulus / (pi * radius));
+    let contact = &solution.summary.contacts["contact"];
+    let peak = -contact.peak_normal_stress.unwrap().value;
+    let what = format!("{} unstructured T6, h = .05", mesh.elements.len());
+    held(
+        9,
+        "Hertz's cylinder on triangles: peak pressure",
+        &what,
+        peak,
+        p0,
+        1e-2,
+    );
+    let profile = &solution.profiles["contact"];
+    let worst = (0..profile.x.len())
+        .filter(|&i| profile.x[i] < 0.8 * half_width)
+        .map(|i| {
+            let exact = p0 * (1.0 - (profile.x[i] / half_width).powi(2)).sqrt();
+            (-profile.normal_stress[i] - exact).abs() / p0
+        })
+        .fold(0.0, f64::max);
+    held(
+        9,
+        "Hertz's cylinder on triangles: largest error of pressure within .8 a, of p₀",
+        &what,
+        worst,
+        0.0,
+        1e-2,
+    );
+    let [_, end] = contact.contact[0];
+    assert!(
+        (end - half_width).abs() < 0.05,
+        "a = {end}, Hertz says {half_width}"
+    );
+}
+
+/// Boundaries by rule where the file names none.
+#[test]
+fn boundaries_are_found_by_box_and_by_normal() {
+    let mut mesh = on_file("fillet-tri6-msh41-ascii");
+    mesh["boundaries"] = json!({
+        "up": {"normal": [0, 1]},
+        "step": {"normal": [0, 1], "box": [[2.4, 2], [4, 0.9]]},
+        "round": {"normal": [1, 1], "angle": 50, "x": [2, 2.5], "y": [1, 1.5]},
+        "low": {"y": [0, 0]},
+    });
+    let text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": mesh,
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "low", "ux": 0, "uy": 0}],
+    });
+    let model = solver::model::Model::new(&problem(&text.to_string()), None).unwrap();
+    let length = |name: &str| -> f64 {
+        let chord = |edge: &[u32; 3]| {
+            let [[x0, y0], [x1, y1], _] = model.mesh.edge_nodes(edge);
+            (x1 - x0).hypot(y1 - y0)
+        };
+        model.mesh.boundaries[name].iter().map(chord).sum()
+    };
+    for (name, exact) in [("up", 3.5), ("step", 1.5), ("low", 4.0)] {
+        assert!(
+            (length(name) - exact).abs() < 1e-12,
+            "{name}: {}",
+            length(name)
+        );
+    }
+    assert_eq!(
+        model.mesh.boundaries["round"].len(),
+        model.mesh.boundaries["fillet"].len()
+    );
+}
+
+/// What is wrong with a file is said with its line, its numbers and what would be right.
+#[test]
+fn a_broken_file_is_refused_with_its_line() {
+    let good = String::from_utf8(bytes("fillet-mixed-msh22-ascii")).unwrap();
+    let said = |text: &str| {
+        let Err(solver::io::ReadError::Invalid(list)) = gmsh::read(text.as_bytes()) else {
+            panic!("a broken file was read");
+        };
+        format!("{}: {}; {}", list[0].reason, list[0].got, list[0].expected)
+    };
+    let line = |n: usize| good.lines().nth(n - 1).unwrap();
+    let nodes = 1 + good.lines().position(|l| l == "$Nodes").unwrap();
+    let third = line(nodes + 4);
+    let broken = third.replacen(' ', " x", 1);
+    assert_eq!(
+        said(&good.replacen(third, &broken, 1)),
+        format!(
+            "malformed: line {}: `{}`; x",
+            nodes + 4,
+            broken.split(' ').nth(1).unwrap()
+        )
+    );
+    assert!(
+        said(&good.replacen("2.2 0 8", "3.1 0 8", 1))
+            .starts_with("unsupported: line 2: MSH 3.1; MSH 2.2 or 4.1")
+    );
+    assert!(said(&good[..good.len() / 2]).starts_with("truncated"));
+    assert!(said("cube.geo").starts_with("malformed: line 1: `cube.geo`; $MeshFormat"));
+    assert!(
+        said(&good.replacen(
+            third,
+            &third.replacen(" 0", " 7", 2).replace(" 07", " 7"),
+            1
+        ))
+        .contains("z = ")
+    );
+    let elements = 1 + good.lines().position(|l| l == "$Elements").unwrap();
+    let last = line(elements + 60);
+    let stray = format!(
+        "{} 99999",
+        last.rsplit_once(' ').map_or("", |(start, _)| start)
+    );
+    assert!(
+        said(&good.replacen(last, &stray, 1)).contains("node 99999 in element"),
+        "{stray}"
+    );
+    let mut three_d: Vec<&str> = last.split(' ').collect();
+    three_d[1] = "11";
+    assert!(said(&good.replacen(last, &three_d.join(" "), 1)).contains("three dimensions"));
+}
