@@ -3,6 +3,7 @@
 //! Each test opens with its source, its goal and the reason of its tolerance.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod abaqus_files;
 mod adaptive;
 mod annular_punch;
 mod balance;

@@ -24,7 +24,7 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The problem, a JSON file
+    /// The problem: a JSON file, or an Abaqus or CalculiX deck (.inp)
     file: PathBuf,
 
     /// Write the result there: .json the whole of it, .svg the stress profile as a figure; - is
@@ -55,7 +55,15 @@ pub(super) fn run(
     let start = Instant::now();
     let text =
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let problem = match solver::parse(&text) {
+    let deck = file
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("inp"));
+    let read = if deck {
+        solver::io::abaqus::problem(&text)
+    } else {
+        solver::parse(&text)
+    };
+    let problem = match read {
         Ok(problem) => problem,
         Err(violations) => return Ok(invalid(file, &violations)),
     };

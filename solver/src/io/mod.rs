@@ -1,5 +1,6 @@
 //! What comes in and what goes out: readers and `String`s, never paths.
 
+pub mod abaqus;
 pub mod gmsh;
 pub mod json;
 pub mod plot;

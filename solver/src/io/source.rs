@@ -159,21 +159,41 @@ pub(super) struct Labels {
 }
 
 impl Labels {
-    /// The next node has this number; false if another has it already.
+    /// The next node has this number; false, and nothing done, if another has it already.
     pub(super) fn add(&mut self, label: u64) -> bool {
+        if self.get(label).is_some() {
+            return false;
+        }
         let place = self.count;
-        let taken = match usize::try_from(label) {
+        match usize::try_from(label) {
             Ok(label) if label <= 4 * place as usize + 1024 => {
                 if self.dense.len() <= label {
                     self.dense.resize(label + 1, u32::MAX);
                 }
-                let old = std::mem::replace(&mut self.dense[label], place);
-                old != u32::MAX || self.sparse.contains_key(&(label as u64))
+                self.dense[label] = place;
             }
-            _ => self.sparse.insert(label, place).is_some(),
-        };
+            _ => {
+                self.sparse.insert(label, place);
+            }
+        }
         self.count += 1;
-        !taken
+        true
+    }
+
+    /// The places of all numbers first, first + step, … up to last. A range may be as wide as numbers
+    /// go: what is looked at are the numbers that exist.
+    pub(super) fn range(&self, first: u64, last: u64, step: u64) -> Vec<u32> {
+        let inside =
+            |label: u64| label >= first && label <= last && (label - first).is_multiple_of(step);
+        let dense = (0u64..)
+            .zip(&self.dense)
+            .filter(|(_, place)| **place != u32::MAX);
+        let sparse = self.sparse.iter().map(|(label, place)| (*label, place));
+        dense
+            .chain(sparse)
+            .filter(|(label, _)| inside(*label))
+            .map(|(_, place)| *place)
+            .collect()
     }
 
     /// The place of a node in the file.

@@ -32,6 +32,8 @@ pub struct RawMesh {
     pub node_sets: BTreeMap<String, Vec<u32>>,
     /// 9-node quadrilaterals that lost their centre node.
     pub without_centre: usize,
+    /// A set of nodes that holds whole sides of the surface is a boundary too.
+    pub sets_span_boundaries: bool,
 }
 
 /// The mesh and what was changed on the way, or everything that is wrong with it. Pointers are empty:
@@ -112,6 +114,19 @@ pub fn build(mut raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
             boundaries.insert(name, edges);
         }
     }
+    if raw.sets_span_boundaries {
+        for (name, set) in &raw.node_sets {
+            let held = |node: &u32| set.binary_search(node).is_ok();
+            let edges: Vec<Edge> = surface
+                .iter()
+                .filter(|e| e.iter().all(held))
+                .copied()
+                .collect();
+            if !edges.is_empty() {
+                boundaries.entry(name.clone()).or_insert(edges);
+            }
+        }
+    }
     let mesh = Mesh {
         nodes: raw.nodes,
         elements: raw.elements,
@@ -190,21 +205,35 @@ fn second_order(raw: &mut RawMesh) -> usize {
             middles.insert(key(a, b), mid);
         }
     }
+    let old = raw.nodes.len() as u32;
     for element in raw.elements.iter_mut().filter(|e| lacks(e)) {
         let corners = element.family().corners();
-        let old = *element;
+        let before = *element;
         let nodes: &mut [u32] = match element {
             Element::Quad(nodes) => nodes,
             Element::Triangle(nodes) => nodes,
         };
         for k in 0..corners {
-            let (a, b) = (old[k], old[(k + 1) % corners]);
+            let (a, b) = (before[k], before[(k + 1) % corners]);
             nodes[corners + k] = *middles.entry(key(a, b)).or_insert_with(|| {
                 let [p, q] = [a, b].map(|n| raw.nodes[n as usize]);
                 raw.nodes.push([0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]);
                 raw.node_labels.push(0); // no line of the file has it
                 raw.nodes.len() as u32 - 1
             });
+        }
+    }
+    // between two corners of a set the new midside belongs to it, as the straight side did
+    if raw.sets_span_boundaries {
+        for set in raw.node_sets.values_mut() {
+            set.sort_unstable();
+            let held = |node: u32| set.binary_search(&node).is_ok();
+            let between = |((a, b), mid): (&(u32, u32), &u32)| {
+                (*mid >= old && held(*a) && held(*b)).then_some(*mid)
+            };
+            let mut new: Vec<u32> = middles.iter().filter_map(between).collect();
+            new.sort_unstable();
+            set.extend(new);
         }
     }
     lacking

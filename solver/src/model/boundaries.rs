@@ -2,7 +2,7 @@
 
 use super::findings::{ALIGNED, Findings};
 use crate::error::{Violation, escape};
-use crate::io::{ReadError, gmsh};
+use crate::io::{ReadError, abaqus, gmsh};
 use crate::mesh::{self, Edge, Mesh};
 use crate::problem::{AdaptiveRefine, Analysis, BoundaryPart, BoundaryValue, MeshInput, Refine};
 use crate::solution::Warning;
@@ -201,6 +201,9 @@ impl Findings {
         }
         if let Some(text) = &input.gmsh {
             return self.file("/mesh/gmsh", gmsh::read(text.as_bytes()));
+        }
+        if let Some(text) = &input.abaqus {
+            return self.file("/mesh/abaqus", abaqus::read(text.as_bytes()));
         }
         if stored.is_none() {
             self.say(

@@ -1,0 +1,29 @@
+//! Decks of Abaqus and CalculiX (`.inp`): nodes, elements, sets and surfaces, and what of the analysis
+//! maps onto ours.
+//!
+//! Written by hand: there is no crate for the format. A keyword begins with `*`, a comment with `**`,
+//! data lines follow their keyword; names are compared without regard to case, as both programs do,
+//! and kept as they were first written.
+
+mod deck;
+mod problem;
+
+pub use problem::problem;
+
+use std::io::BufRead;
+
+use super::source::ReadError;
+use crate::mesh::{self, Mesh};
+use crate::solution::Warning;
+
+/// Reads the mesh of a deck, with what was changed on the way. What the deck says of the analysis is
+/// not looked at, but that the sets and faces it loads have names: `SET P3` for a pressure on the third
+/// sides of the elements of SET, `7` for the node 7.
+pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
+    let deck = deck::Deck::read(reader)?;
+    let (raw, faults) = deck.into_raw();
+    if !faults.is_empty() {
+        return Err(ReadError::Invalid(faults));
+    }
+    mesh::build(raw).map_err(ReadError::Invalid)
+}

@@ -1,0 +1,241 @@
+//! A deck as a whole problem: what is not understood is an error with its line.
+
+use super::deck::{Deck, Elastic, ElementType, Section, Theory};
+use crate::error::Violation;
+use crate::io::source::ReadError;
+use crate::problem::{
+    Analysis, BoundaryValue, Load, Material, MeshInput, Orthotropic, Problem, SolverControls,
+    Support,
+};
+
+/// The problem that a deck states: one linear static step, without contact. The text itself becomes
+/// the problem's mesh.
+pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
+    let mut deck = match Deck::read(text.as_bytes()) {
+        Ok(deck) => deck,
+        Err(ReadError::Invalid(faults)) => return Err(faults),
+        Err(ReadError::Io(error)) => {
+            return Err(vec![Violation {
+                pointer: String::new(),
+                reason: "malformed".to_owned(),
+                got: error.to_string(),
+                expected: "a readable text".to_owned(),
+                hint: "Save the deck again.".to_owned(),
+            }]);
+        }
+    };
+    let analysis = analysis(&mut deck);
+    let quadrature = quadrature(&mut deck);
+    let materials = materials(&mut deck);
+    if deck.steps != 1 {
+        let got = format!("{} steps", deck.steps);
+        deck.doubt(
+            0,
+            got,
+            "one *STEP",
+            "Write the load steps in a problem of our own.",
+        );
+    }
+    let supports = supports(&deck);
+    let loads = loads(&mut deck, &analysis);
+    let (title, doubts) = (deck.title.take(), std::mem::take(&mut deck.doubts));
+    let (_, mut faults) = deck.into_raw();
+    faults.extend(doubts);
+    if !faults.is_empty() {
+        return Err(faults);
+    }
+    Ok(Problem {
+        title,
+        analysis,
+        mesh: MeshInput {
+            abaqus: Some(text.to_owned()),
+            ..MeshInput::default()
+        },
+        materials,
+        supports,
+        loads,
+        contacts: Vec::new(),
+        steps: Vec::new(),
+        quadrature,
+        solver: SolverControls::default(),
+    })
+}
+
+fn analysis(deck: &mut Deck) -> Analysis {
+    let theory = deck
+        .types
+        .first()
+        .map_or(Theory::PlaneStrain, |kind| kind.theory);
+    if deck.types.iter().any(|kind| kind.theory != theory) {
+        deck.doubt(
+            0,
+            "elements of different theories",
+            "one of CPE, CPS, CAX throughout",
+            "Choose one.",
+        );
+    }
+    let first = deck.sections.first().and_then(|section| section.thickness);
+    let thicknesses: Vec<(u64, Option<f64>)> = deck
+        .sections
+        .iter()
+        .map(|s| (s.line, s.thickness))
+        .collect();
+    for (line, thickness) in thicknesses {
+        let wanted = match theory {
+            Theory::PlaneStress => first.unwrap_or(1.0),
+            _ => 1.0,
+        };
+        if theory != Theory::Axisymmetric && thickness.unwrap_or(1.0) != wanted {
+            deck.doubt(
+                line,
+                format!("a thickness of {}", thickness.unwrap_or(1.0)),
+                &format!("{wanted}"),
+                "Plane strain is per unit of thickness, and a sheet has one thickness.",
+            );
+        }
+    }
+    match theory {
+        Theory::PlaneStrain => Analysis::PlaneStrain {},
+        Theory::PlaneStress => Analysis::PlaneStress {
+            thickness: first.unwrap_or(1.0),
+        },
+        Theory::Axisymmetric => Analysis::Axisymmetric {},
+    }
+}
+
+/// The rule of the quadrilaterals; where there are none that of the triangles, which Abaqus and CalculiX
+/// integrate with three points. In a mixture triangles get the larger rule: no worse, but not the same.
+fn quadrature(deck: &mut Deck) -> u32 {
+    if deck.types.iter().all(ElementType::is_triangle) {
+        return 2;
+    }
+    deck.types.retain(|kind| !kind.is_triangle());
+    let reduced = deck.types.iter().filter(|kind| kind.reduced).count();
+    if reduced != 0 && reduced != deck.types.len() {
+        deck.doubt(
+            0,
+            "elements of full and of reduced integration",
+            "one of both",
+            "Take off the R.",
+        );
+    }
+    if reduced > 0 { 2 } else { 3 }
+}
+
+fn materials(deck: &mut Deck) -> Vec<Material> {
+    let mut materials = Vec::new();
+    for section in deck.sections.clone() {
+        let Some(elastic) = deck.materials.get(&section.material).cloned() else {
+            let got = format!("the material `{:.60}`", section.material);
+            deck.doubt(section.line, got, "a *MATERIAL with *ELASTIC", "Define it.");
+            continue;
+        };
+        match material(&section, &elastic) {
+            Some(material) => materials.push(material),
+            None => {
+                let got = format!("{} elastic constants", elastic.values.len());
+                deck.doubt(
+                    elastic.line,
+                    got,
+                    "E, ν; or E1, E2, E3, ν12, ν13, ν23, G12, G13, G23; at one temperature",
+                    "Correct the constants.",
+                );
+            }
+        }
+    }
+    materials
+}
+
+fn material(section: &Section, elastic: &Elastic) -> Option<Material> {
+    let named = Material {
+        group: Some(section.elements.clone()),
+        name: Some(section.material.clone()),
+        ..Material::default()
+    };
+    // a temperature may follow
+    match (elastic.engineering_constants, &elastic.values[..]) {
+        (false, [e, nu] | [e, nu, _]) => Some(Material {
+            youngs_modulus: Some(*e),
+            poissons_ratio: Some(*nu),
+            ..named
+        }),
+        (
+            true,
+            [e1, e2, e3, nu12, nu13, nu23, g12, _, _]
+            | [e1, e2, e3, nu12, nu13, nu23, g12, _, _, _],
+        ) => Some(Material {
+            orthotropic: Some(Orthotropic {
+                e1: *e1,
+                e2: *e2,
+                nu12: *nu12,
+                g12: *g12,
+                angle: 0.0,
+                e3: Some(*e3),
+                nu13: Some(*nu13),
+                nu23: Some(*nu23),
+            }),
+            ..named
+        }),
+        _ => None,
+    }
+}
+
+/// One support for each row; a later row for the same nodes and component takes the earlier one's place.
+fn supports(deck: &Deck) -> Vec<Support> {
+    let mut supports: Vec<Support> = Vec::new();
+    for row in &deck.prescribed {
+        let nodes = Deck::name_of(&row.target, None);
+        let known = supports
+            .iter()
+            .position(|s| s.nodes.as_ref() == Some(&nodes));
+        let place = known.unwrap_or_else(|| {
+            supports.push(Support {
+                nodes: Some(nodes),
+                ..Support::default()
+            });
+            supports.len() - 1
+        });
+        let value = Some(BoundaryValue::Constant(row.value));
+        let (first, last) = row.components;
+        if first == 1 {
+            supports[place].ux = value;
+        }
+        if last == 2 {
+            supports[place].uy = value;
+        }
+    }
+    supports
+}
+
+fn loads(deck: &mut Deck, analysis: &Analysis) -> Vec<Load> {
+    let mut loads: Vec<Load> = deck
+        .pressures
+        .iter()
+        .map(|row| Load {
+            boundary: Some(Deck::name_of(&row.target, row.side)),
+            pressure: Some(BoundaryValue::Constant(row.value)),
+            ..Load::default()
+        })
+        .collect();
+    for row in deck.forces.clone() {
+        if matches!(analysis, Analysis::Axisymmetric {}) {
+            deck.doubt(
+                row.line,
+                "*CLOAD on a body of revolution",
+                "a pressure",
+                "Programs differ in what part of the ring it acts on.",
+            );
+        }
+        let force = if row.component == 1 {
+            [row.value, 0.0]
+        } else {
+            [0.0, row.value]
+        };
+        loads.push(Load {
+            nodes: Some(Deck::name_of(&row.target, None)),
+            force: Some(force),
+            ..Load::default()
+        });
+    }
+    loads
+}

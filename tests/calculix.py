@@ -1,0 +1,64 @@
+"""Runs decks unchanged in CalculiX and in Signorini and compares the displacements of every node.
+
+Usage: calculix.py SIGNORINI
+"""
+
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+# Relative to the largest displacement. In plane strain both are the same discretisation: seven printed
+# digits, and room for the rounding of coordinates. CalculiX makes bodies of revolution of a sector of two
+# degrees and sheets of a layer of bricks, whose thickness strain follows the bricks' shapes: there the
+# two agree as far as that approximation goes.
+ALLOWED = {"cpe": 1e-5, "cax": 5e-4, "cps": 1e-2}
+DECKS = pathlib.Path(__file__).parent / "data" / "abaqus"
+
+
+def calculix(deck, folder):
+    """Displacements by node number."""
+    (folder / deck.name).write_bytes(deck.read_bytes())
+    done = subprocess.run(["ccx", deck.stem], cwd=folder, capture_output=True, text=True, timeout=120)
+    table = folder / f"{deck.stem}.dat"
+    if done.returncode != 0 or not table.exists():
+        sys.exit(f"{deck.name}: CalculiX failed\n{done.stdout[-2000:]}")
+    rows = re.findall(r"^\s+(\d+)\s+(\S+)\s+(\S+)\s+\S+$", table.read_text(), re.M)
+    return {int(node): (float(x), float(y)) for node, x, y in rows}
+
+
+def signorini(program, deck, folder):
+    """Displacements by node number; nodes come in the order of the deck."""
+    out = folder / f"{deck.stem}.json"
+    subprocess.run([program, "solve", str(deck), "-o", str(out)], check=True, capture_output=True, timeout=120)
+    fields = json.loads(out.read_text())["fields"]
+    numbers = [int(n) for n in re.findall(r"^(\d+), \S+, \S+$", deck.read_text().split("*ELEMENT")[0], re.M)]
+    if len(numbers) != len(fields["ux"]):
+        sys.exit(f"{deck.name}: {len(numbers)} nodes in the deck, {len(fields['ux'])} in the result")
+    return dict(zip(numbers, zip(fields["ux"], fields["uy"])))
+
+
+def main():
+    program = str(pathlib.Path(sys.argv[1]).resolve())
+    decks = sorted(DECKS.glob("ring-*.inp"))
+    if not decks:
+        sys.exit("there is no deck")
+    failed = False
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        for deck in decks:
+            theirs, ours = calculix(deck, folder), signorini(program, deck, folder)
+            if theirs.keys() != ours.keys():
+                sys.exit(f"{deck.name}: the nodes differ")
+            size = max(abs(u) for pair in theirs.values() for u in pair)
+            off = max(abs(a - b) for node in theirs for a, b in zip(theirs[node], ours[node])) / size
+            allowed = ALLOWED[deck.stem.split("-")[1][:3]]
+            failed |= not off <= allowed
+            print(f"{deck.stem:12} {len(ours):4} nodes, largest difference {off:.1e} of {size:.4f}, allowed {allowed:.0e}")
+    if failed:
+        sys.exit("CalculiX and Signorini differ")
+
+
+main()

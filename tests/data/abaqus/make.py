@@ -1,0 +1,73 @@
+"""Writes the decks of this folder: a quarter ring held at one end, pressed inside and pulled at the
+other, in every theory and family that CalculiX and we share. CalculiX runs them as they are."""
+
+import math
+import pathlib
+
+HERE = pathlib.Path(__file__).parent
+ROUND, THICK = 6, 3  # elements along the quarter and across the wall
+
+
+def deck(name, kind, step, thickness=None):
+    """step 2: midside nodes lie on the arcs; triangles are quadrilaterals cut in two."""
+    triangles, axisymmetric = kind[3] == "6", kind.startswith("CAX")
+    number, nodes = {}, []
+    for j in range(2 * THICK + 1):
+        for i in range(2 * ROUND + 1):
+            centre = i % 2 and j % 2
+            if centre and not triangles:
+                continue
+            angle, radius = 0.5 * math.pi * i / (2 * ROUND), 1 + 0.5 * j / THICK
+            label = 1000 * (j + 1) + i + 1  # numbers with gaps
+            number[i, j] = label
+            shift = 3 if axisymmetric else 0
+            nodes.append((label, shift + radius * math.sin(angle), radius * math.cos(angle)))
+    elements, inner, label = [], [], 0
+    for j in range(0, 2 * THICK, 2):
+        for i in range(0, 2 * ROUND, 2):
+            n = lambda di, dj: number[i + di, j + dj]
+            # counter-clockwise: along the quarter is clockwise, outwards is up
+            corners = [(0, 0), (2, 0), (2, 2), (0, 2)]
+            if triangles:
+                cells = [
+                    [(0, 0), (2, 0), (2, 2), (1, 0), (2, 1), (1, 1)],
+                    [(0, 0), (2, 2), (0, 2), (1, 1), (1, 2), (0, 1)],
+                ]
+            else:
+                cells = [corners + [(1, 0), (2, 1), (1, 2), (0, 1)]]
+            for k, cell in enumerate(cells):
+                label += 1
+                elements.append((label, [n(*place) for place in cell]))
+                if j == 0 and k == 0:
+                    inner.append(label)
+    first, last = number[0, 0], number[2 * ROUND, 0]
+    fixed = [number[0, j] for j in range(2 * THICK + 1) if (0, j) in number]
+    end = [number[2 * ROUND, j] for j in range(2 * THICK + 1) if (2 * ROUND, j) in number]
+    lines = ["*HEADING", f"Quarter ring, {kind}", "** written by make.py", "*NODE, NSET=Nall"]
+    lines += [f"{label}, {x:.12g}, {y:.12g}" for label, x, y in nodes]
+    lines += [f"*ELEMENT, TYPE={kind}, ELSET=Eall"]
+    for label, cell in elements:
+        # data lines may go on
+        lines += [f"{label}, " + ", ".join(map(str, cell[:4])) + ",", ", ".join(map(str, cell[4:]))]
+    lines += ["*NSET, NSET=fixed"] + [f"{n}," for n in fixed]
+    lines += ["*NSET, NSET=end"] + [f"{n}," for n in end]
+    lines += ["*NSET, NSET=inside, GENERATE", f"{first}, {last}, 1"]
+    lines += ["*ELSET, ELSET=inner"] + [f"{e}," for e in inner]
+    lines += ["*MATERIAL, NAME=steel", "*ELASTIC", "2.1D3, .3", "*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL"]
+    lines += [f"{thickness}," if thickness else ","]
+    lines += ["*BOUNDARY", "Fixed, 1, 2" if not axisymmetric else "fixed, 2, 2"]
+    lines += ["*STEP", "*STATIC", "*DLOAD", "INNER, P1, 5."]
+    if axisymmetric:
+        lines += ["*BOUNDARY", "end, 2, 2, -.01"]
+    else:
+        lines += ["*BOUNDARY", "end, 1, 1, .02", "*CLOAD", f"{number[ROUND - ROUND % 2, 2 * THICK]}, 2, -1.5"]
+    lines += ["*NODE PRINT, NSET=NALL", "U", "*NODE FILE", "U", "*END STEP", ""]
+    (HERE / f"{name}.inp").write_text("\n".join(lines))
+
+
+deck("ring-cpe8", "CPE8", 2)
+deck("ring-cpe8r", "CPE8R", 2)
+deck("ring-cps8", "CPS8", 2, thickness=0.25)
+deck("ring-cax8", "CAX8", 2)
+deck("ring-cpe6", "CPE6", 2)
+deck("ring-cps6", "CPS6", 2, thickness=0.25)
