@@ -480,7 +480,7 @@ mod tests {
             "{got}"
         );
         let mut raw = two_squares();
-        raw.nodes[5] = [-1.0, -1.0];
+        raw.nodes[5] = [0.4, 0.1];
         assert_eq!(said(raw).0, "inverted_element");
         assert_eq!(said(RawMesh::default()).0, "too_few");
     }
