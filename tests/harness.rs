@@ -146,6 +146,35 @@ impl Server {
         self.json(&format!("/v1/jobs/{id}")).await
     }
 
+    /// A DELETE.
+    pub fn delete(&self, path: &str) -> RequestBuilder {
+        self.client.delete(format!("{}{path}", self.url))
+    }
+
+    /// Bytes of memory that the process has, by a name of /proc: VmRSS now, VmHWM at most.
+    pub fn memory(&self, name: &str) -> u64 {
+        let pid = self.child.id().expect("it is running");
+        let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
+        let line = status.lines().find(|line| line.starts_with(name)).unwrap();
+        let kib: u64 = line.split_whitespace().nth(1).unwrap().parse().unwrap();
+        kib * 1024
+    }
+
+    /// CPU seconds that the process has used.
+    pub fn cpu_s(&self) -> f64 {
+        let pid = self.child.id().expect("it is running");
+        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
+        // user and system time, in ticks of 10 ms, behind the name in parentheses
+        let fields: Vec<&str> = stat
+            .rsplit(')')
+            .next()
+            .unwrap()
+            .split_whitespace()
+            .collect();
+        let ticks = |k: usize| fields[k].parse::<f64>().unwrap();
+        (ticks(11) + ticks(12)) / 100.0
+    }
+
     /// Asks a job to stop; gives the outcome and the job.
     pub async fn cancel(&self, id: &str) -> Value {
         let response = self

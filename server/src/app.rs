@@ -37,7 +37,14 @@ impl App {
                 "{interrupted} jobs were interrupted by the last end of the service"
             );
         }
-        let queue = Queue::new(store.clone(), solver::solve);
+        let orphans = store.remove_orphaned_mesh_pieces().await?;
+        if orphans > 0 {
+            info!(
+                orphans,
+                "{orphans} pieces of meshes were left by uploads that broke off"
+            );
+        }
+        let queue = Queue::new(store.clone(), solver::solve_on);
         let service = Arc::new(Service::new(config, store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;
         let router = rest::router(service, config.max_body_bytes, grpc);

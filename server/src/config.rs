@@ -47,6 +47,10 @@ pub struct Config {
     #[arg(long, env = "SIGNORINI_MAX_BODY_BYTES", default_value_t = 16 << 20, value_name = "BYTES")]
     pub max_body_bytes: usize,
 
+    /// Largest mesh file that can be uploaded
+    #[arg(long, env = "SIGNORINI_MAX_MESH_BYTES", default_value_t = 512 << 20, value_name = "BYTES")]
+    pub max_mesh_bytes: usize,
+
     /// After SIGTERM, open requests get this long to end; running jobs go back to the queue at once
     #[arg(
         long,

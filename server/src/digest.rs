@@ -41,6 +41,16 @@ pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<Strin
     Ok(hash.text())
 }
 
+/// A finished hash as it is written everywhere.
+pub fn sha256_text(hash: Sha256) -> String {
+    let hex: String = hash
+        .finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    format!("sha256:{hex}")
+}
+
 /// A history without its times.
 fn untimed(mut history: Value) -> Value {
     let rows = history.as_array_mut().into_iter().flatten();
@@ -67,13 +77,7 @@ impl Hash {
     }
 
     fn text(self) -> String {
-        let hex: String = self
-            .0
-            .finalize()
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
-        format!("sha256:{hex}")
+        sha256_text(self.0)
     }
 }
 

@@ -52,6 +52,9 @@ pub enum ApiError {
     /// A body in a format that is not understood.
     #[error("expected a body of type application/json, got {0}")]
     UnsupportedMedia(String),
+    /// Jobs that wait or run need the mesh.
+    #[error("jobs that wait or run need this mesh; cancel them or let them end first")]
+    MeshInUse,
     /// The job is not done.
     #[error("the job is {0}; its result comes when it is done")]
     ResultNotReady(&'static str),
@@ -124,6 +127,7 @@ impl ApiError {
             ApiError::NoResult(_)             => ("no-result",          "The job has no result",             404, Code::NotFound,           None),
             ApiError::MethodNotAllowed        => ("method-not-allowed", "Method not allowed",                405, Code::Unimplemented,      None),
             ApiError::NotAcceptable(_)        => ("not-acceptable",     "No such format",                    406, Code::Unimplemented,      None),
+            ApiError::MeshInUse               => ("job-active",         "Jobs need it",                      409, Code::FailedPrecondition, None),
             ApiError::ResultNotReady(_)       => ("result-not-ready",   "The result is not ready",           409, Code::FailedPrecondition, Some(1)),
             ApiError::PayloadTooLarge { .. }  => ("payload-too-large",  "The body is too large",             413, Code::OutOfRange,         None),
             ApiError::ProblemTooLarge { .. }  => ("problem-too-large",  "The problem is too large",          413, Code::OutOfRange,         None),

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use solver::{
     error::SolveError,
+    mesh::Mesh,
     problem::Problem,
     solution::{
         ContactCount, ContactProfile, ErrorEstimate, Fields, ForcePair, FrictionCount, Iteration,
@@ -116,7 +117,11 @@ pub(crate) fn iteration(k: u32) -> Iteration {
 }
 
 /// Solves anything at once, as [`solution`].
-pub(crate) fn solve(_: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
+pub(crate) fn solve(
+    _: &Problem,
+    _: Option<&Mesh>,
+    observe: &mut Observer<'_>,
+) -> Result<Solution, SolveError> {
     let mut solution = solution();
     for phase in [Phase::Mesh, Phase::Factor, Phase::Iterate] {
         if observe(Progress::Phase(phase)).is_break() {
@@ -136,6 +141,7 @@ pub(crate) fn solve(_: &Problem, observe: &mut Observer<'_>) -> Result<Solution,
 /// Iterates until it is stopped.
 pub(crate) fn solve_until_stopped(
     _: &Problem,
+    _: Option<&Mesh>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     let mut solution = solution();
@@ -153,6 +159,7 @@ pub(crate) fn solve_until_stopped(
 /// Panics, as no solver should.
 pub(crate) fn solve_with_a_panic(
     _: &Problem,
+    _: Option<&Mesh>,
     _: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     unreachable!("the fake solver panics on purpose")

@@ -5,7 +5,7 @@ use std::{pin::Pin, sync::Arc};
 use axum::Router;
 use futures_util::{Stream, StreamExt};
 use solver::{error::Violation, problem::Problem};
-use tonic::{Request, Response, Status, service::Routes};
+use tonic::{Request, Response, Status, Streaming, service::Routes};
 use tonic_health::server::HealthReporter;
 
 use crate::{
@@ -19,7 +19,7 @@ use crate::{
     verbs::{
         Service,
         jobs::{self, Envelope, MAX_PAGE_SIZE, PAGE_SIZE},
-        problems, results,
+        meshes, problems, results,
     },
     violations,
 };
@@ -106,7 +106,7 @@ impl JobService for Grpc {
     ) -> Reply<pb::ListJobsResponse> {
         let pb::ListJobsRequest {
             status: numbers,
-            page_size,
+            page_size: size,
             page_token,
         } = request.into_inner();
         let statuses = numbers
@@ -116,13 +116,7 @@ impl JobService for Grpc {
                     .ok_or_else(|| bad("status", number, "a value of the enum other than 0"))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let page_size = match i64::from(page_size) {
-            0 => PAGE_SIZE,
-            size if (1..=MAX_PAGE_SIZE).contains(&size) => size,
-            size => {
-                return Err(bad("page_size", size, "a number from 1 to 1000, or 0 for 50").into());
-            }
-        };
+        let page_size = page_size(size)?;
         let token = Some(page_token.as_str()).filter(|token| !token.is_empty());
         let page = jobs::list(&self.service, &statuses, page_size, token).await?;
         Ok(Response::new(pb::ListJobsResponse {
@@ -190,6 +184,51 @@ impl JobService for Grpc {
             job: Some(job.into()),
         }))
     }
+
+    async fn upload_mesh(
+        &self,
+        request: Request<Streaming<pb::UploadMeshRequest>>,
+    ) -> Reply<pb::UploadMeshResponse> {
+        let broken =
+            |status: Status| ApiError::MalformedJson(format!("the stream broke off: {status}"));
+        let pieces = request
+            .into_inner()
+            .map(|piece| piece.map(|piece| piece.data).map_err(broken));
+        let (mesh, new) = meshes::upload(&self.service, pieces).await?;
+        Ok(Response::new(pb::UploadMeshResponse {
+            mesh: Some(mesh.into()),
+            known: !new,
+        }))
+    }
+
+    async fn get_mesh(&self, request: Request<pb::GetMeshRequest>) -> Reply<pb::MeshInfo> {
+        let mesh = meshes::get(&self.service, &request.into_inner().hash).await?;
+        Ok(Response::new(mesh.into()))
+    }
+
+    async fn list_meshes(
+        &self,
+        request: Request<pb::ListMeshesRequest>,
+    ) -> Reply<pb::ListMeshesResponse> {
+        let pb::ListMeshesRequest {
+            page_size: size,
+            page_token,
+        } = request.into_inner();
+        let token = Some(page_token.as_str()).filter(|token| !token.is_empty());
+        let page = meshes::list(&self.service, page_size(size)?, token).await?;
+        Ok(Response::new(pb::ListMeshesResponse {
+            meshes: page.meshes.into_iter().map(Into::into).collect(),
+            next_page_token: page.next.unwrap_or_default(),
+        }))
+    }
+
+    async fn delete_mesh(
+        &self,
+        request: Request<pb::DeleteMeshRequest>,
+    ) -> Reply<pb::DeleteMeshResponse> {
+        meshes::delete(&self.service, &request.into_inner().hash).await?;
+        Ok(Response::new(pb::DeleteMeshResponse {}))
+    }
 }
 
 /// The problem of a request, or what is wrong with it, with pointers into the request.
@@ -207,6 +246,18 @@ async fn problem(
 fn id(text: &str) -> Result<JobId, ApiError> {
     JobId::parse(text)
         .ok_or_else(|| ApiError::NotFound(format!("there is no job {:?}", violations::name(text))))
+}
+
+fn page_size(asked: i32) -> Result<i64, ApiError> {
+    match i64::from(asked) {
+        0 => Ok(PAGE_SIZE),
+        size if (1..=MAX_PAGE_SIZE).contains(&size) => Ok(size),
+        size => Err(bad(
+            "page_size",
+            size,
+            "a number from 1 to 1000, or 0 for 50",
+        )),
+    }
 }
 
 fn wait(wait_s: Option<f64>) -> Result<Option<f64>, ApiError> {

@@ -4,6 +4,7 @@
 // What everybody may know: points in time, a job and its moves, what its watchers are told.
 pub mod event;
 pub mod job;
+pub mod mesh;
 pub mod time;
 
 // What a request can be told went wrong, and what can be set.

@@ -6,6 +6,7 @@ use std::{collections::BTreeMap, ops::ControlFlow, time::Instant};
 use serde::{Deserialize, Serialize};
 use solver::{
     error::SolveError,
+    mesh::Mesh,
     problem::Problem,
     solution::{
         ContactProfile, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution,
@@ -50,19 +51,20 @@ pub struct Summary {
 pub type Timings = BTreeMap<String, f64>;
 
 /// The solver, or what stands in for it in a test.
-pub type Solve = fn(&Problem, &mut Observer<'_>) -> Result<Solution, SolveError>;
+pub type Solve = fn(&Problem, Option<&Mesh>, &mut Observer<'_>) -> Result<Solution, SolveError>;
 
 /// Solves `problem`, stamps each iteration with the seconds since the start and measures the
-/// phases. `parse_s`: seconds that reading the problem took, the caller's own phase.
+/// phases. `stored`: the mesh that it names by its hash. `parse_s`: seconds that reading the problem took, the caller's own phase.
 pub fn run(
     problem: &Problem,
+    stored: Option<&Mesh>,
     parse_s: f64,
     solve: Solve,
     on_progress: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Document, SolveError> {
     let mut watch = Stopwatch::new(parse_s);
     let mut broken = false;
-    let solved = solve(problem, &mut |mut progress| {
+    let solved = solve(problem, stored, &mut |mut progress| {
         match &mut progress {
             Progress::Phase(phase) => watch.enter(*phase),
             Progress::Iteration(row) => {
@@ -198,7 +200,7 @@ mod tests {
     #[test]
     fn every_iteration_is_stamped_and_every_phase_has_a_time() {
         let mut stamps = vec![];
-        let document = run(&fake::problem(), 0.5, fake::solve, &mut |progress| {
+        let document = run(&fake::problem(), None, 0.5, fake::solve, &mut |progress| {
             if let Progress::Iteration(row) = progress {
                 stamps.push(row.wall_s);
             }
@@ -214,7 +216,7 @@ mod tests {
     #[test]
     fn the_same_problem_has_the_same_digest() {
         let digest = |_| {
-            run(&fake::problem(), 0.0, fake::solve, &mut |_| {
+            run(&fake::problem(), None, 0.0, fake::solve, &mut |_| {
                 ControlFlow::Continue(())
             })
             .unwrap()
@@ -226,7 +228,7 @@ mod tests {
 
     #[test]
     fn a_summary_is_read_back_as_it_was_written() {
-        let summary = run(&fake::problem(), 0.0, fake::solve, &mut |_| {
+        let summary = run(&fake::problem(), None, 0.0, fake::solve, &mut |_| {
             ControlFlow::Continue(())
         })
         .unwrap()

@@ -106,4 +106,4 @@ fn begin_warning(observe: &mut Observer<'_>, warning: &Warning) -> Result<(), So
 }
 
 pub use io::json::{parse, schema};
-pub use model::estimate::{Estimate, estimate};
+pub use model::estimate::{Estimate, MeshSize, estimate};

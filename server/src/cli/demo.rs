@@ -30,6 +30,7 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         max_queued: 100,
         memory: MemoryBudget::default(),
         max_body_bytes: 16 << 20,
+        max_mesh_bytes: 16 << 20,
         grace_s: 5,
     };
     let app = App::start(&config).await?;

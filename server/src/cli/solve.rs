@@ -68,7 +68,7 @@ pub(super) fn run(
         Err(violations) => return Ok(invalid(file, &violations)),
     };
     let parse_s = start.elapsed().as_secs_f64();
-    let (estimate, budget_bytes) = (solver::estimate(&problem), memory.bytes());
+    let (estimate, budget_bytes) = (solver::estimate(&problem, None), memory.bytes());
     if estimate.memory_bytes > budget_bytes {
         let too_large = ApiError::ProblemTooLarge {
             estimate,
@@ -77,7 +77,7 @@ pub(super) fn run(
         eprintln!("{}: {too_large}", file.display());
         return Ok(Exit::Invalid);
     }
-    let solved = run::run(&problem, parse_s, solver::solve, &mut |progress| {
+    let solved = run::run(&problem, None, parse_s, solver::solve_on, &mut |progress| {
         match progress {
             Progress::Phase(phase) => eprintln!("{} …", run::phase_name(phase)),
             Progress::Iteration(row) => eprintln!("{}", report::iteration(row)),

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use prost_types::Timestamp;
 use solver::{
     error::Violation,
+    io::MeshFormat,
     problem::NormalOf,
     solution::{
         Comparison, ContactProfile, ContactSummary, ErrorEstimate, Iteration, NodeState, Outcome,
@@ -15,6 +16,7 @@ use solver::{
 use crate::{
     event::{Event, Payload},
     job::{Failure, Job, Progress, QueuePosition, Reason, ResultAvailable, Status},
+    mesh::{BoundaryInfo, MeshInfo},
     pb,
     run::{Summary, phase_name},
     time::Time,
@@ -181,6 +183,55 @@ impl From<Iteration> for pb::Iteration {
             contraction: row.contraction,
             inner: row.inner,
             wall_s: row.wall_s,
+        }
+    }
+}
+
+impl From<MeshInfo> for pb::MeshInfo {
+    fn from(mesh: MeshInfo) -> Self {
+        let MeshInfo {
+            hash,
+            format,
+            bytes,
+            nodes,
+            quadrilaterals,
+            triangles,
+            dofs,
+            extent: [x, y],
+            boundaries,
+            groups,
+            node_sets,
+            quality,
+            warnings,
+            created_at,
+        } = mesh;
+        let format = match format {
+            MeshFormat::Gmsh => pb::MeshFormat::Gmsh,
+            MeshFormat::Abaqus => pb::MeshFormat::Abaqus,
+            MeshFormat::Json => pb::MeshFormat::Json,
+        };
+        let range = |[start, end]: [f64; 2]| pb::Range { start, end };
+        let boundary =
+            |(name, BoundaryInfo { edges, length })| (name, pb::BoundaryInfo { edges, length });
+        pb::MeshInfo {
+            hash,
+            format: format.into(),
+            bytes,
+            nodes,
+            quadrilaterals,
+            triangles,
+            dofs,
+            extent_x: Some(range(x)),
+            extent_y: Some(range(y)),
+            boundaries: boundaries.into_iter().map(boundary).collect(),
+            groups,
+            node_sets,
+            quality: Some(pb::MeshQuality {
+                least_jacobian_ratio: quality.least_jacobian_ratio,
+                worst_element: quality.worst_element,
+            }),
+            warnings: warnings.into_iter().map(Into::into).collect(),
+            created_at: Some(created_at.into()),
         }
     }
 }

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use solver::{
     error::SolveError,
+    mesh::Mesh,
     problem::Problem,
     solution::{Observer, Outcome, Progress, Solution},
 };
@@ -45,6 +46,7 @@ impl Rig {
             title: problem.title.clone(),
             input_hash: digest::input_hash(&problem).unwrap(),
             problem: serde_json::to_string(&problem).unwrap(),
+            mesh: None,
         };
         let job = self.store.insert_job(&new, 10).await.unwrap();
         self.queue.wake();
@@ -143,7 +145,11 @@ async fn a_canceled_running_job_keeps_its_last_state() {
 }
 
 /// Settles where the forces do not balance.
-fn unbalanced(_: &Problem, _: &mut Observer<'_>) -> std::result::Result<Solution, SolveError> {
+fn unbalanced(
+    _: &Problem,
+    _: Option<&Mesh>,
+    _: &mut Observer<'_>,
+) -> std::result::Result<Solution, SolveError> {
     let mut solution = fake::solution();
     solution.summary.outcome = Outcome::FalseConvergence;
     solution.summary.converged = false;
@@ -172,7 +178,11 @@ async fn a_job_that_converged_to_no_balance_fails_and_keeps_its_result() {
 }
 
 /// At work in one long phase, with nothing to tell.
-fn busy(_: &Problem, observe: &mut Observer<'_>) -> std::result::Result<Solution, SolveError> {
+fn busy(
+    _: &Problem,
+    _: Option<&Mesh>,
+    observe: &mut Observer<'_>,
+) -> std::result::Result<Solution, SolveError> {
     while observe(Progress::Pulse).is_continue() {
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -198,10 +208,11 @@ async fn a_pulse_is_answered_and_not_recorded() {
 /// As one long factorisation: deaf for a second.
 fn deaf(
     problem: &Problem,
+    _: Option<&Mesh>,
     observe: &mut Observer<'_>,
 ) -> std::result::Result<Solution, SolveError> {
     std::thread::sleep(Duration::from_secs(1));
-    fake::solve(problem, observe)
+    fake::solve(problem, None, observe)
 }
 
 #[tokio::test]
@@ -351,6 +362,7 @@ async fn the_queue_is_ordered_by_priority_then_by_arrival() {
         title: None,
         input_hash: digest::input_hash(&problem).unwrap(),
         problem: serde_json::to_string(&problem).unwrap(),
+        mesh: None,
     };
     let mut jobs = vec![];
     for priority in [0, 5, 0, -1] {

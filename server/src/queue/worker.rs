@@ -6,6 +6,7 @@ use std::{
 
 use solver::{
     error::SolveError,
+    mesh::Mesh,
     problem::Problem,
     solution::{Outcome, Progress},
 };
@@ -18,7 +19,7 @@ use crate::{
     event::Payload,
     job::{Failure, Job, Reason, ResultAvailable, Status},
     run::{self, Document, Solve},
-    store::{Claim, Ending, Parts},
+    store::{Claim, Ending, Parts, Store},
     time::Time,
 };
 
@@ -49,13 +50,18 @@ pub(super) async fn work(queue: Arc<Queue>) {
 }
 
 /// One start of a job, from claim to end.
-async fn attempt(queue: &Arc<Queue>, Claim { job, problem, .. }: Claim, running: Running) {
+async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) {
+    let Claim {
+        job, problem, mesh, ..
+    } = claim;
     info!(job.id = %job.id, job.attempt, "job {} started", job.id);
     let (say, lines) = mpsc::channel(AHEAD);
     let stop = running.stop.clone();
     let solve = queue.solve;
+    let store = queue.store.clone();
     let solving = tokio::task::spawn_blocking(move || {
-        solve_aloud(&problem, solve, |payload| {
+        let mesh = mesh.map(|hash| stored_mesh(&store, &hash)).transpose()?;
+        solve_aloud(&problem, mesh.as_ref(), solve, |payload| {
             // An error means that the recorder is gone, and with it everybody who would listen.
             let heard = payload.is_none_or(|said| say.blocking_send((Time::now(), said)).is_ok());
             if heard && !stop.load(Ordering::Relaxed) {
@@ -64,6 +70,7 @@ async fn attempt(queue: &Arc<Queue>, Claim { job, problem, .. }: Claim, running:
                 ControlFlow::Break(())
             }
         })
+        .map_err(Unsolved::Solve)
     });
     let recorded = recorder::record(queue, &job, &running, lines).await;
     let solved = solving.await;
@@ -75,17 +82,34 @@ async fn attempt(queue: &Arc<Queue>, Claim { job, problem, .. }: Claim, running:
     queue.release(&job);
 }
 
+/// Why there is no solution.
+enum Unsolved {
+    Solve(SolveError),
+    /// The mesh that was there when the job was accepted cannot be had.
+    Mesh(String),
+}
+
+/// A mesh from the store. On a blocking thread.
+fn stored_mesh(store: &Store, hash: &str) -> Result<Mesh, Unsolved> {
+    let failed = |cause: &dyn std::fmt::Display| Unsolved::Mesh(format!("mesh {hash}: {cause}"));
+    let body = tokio::runtime::Handle::current().block_on(store.mesh_body(hash));
+    let body = body.map_err(|error| failed(&error))?;
+    let body = body.ok_or_else(|| failed(&"it is not stored"))?;
+    postcard::from_bytes(&body).map_err(|error| failed(&error))
+}
+
 /// Reads the problem and solves it, telling everything on the way, or nothing where it only asks
 /// whether to go on. On a blocking thread.
 fn solve_aloud(
     problem: &str,
+    mesh: Option<&Mesh>,
     solve: Solve,
     mut say: impl FnMut(Option<Payload>) -> ControlFlow<()>,
 ) -> Result<Solved, SolveError> {
     let start = Instant::now();
     let problem: Problem = solver::parse(problem).map_err(SolveError::Invalid)?;
     let parse_s = start.elapsed().as_secs_f64();
-    let document = run::run(&problem, parse_s, solve, &mut |progress| {
+    let document = run::run(&problem, mesh, parse_s, solve, &mut |progress| {
         say(match progress {
             Progress::Phase(stage) => Some(Payload::Stage { stage }),
             Progress::Iteration(row) => Some(Payload::Iteration(row.clone())),
@@ -154,8 +178,14 @@ fn ending_of(document: &Document) -> Ending {
 /// What a solver's answer, or its panic, means for the job.
 fn judge(
     job: &Job,
-    solved: Result<Result<Solved, SolveError>, JoinError>,
+    solved: Result<Result<Solved, Unsolved>, JoinError>,
 ) -> (Ending, Option<Parts>) {
+    let solved = match solved {
+        Ok(Err(Unsolved::Mesh(cause))) => return (internal(job, &cause), None),
+        Ok(Err(Unsolved::Solve(error))) => Ok(Err(error)),
+        Ok(Ok(solved)) => Ok(Ok(solved)),
+        Err(panic) => Err(panic),
+    };
     match solved {
         Ok(Ok(Solved {
             ending,

@@ -2,6 +2,7 @@
 
 mod events;
 mod jobs;
+mod meshes;
 mod reply;
 mod request;
 mod results;
@@ -39,6 +40,8 @@ pub fn router(service: Arc<Service>, max_body_bytes: usize, grpc: Router) -> Rou
         .route("/v1/jobs/{id}/profiles/{boundary}",  get(results::profile))
         .route("/v1/jobs/{id}/fields",               get(results::fields))
         .route("/v1/jobs/{id}/cancel",               post(jobs::cancel))
+        .route("/v1/meshes",                         get(meshes::list).post(meshes::upload))
+        .route("/v1/meshes/{hash}",                  get(meshes::get).delete(meshes::delete))
         .route("/v1/problems/validate",              post(jobs::validate))
         .route("/v1/schema/problem.json",            get(schema))
         .route("/livez",                             get(livez))

@@ -123,9 +123,7 @@ pub(super) async fn json_text(
         return Err(ApiError::UnsupportedMedia(content_type.into()));
     }
     let mut pieces = body.into_data_stream();
-    let length = headers
-        .get(header::CONTENT_LENGTH)
-        .and_then(|value| value.to_str().ok()?.parse::<usize>().ok());
+    let length = declared_length(headers);
     let mut bytes = Vec::new();
     let mut too_large = length.is_some_and(|length| length > limit_bytes);
     while !too_large && let Some(piece) = pieces.next().await {
@@ -143,9 +141,15 @@ pub(super) async fn json_text(
     String::from_utf8(bytes).map_err(|error| ApiError::MalformedJson(error.to_string()))
 }
 
+/// How long the body says that it is.
+pub(super) fn declared_length(headers: &HeaderMap) -> Option<usize> {
+    let value = headers.get(header::CONTENT_LENGTH)?;
+    value.to_str().ok()?.parse().ok()
+}
+
 /// Takes in, for a while, what nobody reads: many clients look at the answer only after they have
 /// sent everything, and see a broken connection if we hang up before.
-async fn discard(mut pieces: BodyDataStream) {
+pub(super) async fn discard(mut pieces: BodyDataStream) {
     const MOST_BYTES: usize = 256 << 20;
     const LONGEST: Duration = Duration::from_secs(10);
     let all = async {

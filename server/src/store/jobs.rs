@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use sqlx::{QueryBuilder, Sqlite, SqliteConnection};
 
 use super::{
-    Result, Store, StoreError, events,
+    Result, Store, StoreError, events, meshes,
     rows::{from_row, place, read},
 };
 use crate::{
@@ -29,6 +29,8 @@ pub struct NewJob {
     pub input_hash: String,
     /// The problem as JSON, without its title.
     pub problem: String,
+    /// The stored mesh that it names.
+    pub mesh: Option<String>,
 }
 
 /// A job that a worker has just taken.
@@ -38,6 +40,8 @@ pub struct Claim {
     pub job: Job,
     /// Its problem as JSON, without the title.
     pub problem: String,
+    /// The stored mesh that it names.
+    pub mesh: Option<String>,
     /// The event that says so.
     pub seq: i64,
 }
@@ -106,11 +110,15 @@ impl Store {
         if full {
             return Err(StoreError::QueueFull);
         }
-        sqlx::query("insert into problem (input_hash, body) values (?, ?) on conflict do nothing")
-            .bind(&new.input_hash)
-            .bind(&new.problem)
-            .execute(&mut *tx)
-            .await?;
+        meshes::require(&mut tx, new.mesh.as_deref()).await?;
+        sqlx::query(
+            "insert into problem (input_hash, body, mesh) values (?, ?, ?) on conflict do nothing",
+        )
+        .bind(&new.input_hash)
+        .bind(&new.problem)
+        .bind(&new.mesh)
+        .execute(&mut *tx)
+        .await?;
         let now = Time::now();
         let key: i64 = sqlx::query_scalar(
             "insert into job (uuid, status, name, title, labels, priority, input_hash, created_at)
@@ -197,14 +205,19 @@ impl Store {
         .await?;
         let Some(row) = row else { return Ok(None) };
         let job = from_row(&row)?;
-        let problem = sqlx::query_scalar("select body from problem where input_hash = ?")
+        let (problem, mesh) = sqlx::query_as("select body, mesh from problem where input_hash = ?")
             .bind(&job.input_hash)
             .fetch_one(&mut *tx)
             .await?;
         let started = [(now, Payload::status(Status::Running))];
         let seq = events::append(&mut tx, job.key, job.attempt, &started).await?;
         tx.commit().await?;
-        Ok(Some(Claim { job, problem, seq }))
+        Ok(Some(Claim {
+            job,
+            problem,
+            mesh,
+            seq,
+        }))
     }
 
     /// Notes that somebody wants the job to stop; a queued one is canceled at once.

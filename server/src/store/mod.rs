@@ -6,6 +6,7 @@
 
 mod events;
 mod jobs;
+mod meshes;
 mod results;
 mod rows;
 
@@ -22,6 +23,7 @@ use sqlx::{
 };
 
 pub use jobs::{CancelOutcome, Claim, Ending, NewJob};
+pub use meshes::{Removal, StoredMesh};
 pub use results::Parts;
 
 /// The database of one server.
@@ -42,6 +44,9 @@ pub enum StoreError {
     /// The queue holds as many jobs as it may.
     #[error("the queue is full")]
     QueueFull,
+    /// The job's mesh is not there.
+    #[error("the mesh is not stored")]
+    UnknownMesh,
     /// The disk is full.
     #[error("the disk is full")]
     Full,

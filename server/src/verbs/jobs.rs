@@ -12,7 +12,7 @@ use tokio::time::{Instant, timeout_at};
 use tracing::info;
 
 use super::{
-    Service, detached, page,
+    Service, detached, meshes, page,
     problems::{self, Admitted},
 };
 use crate::{
@@ -65,6 +65,7 @@ pub async fn create(
             title,
             input_hash,
             json,
+            mesh,
         } = match admitted {
             Ok(admitted) if violations.is_empty() => admitted,
             refused => {
@@ -84,6 +85,7 @@ pub async fn create(
             title,
             input_hash,
             problem: json,
+            mesh,
         };
         let limit = service.max_queued;
         let job = service
@@ -92,6 +94,11 @@ pub async fn create(
             .await
             .map_err(|error| match error {
                 StoreError::QueueFull => ApiError::QueueFull { limit },
+                // it was there when the problem was checked, and has been removed since
+                StoreError::UnknownMesh => {
+                    let hash = new.mesh.as_deref().unwrap_or_default();
+                    ApiError::InvalidProblem(vec![meshes::missing(hash)])
+                }
                 other => other.into(),
             })?;
         service.queue.wake();

@@ -1,11 +1,12 @@
 //! What the service does, each verb once, whatever the protocol. The skins only translate.
 
 pub mod jobs;
+pub mod meshes;
 pub mod page;
 pub mod problems;
 pub mod results;
 
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 use tokio::sync::Semaphore;
 
@@ -27,6 +28,10 @@ pub struct Service {
     checks: Arc<Semaphore>,
     max_queued: u32,
     memory_budget_bytes: u64,
+    /// Largest mesh file.
+    pub max_mesh_bytes: usize,
+    /// Where uploads lie until they are read.
+    data: PathBuf,
 }
 
 impl Service {
@@ -38,6 +43,8 @@ impl Service {
             checks: Arc::new(Semaphore::new(2)),
             max_queued: config.max_queued,
             memory_budget_bytes: config.memory.bytes(),
+            max_mesh_bytes: config.max_mesh_bytes,
+            data: config.data.clone(),
         }
     }
 
@@ -102,6 +109,7 @@ mod tests {
             max_queued: 10,
             memory: MemoryBudget::default(),
             max_body_bytes: 1 << 20,
+            max_mesh_bytes: 1 << 20,
             grace_s: 1,
         };
         let store = Arc::new(Store::open(folder.path()).await.unwrap());

@@ -1,10 +1,10 @@
 //! Judging a problem before it becomes a job.
 
 use serde::Serialize;
-use solver::{Estimate, error::Violation, problem::Problem, solution::Warning};
+use solver::{Estimate, error::Violation, mesh::Mesh, problem::Problem, solution::Warning};
 
-use super::Service;
-use crate::{digest, error::ApiError};
+use super::{Service, meshes};
+use crate::{digest, error::ApiError, mesh::MeshInfo};
 
 /// What there is to say about a problem.
 #[derive(Clone, Debug, Serialize)]
@@ -34,10 +34,16 @@ pub async fn validate(
         Err(violations) => return Ok(Judgement::invalid(violations, None)),
     };
     let budget_bytes = service.memory_budget_bytes;
+    let stored = match stored(service, &problem).await {
+        Err(ApiError::InvalidProblem(violations)) => {
+            return Ok(Judgement::invalid(violations, None));
+        }
+        stored => stored?,
+    };
     let judge = move || {
-        let estimate = affordable(&problem, budget_bytes)?;
+        let estimate = affordable(&problem, stored.as_ref(), budget_bytes)?;
         let input_hash = digest::input_hash(&problem).ok();
-        Ok(match check(&problem) {
+        Ok(match check(&problem, stored.as_ref()) {
             Ok(warnings) => Judgement {
                 valid: true,
                 violations: vec![],
@@ -72,14 +78,28 @@ pub struct Admitted {
     pub input_hash: String,
     /// The rest as JSON.
     pub json: String,
+    /// The stored mesh that it names.
+    pub mesh: Option<String>,
+}
+
+/// The stored mesh that a problem names, unless it would not be looked at anyway.
+async fn stored(
+    service: &Service,
+    problem: &Problem,
+) -> Result<Option<(MeshInfo, Mesh)>, ApiError> {
+    match &problem.mesh.stored {
+        Some(hash) => Ok(Some(meshes::load(service, hash).await?)),
+        None => Ok(None),
+    }
 }
 
 /// Admits a problem that is affordable and means something.
 pub async fn admit(service: &Service, mut problem: Problem) -> Result<Admitted, ApiError> {
     let budget_bytes = service.memory_budget_bytes;
+    let stored = stored(service, &problem).await?;
     let admit = move || {
-        affordable(&problem, budget_bytes)?;
-        check(&problem).map_err(ApiError::InvalidProblem)?;
+        affordable(&problem, stored.as_ref(), budget_bytes)?;
+        check(&problem, stored.as_ref()).map_err(ApiError::InvalidProblem)?;
         let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
         let title = problem.title.take();
         let json = serde_json::to_string(&problem).map_err(ApiError::internal)?;
@@ -87,14 +107,20 @@ pub async fn admit(service: &Service, mut problem: Problem) -> Result<Admitted, 
             title,
             input_hash,
             json,
+            mesh: problem.mesh.stored,
         })
     };
     service.work(admit).await?
 }
 
 /// The estimate is made before anything is meshed: a mesh may be what we cannot afford.
-fn affordable(problem: &Problem, budget_bytes: u64) -> Result<Estimate, ApiError> {
-    let estimate = solver::estimate(problem);
+fn affordable(
+    problem: &Problem,
+    stored: Option<&(MeshInfo, Mesh)>,
+    budget_bytes: u64,
+) -> Result<Estimate, ApiError> {
+    let size = stored.map(|(info, _)| info.size());
+    let estimate = solver::estimate(problem, size.as_ref());
     if estimate.memory_bytes > budget_bytes {
         return Err(ApiError::ProblemTooLarge {
             estimate,
@@ -104,8 +130,12 @@ fn affordable(problem: &Problem, budget_bytes: u64) -> Result<Estimate, ApiError
     Ok(estimate)
 }
 
-fn check(problem: &Problem) -> Result<Vec<Warning>, Vec<Violation>> {
-    solver::check(problem, None).map_err(|violations| prefixed(AT, violations))
+fn check(
+    problem: &Problem,
+    stored: Option<&(MeshInfo, Mesh)>,
+) -> Result<Vec<Warning>, Vec<Violation>> {
+    solver::check(problem, stored.map(|(_, mesh)| mesh))
+        .map_err(|violations| prefixed(AT, violations))
 }
 
 /// Moves violations to where their subject stands in a request.

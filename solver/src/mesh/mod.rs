@@ -12,6 +12,8 @@ pub use refine::refine;
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use crate::element::Element;
 
 /// A side of an element on the surface of the body: start, end, midside node, so directed that the
@@ -20,7 +22,7 @@ use crate::element::Element;
 pub type Edge = [u32; 3];
 
 /// Nodes, elements and named boundaries, without a word of what they are for.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
     /// Positions.
     pub nodes: Vec<[f64; 2]>,
@@ -79,6 +81,27 @@ impl Mesh {
             .enumerate()
             .filter_map(inverted)
             .collect()
+    }
+
+    /// The least ratio of smallest to largest det J within an element, and that element: 1 for a
+    /// parallelogram or a triangle with straight sides, near 0 for one that is almost folded.
+    pub fn worst_element(&self) -> (f64, usize) {
+        let ratio = |element: &Element| {
+            let (family, nodes) = (element.family(), self.element_nodes(element));
+            let points = family.rule(3).iter().map(|point| point.place);
+            let (low, high) = points
+                .chain(family.places().iter().copied())
+                .map(|place| family.map(&nodes, place).det)
+                .fold((f64::INFINITY, 0.0f64), |(low, high), det| {
+                    (low.min(det), high.max(det))
+                });
+            low / high
+        };
+        let ratios = self.elements.iter().map(ratio).enumerate();
+        ratios.fold(
+            (1.0, 0),
+            |worst, (e, ratio)| if ratio < worst.0 { (ratio, e) } else { worst },
+        )
     }
 
     /// The parts that hang together by sides of elements, each as a list of its nodes. Parts that

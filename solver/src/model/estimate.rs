@@ -1,5 +1,7 @@
 //! What a problem will cost, before anything is built.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use crate::problem::{MeshInput, Problem, Refine};
@@ -18,17 +20,36 @@ pub struct Estimate {
 /// Adaptive refinement makes no larger mesh.
 pub const MOST_ADAPTIVE_ELEMENTS: usize = 60_000;
 
+/// What the estimate needs of a stored mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeshSize {
+    /// Elements.
+    pub elements: u64,
+    /// Sides of each boundary.
+    pub boundaries: BTreeMap<String, u64>,
+}
+
+/// Bytes of a mesh file for one element, rather too few than too many: in the larger files that
+/// Gmsh writes an element of second order has about 150 with its nodes, one of first order 100.
+const BYTES_PER_ELEMENT: f64 = 80.0;
+
 /// Estimates from the numbers of elements alone; the constants are measured in `docs/performance.md`.
-pub fn estimate(problem: &Problem) -> Estimate {
+/// `stored`: the mesh that the problem names by its hash, where it does.
+pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Estimate {
     let mesh = &problem.mesh;
     let split = 4f64.powi(halvings(mesh));
     let adaptive = matches!(mesh.refine, Refine::Adaptive(_));
+    let text = mesh.gmsh.as_ref().or(mesh.abaqus.as_ref());
     let elements = match (&mesh.grid, &mesh.inline) {
         (Some(grid), _) => {
             grid.x.len().saturating_sub(1) as f64 * grid.y.len().saturating_sub(1) as f64
         }
         (None, Some(inline)) => inline.elements.len() as f64,
-        (None, None) => 0.0,
+        (None, None) => match (text, stored) {
+            (Some(text), _) => text.len() as f64 / BYTES_PER_ELEMENT,
+            (None, Some(size)) => size.elements as f64,
+            (None, None) => 0.0,
+        },
     };
     // A large mesh has three nodes an element, a small one up to eight.
     let n = match adaptive {
@@ -40,7 +61,7 @@ pub fn estimate(problem: &Problem) -> Estimate {
     let dofs = 2.0 * nodes;
     // fill of a minimum-degree factor in the plane grows like n log n
     let fill = dofs * dofs.max(2.0).log2();
-    let contact = contact_dofs(problem, n.sqrt());
+    let contact = contact_dofs(problem, stored, n.sqrt());
     let memory = 1500.0 * dofs + 95.0 * fill + 60.0 * contact * contact;
     let increments: f64 = problem.steps.iter().map(|s| f64::from(s.increments)).sum();
     let once_more = 1
@@ -65,7 +86,7 @@ fn halvings(mesh: &MeshInput) -> i32 {
 
 /// Unknowns on the contact boundaries: two for each of two nodes per edge, taken from the sides of
 /// the mesh.
-fn contact_dofs(problem: &Problem, side: f64) -> f64 {
+fn contact_dofs(problem: &Problem, stored: Option<&MeshSize>, side: f64) -> f64 {
     let mesh = &problem.mesh;
     let split = 2f64.powi(halvings(mesh));
     let edges = |name: &str| match (&mesh.grid, &mesh.inline) {
@@ -75,7 +96,9 @@ fn contact_dofs(problem: &Problem, side: f64) -> f64 {
             .boundaries
             .get(name)
             .map_or(side, |edges| edges.len() as f64 * split),
-        (None, None) => 0.0,
+        (None, None) => stored
+            .and_then(|size| size.boundaries.get(name))
+            .map_or(side, |edges| *edges as f64 * split),
     };
     let name = |boundary: &str| {
         mesh.boundaries

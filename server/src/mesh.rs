@@ -1,0 +1,123 @@
+//! What is said of a stored mesh.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use solver::{
+    MeshSize,
+    element::Family,
+    io::MeshFormat,
+    mesh::{Edge, Mesh},
+    solution::Warning,
+};
+
+use crate::time::Time;
+
+/// A stored mesh, without its nodes and elements.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeshInfo {
+    /// `sha256:…` of the file; what a problem's `mesh.stored` names.
+    pub hash: String,
+    /// What kind of file it was.
+    pub format: MeshFormat,
+    /// Size of the file.
+    pub bytes: u64,
+    /// Nodes, midsides included.
+    pub nodes: u64,
+    /// 8-node elements.
+    pub quadrilaterals: u64,
+    /// 6-node elements.
+    pub triangles: u64,
+    /// Displacements, before supports.
+    pub dofs: u64,
+    /// Ranges of x and y (length).
+    pub extent: [[f64; 2]; 2],
+    /// Named boundaries.
+    pub boundaries: BTreeMap<String, BoundaryInfo>,
+    /// Elements of each named group.
+    pub groups: BTreeMap<String, u64>,
+    /// Nodes of each named set.
+    pub node_sets: BTreeMap<String, u64>,
+    /// Shape of the elements.
+    pub quality: Quality,
+    /// What was changed when it was read.
+    pub warnings: Vec<Warning>,
+    /// When it was stored.
+    pub created_at: Time,
+}
+
+/// A named boundary of a stored mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BoundaryInfo {
+    /// Sides.
+    pub edges: u64,
+    /// Their length, from corner to corner.
+    pub length: f64,
+}
+
+/// How far the elements are from being folded.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    /// Least ratio of the smallest to the largest det J within an element: 1 is best, 0 is folded.
+    pub least_jacobian_ratio: f64,
+    /// The element that has it, from 0.
+    pub worst_element: u64,
+}
+
+impl MeshInfo {
+    /// Of a mesh that was just read.
+    pub fn new(
+        hash: String,
+        bytes: u64,
+        (format, mesh, warnings): (MeshFormat, &Mesh, Vec<Warning>),
+    ) -> MeshInfo {
+        let quads = mesh.elements.iter().filter(|e| e.family() == Family::Quad);
+        let quadrilaterals = quads.count() as u64;
+        let range = |axis: usize| {
+            mesh.nodes
+                .iter()
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+                    [low.min(x[axis]), high.max(x[axis])]
+                })
+        };
+        let boundary = |(name, edges): (&String, &Vec<Edge>)| {
+            let chord = |edge: &Edge| {
+                let [[x0, y0], [x1, y1], _] = mesh.edge_nodes(edge);
+                (x1 - x0).hypot(y1 - y0)
+            };
+            let length = edges.iter().map(chord).sum();
+            let edges = edges.len() as u64;
+            (name.clone(), BoundaryInfo { edges, length })
+        };
+        let count = |(name, list): (&String, &Vec<u32>)| (name.clone(), list.len() as u64);
+        let (least_jacobian_ratio, worst) = mesh.worst_element();
+        MeshInfo {
+            hash,
+            format,
+            bytes,
+            nodes: mesh.nodes.len() as u64,
+            quadrilaterals,
+            triangles: mesh.elements.len() as u64 - quadrilaterals,
+            dofs: 2 * mesh.nodes.len() as u64,
+            extent: [range(0), range(1)],
+            boundaries: mesh.boundaries.iter().map(boundary).collect(),
+            groups: mesh.groups.iter().map(count).collect(),
+            node_sets: mesh.node_sets.iter().map(count).collect(),
+            quality: Quality {
+                least_jacobian_ratio,
+                worst_element: worst as u64,
+            },
+            warnings,
+            created_at: Time::now(),
+        }
+    }
+
+    /// What an estimate needs.
+    pub fn size(&self) -> MeshSize {
+        let edges = |(name, info): (&String, &BoundaryInfo)| (name.clone(), info.edges);
+        MeshSize {
+            elements: self.quadrilaterals + self.triangles,
+            boundaries: self.boundaries.iter().map(edges).collect(),
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Meshes that are stored once and named by jobs.
+
+use std::{
+    fs::File,
+    io::{BufReader, BufWriter, Read, Seek, Write},
+    path::Path,
+    sync::Arc,
+};
+
+use futures_util::{Stream, StreamExt};
+use sha2::{Digest, Sha256};
+use solver::{error::Violation, io::ReadError, mesh::Mesh};
+use tokio::io::AsyncWriteExt;
+use tracing::info;
+
+use super::{Service, detached, page};
+use crate::{digest, error::ApiError, mesh::MeshInfo, store::Removal, violations};
+
+/// As of a result: larger pieces make SQLite chain pages.
+const PIECE_BYTES: usize = 256 << 10;
+/// 1 MiB holds the single writer for some ten milliseconds.
+const PIECES_PER_COMMIT: usize = 4;
+
+/// Stores a mesh file that arrives in pieces, and says whether it is new. The file streams to the disk
+/// and from there through the reader: only the parsed mesh is ever in memory.
+pub async fn upload(
+    service: &Arc<Service>,
+    mut pieces: impl Stream<Item = Result<impl AsRef<[u8]>, ApiError>> + Unpin,
+) -> Result<(MeshInfo, bool), ApiError> {
+    service.accepting()?;
+    let limit_bytes = service.max_mesh_bytes;
+    // without a name: it is gone with the process, whatever happens
+    let file = tempfile::tempfile_in(&service.data).map_err(unwritten)?;
+    let mut out = tokio::io::BufWriter::with_capacity(
+        PIECE_BYTES,
+        tokio::fs::File::from_std(file.try_clone().map_err(unwritten)?),
+    );
+    let (mut hash, mut bytes) = (Sha256::new(), 0);
+    while let Some(piece) = pieces.next().await {
+        let piece = piece?;
+        let piece = piece.as_ref();
+        bytes += piece.len();
+        if bytes > limit_bytes {
+            return Err(ApiError::PayloadTooLarge { limit_bytes });
+        }
+        hash.update(piece);
+        out.write_all(piece).await.map_err(unwritten)?;
+    }
+    out.flush().await.map_err(unwritten)?;
+    let hash = digest::sha256_text(hash);
+    if let Some(known) = service.store.mesh(&hash).await? {
+        return Ok((known, false));
+    }
+    let name = hash.clone();
+    let folder = service.data.clone();
+    let parsed = service
+        .work(move || parse(file, &folder, name, bytes as u64))
+        .await??;
+    let service = service.clone();
+    detached(async move {
+        let (info, encoded) = parsed;
+        store(&service, &info.hash, encoded).await?;
+        let new = service.store.insert_mesh(&info).await?;
+        info!(
+            mesh.hash = info.hash,
+            info.nodes, "mesh {} stored", info.hash
+        );
+        Ok((info, new))
+    })
+    .await
+}
+
+/// Reads the file and writes the parsed mesh to another.
+fn parse(
+    mut file: File,
+    folder: &Path,
+    hash: String,
+    bytes: u64,
+) -> Result<(MeshInfo, File), ApiError> {
+    file.rewind().map_err(ApiError::internal)?;
+    let encoded = tempfile::tempfile_in(folder).map_err(unwritten)?;
+    let reader = BufReader::with_capacity(PIECE_BYTES, file);
+    let (format, mesh, warnings) = solver::io::read_mesh(reader).map_err(refused)?;
+    let info = MeshInfo::new(hash, bytes, (format, &mesh, warnings));
+    let out = BufWriter::with_capacity(PIECE_BYTES, encoded);
+    let out = postcard::to_io(&mesh, out).map_err(ApiError::internal)?;
+    let mut encoded = out
+        .into_inner()
+        .map_err(|error| unwritten(error.into_error()))?;
+    encoded.flush().map_err(unwritten)?;
+    encoded.rewind().map_err(ApiError::internal)?;
+    Ok((info, encoded))
+}
+
+fn refused(error: ReadError) -> ApiError {
+    match error {
+        ReadError::Invalid(violations) => ApiError::InvalidProblem(violations),
+        ReadError::Io(error) => ApiError::internal(error),
+    }
+}
+
+async fn store(service: &Service, hash: &str, mut encoded: File) -> Result<(), ApiError> {
+    let mut first = 0;
+    loop {
+        // 1 MiB from the page cache: no work for another thread
+        let mut group = Vec::with_capacity(PIECES_PER_COMMIT);
+        while group.len() < PIECES_PER_COMMIT {
+            let mut piece = Vec::with_capacity(PIECE_BYTES);
+            let mut limited = (&mut encoded).take(PIECE_BYTES as u64);
+            limited
+                .read_to_end(&mut piece)
+                .map_err(ApiError::internal)?;
+            if piece.is_empty() {
+                break;
+            }
+            group.push(piece);
+        }
+        if group.is_empty() {
+            return Ok(());
+        }
+        service.store.write_mesh_pieces(hash, first, &group).await?;
+        first += group.len() as i64;
+    }
+}
+
+fn unwritten(error: std::io::Error) -> ApiError {
+    match error.kind() {
+        std::io::ErrorKind::StorageFull => ApiError::StorageFull,
+        _ => ApiError::internal(error),
+    }
+}
+
+/// What is said of a mesh.
+pub async fn get(service: &Service, hash: &str) -> Result<MeshInfo, ApiError> {
+    let found = service.store.mesh(hash).await?;
+    found.ok_or_else(|| unknown(hash))
+}
+
+fn unknown(hash: &str) -> ApiError {
+    ApiError::NotFound(format!("there is no mesh {:?}", violations::name(hash)))
+}
+
+/// A page of meshes, newest first.
+#[derive(Debug)]
+pub struct Page {
+    /// The meshes.
+    pub meshes: Vec<MeshInfo>,
+    /// Where the next page begins; none after the last.
+    pub next: Option<String>,
+}
+
+/// Lists meshes, newest first.
+pub async fn list(
+    service: &Service,
+    page_size: i64,
+    page_token: Option<&str>,
+) -> Result<Page, ApiError> {
+    let before = page_token
+        .map(|token| page::before(token, &[]).ok_or(ApiError::BadPageToken))
+        .transpose()?;
+    let mut meshes = service.store.meshes(before, page_size + 1).await?;
+    let more = meshes.len() as i64 > page_size;
+    meshes.truncate(page_size as usize);
+    let last = meshes.last().filter(|_| more);
+    let next = last.map(|mesh| page::token(mesh.key, &[]));
+    let meshes = meshes.into_iter().map(|mesh| mesh.info).collect();
+    Ok(Page { meshes, next })
+}
+
+/// Removes a mesh that no waiting or running job needs.
+pub async fn delete(service: &Arc<Service>, hash: &str) -> Result<(), ApiError> {
+    let (service, hash) = (service.clone(), hash.to_owned());
+    detached(async move {
+        match service.store.remove_mesh(&hash).await? {
+            Removal::Removed => Ok(()),
+            Removal::Unknown => Err(unknown(&hash)),
+            Removal::InUse => Err(ApiError::MeshInUse),
+        }
+    })
+    .await
+}
+
+/// The mesh that a problem names, or the violation that there is none.
+pub async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mesh), ApiError> {
+    let found = match service.store.mesh(hash).await? {
+        Some(info) => service
+            .store
+            .mesh_body(hash)
+            .await?
+            .map(|body| (info, body)),
+        None => None,
+    };
+    let (info, body) = found.ok_or_else(|| ApiError::InvalidProblem(vec![missing(hash)]))?;
+    let mesh = service
+        .work(move || postcard::from_bytes(&body).map_err(ApiError::internal))
+        .await??;
+    Ok((info, mesh))
+}
+
+/// What is said where a problem names a mesh that is not there.
+pub fn missing(hash: &str) -> Violation {
+    Violation {
+        pointer: format!("{}/mesh/stored", super::problems::AT),
+        reason: "unknown_mesh".to_owned(),
+        got: violations::name(hash).to_owned(),
+        expected: "the hash of a mesh that this service has stored".to_owned(),
+        hint: "Upload it first: POST /v1/meshes, or UploadMesh.".to_owned(),
+    }
+}

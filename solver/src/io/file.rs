@@ -1,0 +1,106 @@
+//! A mesh file of whatever format, told by how it begins.
+
+use std::io::BufRead;
+
+use serde::{Deserialize, Serialize};
+
+use super::{ReadError, abaqus, gmsh};
+use crate::error::Violation;
+use crate::mesh::{Mesh, inline_mesh};
+use crate::problem::InlineMesh;
+use crate::solution::Warning;
+
+/// Formats of mesh files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MeshFormat {
+    /// MSH 2.2 or 4.1 of Gmsh.
+    Gmsh,
+    /// A deck of Abaqus or CalculiX.
+    Abaqus,
+    /// An inline mesh: `{"nodes": …, "elements": …}`.
+    Json,
+}
+
+/// Reads a mesh file, with what was changed on the way.
+pub fn read_mesh(mut reader: impl BufRead) -> Result<(MeshFormat, Mesh, Vec<Warning>), ReadError> {
+    let start = reader.fill_buf().map_err(ReadError::Io)?;
+    let first = start.iter().find(|byte| !byte.is_ascii_whitespace());
+    match first {
+        Some(b'$') => gmsh::read(reader).map(|(mesh, notes)| (MeshFormat::Gmsh, mesh, notes)),
+        Some(b'*') => abaqus::read(reader).map(|(mesh, notes)| (MeshFormat::Abaqus, mesh, notes)),
+        Some(b'{') => json(reader).map(|mesh| (MeshFormat::Json, mesh, Vec::new())),
+        _ => Err(invalid(
+            "malformed",
+            "a file that begins otherwise".to_owned(),
+            "a Gmsh mesh ($MeshFormat), an Abaqus or CalculiX deck (*HEADING, *NODE), or an inline mesh as JSON",
+            "Send the file as it is, without multipart or compression.",
+        )),
+    }
+}
+
+fn json(reader: impl BufRead) -> Result<Mesh, ReadError> {
+    let inline: InlineMesh = serde_json::from_reader(reader).map_err(|error| {
+        if error.is_io() {
+            return ReadError::Io(error.into());
+        }
+        invalid(
+            "malformed",
+            error.to_string(),
+            "an inline mesh: nodes, elements, boundaries, groups, node_sets",
+            "See `InlineMesh` in /v1/schema/problem.json.",
+        )
+    })?;
+    let mesh = inline_mesh(&inline, "").map_err(ReadError::Invalid)?;
+    let folded = mesh.inverted_elements(true);
+    if folded.is_empty() {
+        return Ok(mesh);
+    }
+    let fault = |(e, place, det): &(usize, String, f64)| Violation {
+        pointer: format!("/elements/{e}"),
+        reason: "inverted_element".to_owned(),
+        got: format!("det J = {det:.3e} at {place}"),
+        expected: "det J > 0 at all Gauss points and at the nodes".to_owned(),
+        hint: "List corners counter-clockwise, and keep midsides near the middle of their sides."
+            .to_owned(),
+    };
+    Err(ReadError::Invalid(
+        folded.iter().take(20).map(fault).collect(),
+    ))
+}
+
+fn invalid(reason: &str, got: String, expected: &str, hint: &str) -> ReadError {
+    ReadError::Invalid(vec![Violation {
+        pointer: String::new(),
+        reason: reason.to_owned(),
+        got,
+        expected: expected.to_owned(),
+        hint: hint.to_owned(),
+    }])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_known_by_how_it_begins() {
+        let square = r#" {"nodes": [[0,0],[1,0],[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]],
+            "elements": [[0,1,2,3,4,5,6,7]], "boundaries": {"top": [[3,2,6]]}}"#;
+        let (format, mesh, _) = read_mesh(square.as_bytes()).unwrap();
+        assert_eq!((format, mesh.elements.len()), (MeshFormat::Json, 1));
+        let reason = |text: &str| match read_mesh(text.as_bytes()) {
+            Err(ReadError::Invalid(list)) => format!("{}: {}", list[0].pointer, list[0].reason),
+            _ => "nothing".to_owned(),
+        };
+        assert_eq!(reason("solid cube"), ": malformed");
+        assert_eq!(reason(""), ": malformed");
+        assert_eq!(reason("$MeshFormat\n4.1 0 8\n"), ": truncated");
+        assert_eq!(reason("*NODE\n1, 0, 0\n"), ": too_few");
+        assert_eq!(
+            reason(&square.replace("[1,1]", "[0.1,0.1]")),
+            "/elements/0: inverted_element"
+        );
+        assert_eq!(reason(&square.replace("\"top\"", "top")), ": malformed");
+    }
+}
