@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use crate::error::SolveError;
-use crate::model::estimate::MOST_ADAPTIVE_ELEMENTS;
+use crate::model::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
 use crate::problem::{AdaptiveRefine, Grid, Problem, Refine};
 use crate::solution::{Observer, Progress, Refinement, Solution, Warning};
 
@@ -70,8 +70,12 @@ pub fn run(
             .as_ref()
             .map(|grid| finer(grid, &problem, &solution));
         let elements = split.as_ref().map_or(0, |grid| grid.x.len() * grid.y.len());
+        let lines = split
+            .as_ref()
+            .map_or(0, |grid| grid.x.len().max(grid.y.len()));
+        let large = elements > MOST_ADAPTIVE_ELEMENTS || lines > MOST_ADAPTIVE_LINES;
         let done = stopped || !solution.summary.converged || settled(&sequence, goal.tolerance);
-        if done || sequence.len() >= MOST_MESHES || elements > MOST_ADAPTIVE_ELEMENTS {
+        if done || sequence.len() >= MOST_MESHES || large {
             if !done {
                 warnings.push(unfinished(&sequence, goal.tolerance));
                 solution.summary.warnings.extend(warnings.last().cloned());

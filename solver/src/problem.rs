@@ -528,7 +528,8 @@ pub struct Friction {
     /// Largest τ, > 0 (stress); absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shear_cap: Option<f64>,
-    /// A prescribed τ ≥ 0 (Tresca's law) instead of coefficient, radius, cohesion and cap.
+    /// A prescribed τ ≥ 0 (Tresca's law) instead of coefficient, radius, cohesion and cap. It acts on all
+    /// of Γ_C, touched or not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bound: Option<PrescribedBound>,
 }

@@ -57,7 +57,7 @@ pub fn run(
         });
         history.extend(rows);
         last = Some(reported);
-        if !converged && outcome != Outcome::FalseConvergence {
+        if !converged && !goes_on(outcome) {
             break;
         }
     }
@@ -103,6 +103,12 @@ fn doubled(
         }
     }
     algorithm::compared(&march.system, march.last.as_ref(), converged)
+}
+
+/// Whether a next increment can begin there: the thesis's own iteration settles in false states, and
+/// goes on from them.
+fn goes_on(outcome: Outcome) -> bool {
+    matches!(outcome, Outcome::Converged | Outcome::FalseConvergence)
 }
 
 /// The way through the steps.
@@ -157,7 +163,7 @@ impl<'a> March<'a> {
             );
             let place = (number, &mut increment);
             let finished = self.advance(&path, place, from, to, 0, observe);
-            if finished.outcome != Outcome::Converged || k == count {
+            if !goes_on(finished.outcome) || k == count {
                 return (finished, std::mem::take(&mut self.rows));
             }
         }
@@ -184,7 +190,7 @@ impl<'a> March<'a> {
                 let middle = 0.5 * (from + to);
                 let half =
                     self.advance(path, (step, increment), from, middle, halvings + 1, observe);
-                if half.outcome != Outcome::Converged {
+                if !goes_on(half.outcome) {
                     return half;
                 }
                 self.advance(path, (step, increment), middle, to, halvings + 1, observe)
@@ -219,7 +225,7 @@ impl<'a> March<'a> {
         let finished = algorithm::run(&self.system, controls, place, self.last.as_ref(), observe);
         self.row_count += finished.history.len() as u32;
         self.rows.extend(finished.history.iter().cloned());
-        if finished.outcome == Outcome::Converged {
+        if goes_on(finished.outcome) {
             self.increments += 1;
             self.level = level;
             self.last = Some(finished.clone());

@@ -30,6 +30,7 @@ fn main() {
     let mut text = String::from(INTRODUCTION);
     text += &table::rows(&records);
     text += &table::robustness(&records);
+    text += &table::dragged_sheet(&records);
     text += &examples::section(&figures);
     text += &studies::section();
     std::fs::write(out.join("verification.md"), text).unwrap();

@@ -139,6 +139,34 @@ fn small(value: f64) -> String {
     }
 }
 
+/// Rows needed by `auto` on the sheet that is dragged along its wall.
+pub(crate) fn dragged_sheet(records: &Path) -> String {
+    let text = std::fs::read_to_string(records.join("dragged_sheet.jsonl")).unwrap();
+    let cases: Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+    let coefficients = ["0.3", "0.6", "0.8", "1.0", "2.0", "4.0", "10.0"];
+    let mut out = format!(
+        "The sheet of the example on a finer grid, its wall dragged by d along t: iterations for each μ, all\nconverged; a case without contact is marked –.\n\n| d | pull | {} |\n|---|---|{}\n",
+        coefficients.join(" | "),
+        "---|".repeat(coefficients.len())
+    );
+    for row in cases.as_array().unwrap().chunks(coefficients.len()) {
+        let cell = |case: &Value| match case["normal_force"].as_f64().unwrap() {
+            0.0 => "–".to_owned(),
+            _ => case["iterations"].to_string(),
+        };
+        let cells: Vec<String> = row.iter().map(cell).collect();
+        writeln!(
+            out,
+            "| {} | {} | {} |",
+            row[0]["drag"],
+            row[0]["pull"],
+            cells.join(" | ")
+        )
+        .unwrap();
+    }
+    out + "\n"
+}
+
 /// Rows needed by `auto` on the robustness grid.
 pub(crate) fn robustness(records: &Path) -> String {
     let text = std::fs::read_to_string(records.join("robustness.jsonl")).unwrap();

@@ -20,6 +20,7 @@ mod held_by_contact;
 mod hertz_sphere;
 mod input;
 mod invariance;
+mod lift_off;
 mod loads;
 mod manufactured;
 mod oblique;

@@ -252,3 +252,74 @@ fn what_sticks_to_a_sloping_face_moves_with_it() {
     }
     assert!(stuck > 20, "{stuck}");
 }
+
+/// A curve that runs round the body faces each side with the part in front of it: the one behind, though
+/// nearer, lies beyond the body's other side.
+#[test]
+fn what_lies_behind_the_body_is_not_in_contact_with_it() {
+    let text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [0, 1, 2], "y": [-4, -2, 0]}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [{"boundary": "top", "obstacle": {"kind": "polyline", "points": [[-1, 5], [9, 5], [9, -4.5], [-1, -4.5]]}}],
+    });
+    let model = |text: &Value| Model::new(&problem(&text.to_string()), None).unwrap();
+    assert!(
+        model(&text).contacts[0]
+            .profile
+            .iter()
+            .all(|gap| (gap - 5.0).abs() < 1e-12)
+    );
+    // one that cuts the surface from the start is felt, though there is more of it in front
+    let mut cut = text;
+    cut["contacts"][0]["obstacle"]["points"] = json!([[-1, 5], [9, 5], [9, -0.1], [-1, -0.1]]);
+    assert!(
+        model(&cut).contacts[0]
+            .profile
+            .iter()
+            .all(|gap| (gap + 0.1).abs() < 1e-12)
+    );
+}
+
+/// The indentation that a warning names is the obstacle's own, not its part along a turned normal.
+#[test]
+fn the_indentation_that_engages_a_sloping_obstacle_is_its_own() {
+    let solution = |indentation: f64| {
+        let text = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": [0, 1, 1.5, 2], "y": [0, 1]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+            "contacts": [{"boundary": "top", "normal": "obstacle", "indentation": indentation,
+                "obstacle": {"kind": "tilted", "slope": -1, "center": 3, "to": 2}}],
+        });
+        solve(&problem(&text.to_string()))
+    };
+    let open = solution(0.72);
+    let message = &open
+        .summary
+        .warnings
+        .iter()
+        .find(|w| w.code == "no_contact")
+        .unwrap()
+        .message;
+    assert!(
+        message.contains("An indentation above 1.000000e0 engages it"),
+        "{message}"
+    );
+    assert_eq!(solution(0.99).summary.normal_force, 0.0);
+    assert!(solution(1.01).summary.normal_force > 0.0);
+}
+
+/// Tresca's bound acts on the whole boundary; where the body does not touch, that is said.
+#[test]
+fn a_given_bound_beyond_the_contact_is_said() {
+    let bound = |bound: Value| {
+        let solution = cylinder("body", json!({"elastic_slip": 1e-4, "bound": bound}));
+        let mut codes = solution.summary.warnings.into_iter().map(|w| w.code);
+        codes.any(|code| code == "bound_beyond_contact")
+    };
+    assert!(bound(json!(5)));
+    assert!(!bound(json!({"s": [0, 0.5], "bound": [5, 5]})));
+}

@@ -422,3 +422,33 @@ fn the_thesis_has_no_triangles_and_an_element_no_seven_nodes() {
         violations[0].got
     );
 }
+
+#[test]
+fn what_would_take_all_memory_is_refused() {
+    let contacts = json!([{"boundary": "top", "obstacle": {"kind": "flat"}}]);
+    let lines: Vec<u32> = (0..=1500).collect();
+    let mesh = json!({"grid": {"x": lines, "y": lines}, "refine": {"tolerance": 0.01}});
+    refused(
+        &[("/mesh", mesh.clone()), ("/contacts", contacts)],
+        &[("/mesh/refine", "too_large")],
+    );
+    let mut adaptive = with(&[]);
+    adaptive.mesh = serde_json::from_value(mesh).unwrap();
+    assert!(solver::estimate(&adaptive, None).memory_bytes > 10 << 30);
+    let steps = vec![json!({"increments": 10_000}); 3];
+    let mut p = with(&[]);
+    p.steps = serde_json::from_value(json!(steps)).unwrap();
+    assert_eq!(violations(&p), [pair("/steps", "too_many")]);
+}
+
+#[test]
+fn a_bonded_obstacle_and_a_support_must_agree() {
+    let bonded = |indentation: f64| json!([{"boundary": "top", "obstacle": {"kind": "flat"}, "indentation": indentation, "condition": "bonded"}]);
+    let held = json!([{"boundary": "bottom", "ux": 0, "uy": 0}, {"boundary": "right", "uy": 0}]);
+    refused(
+        &[("/contacts", bonded(-0.2)), ("/supports", held.clone())],
+        &[("/contacts/0/condition", "conflict")],
+    );
+    let agreed = with(&[("/contacts", bonded(0.0)), ("/supports", held)]);
+    assert!(solver::check(&agreed, None).is_ok());
+}

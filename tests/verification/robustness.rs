@@ -114,6 +114,7 @@ fn dragged_sheet(pull: f64, drag: f64, mu: f64) -> Problem {
 
 #[test]
 fn a_sheet_dragged_along_its_wall_converges_up_to_a_coefficient_of_ten() {
+    let mut lines = Vec::new();
     for drag in [-1.0, 0.0, 1.0] {
         for pull in [0.1, 0.2] {
             for mu in [0.3, 0.6, 0.8, 1.0, 2.0, 4.0, 10.0] {
@@ -122,9 +123,12 @@ fn a_sheet_dragged_along_its_wall_converges_up_to_a_coefficient_of_ten() {
                     summary.residuals.monolithic < 1e-10,
                     "d = {drag}, pull {pull}, μ = {mu}"
                 );
+                lines.push(json!({"drag": drag, "pull": pull, "coefficient": mu,
+                    "iterations": summary.iterations, "normal_force": summary.normal_force}));
             }
         }
     }
+    keep_table("dragged_sheet", &json!(lines));
 }
 
 /// Free (Y = 0) and jammed at once from μ = .8 on; one state only up to .6.

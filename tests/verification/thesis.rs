@@ -132,8 +132,22 @@ fn both_ways_of_evaluating_the_friction_force_are_similar() {
     }
 }
 
-/// What the two-element limit of 3.4.2 costs on example 2 with ρ = .05, elements of .05: against a
-/// kernel that stays within two elements (ρ = .01) the limit must cost more.
+/// A step ends at its own level, also where every increment settles in a false state.
+#[test]
+fn a_false_state_goes_on_to_the_end_of_its_step() {
+    let punch = example("rectangular_punch");
+    let whole = by_thesis(&punch, ThesisOptions::default(), 200).summary;
+    let mut steps = punch.clone();
+    steps.steps =
+        serde_json::from_value(serde_json::json!([{"name": "a", "increments": 4}])).unwrap();
+    let last = by_thesis(&steps, ThesisOptions::default(), 200).summary;
+    assert_eq!(last.outcome, Outcome::FalseConvergence);
+    close(last.normal_force, whole.normal_force, 1e-9);
+    close(last.tangential_force, whole.tangential_force, 1e-9);
+}
+
+/// What the two-element limit of 3.4.2 and the interpolation that goes with it change on example 2 with
+/// ρ = .05, elements of .05.
 #[test]
 fn the_two_element_limit_costs_little_on_example_2() {
     let difference = |radius: f64| {
@@ -184,6 +198,7 @@ fn a_first_guess_is_taken_and_misuse_is_refused() {
     let friction = wrong.contacts[0].friction.as_mut().unwrap();
     friction.history = solver::problem::History::Incremental;
     friction.points = solver::problem::FrictionPoints::Nodal;
+    friction.measure = solver::problem::Measure::Surface;
     let found = pointers(&wrong);
     for pointer in [
         "/solver/thesis/relaxation",
@@ -192,6 +207,7 @@ fn a_first_guess_is_taken_and_misuse_is_refused() {
         "/solver/thesis/contact_guess/side",
         "/contacts/0/friction/history",
         "/contacts/0/friction/points",
+        "/contacts/0/friction/measure",
     ] {
         assert!(found.iter().any(|f| f == pointer), "{pointer} in {found:?}");
     }

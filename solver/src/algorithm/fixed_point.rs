@@ -46,7 +46,7 @@ pub(super) fn sweep(
         contraction: contraction(&measured),
         inner: steps,
         tractions: track.system.tractions(&measured.state.v, &measured.bound),
-        relaxation: 1.0,
+        r_f: None,
     };
     let answer = track.tell(&measured, row, observe);
     (measured, answer)
@@ -100,6 +100,7 @@ pub(super) fn run(
         swept.measured = measured;
         if settled && (!track.contact_changed || prescribed) && swept.measured.within(tolerance) {
             swept.outcome = Outcome::Converged;
+            swept.cycle = None;
             return swept;
         }
         if answer.is_break() {
@@ -113,14 +114,13 @@ pub(super) fn run(
         } else {
             since_best += 1;
         }
-        if !accelerated && let Some(cycle) = track.note(&swept.measured.state, friction) {
-            // an acceleration may yet lead out of it
-            accelerated = true;
-            if give_up_early {
-                swept.outcome = Outcome::ContactCycling;
-                swept.cycle = Some(cycle);
+        if let Some(cycle) = track.note(&swept.measured.state, friction) {
+            // an acceleration may yet lead out of it; if not, this is what is told in the end
+            swept.cycle = Some(cycle);
+            if give_up_early && !accelerated {
                 break;
             }
+            accelerated = true;
         }
         slow = if q.is_some_and(|q| q > SLOW) {
             slow + 1
@@ -139,6 +139,9 @@ pub(super) fn run(
             break;
         }
         swept.exhausted = count + 1 == track.controls.max_iterations;
+    }
+    if swept.cycle.is_some() {
+        swept.outcome = Outcome::ContactCycling;
     }
     if let Some(best) = best
         && best.residuals.friction < swept.measured.residuals.friction

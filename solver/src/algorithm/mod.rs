@@ -185,7 +185,12 @@ fn auto(mut track: Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -
     let nearer = second.outcome == Outcome::Converged
         || second.outcome == Outcome::Canceled
         || second.measured.residuals.monolithic < first.measured.residuals.monolithic;
-    finish(track, if nearer { second } else { first })
+    let (nearest, other) = if nearer {
+        (second, first)
+    } else {
+        (first, second)
+    };
+    finish(track, nearest.with_cycle_of(&other))
 }
 
 /// Sweeps, then Newton's method from the best of them.
@@ -199,9 +204,15 @@ fn both(track: &mut Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) 
     let nearer = newton.outcome == Outcome::Converged
         || newton.outcome == Outcome::Canceled
         || newton.measured.residuals.monolithic < swept.measured.residuals.monolithic;
+    let contraction = swept.contraction;
+    let (nearest, other) = if nearer {
+        (newton, swept)
+    } else {
+        (swept, newton)
+    };
     End {
-        contraction: swept.contraction,
-        ..if nearer { newton } else { swept }
+        contraction,
+        ..nearest.with_cycle_of(&other)
     }
 }
 
@@ -218,6 +229,15 @@ struct End {
 }
 
 impl End {
+    /// What does not converge is told with the cycle that another way ran into, if it has none itself.
+    fn with_cycle_of(mut self, other: &End) -> Self {
+        if self.outcome == Outcome::NotConverged && other.cycle.is_some() {
+            self.cycle.clone_from(&other.cycle);
+            self.outcome = Outcome::ContactCycling;
+        }
+        self
+    }
+
     /// Nothing else is to be tried: it converged, or the observer or the limit put an end to it.
     fn ended(&self) -> bool {
         matches!(self.outcome, Outcome::Converged | Outcome::Canceled) || self.exhausted

@@ -6,8 +6,8 @@ use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
-use crate::problem::Condition;
-use crate::solution::{ContactProfile, ContactSummary, NodeState, Peak, Warning};
+use crate::problem::{Condition, Friction, FrictionPoints};
+use crate::solution::{ContactProfile, ContactSummary, NodeState, Outcome, Peak, Warning};
 
 /// Samples per edge in the search for a peak, before it is narrowed down.
 const SAMPLES: usize = 16;
@@ -100,7 +100,7 @@ impl<'a> PatchView<'a> {
         if own.is_empty() {
             return vec![[0.0; 3]; edges];
         }
-        if own.len() == 3 * edges {
+        if self.at_gauss_points() {
             let gauss = GAUSS_3[2].0;
             let parabola = |edge: usize| {
                 let [low, middle, high] = [0, 1, 2].map(|k| value(own[3 * edge + k]));
@@ -118,6 +118,46 @@ impl<'a> PatchView<'a> {
         (0..edges)
             .map(|edge| edge_nodes(edge).map(|i| nodal[i]))
             .collect()
+    }
+
+    /// The largest |σ_t| that a prescribed bound exerts on edges of which no node touches.
+    fn bound_beyond_contact(&self) -> Option<f64> {
+        let friction = self.patch.contact.friction.as_ref()?;
+        friction.bound.as_ref()?;
+        let open = |node: usize| !self.active(node - self.patch.first);
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        let largest = points
+            .filter(|(point, _)| point.patch == self.p && point.nodes.iter().all(|n| open(*n)))
+            .fold(0.0f64, |most, (_, traction)| most.max(traction.abs()));
+        (largest > 0.0).then_some(largest)
+    }
+
+    /// The edge under the peak of σ_t, where it is longer than ρ; unless all edges are, which was said
+    /// before the solution.
+    fn unresolved_radius(&self) -> Option<(f64, f64)> {
+        let contact = &self.patch.contact;
+        let friction = contact.friction.as_ref()?;
+        friction.coefficient.filter(|mu| *mu > 0.0)?;
+        let radius = friction.nonlocal_radius.filter(|radius| *radius > 0.0)?;
+        let boundary = &contact.boundary;
+        let length = |edge: usize| boundary.edge_arc(edge)[1] - boundary.edge_arc(edge)[0];
+        let edges = || 0..boundary.edge_count();
+        if edges().all(|edge| length(edge) > radius) {
+            return None;
+        }
+        let size = |edge: usize| {
+            let at = |xi: f64| self.tangential_stress_at(edge, xi).abs();
+            at(-0.7).max(at(0.0)).max(at(0.7))
+        };
+        let under = edges().max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+        // rounding of a grid whose lines are ρ apart
+        (length(under) > radius * (1.0 + 1e-9)).then_some((length(under), radius))
+    }
+
+    /// Friction acts at Gauss points, three an edge.
+    fn at_gauss_points(&self) -> bool {
+        let friction = self.patch.contact.friction.as_ref();
+        friction.is_some_and(|f| f.points == FrictionPoints::Gauss3)
     }
 
     fn count(&self) -> usize {
@@ -434,6 +474,17 @@ impl<'a> PatchView<'a> {
                 message,
             });
         };
+        let jumps = |f: &Friction| f.cohesion > 0.0 && f.nonlocal_radius == Some(0.0);
+        let settled = matches!(
+            self.finished.outcome,
+            Outcome::Converged | Outcome::Canceled
+        );
+        if !settled && contact.friction.as_ref().is_some_and(jumps) {
+            warn(
+                "cohesion_jumps",
+                "The friction bound jumps by the cohesion where the pressure ends; without a nonlocal radius the nodes there may come and go for ever. Give a radius of an element or more.".to_owned(),
+            );
+        }
         let touching = (0..self.count()).filter(|&i| self.active(i)).count();
         if contact.condition != Condition::Unilateral {
             return;
@@ -448,8 +499,13 @@ impl<'a> PatchView<'a> {
             let nearest = (0..self.count()).min_by(|&a, &b| opening(a).total_cmp(&opening(b)));
             let smallest = nearest.map_or(f64::INFINITY, opening);
             // untouched, the body does not feel the obstacle: what the gap lacks is what to indent by
-            let level = self.system.level.indentation;
-            let needed = smallest + nearest.map_or(0.0, |i| level * contact.indentation[i]);
+            let engages = |i: usize| {
+                let moved = self
+                    .system
+                    .normal_displacement(self.v, self.patch.first + i);
+                (contact.profile[i] - moved) / contact.cosines[i]
+            };
+            let needed = (0..self.count()).map(engages).fold(f64::INFINITY, f64::min);
             warn(
                 "no_contact",
                 format!(
@@ -457,6 +513,22 @@ impl<'a> PatchView<'a> {
                 ),
             );
             return;
+        }
+        if let Some(tau) = self.bound_beyond_contact() {
+            warn(
+                "bound_beyond_contact",
+                format!(
+                    "The prescribed friction bound acts on all of the boundary, as Tresca's law has it: up to {tau:.3e} also where the body does not touch. Give it as a table over s that ends with the contact."
+                ),
+            );
+        }
+        if let Some((length, radius)) = self.unresolved_radius() {
+            warn(
+                "mesh_too_coarse_for_radius",
+                format!(
+                    "The edge under the peak of σ_t ({length:.3e}) is longer than the nonlocal radius ({radius}): the averaging is not resolved there. Refine the mesh."
+                ),
+            );
         }
         let edges = (0..contact.boundary.edge_count())
             .filter(|k| edge_nodes(*k).iter().all(|&i| self.active(i)))
@@ -530,7 +602,7 @@ impl<'a> PatchView<'a> {
             .filter(|(point, _)| point.patch == self.p)
             .map(|(point, traction)| point.weight * traction)
             .collect();
-        if own.len() != 3 * self.patch.contact.boundary.edge_count() {
+        if !self.at_gauss_points() {
             return; // friction at nodes does not oscillate
         }
         let cancels = |edge: &[f64]| {

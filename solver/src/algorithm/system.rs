@@ -36,6 +36,9 @@ pub struct System<'a> {
     pub semidefinite: bool,
     /// Work done against friction under the incremental law in the increments so far (without 2π).
     pub past_work: f64,
+    /// A nodal force of the size that this problem is about, also at a level where nothing acts: that
+    /// of the full loads, or of a contact node pushed by the indentation or the drag.
+    pub reference_force: f64,
     pub(super) body: &'a ElasticBody,
     pub(super) model: &'a Model,
 }
@@ -139,6 +142,7 @@ impl<'a> System<'a> {
             level: Level::FULL,
             semidefinite: model.held_by_contact,
             past_work: 0.0,
+            reference_force: 0.0,
             body,
             model,
         };
@@ -146,6 +150,14 @@ impl<'a> System<'a> {
             system.add(model, contact);
         }
         system.set_level(Level::FULL);
+        let most =
+            |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |a, b| a.max(b.abs()));
+        let stiffest = most(&mut (0..system.load.len()).map(|i| body.stiffness.at(i, i)));
+        let pushed = most(&mut model.contacts.iter().flat_map(|contact| {
+            let indented = contact.indentation.iter().copied();
+            indented.chain([contact.tangential_displacement])
+        }));
+        system.reference_force = (stiffest * pushed).max(most(&mut system.load.iter().copied()));
         system
     }
 
@@ -414,7 +426,8 @@ impl<'a> System<'a> {
     }
 
     /// The largest force or complementarity defect for a given friction bound, divided by the
-    /// largest nodal reaction (by the largest load or friction force where nothing touches).
+    /// largest nodal reaction. Where nothing touches: by the largest load, friction force or, since a
+    /// body may be at rest again, by the problem's own force.
     pub fn kkt_residual(&self, state: &State, bound: &[f64]) -> f64 {
         let mut friction = vec![0.0; state.v.len()];
         self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
@@ -443,10 +456,17 @@ impl<'a> System<'a> {
         }
         let largest = |values: &[f64]| values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
         let scale = match largest(&reactions) {
-            0.0 => largest(&self.load).max(largest(&friction)).max(defect),
+            0.0 => largest(&self.load)
+                .max(largest(&friction))
+                .max(self.reference_force),
             reaction => reaction,
         };
-        if defect == 0.0 { 0.0 } else { defect / scale }
+        // without any force in the whole problem there is nothing to compare with, and no defect
+        if defect == 0.0 {
+            0.0
+        } else {
+            defect / scale.max(f64::MIN_POSITIVE)
+        }
     }
 }
 

@@ -78,8 +78,8 @@ pub(super) struct Row {
     pub(super) inner: u32,
     /// σ_t at every friction point.
     pub(super) tractions: Vec<f64>,
-    /// Part of a new friction force that was taken over: R_F is divided by it.
-    pub(super) relaxation: f64,
+    /// R_F where the stage tests one of its own; else it is that of the nodal pressures.
+    pub(super) r_f: Option<Option<f64>>,
 }
 
 /// States that repeat.
@@ -141,10 +141,10 @@ impl<'s, 'a> Track<'s, 'a> {
             entered: changes(false),
             left: changes(true),
         };
-        let r_f = self
-            .before
-            .as_ref()
-            .map(|(_, pressures)| relative_change(&measured.pressures, pressures) / row.relaxation);
+        let before = self.before.as_ref();
+        let r_f = row.r_f.unwrap_or_else(|| {
+            before.map(|(_, pressures)| relative_change(&measured.pressures, pressures))
+        });
         let (slip, stick) = slipping(system, &measured.state, &measured.implied_bound);
         let points = system.points.iter().zip(&row.tractions);
         let friction: f64 = points

@@ -47,6 +47,8 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
         Along::ArcLength => whole.s[node],
     };
     let rounding = ROUNDING * whole.s[whole.s.len() - 1];
+    let in_space = matches!(obstacle, Obstacle::Polyline { .. } | Obstacle::Line { .. });
+    let surface = if in_space { mesh.surface() } else { Vec::new() };
     let seen_from = |node: usize| {
         let (place, n, t) = (
             whole.positions[node],
@@ -56,17 +58,20 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
         match obstacle {
             Obstacle::Polyline { points, .. } => {
                 let segments = points.windows(2).map(|pair| (pair[0], pair[1], [0.0, 1.0]));
-                along_normal(place, n, t, segments, rounding)
+                let depth = depth(mesh, &surface, place, n, rounding);
+                along_normal(place, n, t, segments, depth, rounding)
             }
             Obstacle::Line { point, angle, .. } => {
                 let (sine, cosine) = angle.to_radians().sin_cos();
                 let end = [point[0] + cosine, point[1] + sine];
                 let endless = [f64::NEG_INFINITY, f64::INFINITY];
+                let depth = depth(mesh, &surface, place, n, rounding);
                 along_normal(
                     place,
                     n,
                     t,
                     std::iter::once((*point, end, endless)),
+                    depth,
                     rounding,
                 )
             }
@@ -192,6 +197,26 @@ fn tabulated(x: &[f64], y: &[f64], at: f64, rounding: f64) -> Option<(f64, f64)>
     Some((distance, mean))
 }
 
+/// How far the body reaches from a place of its surface along −n (length), by the chords of its sides.
+fn depth(mesh: &Mesh, surface: &[Edge], place: [f64; 2], n: [f64; 2], rounding: f64) -> f64 {
+    let across = |edge: &Edge| {
+        let [p, q, _] = mesh.edge_nodes(edge);
+        let (along, to) = (
+            [q[0] - p[0], q[1] - p[1]],
+            [place[0] - p[0], place[1] - p[1]],
+        );
+        // place − λ n = p + μ (q − p)
+        let det = along[0] * n[1] - along[1] * n[0];
+        let mu = (to[0] * n[1] - to[1] * n[0]) / det;
+        let lambda = (along[0] * to[1] - along[1] * to[0]) / det;
+        ((0.0..=1.0).contains(&mu) && lambda > rounding).then_some(lambda)
+    };
+    surface
+        .iter()
+        .filter_map(across)
+        .fold(f64::INFINITY, f64::min)
+}
+
 /// Where the straight line along the normal n through `place` meets the nearest of the segments
 /// (start, end, range of the parameter between them).
 fn along_normal(
@@ -199,6 +224,7 @@ fn along_normal(
     n: [f64; 2],
     t: [f64; 2],
     segments: impl Iterator<Item = ([f64; 2], [f64; 2], [f64; 2])>,
+    depth: f64,
     rounding: f64,
 ) -> Option<Profile> {
     let mut hits: Vec<Profile> = Vec::new();
@@ -224,6 +250,8 @@ fn along_normal(
             slope: (direction[0] * n[0] + direction[1] * n[1]) / across,
         });
     }
+    // what lies behind the body faces its other side
+    hits.retain(|hit| hit.distance >= -depth);
     let nearest = hits
         .iter()
         .map(|hit| hit.distance.abs())

@@ -1,5 +1,6 @@
 //! The mesh with all its names, and values along named boundaries.
 
+use super::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
 use super::findings::{ALIGNED, Findings};
 use crate::error::{Violation, escape};
 use crate::io::{ReadError, abaqus, gmsh};
@@ -109,6 +110,21 @@ impl Findings {
                 "adaptive refinement of a mesh that is no grid",
                 "a `grid`, or a number of refinements",
                 "Lines can be put into a grid only; refine an inline mesh by a number.",
+            );
+        }
+        let lines = input
+            .grid
+            .as_ref()
+            .map_or([0; 2], |grid| [grid.x.len(), grid.y.len()]);
+        if lines[0] * lines[1] > MOST_ADAPTIVE_ELEMENTS
+            || lines[0].max(lines[1]) > MOST_ADAPTIVE_LINES
+        {
+            self.say(
+                "/mesh/refine",
+                "too_large",
+                format!("a first grid of {} × {} lines", lines[0], lines[1]),
+                format!("at most {MOST_ADAPTIVE_ELEMENTS} elements and {MOST_ADAPTIVE_LINES} lines in a direction"),
+                "Adaptive refinement starts coarse and makes no larger grid; give a coarse one, or a number of refinements.",
             );
         }
         if contacts == 0 {

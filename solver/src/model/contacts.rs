@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::findings::{ALIGNED, AXIS, Findings};
-use super::{ContactModel, Held};
+use super::{ContactModel, Held, Level};
 use crate::contact::ContactBoundary;
 use crate::contact::obstacle::{self, FacingRun};
 use crate::elasticity::Section;
@@ -91,6 +91,7 @@ impl Findings {
                 boundary,
                 profile: along(&|i| run.profile[i].distance),
                 indentation: along(&|_| contact.indentation),
+                cosines: cosines.clone(),
                 tangential_displacement: contact.tangential_displacement,
                 // the obstacle moves by −δ n, and n·t is the sine of the slope
                 indentation_drag: match contact.normal {
@@ -267,10 +268,11 @@ impl Findings {
         fixed: &BTreeMap<u32, Held>,
     ) {
         let (boundary, pointer) = (&contact.boundary, &contact.pointer);
-        let ends: Vec<[f64; 2]> = match steps {
-            [] => vec![[1.0, 1.0]],
-            _ => steps.iter().map(|s| [s.indentation, s.supports]).collect(),
+        let ends: Vec<Level> = match steps {
+            [] => vec![Level::FULL],
+            _ => steps.iter().map(Level::end_of).collect(),
         };
+        let bonded = contact.condition == Condition::Bonded;
         for (i, node) in boundary.nodes.iter().enumerate() {
             let Some(held) = fixed.get(node) else {
                 continue;
@@ -290,9 +292,27 @@ impl Findings {
                     "End the contact an edge before the support with `from` or `to`.",
                 );
             }
+            for level in ends.iter().filter(|_| bonded) {
+                let wanted = [contact.gap(i, level.indentation), contact.drag(i, level)];
+                for (prescribed, wanted) in [along_n, along_t].into_iter().zip(wanted) {
+                    let Some(u) = prescribed.map(|u| level.supports * u) else {
+                        continue;
+                    };
+                    if (u - wanted).abs() > ALIGNED * u.abs().max(wanted.abs()) {
+                        self.say(
+                            format!("{pointer}/condition"),
+                            "conflict",
+                            format!("node {node} at ({x}, {y}) held at {u} by a support"),
+                            format!("{wanted}, where the bonded obstacle holds it"),
+                            "End the contact an edge before the support with `from` or `to`, or let both agree.",
+                        );
+                        return;
+                    }
+                }
+            }
             let Some(u_n) = along_n else { continue };
-            for [indentation, supports] in &ends {
-                let (u_n, gap) = (supports * u_n, contact.gap(i, *indentation));
+            for level in &ends {
+                let (u_n, gap) = (level.supports * u_n, contact.gap(i, level.indentation));
                 let free = contact.condition == Condition::None;
                 if !free && u_n > gap + ALIGNED * gap.abs() {
                     self.say(

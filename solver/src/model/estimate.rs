@@ -20,6 +20,9 @@ pub struct Estimate {
 /// Adaptive refinement makes no larger mesh.
 pub const MOST_ADAPTIVE_ELEMENTS: usize = 60_000;
 
+/// Nor one with more lines in a direction: the contact's dense system grows with their square.
+pub const MOST_ADAPTIVE_LINES: usize = 600;
+
 /// What the estimate needs of a stored mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshSize {
@@ -32,6 +35,9 @@ pub struct MeshSize {
 /// Bytes of a mesh file for one element, rather too few than too many: in the larger files that
 /// Gmsh writes an element of second order has about 150 with its nodes, one of first order 100.
 const BYTES_PER_ELEMENT: f64 = 80.0;
+
+/// Bytes of history that an increment leaves: some twenty rows, kept for the step and for the whole.
+const INCREMENT: f64 = 1e4;
 
 /// Estimates from the numbers of elements alone; the constants are measured in `docs/performance.md`.
 /// `stored`: the mesh that the problem names by its hash, where it does.
@@ -54,16 +60,19 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Estimate {
     // A large mesh has three nodes an element, a small one up to eight.
     let n = match adaptive {
         // as large as it may become
-        true => MOST_ADAPTIVE_ELEMENTS as f64,
+        true => elements.max(MOST_ADAPTIVE_ELEMENTS as f64),
         false => split * elements,
     };
     let nodes = (3.0 * n + 4.0 * n.sqrt() + 1.0).min(8.0 * n);
     let dofs = 2.0 * nodes;
     // fill of a minimum-degree factor in the plane grows like n log n
     let fill = dofs * dofs.max(2.0).log2();
-    let contact = contact_dofs(problem, stored, n.sqrt());
-    let memory = 1500.0 * dofs + 95.0 * fill + 60.0 * contact * contact;
+    let contact = match adaptive {
+        true => 4.0 * (MOST_ADAPTIVE_LINES * problem.contacts.len()) as f64,
+        false => contact_dofs(problem, stored, n.sqrt()),
+    };
     let increments: f64 = problem.steps.iter().map(|s| f64::from(s.increments)).sum();
+    let memory = 1500.0 * dofs + 95.0 * fill + 60.0 * contact * contact + INCREMENT * increments;
     let once_more = 1
         + u32::from(problem.solver.check_uniqueness)
         + 2 * u32::from(problem.solver.check_increments);

@@ -73,6 +73,16 @@ impl Level {
         supports: 0.0,
     };
 
+    /// The end of a load step.
+    pub fn end_of(step: &Step) -> Level {
+        Level {
+            indentation: step.indentation,
+            tangential_displacement: step.tangential_displacement,
+            loads: step.loads,
+            supports: step.supports,
+        }
+    }
+
     /// Everything as given.
     pub const FULL: Level = Level {
         indentation: 1.0,
@@ -95,6 +105,9 @@ pub struct ContactModel {
     pub profile: Vec<f64>,
     /// The obstacle's indentation at each node, along the contact's normal (length).
     pub indentation: Vec<f64>,
+    /// Part of an indentation that acts along the contact's normal, at each node: 1 with the body's
+    /// normal, the cosine of the slope with the obstacle's.
+    pub cosines: Vec<f64>,
     /// The obstacle's own displacement along the contact's t (length).
     pub tangential_displacement: f64,
     /// What its indentation moves it along the contact's t at each node (length): nothing with the

@@ -5,8 +5,8 @@ use crate::element::{Element, Family};
 use crate::error::escape;
 use crate::mesh::Mesh;
 use crate::problem::{
-    Algorithm, Analysis, Condition, Friction, FrictionPoints, History, NormalOf, Problem, Step,
-    ThesisPressure,
+    Algorithm, Analysis, Condition, Friction, FrictionPoints, History, Measure, NormalOf, Problem,
+    Step, ThesisPressure,
 };
 
 impl Findings {
@@ -125,6 +125,18 @@ impl Findings {
     pub(super) fn steps(&mut self, steps: &[Step]) {
         /// Far beyond any use, and still a bounded time.
         const MOST_INCREMENTS: u32 = 10_000;
+        /// Of all steps: each leaves rows of history.
+        const MOST_IN_ALL: u64 = 20_000;
+        let all: u64 = steps.iter().map(|step| u64::from(step.increments)).sum();
+        if all > MOST_IN_ALL {
+            self.say(
+                "/steps",
+                "too_many",
+                format!("{all} increments in all"),
+                format!("at most {MOST_IN_ALL}"),
+                "Take fewer increments, or make several jobs of it.",
+            );
+        }
         for (i, step) in steps.iter().enumerate() {
             self.require(
                 (1..=MOST_INCREMENTS).contains(&step.increments),
@@ -175,6 +187,16 @@ impl Findings {
                     "another condition than `unilateral`",
                     "unilateral contact",
                     "The thesis's iteration knows no other; choose another algorithm.",
+                );
+            }
+            let surface = |f: &Friction| f.measure == Measure::Surface;
+            if contact.friction.as_ref().is_some_and(surface) {
+                self.say(
+                    format!("/contacts/{i}/friction/measure"),
+                    "not_used",
+                    "`surface`",
+                    "`line`",
+                    "The thesis averages along the line of contact (3.4); choose another algorithm.",
                 );
             }
             let incremental = |f: &Friction| f.history == History::Incremental;
