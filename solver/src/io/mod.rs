@@ -3,10 +3,13 @@
 // In.
 pub mod json;
 
-// Out: tables (CSV and JSON Lines are in `table`), figures.
+// Out: tables (CSV and JSON Lines are in `table`), fields, figures.
 pub mod arrow;
+pub mod fields;
 pub mod npz;
 pub mod plot;
+pub mod stress;
 pub mod table;
+pub mod vtu;
 
 mod number; // what these share
