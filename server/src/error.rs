@@ -48,7 +48,7 @@ pub enum ApiError {
     MethodNotAllowed,
     /// None of the wanted formats exists.
     #[error("not available in this format; available: {0}")]
-    NotAcceptable(&'static str),
+    NotAcceptable(String),
     /// A body in a format that is not understood.
     #[error("expected a body of type application/json, got {0}")]
     UnsupportedMedia(String),

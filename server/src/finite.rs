@@ -104,7 +104,7 @@ fn profile(profile: &ContactProfile) -> bool {
 
 #[rustfmt::skip]
 fn fields(fields: &Fields) -> bool {
-    let Fields { x, y, ux, uy, stress_xx, stress_yy, stress_xy, stress_zz, element_error, gauss, elements: _ } = fields;
+    let Fields { x, y, ux, uy, stress_xx, stress_yy, stress_xy, stress_zz, element_error, gauss, elements: _, contact_state: _ } = fields;
     let GaussFields { x: gx, y: gy, stress_xx: gxx, stress_yy: gyy, stress_xy: gxy, stress_zz: gzz, order: _ } = gauss;
     [x, y, ux, uy, stress_xx, stress_yy, stress_xy, stress_zz, element_error, gx, gy, gxx, gyy, gxy, gzz]
         .into_iter()

@@ -12,9 +12,10 @@ pub mod config;
 pub mod error;
 pub mod violations;
 
-// Solve one problem and measure it; fingerprints of problem and result.
+// Solve one problem and measure it; fingerprints of problem and result; the formats of a result.
 pub mod digest;
 pub mod finite;
+pub mod formats;
 pub mod run;
 
 // Remember: everything durable, and the only SQL.

@@ -370,6 +370,9 @@ pub struct Fields {
     pub stress_xy: Vec<f64>,
     /// Recovered out-of-plane stress σ_zz (the hoop stress σ_θθ in axisymmetry).
     pub stress_zz: Vec<f64>,
+    /// −1 where the node lies on no contact boundary, else its state in the profile: 0 open, 1 stick,
+    /// 2 slip; the largest where contacts meet.
+    pub contact_state: Vec<i8>,
     /// Eight or six node numbers per element: corners counter-clockwise, then midsides.
     pub elements: Vec<Element>,
     /// Estimated error of each element (see [`ErrorEstimate`]).

@@ -1,4 +1,4 @@
-//! What a job has found: /result, /profiles/{boundary}, /fields.
+//! What a job has found: /result, /history, /profiles/{boundary}, /fields.
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -75,9 +75,119 @@ async fn a_result_has_its_summary_profiles_and_fields() {
         );
     }
 
-    let fields = server.json(&format!("/v1/jobs/{id}/fields")).await;
+    let fields = server
+        .json(&format!("/v1/jobs/{id}/fields?format=json"))
+        .await;
     let nodes = fields["x"].as_array().unwrap().len();
     assert!(nodes > 100 && fields["stress_zz"].as_array().unwrap().len() == nodes);
+    // What the nodes of the profile are told there is told here too, and of no other node.
+    let states = fields["contact_state"].as_array().unwrap();
+    assert_eq!(states.len(), nodes);
+    let count = |state: i64| states.iter().filter(|s| s.as_i64() == Some(state)).count();
+    let said = |state: &str| {
+        let said = profile["state"].as_array().unwrap();
+        said.iter().filter(|s| s.as_str() == Some(state)).count()
+    };
+    assert_eq!(
+        [count(0), count(1), count(2)],
+        [said("open"), said("stick"), said("slip")]
+    );
+}
+
+#[tokio::test]
+async fn every_format_has_its_type_its_name_and_its_first_bytes() {
+    let server = server().await;
+    let id = server.submit(&example_json("rectangular_punch")).await;
+    server.until_done(&id).await;
+    let tables: [(&str, &str, &[u8]); 5] = [
+        ("json", "application/json", b""),
+        ("csv", "text/csv; charset=utf-8", b""),
+        ("jsonl", "application/jsonl", b"{\""),
+        ("arrow", "application/vnd.apache.arrow.file", b"ARROW1\0\0"),
+        ("npz", "application/x-npz", b"PK\x03\x04"),
+    ];
+    let fields: [(&str, &str, &[u8]); 3] = [
+        ("vtu", "application/vnd.vtk.unstructuredgrid+xml", b"<?xml"),
+        ("npz", "application/x-npz", b"PK\x03\x04"),
+        ("json", "application/json", b"{\"x\":"),
+    ];
+    for (part, file, formats) in [
+        ("profiles/top", "profile.top", &tables[..]),
+        ("history", "history", &tables[..]),
+        ("fields", "fields", &fields[..]),
+    ] {
+        for (n, (format, media, start)) in formats.iter().enumerate() {
+            let path = format!("/v1/jobs/{id}/{part}");
+            let asked = server.get(&format!("{path}?format={format}"));
+            let asked = asked.header("Accept", "image/png").send().await.unwrap();
+            assert_eq!(asked.status(), StatusCode::OK, "{part} {format}");
+            assert_eq!(asked.headers()["content-type"], media);
+            assert_eq!(
+                asked.headers()["content-disposition"],
+                format!("attachment; filename=\"{id}.{file}.{format}\"")
+            );
+            let body = asked.bytes().await.unwrap();
+            assert!(body.starts_with(start), "{part} {format}");
+            let essence = media.split(';').next().unwrap();
+            let accepted = server.get(&path).header("Accept", essence);
+            assert_eq!(accepted.send().await.unwrap().bytes().await.unwrap(), body);
+            if n == 0 {
+                let default = server.get(&path).send().await.unwrap();
+                assert_eq!(default.bytes().await.unwrap(), body, "{part}");
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_history_has_the_rows_that_were_told_and_no_more_than_asked_for() {
+    let server = server().await;
+    let id = server.submit(&example_json("rectangular_punch")).await;
+    server.until_done(&id).await;
+    let history = server.json(&format!("/v1/jobs/{id}/history")).await;
+    let rows = history.as_array().unwrap();
+    let mut told = server.events(&id, 0).await.rest().await;
+    told.retain(|event| event["type"] == "iteration");
+    assert!(rows.len() > 4);
+    assert_eq!(rows.len(), told.len());
+    for (row, told) in rows.iter().zip(&told) {
+        for (name, value) in row.as_object().unwrap() {
+            assert_eq!(value, &told[name], "{name}");
+        }
+    }
+    let few = server
+        .json(&format!("/v1/jobs/{id}/history?max_points=3"))
+        .await;
+    let few = few.as_array().unwrap();
+    assert_eq!(few.len(), 3);
+    assert_eq!((&few[0], &few[2]), (&rows[0], &rows[rows.len() - 1]));
+    let csv = server.get(&format!("/v1/jobs/{id}/history?format=csv&max_points=2"));
+    let csv = csv.send().await.unwrap().text().await.unwrap();
+    assert!(
+        csv.starts_with("k,stage,") && csv.lines().count() == 3,
+        "{csv}"
+    );
+    for wrong in ["1", "-3", "many"] {
+        let refused = server.get(&format!("/v1/jobs/{id}/history?max_points={wrong}"));
+        let refused = refused.send().await.unwrap();
+        assert_eq!(refused.status(), StatusCode::BAD_REQUEST, "{wrong}");
+    }
+}
+
+#[tokio::test]
+async fn a_job_without_a_result_has_the_history_that_was_told_so_far() {
+    let server = suite::harness::Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
+    let running = server.submit(&large()).await;
+    let waiting = server.submit(&example_json("sheet")).await;
+    server.until(&running, |e| e["type"] == "iteration").await;
+    let so_far = server.json(&format!("/v1/jobs/{running}/history")).await;
+    assert_eq!(so_far[0]["k"], 1);
+    let none = server.json(&format!("/v1/jobs/{waiting}/history")).await;
+    assert_eq!(none, json!([]));
+    server.cancel(&running).await;
+    server.until_done(&running).await;
+    let kept = server.json(&format!("/v1/jobs/{running}/history")).await;
+    assert!(kept.as_array().unwrap().len() >= so_far.as_array().unwrap().len());
 }
 
 #[tokio::test]
@@ -92,14 +202,18 @@ async fn what_is_not_there_is_said_with_what_is() {
         .unwrap();
     assert_eq!(other.status(), StatusCode::NOT_FOUND);
     assert!(other.text().await.unwrap().contains("it has: top"));
-    for path in ["profiles/top?format=xml", "fields?format=vtu"] {
+    for (path, available) in [
+        ("profiles/top?format=xml", "json, csv, jsonl, arrow, npz"),
+        ("history?format=vtu", "json, csv, jsonl, arrow, npz"),
+        ("fields?format=csv", "vtu, npz, json"),
+    ] {
         let other = server
             .get(&format!("/v1/jobs/{id}/{path}"))
             .send()
             .await
             .unwrap();
         assert_eq!(other.status(), StatusCode::NOT_ACCEPTABLE, "{path}");
-        assert!(other.text().await.unwrap().contains("json"), "{path}");
+        assert!(other.text().await.unwrap().contains(available), "{path}");
     }
 }
 

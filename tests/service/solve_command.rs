@@ -94,3 +94,76 @@ fn a_missing_file_exits_with_1_in_one_line() {
     assert_eq!(output.status.code(), Some(1));
     assert_eq!(String::from_utf8(output.stderr).unwrap().lines().count(), 1);
 }
+
+#[test]
+fn every_ending_is_written_in_one_go_and_leaves_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = [
+        "p.json",
+        "p.csv",
+        "p.jsonl",
+        "p.arrow",
+        "p.npz",
+        "p.vtu",
+        "p.svg",
+        "p.history.csv",
+        "p.profile.arrow",
+        "p.profile.top.csv",
+        "p.fields.npz",
+    ];
+    std::fs::write(folder.path().join("p.csv"), "older").unwrap();
+    let paths = names.map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    let arguments: Vec<&str> = paths.iter().flat_map(|path| ["-o", path]).collect();
+    let output = solve(&example("rectangular_punch"), &arguments);
+    assert_eq!(output.status.code(), Some(0));
+    assert!(
+        output.stdout.is_empty(),
+        "a file is asked for, not a summary"
+    );
+    assert_eq!(
+        std::fs::read_dir(folder.path()).unwrap().count(),
+        names.len()
+    );
+    let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    let document: Value = serde_json::from_slice(&read("p.json")).unwrap();
+    let csv = String::from_utf8(read("p.csv")).unwrap();
+    let nodes = document["profiles"]["top"]["s"].as_array().unwrap().len();
+    assert_eq!(csv.lines().count(), nodes + 1);
+    assert_eq!(read("p.profile.top.csv"), read("p.csv"));
+    assert_eq!(read("p.profile.arrow"), read("p.arrow"));
+    let history = String::from_utf8(read("p.history.csv")).unwrap();
+    let rows = document["history"].as_array().unwrap().len();
+    assert_eq!(history.lines().count(), rows + 1);
+    for (name, start) in [
+        ("p.npz", &b"PK"[..]),
+        ("p.vtu", b"<?xml"),
+        ("p.svg", b"<svg"),
+    ] {
+        assert!(read(name).starts_with(start), "{name}");
+    }
+}
+
+#[test]
+fn what_cannot_be_written_is_said_before_anything_is_solved() {
+    let mut two = example_json("rectangular_punch");
+    two["supports"] = json!([{ "boundary": "left", "ux": 0 }]);
+    let mut below = two["contacts"][0].clone();
+    below["boundary"] = json!("bottom");
+    two["contacts"].as_array_mut().unwrap().push(below);
+    for (name, said) in [
+        ("p.xlsx", ".vtu"),
+        ("p", ".json"),
+        ("p.fields.csv", ".npz"),
+        ("no-such-folder/p.csv", "no folder"),
+        ("p.csv", "NAME.profile.top.csv"),
+        ("p.profile.left.csv", "it has: top, bottom"),
+    ] {
+        let output = solve(&two.to_string(), &["-o", name]);
+        assert_eq!(output.status.code(), Some(2), "{name}");
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            error.contains(said) && error.lines().count() == 1,
+            "{error}"
+        );
+    }
+}

@@ -2,6 +2,7 @@
 
 mod demo;
 pub mod examples;
+mod output;
 mod report;
 mod serve;
 mod solve;

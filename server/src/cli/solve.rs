@@ -1,8 +1,7 @@
 //! `signorini solve FILE`: the same code as a worker's, without a service.
 
 use std::{
-    fs::File,
-    io::{BufWriter, Write},
+    io::Write,
     ops::ControlFlow,
     path::{Path, PathBuf},
     time::Instant,
@@ -15,22 +14,20 @@ use solver::{
     solution::Progress,
 };
 
-use super::{Exit, report};
-use crate::{
-    config::MemoryBudget,
-    error::ApiError,
-    run::{self, Document},
+use super::{
+    Exit,
+    output::{self, Output},
+    report,
 };
+use crate::{config::MemoryBudget, error::ApiError, run};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// The problem: a JSON file, or an Abaqus or CalculiX deck (.inp)
     file: PathBuf,
 
-    /// Write the result there: .json the whole of it, .svg the stress profile as a figure; - is
-    /// JSON on standard output. Without it a summary is printed
-    #[arg(short, long, value_name = "OUT")]
-    output: Option<PathBuf>,
+    #[arg(short, long, value_name = "OUT", help = output::HELP)]
+    output: Vec<PathBuf>,
 
     #[command(flatten)]
     memory: MemoryBudget,
@@ -43,15 +40,6 @@ pub(super) fn run(
         memory,
     }: &Arguments,
 ) -> anyhow::Result<Exit> {
-    let format = match output.as_deref().map(Format::of) {
-        Some(None) => {
-            eprintln!(
-                "-o takes a file that ends in .json or .svg, or - for JSON on standard output"
-            );
-            return Ok(Exit::Invalid);
-        }
-        format => format.flatten(),
-    };
     let start = Instant::now();
     let text =
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
@@ -68,6 +56,16 @@ pub(super) fn run(
         Err(violations) => return Ok(invalid(file, &violations)),
     };
     let parse_s = start.elapsed().as_secs_f64();
+    let contacts = problem.contacts.iter();
+    let contacts: Vec<&str> = contacts.map(|contact| contact.boundary.as_str()).collect();
+    let asked = output.iter().map(|path| Output::parse(path, &contacts));
+    let outputs = match asked.collect::<Result<Vec<_>, _>>() {
+        Ok(outputs) => outputs,
+        Err(problem) => {
+            eprintln!("{problem}");
+            return Ok(Exit::Invalid);
+        }
+    };
     let (estimate, budget_bytes) = (solver::estimate(&problem, None), memory.bytes());
     if estimate.memory_bytes > budget_bytes {
         let too_large = ApiError::ProblemTooLarge {
@@ -94,10 +92,11 @@ pub(super) fn run(
         Err(error) => return Err(error.into()),
     };
     let title = problem.title.as_deref();
-    match (output, format) {
-        (Some(path), Some(format)) => write(path, format, title, &document)
-            .with_context(|| format!("cannot write {}", path.display()))?,
-        _ => print(&report::document(title, &document))?,
+    for output in &outputs {
+        output.write(title, &document)?;
+    }
+    if outputs.is_empty() {
+        print(&report::document(title, &document))?;
     }
     Ok(if document.summary.solution.converged {
         Exit::Ok
@@ -123,54 +122,6 @@ fn invalid(file: &Path, violations: &[Violation]) -> Exit {
         eprintln!("  {violation}");
     }
     Exit::Invalid
-}
-
-/// What `-o` asks for.
-#[derive(Clone, Copy, Debug)]
-enum Format {
-    Json,
-    Svg,
-}
-
-impl Format {
-    fn of(path: &Path) -> Option<Format> {
-        if path.as_os_str() == "-" {
-            return Some(Format::Json);
-        }
-        match path.extension()?.to_str()? {
-            "json" => Some(Format::Json),
-            "svg" => Some(Format::Svg),
-            _ => None,
-        }
-    }
-}
-
-fn write(
-    path: &Path,
-    format: Format,
-    title: Option<&str>,
-    document: &Document,
-) -> anyhow::Result<()> {
-    let figure = match format {
-        Format::Json => None,
-        Format::Svg => {
-            let drawn =
-                solver::io::plot::profile_svg(title.unwrap_or_default(), &document.profiles);
-            Some(drawn.map_err(anyhow::Error::msg)?)
-        }
-    };
-    let mut out: Box<dyn Write> = match path.to_str() {
-        Some("-") => Box::new(std::io::stdout().lock()),
-        _ => Box::new(File::create(path)?),
-    };
-    let mut out = BufWriter::new(&mut out);
-    match figure {
-        Some(svg) => out.write_all(svg.as_bytes())?,
-        None => serde_json::to_writer(&mut out, document)?,
-    }
-    writeln!(out)?;
-    out.flush()?;
-    Ok(())
 }
 
 fn print(text: &str) -> std::io::Result<()> {

@@ -36,6 +36,7 @@ pub fn router(service: Arc<Service>, max_body_bytes: usize, grpc: Router) -> Rou
         .route("/v1/jobs",                           get(jobs::list).post(jobs::create))
         .route("/v1/jobs/{id}",                      get(jobs::get))
         .route("/v1/jobs/{id}/events",               get(events::watch))
+        .route("/v1/jobs/{id}/history",              get(results::history))
         .route("/v1/jobs/{id}/result",               get(results::result))
         .route("/v1/jobs/{id}/profiles/{boundary}",  get(results::profile))
         .route("/v1/jobs/{id}/fields",               get(results::fields))

@@ -1,23 +1,25 @@
-//! `/v1/jobs/{id}/result`, `/profiles/{boundary}` and `/fields`.
-
-use std::fmt::Write;
+//! `/v1/jobs/{id}/result`, `/history`, `/profiles/{boundary}` and `/fields`.
 
 use axum::{
     Json,
     body::Body,
     extract::{RawQuery, State},
-    http::{HeaderMap, StatusCode, header},
+    http::{HeaderMap, header},
     response::{IntoResponse, Response},
 };
 use serde::Serialize;
-use solver::solution::{ContactProfile, NodeState};
+use solver::solution::Fields;
 
 use super::{
     Rest,
-    reply::json_body,
     request::{JobPath, Params},
 };
-use crate::{error::ApiError, run::Summary, verbs::results};
+use crate::{
+    error::ApiError,
+    formats::{self, Format},
+    run::Summary,
+    verbs::results,
+};
 
 /// The scalars of a result, whole and by load step.
 #[derive(Serialize)]
@@ -36,6 +38,24 @@ pub(super) async fn result(
     Ok(Json(Found { summary, steps }))
 }
 
+pub(super) async fn history(
+    State(rest): State<Rest>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+    path: JobPath,
+) -> Result<Response, ApiError> {
+    // without the first and the last row it would not be the history
+    const POINTS: &str = "a whole number, 2 or more";
+    let params = Params::parse(query.as_deref(), &["format", "max_points"])?;
+    let format = choose(Format::OF_TABLES, params.one("format"), &headers)?;
+    let most = params.number("max_points", 2..=i64::from(u32::MAX), POINTS)?;
+    let most = most.and_then(|most| usize::try_from(most).ok());
+    let rows = results::history(&rest.service, path.id, most).await?;
+    let bytes = rest.service.work(move || formats::history(&rows, format));
+    let bytes = bytes.await?.map_err(ApiError::internal)?;
+    Ok(data(format, &format!("{}.history", path.id), bytes))
+}
+
 pub(super) async fn profile(
     State(rest): State<Rest>,
     RawQuery(query): RawQuery,
@@ -43,18 +63,15 @@ pub(super) async fn profile(
     path: JobPath,
 ) -> Result<Response, ApiError> {
     let params = Params::parse(query.as_deref(), &["format", "step"])?;
-    let formats = [("json", "application/json"), ("csv", "text/csv")];
-    let format = choose(&formats, "json, csv", params.one("format"), &headers)?;
+    let format = choose(Format::OF_TABLES, params.one("format"), &headers)?;
     let step = params.one("step");
     let profile = results::profile(&rest.service, path.id, &path.boundary, step).await?;
-    Ok(match format {
-        "csv" => (
-            [(header::CONTENT_TYPE, "text/csv; charset=utf-8")],
-            csv(&profile),
-        )
-            .into_response(),
-        _ => Json(profile).into_response(),
-    })
+    let bytes = rest
+        .service
+        .work(move || formats::profile(&profile, format));
+    let bytes = bytes.await?.map_err(ApiError::internal)?;
+    let name = format!("{}.profile.{}", path.id, path.boundary);
+    Ok(data(format, &name, bytes))
 }
 
 pub(super) async fn fields(
@@ -64,30 +81,60 @@ pub(super) async fn fields(
     path: JobPath,
 ) -> Result<Response, ApiError> {
     let params = Params::parse(query.as_deref(), &["format"])?;
-    choose(
-        &[("json", "application/json")],
-        "json",
-        params.one("format"),
-        &headers,
-    )?;
-    let pieces = results::fields(&rest.service, path.id).await?;
-    Ok(json_body(StatusCode::OK, Body::from_stream(pieces)))
+    let format = choose(Format::OF_FIELDS, params.one("format"), &headers)?;
+    let name = format!("{}.fields", path.id);
+    if format == Format::Json {
+        // as they are stored, so they are passed on
+        let pieces = results::fields(&rest.service, path.id).await?;
+        return Ok(data(format, &name, Body::from_stream(pieces)));
+    }
+    let stored = results::whole_fields(&rest.service, path.id).await?;
+    let written = rest.service.work(move || {
+        let fields: Fields = serde_json::from_slice(&stored).map_err(|error| error.to_string())?;
+        drop(stored); // they may be large
+        formats::fields(&fields, format)
+    });
+    let bytes = written.await?.map_err(ApiError::internal)?;
+    Ok(data(format, &name, bytes))
+}
+
+/// Data under a name for the file that they may become.
+fn data(format: Format, name: &str, body: impl Into<Body>) -> Response {
+    // a boundary's name may be any text; a file's should be a plain one everywhere
+    let plain = |c: char| {
+        if c.is_ascii_alphanumeric() || "._-".contains(c) {
+            c
+        } else {
+            '_'
+        }
+    };
+    let name: String = name.chars().map(plain).collect();
+    let kind = match format {
+        Format::Csv => "text/csv; charset=utf-8",
+        other => other.media_type(),
+    };
+    let disposition = format!("attachment; filename=\"{name}.{}\"", format.name());
+    let headers = [
+        (header::CONTENT_TYPE, kind.to_string()),
+        (header::CONTENT_DISPOSITION, disposition),
+        (header::VARY, "Accept".to_string()),
+    ];
+    (headers, body.into()).into_response()
 }
 
 /// The format to answer in: the parameter overrides the header, the first is the default.
 fn choose(
-    formats: &[(&'static str, &'static str)],
-    available: &'static str,
+    formats: &[Format],
     parameter: Option<&str>,
     headers: &HeaderMap,
-) -> Result<&'static str, ApiError> {
-    let none = ApiError::NotAcceptable(available);
+) -> Result<Format, ApiError> {
+    let none = || {
+        let available: Vec<&str> = formats.iter().map(|format| format.name()).collect();
+        ApiError::NotAcceptable(available.join(", "))
+    };
     if let Some(wanted) = parameter {
-        return formats
-            .iter()
-            .find(|(name, _)| *name == wanted)
-            .map(|(name, _)| *name)
-            .ok_or(none);
+        let named = formats.iter().find(|format| format.name() == wanted);
+        return named.copied().ok_or_else(none);
     }
     let accept: Vec<&str> = headers
         .get_all(header::ACCEPT)
@@ -95,17 +142,17 @@ fn choose(
         .filter_map(|value| value.to_str().ok())
         .collect();
     if accept.is_empty() {
-        return formats.first().map(|(name, _)| *name).ok_or(none);
+        return formats.first().copied().ok_or_else(none);
     }
     // Each range with its weight; the best wanted format wins, ours first among equals.
-    let mut best: Option<(f32, &'static str)> = None;
-    for (name, media) in formats {
-        let weight = weight(&accept, media);
+    let mut best: Option<(f32, Format)> = None;
+    for format in formats {
+        let weight = weight(&accept, format.media_type());
         if weight > best.map_or(0.0, |(weight, _)| weight) {
-            best = Some((weight, name));
+            best = Some((weight, *format));
         }
     }
-    best.map(|(_, name)| name).ok_or(none)
+    best.map(|(_, format)| format).ok_or_else(none)
 }
 
 /// How much a media type is wanted: the weight of the most specific range that covers it.
@@ -131,56 +178,19 @@ fn weight(accept: &[&str], media: &str) -> f32 {
     found.1
 }
 
-/// One line per node, the columns in the order of the API.
-fn csv(profile: &ContactProfile) -> String {
-    let p = profile;
-    #[rustfmt::skip]
-    let columns: [(&str, &[f64]); 11] = [
-        ("s",                       &p.s),
-        ("x",                       &p.x),
-        ("y",                       &p.y),
-        ("gap",                     &p.gap),
-        ("normal_displacement",     &p.normal_displacement),
-        ("tangential_displacement", &p.tangential_displacement),
-        ("normal_stress",           &p.normal_stress),
-        ("tangential_stress",       &p.tangential_stress),
-        ("nonlocal_pressure",       &p.nonlocal_pressure),
-        ("friction_bound",          &p.friction_bound),
-        ("friction_ratio",          &p.friction_ratio),
-    ];
-    let mut text: String = columns.iter().map(|(name, _)| format!("{name},")).collect();
-    text.push_str("state\r\n");
-    for (node, state) in p.state.iter().enumerate() {
-        for (_, column) in &columns {
-            // The shortest text that reads back as the same number; nothing for a missing one.
-            if let Some(value) = column.get(node) {
-                let _ = write!(text, "{value:?}");
-            }
-            text.push(',');
-        }
-        text.push_str(match state {
-            NodeState::Open => "open\r\n",
-            NodeState::Stick => "stick\r\n",
-            NodeState::Slip => "slip\r\n",
-        });
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::fake;
-
-    const FORMATS: [(&str, &str); 2] = [("json", "application/json"), ("csv", "text/csv")];
 
     fn chosen(parameter: Option<&str>, accept: Option<&str>) -> Option<&'static str> {
         let mut headers = HeaderMap::new();
         if let Some(accept) = accept {
             headers.insert(header::ACCEPT, accept.parse().unwrap());
         }
-        choose(&FORMATS, "json, csv", parameter, &headers).ok()
+        choose(Format::OF_TABLES, parameter, &headers)
+            .ok()
+            .map(Format::name)
     }
 
     #[test]
@@ -193,21 +203,24 @@ mod tests {
             chosen(None, Some("text/*, application/json;q=0.5")),
             Some("csv")
         );
+        assert_eq!(
+            chosen(None, Some("text/*;q=0.1, application/x-npz")),
+            Some("npz")
+        );
         assert_eq!(chosen(None, Some("application/json;q=0, */*")), Some("csv"));
         assert_eq!(chosen(None, Some("image/png")), None);
         assert_eq!(chosen(Some("xml"), None), None);
+        assert_eq!(chosen(Some("vtu"), None), None);
     }
 
     #[test]
-    fn a_table_has_a_header_and_a_line_per_node() {
-        let profile = fake::solution().profiles.remove("top").unwrap();
-        let text = csv(&profile);
-        let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines.len(), 3);
-        assert!(lines[0].starts_with("s,x,y,gap,") && lines[0].ends_with(",state"));
+    fn a_file_has_a_plain_name_whatever_the_boundary_is_called() {
+        let response = data(Format::Csv, "job_1.profile.a\"; b/\r\nñ", vec![]);
+        let headers = response.headers();
         assert_eq!(
-            lines[1],
-            "0.0,0.0,0.0,-0.1,-0.1,0.0,-20.0,0.1,19.0,5.7,0.02,stick"
+            headers["content-disposition"],
+            "attachment; filename=\"job_1.profile.a___b____.csv\""
         );
+        assert_eq!(headers["content-type"], "text/csv; charset=utf-8");
     }
 }

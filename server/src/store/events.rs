@@ -57,6 +57,17 @@ impl Store {
             })
             .collect()
     }
+
+    /// The iterations of one start of a job, each as the JSON of its event, in order.
+    pub async fn iterations(&self, key: i64, attempt: i32) -> Result<Vec<String>> {
+        Ok(sqlx::query_scalar(
+            "select body from event where job_id = ? and attempt = ? and type = 'iteration' order by seq",
+        )
+        .bind(key)
+        .bind(attempt)
+        .fetch_all(&self.reader)
+        .await?)
+    }
 }
 
 /// Numbers and appends within a transaction; gives the last number.

@@ -99,7 +99,7 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
 }
 
 fn links(id: JobId) -> BTreeMap<String, String> {
-    ["events", "result", "fields", "cancel"]
+    ["events", "history", "result", "fields", "cancel"]
         .into_iter()
         .map(|verb| (verb.to_string(), format!("/v1/jobs/{id}/{verb}")))
         .chain([

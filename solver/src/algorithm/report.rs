@@ -11,8 +11,8 @@ use crate::elasticity::{Dof, Recovered, StressError, recover, stress_error};
 use crate::error::SolveError;
 use crate::model::Model;
 use crate::solution::{
-    ContactProfile, ContactSummary, ErrorEstimate, Fields, GaussFields, Outcome, Residuals,
-    Summary, Warning,
+    ContactProfile, ContactSummary, ErrorEstimate, Fields, GaussFields, NodeState, Outcome,
+    Residuals, Summary, Warning,
 };
 
 /// Forces that balance no better than this have lost half of their digits: no result to trust.
@@ -65,13 +65,23 @@ pub fn report(
     let error = stress_error(&model.mesh, &model.section, model.quadrature, &recovered);
     let circumference = system.circumference;
 
+    let mut contact_state = vec![-1; model.mesh.nodes.len()];
     let mut warnings = model.warnings.clone();
     let (mut contacts, mut profiles) = (BTreeMap::new(), BTreeMap::new());
     for (p, patch) in system.patches.iter().enumerate() {
         let view = PatchView::new(system, p, finished, &forces);
         let summary = view.summary();
         view.warn(&mut warnings);
-        profiles.insert(patch.contact.name.clone(), view.profile());
+        let profile = view.profile();
+        for (&node, state) in patch.contact.boundary.nodes.iter().zip(&profile.state) {
+            let seen: &mut i8 = &mut contact_state[node as usize];
+            *seen = (*seen).max(match state {
+                NodeState::Open => 0,
+                NodeState::Stick => 1,
+                NodeState::Slip => 2,
+            });
+        }
+        profiles.insert(patch.contact.name.clone(), profile);
         contacts.insert(patch.contact.name.clone(), summary);
     }
     warn_of_iteration(finished, &mut warnings);
@@ -133,7 +143,7 @@ pub fn report(
         dofs: body.map.unknowns as u64,
         contact_dofs: system.load.len() as u64,
     };
-    let fields = fields(model, &displacements, &recovered, error);
+    let fields = fields(model, &displacements, &recovered, error, contact_state);
     let finite = [
         summary.normal_force,
         summary.tangential_force,
@@ -288,6 +298,7 @@ fn fields(
     displacements: &[[f64; 2]],
     recovered: &Recovered,
     error: StressError,
+    contact_state: Vec<i8>,
 ) -> Fields {
     let mesh = &model.mesh;
     let at_points = |component: usize| {
@@ -306,6 +317,7 @@ fn fields(
         stress_yy: stress(1),
         stress_xy: stress(2),
         stress_zz: stress(3),
+        contact_state,
         elements: mesh.elements.clone(),
         element_error: per_element,
         gauss: GaussFields {

@@ -1,0 +1,299 @@
+//! `-o`: what a file is to hold, by its name, and writing it whole or not at all.
+
+use std::{
+    fs::File,
+    io::{BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+use anyhow::Context;
+
+use crate::{
+    formats::{self, Format, PLOTS},
+    run::Document,
+};
+
+/// The help of `-o`.
+pub(super) const HELP: &str = "\
+Write the result there, by its ending: .json everything; .csv, .jsonl, .arrow the profile of the \
+contact; .npz fields, profiles and history; .vtu the fields; .svg the profile as a figure. A part may \
+be named before the ending: punch.history.csv, punch.fields.npz; of several contacts one must be: \
+punch.profile.top.csv. May be repeated; - is JSON on standard output. Without it a summary is printed";
+
+/// One file to write.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Output {
+    /// None is standard output.
+    path: Option<PathBuf>,
+    part: Part,
+    format: Format,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Part {
+    Everything,
+    /// Of this contact boundary.
+    Profile(String),
+    History,
+    Fields,
+    /// By its name in [`PLOTS`].
+    Plot(&'static str),
+}
+
+impl Output {
+    /// What `path` asks for, of a problem with these contact boundaries. An `Err` says why there is
+    /// no such thing: before hours of solving, not after.
+    pub(super) fn parse(path: &Path, contacts: &[&str]) -> Result<Output, String> {
+        if path.as_os_str() == "-" {
+            return Ok(Output {
+                path: None,
+                part: Part::Everything,
+                format: Format::Json,
+            });
+        }
+        let said = |problem: String| format!("-o {}: {problem}", path.display());
+        let name = path.file_name().and_then(|name| name.to_str());
+        let (stem, ending) = name
+            .and_then(|name| name.rsplit_once('.'))
+            .unwrap_or_default();
+        let ending = ending.to_ascii_lowercase();
+        let format = Format::ALL.iter().find(|format| format.name() == ending);
+        let format = *format.ok_or_else(|| {
+            let endings: Vec<String> = Format::ALL
+                .iter()
+                .map(|format| format!(".{}", format.name()))
+                .collect();
+            let endings = endings.join(", ");
+            said(format!(
+                "a file must end in one of {endings}; or be -, for JSON on standard output"
+            ))
+        })?;
+        let folder = path
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+            return Err(said(format!("there is no folder {}", folder.display())));
+        }
+        Ok(Output {
+            path: Some(path.to_path_buf()),
+            part: part(format, stem, contacts).map_err(said)?,
+            format,
+        })
+    }
+
+    pub(super) fn write(&self, title: Option<&str>, document: &Document) -> anyhow::Result<()> {
+        let Some(path) = &self.path else {
+            return self.write_to(&mut std::io::stdout().lock(), title, document);
+        };
+        replace(path, |out| self.write_to(out, title, document))
+            .with_context(|| format!("cannot write {}", path.display()))
+    }
+
+    fn write_to(
+        &self,
+        out: &mut dyn Write,
+        title: Option<&str>,
+        document: &Document,
+    ) -> anyhow::Result<()> {
+        let mut out = BufWriter::new(out);
+        let bytes = match &self.part {
+            // the fields of a large problem are not held a second time
+            Part::Everything if self.format == Format::Json => {
+                serde_json::to_writer(&mut out, document)?;
+                Ok(vec![])
+            }
+            Part::Everything => formats::everything_as_npz(document),
+            Part::Profile(boundary) => match document.profiles.get(boundary) {
+                Some(profile) => formats::profile(profile, self.format),
+                None => Err(format!("the result has no profile of {boundary:?}")),
+            },
+            Part::History => formats::history(&document.history, self.format),
+            Part::Fields => formats::fields(&document.fields, self.format),
+            Part::Plot(name) => {
+                formats::plot(name, title.unwrap_or_default(), document).map(String::into_bytes)
+            }
+        };
+        out.write_all(&bytes.map_err(anyhow::Error::msg)?)?;
+        if matches!(self.format, Format::Json | Format::Svg) {
+            writeln!(out)?;
+        }
+        Ok(out.flush()?)
+    }
+}
+
+/// The part that the name before the ending asks for, or what the ending stands for by itself.
+fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
+    let words: Vec<&str> = stem.split('.').collect();
+    let last = words.last().copied().unwrap_or_default();
+    if format == Format::Svg {
+        let named = PLOTS.iter().find(|plot| **plot == last);
+        return Ok(Part::Plot(named.unwrap_or(&PLOTS[0])));
+    }
+    // a boundary may have any name, with dots or a word of ours: one that the problem has goes first
+    let after = words.iter().enumerate();
+    let after = after.filter(|(_, word)| **word == "profile");
+    let mut named: Vec<String> = after
+        .map(|(place, _)| words[place + 1..].join("."))
+        .collect();
+    named.retain(|name| !name.is_empty());
+    let known = named.iter().find(|name| contacts.contains(&name.as_str()));
+    let asked = match known.or(named.last()) {
+        Some(boundary) => Some(("profile", Some(boundary.clone()))),
+        None => ["profile", "history", "fields"]
+            .into_iter()
+            .find(|word| *word == last)
+            .map(|word| (word, None)),
+    };
+    let ending = format.name();
+    match (asked, format) {
+        (Some(("fields", _)), f) if !Format::OF_FIELDS.contains(&f) => Err(format!(
+            "fields are written as .vtu, .npz or .json, not as .{ending}"
+        )),
+        (None | Some(("fields", _)), Format::Vtu) => Ok(Part::Fields),
+        (Some((word, _)), Format::Vtu) => Err(format!(
+            "a .vtu file holds fields; the {word} is written as .csv, .jsonl, .arrow, .npz or .json"
+        )),
+        (None, Format::Json | Format::Npz) => Ok(Part::Everything),
+        (Some(("fields", _)), _) => Ok(Part::Fields),
+        (Some(("history", _)), _) => Ok(Part::History),
+        (asked, _) => {
+            let boundary = asked.and_then(|(_, boundary)| boundary);
+            one_of(contacts, boundary, ending).map(Part::Profile)
+        }
+    }
+}
+
+fn one_of(contacts: &[&str], asked: Option<String>, ending: &str) -> Result<String, String> {
+    let known = contacts.join(", ");
+    match (asked, contacts) {
+        (_, []) => Err("the problem has no contact, and so no profile".into()),
+        (Some(name), _) if contacts.contains(&name.as_str()) => Ok(name),
+        (Some(name), _) => Err(format!(
+            "the problem has no contact boundary {name:?}; it has: {known}"
+        )),
+        (None, [only]) => Ok(only.to_string()),
+        (None, [first, ..]) => Err(format!(
+            "the problem has several contact boundaries ({known}); name one, as in NAME.profile.{first}.{ending}"
+        )),
+    }
+}
+
+/// Writes beside `path` and renames, so that there is never half a file of that name, and an older
+/// one stays until the new one is whole. A pipe or device is written to as it is.
+fn replace(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    // a link keeps pointing to the file, which gets the new content
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    if target.exists() && !target.is_file() {
+        return write(&mut File::options().write(true).open(&target)?);
+    }
+    let folder = match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".signorini-").suffix(".part");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // as any other new file (the umask applies), not for the owner's eyes only
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder)?;
+    write(&mut file)?;
+    file.as_file().sync_all()?;
+    file.persist(&target)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn asked(name: &str, contacts: &[&str]) -> Result<(Part, Format), String> {
+        Output::parse(Path::new(name), contacts).map(|output| (output.part, output.format))
+    }
+
+    #[test]
+    fn a_name_says_what_the_file_holds() {
+        let top = || Part::Profile("top".into());
+        for (name, part, format) in [
+            ("-", Part::Everything, Format::Json),
+            ("punch.json", Part::Everything, Format::Json),
+            ("punch.v2.NPZ", Part::Everything, Format::Npz),
+            ("punch.csv", top(), Format::Csv),
+            ("punch.jsonl", top(), Format::Jsonl),
+            ("punch.profile.arrow", top(), Format::Arrow),
+            ("punch.profile.top.csv", top(), Format::Csv),
+            ("profile.top.json", top(), Format::Json),
+            ("history.csv", Part::History, Format::Csv),
+            ("punch.history.npz", Part::History, Format::Npz),
+            ("punch.fields.npz", Part::Fields, Format::Npz),
+            ("punch.fields.json", Part::Fields, Format::Json),
+            ("punch.vtu", Part::Fields, Format::Vtu),
+            ("punch.svg", Part::Plot("profile"), Format::Svg),
+            ("punch.profile.svg", Part::Plot("profile"), Format::Svg),
+        ] {
+            assert_eq!(asked(name, &["top"]).unwrap(), (part, format), "{name}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_said_with_what_can() {
+        for (name, contacts, part) in [
+            ("punch", vec!["top"], ".json, .csv"),
+            ("punch.xlsx", vec!["top"], ".vtu"),
+            ("no-such-folder/punch.csv", vec!["top"], "no folder"),
+            ("punch.fields.csv", vec!["top"], ".npz"),
+            (
+                "punch.history.vtu",
+                vec!["top"],
+                "history is written as .csv",
+            ),
+            ("punch.csv", vec![], "no contact"),
+            ("punch.csv", vec!["left", "top"], "NAME.profile.left.csv"),
+            (
+                "punch.profile.bottom.csv",
+                vec!["left", "top"],
+                "it has: left, top",
+            ),
+        ] {
+            let error = asked(name, &contacts).unwrap_err();
+            assert!(error.contains(part), "{name}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_boundary_may_have_any_name() {
+        for boundary in ["history", "a.b", "profile", "x.profile.y"] {
+            let name = format!("x.profile.{boundary}.csv");
+            let found = asked(&name, &["left", boundary]).unwrap();
+            assert_eq!(found.0, Part::Profile(boundary.into()));
+        }
+    }
+
+    #[test]
+    fn a_file_is_there_whole_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let link = folder.path().join("link.csv");
+        replace(&path, |out| Ok(out.write_all(b"old")?)).unwrap();
+        let failed = replace(&path, |out| {
+            out.write_all(b"ne")?;
+            anyhow::bail!("the disk is full")
+        });
+        assert!(failed.is_err());
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(&path, &link).unwrap();
+            replace(&link, |out| Ok(out.write_all(b"new")?)).unwrap();
+            assert_eq!(std::fs::read(&path).unwrap(), b"new");
+            assert!(link.is_symlink());
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+}

@@ -1,0 +1,190 @@
+//! What a result can be written as: one list of formats, and one way to write each, for the data
+//! routes and for `signorini solve -o`.
+
+use serde::Serialize;
+use solver::{
+    io::{self, npz::Npz, table::Table},
+    solution::{ContactProfile, Fields, Iteration},
+};
+
+use crate::run::Document;
+
+/// How data are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// The API's own.
+    Json,
+    /// A line of names, a line per row.
+    Csv,
+    /// A JSON object per row.
+    Jsonl,
+    /// An Arrow IPC file.
+    Arrow,
+    /// NumPy's archive of arrays.
+    Npz,
+    /// VTK's XML unstructured grid.
+    Vtu,
+    /// A figure.
+    Svg,
+}
+
+impl Format {
+    /// What rows are served as, the default first.
+    pub const OF_TABLES: &[Format] = &[
+        Format::Json,
+        Format::Csv,
+        Format::Jsonl,
+        Format::Arrow,
+        Format::Npz,
+    ];
+    /// What fields are served as, the default first.
+    pub const OF_FIELDS: &[Format] = &[Format::Vtu, Format::Npz, Format::Json];
+    /// What `-o` knows.
+    pub const ALL: &[Format] = &[
+        Format::Json,
+        Format::Csv,
+        Format::Jsonl,
+        Format::Arrow,
+        Format::Npz,
+        Format::Vtu,
+        Format::Svg,
+    ];
+
+    /// The value of `format`, and the ending of a file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Json => "json",
+            Format::Csv => "csv",
+            Format::Jsonl => "jsonl",
+            Format::Arrow => "arrow",
+            Format::Npz => "npz",
+            Format::Vtu => "vtu",
+            Format::Svg => "svg",
+        }
+    }
+
+    /// As in `Accept` and `Content-Type`; registered where there is a registered one.
+    pub fn media_type(self) -> &'static str {
+        match self {
+            Format::Json => "application/json",
+            Format::Csv => "text/csv",
+            Format::Jsonl => "application/jsonl",
+            Format::Arrow => "application/vnd.apache.arrow.file",
+            Format::Npz => "application/x-npz",
+            Format::Vtu => "application/vnd.vtk.unstructuredgrid+xml",
+            Format::Svg => "image/svg+xml",
+        }
+    }
+}
+
+/// A profile in that format. `Err` says why it could not be written.
+pub fn profile(profile: &ContactProfile, format: Format) -> Result<Vec<u8>, String> {
+    rows(profile, Table::of_profile, format)
+}
+
+/// A history in that format.
+pub fn history(history: &[Iteration], format: Format) -> Result<Vec<u8>, String> {
+    rows(history, Table::of_history, format)
+}
+
+fn rows<T: Serialize + ?Sized>(
+    part: &T,
+    table: fn(&T) -> Table,
+    format: Format,
+) -> Result<Vec<u8>, String> {
+    match format {
+        Format::Json => serde_json::to_vec(part).map_err(|error| error.to_string()),
+        Format::Csv => table(part).csv().map(String::into_bytes),
+        Format::Jsonl => table(part).jsonl().map(String::into_bytes),
+        Format::Arrow => io::arrow::file(&table(part)),
+        Format::Npz => io::npz::file(&table(part)),
+        Format::Vtu | Format::Svg => Err(format!("rows are not written as {}", format.name())),
+    }
+}
+
+/// Fields in that format.
+pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
+    match format {
+        Format::Json => serde_json::to_vec(fields).map_err(|error| error.to_string()),
+        Format::Npz => io::fields::npz(fields),
+        Format::Vtu => io::vtu::file(fields),
+        Format::Csv | Format::Jsonl | Format::Arrow | Format::Svg => {
+            Err(format!("fields are not written as {}", format.name()))
+        }
+    }
+}
+
+/// Fields, history and profiles in one archive: `fields/points`, `history/k`,
+/// `profiles/top/normal_stress`, and of each load step `steps/0/profiles/top/normal_stress`.
+pub fn everything_as_npz(document: &Document) -> Result<Vec<u8>, String> {
+    let mut npz = Npz::new();
+    io::fields::add(&mut npz, "fields/", &document.fields)?;
+    npz.table("history/", &Table::of_history(&document.history))?;
+    for (boundary, profile) in &document.profiles {
+        npz.table(
+            &format!("profiles/{boundary}/"),
+            &Table::of_profile(profile),
+        )?;
+    }
+    for (number, step) in document.steps.iter().enumerate() {
+        for (boundary, profile) in &step.profiles {
+            let prefix = format!("steps/{number}/profiles/{boundary}/");
+            npz.table(&prefix, &Table::of_profile(profile))?;
+        }
+    }
+    npz.finish()
+}
+
+/// The figures that [`plot`] draws; the first is the default.
+pub const PLOTS: &[&str] = &["profile"];
+
+/// The figure of that name, as SVG.
+pub fn plot(name: &str, title: &str, document: &Document) -> Result<String, String> {
+    match name {
+        "profile" => io::plot::profile_svg(title, &document.profiles),
+        _ => Err(format!(
+            "there is no figure {name:?}; there are: {}",
+            PLOTS.join(", ")
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::fake;
+
+    #[test]
+    fn rows_are_written_in_every_format_of_tables_and_in_no_other() {
+        let solution = fake::solution();
+        for format in Format::ALL {
+            let expected = Format::OF_TABLES.contains(format);
+            let name = format.name();
+            let top = profile(&solution.profiles["top"], *format);
+            assert_eq!(top.is_ok(), expected, "{name}");
+            assert_eq!(history(&solution.history, *format).is_ok(), expected);
+        }
+        let csv = profile(&solution.profiles["top"], Format::Csv).unwrap();
+        let line = String::from_utf8(csv)
+            .unwrap()
+            .lines()
+            .nth(1)
+            .unwrap()
+            .to_string();
+        assert_eq!(
+            line,
+            "0.0,0.0,0.0,-0.1,-0.1,0.0,-20.0,0.1,19.0,5.7,0.02,stick"
+        );
+    }
+
+    #[test]
+    fn names_and_media_types_are_unique() {
+        for (n, one) in Format::ALL.iter().enumerate() {
+            for other in &Format::ALL[n + 1..] {
+                assert_ne!(one.name(), other.name());
+                assert_ne!(one.media_type(), other.media_type());
+            }
+        }
+    }
+}

@@ -1,0 +1,315 @@
+//! Columns with names: a profile or a history, written as CSV or JSON Lines (`arrow` and `npz` have
+//! the binary formats). One table for all formats, so that all have the same columns.
+
+use std::fmt::Write;
+
+use crate::solution::{ContactProfile, Iteration, NodeState};
+
+/// Columns of equal length, in their order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// Names are unique.
+    pub columns: Vec<Column>,
+}
+
+/// One quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Its name in the API; a part of a part is written `contact_active`.
+    pub name: &'static str,
+    /// One entry per row.
+    pub values: Values,
+}
+
+/// The entries of a column.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// NaN is a missing value: results hold no other.
+    Real(Vec<f64>),
+    /// Numbers and counts.
+    Whole(Vec<u32>),
+    /// Words of the API.
+    Text(Vec<&'static str>),
+}
+
+impl Values {
+    /// Entries.
+    pub fn len(&self) -> usize {
+        match self {
+            Values::Real(values) => values.len(),
+            Values::Whole(values) => values.len(),
+            Values::Text(values) => values.len(),
+        }
+    }
+
+    /// Whether there is no entry.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl Table {
+    /// One row per node of Γ_C, in order of arc length.
+    #[rustfmt::skip]
+    pub fn of_profile(profile: &ContactProfile) -> Table {
+        // taken apart by all its fields: a column added later does not compile until it stands here
+        let ContactProfile {
+            s, x, y, gap, normal_displacement, tangential_displacement, normal_stress, tangential_stress,
+            nonlocal_pressure, friction_bound, friction_ratio, state,
+        } = profile;
+        let real = |name, values: &[f64]| column(name, Values::Real(values.to_vec()));
+        Table { columns: vec![
+            real("s",                       s),
+            real("x",                       x),
+            real("y",                       y),
+            real("gap",                     gap),
+            real("normal_displacement",     normal_displacement),
+            real("tangential_displacement", tangential_displacement),
+            real("normal_stress",           normal_stress),
+            real("tangential_stress",       tangential_stress),
+            real("nonlocal_pressure",       nonlocal_pressure),
+            real("friction_bound",          friction_bound),
+            real("friction_ratio",          friction_ratio),
+            column("state", Values::Text(state.iter().map(|state| state.as_str()).collect())),
+        ] }
+    }
+
+    /// One row per iteration; what stands inside another object of the JSON has both names.
+    #[rustfmt::skip]
+    pub fn of_history(rows: &[Iteration]) -> Table {
+        let real = |name, value: fn(&Iteration) -> f64| column(name, Values::Real(rows.iter().map(value).collect()));
+        let whole = |name, value: fn(&Iteration) -> u32| column(name, Values::Whole(rows.iter().map(value).collect()));
+        Table { columns: vec![
+            whole("k",                 |row| row.k),
+            column("stage", Values::Text(rows.iter().map(|row| row.stage.as_str()).collect())),
+            whole("step",              |row| row.step),
+            whole("increment",         |row| row.increment),
+            real("residual",           |row| row.residual),
+            real("friction_residual",  |row| row.friction_residual),
+            real("r_f",                |row| row.r_f.unwrap_or(f64::NAN)),
+            real("tolerance",          |row| row.tolerance),
+            whole("contact_active",    |row| row.contact.active),
+            whole("contact_entered",   |row| row.contact.entered),
+            whole("contact_left",      |row| row.contact.left),
+            whole("friction_slip",     |row| row.friction.slip),
+            whole("friction_stick",    |row| row.friction.stick),
+            real("force_normal",       |row| row.force.normal),
+            real("force_tangential",   |row| row.force.tangential),
+            real("contraction",        |row| row.contraction.unwrap_or(f64::NAN)),
+            whole("inner",             |row| row.inner),
+            real("wall_s",             |row| row.wall_s),
+        ] }
+    }
+
+    /// Rows; an `Err` says which column has another number of them.
+    pub fn rows(&self) -> Result<usize, String> {
+        let rows = self.columns.first().map_or(0, |first| first.values.len());
+        match self.columns.iter().find(|c| c.values.len() != rows) {
+            None => Ok(rows),
+            Some(odd) => Err(format!(
+                "the column {} has {} entries, where others have {rows}",
+                odd.name,
+                odd.values.len()
+            )),
+        }
+    }
+
+    /// RFC 4180: a line of names, then a line per row. A number is the shortest text that reads back
+    /// as the same; a missing one is empty.
+    pub fn csv(&self) -> Result<String, String> {
+        let mut text = self.header();
+        for row in 0..self.rows()? {
+            for (place, column) in self.columns.iter().enumerate() {
+                if place > 0 {
+                    text.push(',');
+                }
+                match &column.values {
+                    Values::Real(values) => real(&mut text, values[row], ""),
+                    Values::Whole(values) => push(&mut text, values[row]),
+                    Values::Text(values) => text.push_str(values[row]),
+                }
+            }
+            text.push_str("\r\n");
+        }
+        Ok(text)
+    }
+
+    fn header(&self) -> String {
+        let names: Vec<&str> = self.columns.iter().map(|column| column.name).collect();
+        format!("{}\r\n", names.join(","))
+    }
+
+    /// A JSON object per row; a missing number is null. Names and words are the API's own and need
+    /// no escape.
+    pub fn jsonl(&self) -> Result<String, String> {
+        let mut text = String::new();
+        for row in 0..self.rows()? {
+            for (place, column) in self.columns.iter().enumerate() {
+                text.push(if place > 0 { ',' } else { '{' });
+                push(&mut text, format_args!("\"{}\":", column.name));
+                match &column.values {
+                    Values::Real(values) => real(&mut text, values[row], "null"),
+                    Values::Whole(values) => push(&mut text, values[row]),
+                    Values::Text(values) => push(&mut text, format_args!("\"{}\"", values[row])),
+                }
+            }
+            text.push_str("}\n");
+        }
+        Ok(text)
+    }
+}
+
+impl NodeState {
+    /// The name that the API has for it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            NodeState::Open => "open",
+            NodeState::Stick => "stick",
+            NodeState::Slip => "slip",
+        }
+    }
+}
+
+fn column(name: &'static str, values: Values) -> Column {
+    Column { name, values }
+}
+
+fn real(text: &mut String, value: f64, missing: &str) {
+    if value.is_finite() {
+        push(text, format_args!("{value:?}"));
+    } else {
+        text.push_str(missing);
+    }
+}
+
+fn push(text: &mut String, value: impl std::fmt::Display) {
+    let _ = write!(text, "{value}"); // a String takes everything
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::solution::{ContactCount, ForcePair, FrictionCount, Stage};
+
+    pub(crate) fn profile() -> ContactProfile {
+        let column = |value: f64| vec![value, -0.0, 5e-324];
+        ContactProfile {
+            s: vec![0.0, 0.1, 0.1 + 0.2],
+            x: column(1.0),
+            y: column(2.0),
+            gap: column(-0.1),
+            normal_displacement: column(-0.1),
+            tangential_displacement: column(1e-7),
+            normal_stress: column(-20.0),
+            tangential_stress: column(1.0 / 3.0),
+            nonlocal_pressure: column(1e300),
+            friction_bound: column(5.7),
+            friction_ratio: column(1.0),
+            state: vec![NodeState::Stick, NodeState::Slip, NodeState::Open],
+        }
+    }
+
+    pub(crate) fn history() -> Vec<Iteration> {
+        let row = |k| Iteration {
+            k,
+            stage: if k == 1 {
+                Stage::Frictionless
+            } else {
+                Stage::Outer
+            },
+            step: 0,
+            increment: 4,
+            residual: 1e-3,
+            friction_residual: 0.5,
+            r_f: (k > 1).then_some(0.25),
+            tolerance: 1e-10,
+            contact: ContactCount {
+                active: 5,
+                entered: 1,
+                left: 0,
+            },
+            friction: FrictionCount { slip: 2, stick: 3 },
+            force: ForcePair {
+                normal: 50.0,
+                tangential: -14.0,
+            },
+            contraction: None,
+            inner: 2,
+            wall_s: 0.125,
+        };
+        vec![row(1), row(2)]
+    }
+
+    #[test]
+    fn a_profile_has_a_line_of_names_and_a_line_per_node() {
+        let text = Table::of_profile(&profile()).csv().unwrap();
+        let lines: Vec<&str> = text.split("\r\n").collect();
+        assert_eq!(lines.len(), 5);
+        assert!(lines[0].starts_with("s,x,y,gap,") && lines[0].ends_with(",state"));
+        assert_eq!(
+            lines[1],
+            "0.0,1.0,2.0,-0.1,-0.1,1e-7,-20.0,0.3333333333333333,1e300,5.7,1.0,stick"
+        );
+        let first = |line: &str| line.split(',').next().unwrap().parse::<f64>().unwrap();
+        assert_eq!(first(lines[3]), 0.1 + 0.2);
+        assert_eq!(lines[4], "");
+    }
+
+    #[test]
+    fn the_names_of_a_table_are_those_of_the_json_and_unique() {
+        let flat = |value: serde_json::Value| {
+            let mut names = Vec::new();
+            for (name, value) in value.as_object().unwrap() {
+                match value.as_object() {
+                    None => names.push(name.clone()),
+                    Some(inner) => names.extend(inner.keys().map(|k| format!("{name}_{k}"))),
+                }
+            }
+            names.sort();
+            names
+        };
+        let names = |table: Table| {
+            let mut names: Vec<String> = table.columns.iter().map(|c| c.name.to_owned()).collect();
+            names.sort();
+            names
+        };
+        let rows = history();
+        assert_eq!(
+            names(Table::of_history(&rows)),
+            flat(serde_json::to_value(&rows[0]).unwrap())
+        );
+        let profile = profile();
+        assert_eq!(
+            names(Table::of_profile(&profile)),
+            flat(serde_json::to_value(&profile).unwrap())
+        );
+    }
+
+    #[test]
+    fn a_missing_number_is_empty_in_csv_and_null_in_json() {
+        let table = Table::of_history(&history());
+        let csv = table.csv().unwrap();
+        let first: Vec<&str> = csv.lines().nth(1).unwrap().split(',').collect();
+        assert_eq!((first[0], first[1], first[6]), ("1", "frictionless", ""));
+        let jsonl = table.jsonl().unwrap();
+        let rows: Vec<serde_json::Value> = jsonl
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect();
+        assert_eq!(rows.len(), 2);
+        assert!(rows[0]["r_f"].is_null() && rows[1]["r_f"] == 0.25);
+        assert_eq!(rows[1]["force_tangential"], -14.0);
+        assert_eq!(rows[0]["stage"], "frictionless");
+    }
+
+    #[test]
+    fn columns_of_unequal_length_are_an_error_and_no_rows_are_none() {
+        let mut odd = profile();
+        odd.gap.pop();
+        let error = Table::of_profile(&odd).csv().unwrap_err();
+        assert!(error.contains("gap has 2"), "{error}");
+        let empty = Table::of_history(&[]);
+        assert_eq!(empty.csv().unwrap().lines().count(), 1);
+        assert_eq!(empty.jsonl().unwrap(), "");
+    }
+}
