@@ -12,6 +12,8 @@ use anyhow::Context;
 use clap::Args;
 use solver::{
     error::{SolveError, Violation},
+    io::plot::{self, Parts, Plot, Theme},
+    problem::Problem,
     solution::Progress,
 };
 
@@ -27,10 +29,15 @@ pub(super) struct Arguments {
     /// The problem, a JSON file
     file: PathBuf,
 
-    /// Write the result there: .json the whole of it, .svg the stress profile as a figure; - is
-    /// JSON on standard output. Without it a summary is printed
+    /// Write the result there: .json the whole of it, .svg a figure: the stress profile, or what is
+    /// named before the ending (.mesh.svg, .deformed.svg, .convergence.svg); - is JSON on standard
+    /// output. Without it a summary is printed
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
+
+    /// Colours of a figure: light or dark
+    #[arg(long, default_value = "light")]
+    theme: Theme,
 
     #[command(flatten)]
     memory: MemoryBudget,
@@ -40,6 +47,7 @@ pub(super) fn run(
     Arguments {
         file,
         output,
+        theme,
         memory,
     }: &Arguments,
 ) -> anyhow::Result<Exit> {
@@ -87,7 +95,7 @@ pub(super) fn run(
     };
     let title = problem.title.as_deref();
     match (output, format) {
-        (Some(path), Some(format)) => write(path, format, title, &document)
+        (Some(path), Some(format)) => write(path, format, *theme, &problem, &document)
             .with_context(|| format!("cannot write {}", path.display()))?,
         _ => print(&report::document(title, &document))?,
     }
@@ -121,7 +129,7 @@ fn invalid(file: &Path, violations: &[Violation]) -> Exit {
 #[derive(Clone, Copy, Debug)]
 enum Format {
     Json,
-    Svg,
+    Svg(Plot),
 }
 
 impl Format {
@@ -131,7 +139,11 @@ impl Format {
         }
         match path.extension()?.to_str()? {
             "json" => Some(Format::Json),
-            "svg" => Some(Format::Svg),
+            "svg" => {
+                let named = Path::new(path.file_stem()?).extension();
+                let plot = named.and_then(|name| name.to_str()?.parse().ok());
+                Some(Format::Svg(plot.unwrap_or(Plot::Profile)))
+            }
             _ => None,
         }
     }
@@ -140,14 +152,19 @@ impl Format {
 fn write(
     path: &Path,
     format: Format,
-    title: Option<&str>,
+    theme: Theme,
+    problem: &Problem,
     document: &Document,
 ) -> anyhow::Result<()> {
+    let parts = Parts {
+        history: &document.history,
+        profiles: &document.profiles,
+        fields: &document.fields,
+    };
     let figure = match format {
         Format::Json => None,
-        Format::Svg => {
-            let drawn =
-                solver::io::plot::profile_svg(title.unwrap_or_default(), &document.profiles);
+        Format::Svg(plot) => {
+            let drawn = plot::draw(plot, theme, problem, &parts);
             Some(drawn.map_err(anyhow::Error::msg)?)
         }
     };

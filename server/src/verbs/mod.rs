@@ -2,6 +2,7 @@
 
 pub mod jobs;
 pub mod page;
+pub mod plots;
 pub mod problems;
 pub mod results;
 
