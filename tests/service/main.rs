@@ -8,6 +8,7 @@ mod errors;
 mod grpc;
 mod limits;
 mod list;
+mod plots;
 mod rest_and_grpc_agree;
 mod restart;
 mod results;

@@ -9,8 +9,8 @@ use super::page::{self, Area, Fallible, WIDTH, number, px, round_up};
 use super::theme::{Theme, hex, viridis};
 use crate::element::{Element, Family};
 
-/// About so many bands.
-const BANDS: f64 = 10.0;
+/// No more bands than this, and about half as many at least.
+const BANDS: f64 = 14.0;
 /// Side of the cells that an element is cut into (pixels), and most of them along a side.
 const CELL: f64 = 6.0;
 const MOST_CELLS: usize = 16;
@@ -18,7 +18,7 @@ const MOST_CELLS: usize = 16;
 const SPECK: f64 = 1.5;
 
 /// Height of the colour bar with its numbers and name (pixels).
-pub(super) const BAR: i32 = 74;
+pub(super) const BAR: i32 = 76;
 
 /// Bands between round numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub(super) struct Bands {
 
 impl Bands {
     /// For values at nodes. At a sharp edge a few may dwarf all others, and have no mesh limit: then
-    /// the bands end near what 99 % of the nodes stay within, and the bar says what is beyond.
+    /// the bands end near what 97 % of the nodes stay within, and the bar says what is beyond.
     pub(super) fn of(values: &[f64]) -> Bands {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -40,7 +40,7 @@ impl Bands {
             sorted.get((q * last as f64).round() as usize).copied()
         };
         let at = |q: f64| quantile(q).unwrap_or(0.0);
-        let (least, low, high, most) = (at(0.0), at(0.01), at(0.99), at(1.0));
+        let (least, low, high, most) = (at(0.0), at(0.03), at(0.97), at(1.0));
         let usual = high - low;
         let lowest = if low - least > 0.5 * usual {
             low
@@ -54,7 +54,7 @@ impl Bands {
         };
         let span = highest - lowest;
         let step = match span > 1e-9 * most.abs().max(least.abs()) && span.is_normal() {
-            true => round_up(span / BANDS / 1.25),
+            true => round_up(span / BANDS, &[1.0, 2.0, 2.5, 5.0]),
             false => most.abs().max(1.0), // one colour
         };
         let first = (lowest / step + 1e-9).floor();
@@ -100,7 +100,7 @@ impl Bands {
             let colour = hex(self.colour(k));
             // the thin line closes the seam between neighbours
             path.drawn(&format!(
-                r#"fill="{colour}" stroke="{colour}" stroke-width="4""#
+                r#"fill="{colour}" stroke="{colour}" stroke-width="6""#
             ))
         };
         paths.iter().enumerate().map(drawn).collect()
@@ -199,7 +199,7 @@ impl Bands {
             area.draw(&Text::new(words.to_owned(), (x, px(y)), style))
         };
         let axis = theme.palette().axis.stroke_width(px(1) as u32);
-        centred(top + 10, px(WIDTH / 2), name, 15, VPos::Center)?;
+        centred(top + 10, px(WIDTH / 2), name, 16, VPos::Center)?;
         let (upper, lower) = (px(top + 24), px(top + 40));
         for k in 0..count {
             let colour = self.colour(k as usize).filled();
@@ -222,7 +222,7 @@ impl Bands {
                 axis,
             ))?;
             if k % stride.max(1) == 0 {
-                centred(top + 46, edge(k), label, 14, VPos::Top)?;
+                centred(top + 47, edge(k), label, page::LETTERS, VPos::Top)?;
             }
         }
         let beyond = [

@@ -11,9 +11,11 @@ use super::theme::{Theme, hex};
 use crate::element::Element;
 
 /// Around the axes (pixels): numbers and names left and below, a caption above.
-const LEFT: i32 = 72;
-const RIGHT: i32 = 14;
-const BELOW: i32 = 50;
+const EDGE: i32 = 4;
+const LEFT: i32 = 84;
+const RIGHT: i32 = 16;
+const BELOW: i32 = 46;
+const GAP: i32 = 12;
 const CAPTION: i32 = 26;
 /// Highest axes: one above the other and beside one another (pixels).
 const HIGHEST: [f64; 2] = [430.0, 420.0];
@@ -113,11 +115,11 @@ pub(super) fn layout(windows: &[Window]) -> (Vec<Frame>, i32) {
         if beside {
             left += column;
         } else {
-            top += CAPTION + size[1] / page::FINE + BELOW;
+            top += CAPTION + size[1] / page::FINE + BELOW + GAP;
         }
     }
     let height = match beside {
-        true => CAPTION + highest / page::FINE + BELOW,
+        true => CAPTION + highest / page::FINE + BELOW + GAP,
         false => top,
     };
     (frames, height)
@@ -135,14 +137,14 @@ pub(super) fn axes(
     let [left, top] = frame.corner;
     let [w, h] = frame.size;
     let place = area.clone().shrink(
-        (left - px(LEFT), top),
-        ((w + px(LEFT)) as u32, (h + px(BELOW)) as u32),
+        (left - px(LEFT - EDGE), top),
+        ((w + px(LEFT - EDGE)) as u32, (h + px(BELOW)) as u32),
     );
     let Window { low, high } = frame.window;
     let mut chart: ChartContext<'_, _, Cartesian2d<RangedCoordf64, RangedCoordf64>> =
         ChartBuilder::on(&place)
             .x_label_area_size(px(BELOW))
-            .y_label_area_size(px(LEFT))
+            .y_label_area_size(px(LEFT - EDGE))
             .build_cartesian_2d(low[0]..high[0], low[1]..high[1])?;
     let fits = |size: i32, each: i32| ((size / px(each)) as usize).clamp(2, 9);
     chart
@@ -152,12 +154,12 @@ pub(super) fn axes(
         .set_all_tick_mark_size(px(4))
         .x_desc(names[0])
         .y_desc(names[1])
-        .x_labels(fits(w, 62))
+        .x_labels(fits(w, 54))
         .y_labels(fits(h, 40))
         .x_label_formatter(&|value| number(*value))
         .y_label_formatter(&|value| number(*value))
-        .label_style(page::text(theme, 14))
-        .axis_desc_style(page::text(theme, 15))
+        .label_style(page::text(theme, page::LETTERS))
+        .axis_desc_style(page::text(theme, 16))
         .draw()?;
     let corner = (left / page::FINE, top / page::FINE - CAPTION / 2);
     say(area, theme, caption, corner)
@@ -167,11 +169,14 @@ pub(super) fn axes(
 pub(super) fn inside(theme: Theme, frame: &Frame, content: &str) -> String {
     let ([x, y], [w, h]) = (frame.corner, frame.size);
     let y = y + px(HEAD);
-    let border = hex(theme.palette().axis);
+    let (place, border) = (
+        format!(r#"x="{x}" y="{y}" width="{w}" height="{h}""#),
+        hex(theme.palette().axis),
+    );
     format!(
-        r#"<svg x="{x}" y="{y}" width="{w}" height="{h}" overflow="hidden" stroke-linejoin="round" stroke-linecap="round">
-{content}<rect width="{w}" height="{h}" fill="none" stroke="{border}" stroke-width="20"/>
-</svg>
+        r#"<svg {place} overflow="hidden" stroke-linejoin="round" stroke-linecap="round">
+{content}</svg>
+<rect {place} fill="none" stroke="{border}" stroke-width="10"/>
 "#
     )
 }

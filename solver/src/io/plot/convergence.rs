@@ -37,7 +37,7 @@ pub fn convergence_svg(
         curve("friction_residual", Look::Marked(1), &|row| {
             Some(row.friction_residual)
         }),
-        curve("r_f (thesis 3.5)", Look::Marked(3), &|row| row.r_f),
+        curve("r_f (thesis 3.5)", Look::Points(3), &|row| row.r_f),
         curve("tolerance", Look::Dashed, &|row| Some(row.tolerance)),
     ];
     let counts = vec![
@@ -69,7 +69,7 @@ pub fn convergence_svg(
                 residuals,
             ),
             panel(
-                "number",
+                "count",
                 Scale::Count,
                 steps(problem, history, false),
                 counts.into_iter().filter(nonzero).collect(),

@@ -149,12 +149,8 @@ fn visible(wanted: f64, largest: f64) -> f64 {
     if !factor.is_normal() || (0.25..2.0).contains(&factor) {
         return 1.0;
     }
-    // round down: half of what is rounded up to, or less
-    let up = page::round_up(factor);
-    [up, up / 2.0, up / 2.5, up / 5.0]
-        .into_iter()
-        .find(|f| *f <= factor * (1.0 + 1e-9) && (page::round_up(*f) / f - 1.0).abs() < 1e-6)
-        .unwrap_or(factor)
+    // rounded down, that is up between the reciprocals
+    1.0 / page::round_up(1.0 / factor, &[1.0, 2.0, 5.0])
 }
 
 /// A body and its displacements.
@@ -186,16 +182,27 @@ impl Body<'_> {
         self.fields.ux[node as usize].hypot(self.fields.uy[node as usize])
     }
 
-    /// The nodes in contact; profiles know them by their places.
+    /// The nodes in contact and beside it; profiles know them by their places.
     fn contact(&self, profiles: &BTreeMap<String, ContactProfile>) -> Vec<u32> {
         let bits = |x: f64, y: f64| (x.to_bits(), y.to_bits());
         let touching: BTreeSet<(u64, u64)> = profiles
             .values()
             .flat_map(|profile| {
-                let places = profile.x.iter().zip(&profile.y).zip(&profile.state);
-                places.filter(|(_, state)| **state != NodeState::Open)
+                // with a neighbour on each side: also one node has an extent
+                let near = |i: usize| {
+                    let states = profile.state.get(i.saturating_sub(1)..).unwrap_or_default();
+                    let three = if i == 0 { 2 } else { 3 };
+                    states
+                        .iter()
+                        .take(three)
+                        .any(|state| *state != NodeState::Open)
+                };
+                let places = profile.x.iter().zip(&profile.y).enumerate();
+                places
+                    .filter(move |(i, _)| near(*i))
+                    .map(|(_, place)| place)
             })
-            .map(|((&x, &y), _)| bits(x, y))
+            .map(|(&x, &y)| bits(x, y))
             .collect();
         let (x, y) = (&self.fields.x, &self.fields.y);
         (0..x.len() as u32)
@@ -205,9 +212,10 @@ impl Body<'_> {
 
     /// A square around the contact, twice its size, as much of it in the body as can be.
     fn near(&self, contact: &[u32], touching: &Window, whole: &Window) -> (Window, f64) {
-        let side = (2.0 * touching.largest()).max(0.02 * whole.largest());
+        let side = (2.0 * touching.largest()).max(0.002 * whole.largest());
         let largest = contact.iter().map(|&n| self.moved(n)).fold(0.0, f64::max);
-        let factor = visible(VISIBLE * side, largest);
+        // not smaller than true: the window follows the contact where that has moved far
+        let factor = visible(VISIBLE * side, largest).max(1.0);
         let places = |nodes: &mut dyn Iterator<Item = u32>, factor: f64| {
             Window::around(nodes.map(|n| self.place(n, factor)))
         };

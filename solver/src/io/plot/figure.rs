@@ -5,15 +5,16 @@ use std::ops::Range;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::page::{self, Area, Fallible, WIDTH, number, px, say};
+use super::page::{self, Area, Fallible, LETTERS, WIDTH, number, px, say};
 use super::theme::{Palette, Theme};
 
 /// Of a panel without its legend (pixels).
-const PANEL: i32 = 258;
+const PANEL: i32 = 264;
 /// Height of one line of the legend above a panel (pixels).
 const LEGEND: i32 = 22;
-/// Left of the axes (pixels).
-const LEFT: i32 = 80;
+/// Left of the names of axes, and of the axes (pixels).
+const EDGE: i32 = 4;
+const LEFT: i32 = 92;
 /// Decades that a logarithmic axis spans at most, from the largest value down.
 const DECADES: f64 = 18.0;
 
@@ -117,9 +118,10 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
         ChartBuilder::on(&body)
             .margin_top(px(6))
             .margin_right(px(20))
-            .margin_bottom(px(8))
+            .margin_bottom(px(14))
+            .margin_left(px(EDGE))
             .x_label_area_size(px(46))
-            .y_label_area_size(px(LEFT))
+            .y_label_area_size(px(LEFT - EDGE))
             .build_cartesian_2d(across.clone(), up.clone())?;
     let whole_number = |value: f64| match value.round() {
         round if (value - round).abs() < 1e-6 => number(round),
@@ -146,8 +148,8 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
         .y_labels(if whole { ticks(&up).min(7) } else { 9 })
         .x_label_formatter(&x_label)
         .y_label_formatter(&y_label)
-        .label_style(page::text(theme, 14))
-        .axis_desc_style(page::text(theme, 15))
+        .label_style(page::text(theme, LETTERS))
+        .axis_desc_style(page::text(theme, 16))
         .draw()?;
     let thin = palette.reference.stroke_width(px(1) as u32);
     let pixels = chart.plotting_area().get_x_axis_pixel_range();
@@ -158,7 +160,7 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
         let place = pixels.start + (part * f64::from(pixels.end - pixels.start)) as i32 + px(4);
         let end = place + px(page::width(word));
         if place >= free && end <= pixels.end {
-            let text = Text::new(word.clone(), (px(4), px(3)), page::text(theme, 12));
+            let text = Text::new(word.clone(), (px(4), px(3)), page::text(theme, 13));
             chart.draw_series([EmptyElement::at((*x, up.end)) + text])?;
             free = end + px(6);
         }
@@ -220,7 +222,7 @@ fn entry(curve: &Curve, limit: f64) -> (String, i32) {
         String::new()
     };
     let text = format!("{}{cut}", curve.label);
-    let width = 28 + page::width(&text) + 24;
+    let width = 28 + page::width(&text) + 18;
     (text, width)
 }
 

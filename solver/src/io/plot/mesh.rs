@@ -14,9 +14,9 @@ use crate::solution::Fields;
 
 /// Height of one line of the legend (pixels).
 const LEGEND: i32 = 22;
-const LEFT: i32 = 72;
+const LEFT: i32 = 84;
 /// Lines of boundaries that lie over one another, the first below (pixels).
-const WIDTHS: [f64; 3] = [7.0, 3.5, 1.5];
+const WIDTHS: [f64; 3] = [5.0, 2.4, 1.2];
 /// More boundaries than this are not named.
 const MOST: usize = 24;
 

@@ -14,8 +14,10 @@ pub(super) const HEAD: i32 = 34;
 /// plotters draws in whole units: a tenth of a pixel keeps curves smooth.
 pub(super) const FINE: i32 = 10;
 const FONT: &str = "sans-serif";
+/// Height of numbers, legends and names (pixels): 5 pt or more in a column of 9 cm.
+pub(super) const LETTERS: i32 = 15;
 /// Characters that fit on a line at the size of the title.
-const TITLE: usize = 72;
+const TITLE: usize = 64;
 
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(super) type Fallible<T> = Result<T, Box<dyn std::error::Error>>;
@@ -42,7 +44,7 @@ pub(super) fn page(
         root.fill(&palette.background)?;
         let middle = (px(WIDTH / 2), px(HEAD / 2 + 2));
         let at = Pos::new(HPos::Center, VPos::Center);
-        let style = text(theme, 18).pos(at);
+        let style = text(theme, 19).pos(at);
         root.draw(&Text::new(shortened(title, TITLE), middle, style))?;
         let (_, below) = root.split_vertically(px(HEAD));
         let over = draw(&below)?;
@@ -62,17 +64,20 @@ pub(super) fn page(
 
 /// Text of a height in pixels.
 pub(super) fn text(theme: Theme, pixels: i32) -> TextStyle<'static> {
-    (FONT, px(pixels)).into_font().color(&theme.palette().text)
+    // plotters writes a font of size s as s/1.24
+    (FONT, 1.24 * f64::from(px(pixels)))
+        .into_font()
+        .color(&theme.palette().text)
 }
 
 /// A line of text with its left end and its middle at a place (pixels).
 pub(super) fn say(area: &Area<'_>, theme: Theme, words: &str, (x, y): (i32, i32)) -> Fallible<()> {
-    let style = text(theme, 14).pos(Pos::new(HPos::Left, VPos::Center));
+    let style = text(theme, LETTERS).pos(Pos::new(HPos::Left, VPos::Center));
     area.draw(&Text::new(words.to_owned(), (px(x), px(y)), style))?;
     Ok(())
 }
 
-/// How wide a text of 14 pixels is at most, without asking a font (pixels).
+/// How wide a text of that height is at most, without asking a font (pixels).
 pub(super) fn width(words: &str) -> i32 {
     8 * words.chars().count() as i32
 }
@@ -104,10 +109,13 @@ pub(super) fn stress(units: &Option<Units>) -> Option<&str> {
     units.as_ref()?.stress.as_deref()
 }
 
-/// A number for an axis: at most six digits, without trailing zeros.
+/// A number for an axis: at most six digits, without trailing zeros, with a true minus.
 pub(super) fn number(value: f64) -> String {
+    digits(value).replace('-', "−")
+}
+
+fn digits(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
-        // what a sum of ticks leaves of zero is shown by its neighbours to be zero
         let text = format!("{value:.3e}");
         let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
         let digits = digits.trim_end_matches('0').trim_end_matches('.');
@@ -121,12 +129,12 @@ pub(super) fn number(value: f64) -> String {
     }
 }
 
-/// The next of 1, 2, 5, 10, … (times a power of ten) that is not below a positive number.
-pub(super) fn round_up(value: f64) -> f64 {
+/// The first of these steps, times a power of ten, that is not below a positive number.
+pub(super) fn round_up(value: f64, steps: &[f64]) -> f64 {
     let power = 10f64.powf(value.log10().floor());
-    let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * power);
+    let mut rounds = steps.iter().map(|step| step * power);
     // a hair above counts as equal
-    let fits = steps.into_iter().find(|step| *step >= value * (1.0 - 1e-9));
+    let fits = rounds.find(|round| *round >= value * (1.0 - 1e-9));
     fits.unwrap_or(10.0 * power)
 }
 
@@ -139,9 +147,9 @@ mod tests {
         for (value, text) in [
             (0.0, "0"),
             (0.1 + 0.2, "0.3"),
-            (-11507.26, "-11507.3"),
+            (-11507.26, "−11507.3"),
             (250.0, "250"),
-            (1e-9, "1e-9"),
+            (1e-9, "1e−9"),
             (2.5e7, "2.5e7"),
         ] {
             assert_eq!(number(value), text);
@@ -151,7 +159,7 @@ mod tests {
     #[test]
     fn round_numbers_are_one_two_and_five() {
         for (value, round) in [(0.9, 1.0), (1.1, 2.0), (3.0, 5.0), (5.0, 5.0), (7e-4, 1e-3)] {
-            assert!((round_up(value) - round).abs() < 1e-12 * round);
+            assert!((round_up(value, &[1.0, 2.0, 5.0]) - round).abs() < 1e-12 * round);
         }
     }
 
