@@ -98,9 +98,9 @@ impl Bands {
         }
         let drawn = |(k, path): (usize, &Path)| {
             let colour = hex(self.colour(k));
-            // the thin line closes the seam between neighbours
+            // a line of one pixel closes the seam between neighbours
             path.drawn(&format!(
-                r#"fill="{colour}" stroke="{colour}" stroke-width="6""#
+                r#"fill="{colour}" stroke="{colour}" stroke-width="10""#
             ))
         };
         paths.iter().enumerate().map(drawn).collect()

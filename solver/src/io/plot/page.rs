@@ -10,7 +10,7 @@ use crate::problem::Units;
 /// Width of every figure (pixels).
 pub(super) const WIDTH: i32 = 720;
 /// Height of the title (pixels).
-pub(super) const HEAD: i32 = 34;
+pub(super) const HEAD: i32 = 40;
 /// plotters draws in whole units: a tenth of a pixel keeps curves smooth.
 pub(super) const FINE: i32 = 10;
 const FONT: &str = "sans-serif";
@@ -42,7 +42,7 @@ pub(super) fn page(
         let root = SVGBackend::with_string(&mut svg, fine).into_drawing_area();
         let palette = theme.palette();
         root.fill(&palette.background)?;
-        let middle = (px(WIDTH / 2), px(HEAD / 2 + 2));
+        let middle = (px(WIDTH / 2), px(HEAD / 2));
         let at = Pos::new(HPos::Center, VPos::Center);
         let style = text(theme, 19).pos(at);
         root.draw(&Text::new(shortened(title, TITLE), middle, style))?;
@@ -169,6 +169,6 @@ mod tests {
         let svg = page(Theme::Dark, &title, 50, |_| Ok("<g/>".to_owned())).unwrap();
         assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;&amp;"));
         assert!(svg.contains('…') && svg.trim_end().ends_with("<g/></svg>"));
-        assert!(svg.starts_with(r#"<svg width="720" height="84" viewBox="0 0 7200 840""#));
+        assert!(svg.starts_with(r#"<svg width="720" height="90" viewBox="0 0 7200 900""#));
     }
 }
