@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 use solver::{problem::Problem, solution::Solution};
 
 /// Fingerprint of a problem with its defaults filled in. The title is for people and has no part.
+/// Units have one: problems are stored once per fingerprint, and figures show them.
 pub fn input_hash(problem: &Problem) -> serde_json::Result<String> {
     let untitled = Problem {
         title: None,

@@ -135,20 +135,6 @@ pub fn everything_as_npz(document: &Document) -> Result<Vec<u8>, String> {
     npz.finish()
 }
 
-/// The figures that [`plot`] draws; the first is the default.
-pub const PLOTS: &[&str] = &["profile"];
-
-/// The figure of that name, as SVG.
-pub fn plot(name: &str, title: &str, document: &Document) -> Result<String, String> {
-    match name {
-        "profile" => io::plot::profile_svg(title, &document.profiles),
-        _ => Err(format!(
-            "there is no figure {name:?}; there are: {}",
-            PLOTS.join(", ")
-        )),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]

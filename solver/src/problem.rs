@@ -18,6 +18,9 @@ pub struct Problem {
     /// A title for people; it does not enter `input_hash`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
+    /// What the units are called; for figures, and no number is converted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
     /// The two-dimensional theory.
     pub analysis: Analysis,
     /// The body, cut into 8-node quadrilaterals and 6-node triangles.
@@ -42,6 +45,22 @@ pub struct Problem {
     /// How to solve, and how far.
     #[serde(default)]
     pub solver: SolverControls,
+}
+
+/// Names of the client's units, as axes show them (each at most 20 characters): `{"length": "mm",
+/// "force": "N", "stress": "MPa"}`. Absent: no unit is shown.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Units {
+    /// Of coordinates, displacements, radii.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<String>,
+    /// Of total forces.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force: Option<String>,
+    /// Of moduli, pressures, stresses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stress: Option<String>,
 }
 
 /// The two-dimensional theory of the body.

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::Path;
 
-use solver::io::plot::{Curve, Look, Panel, figure};
+use solver::io::plot::{Curve, Look, Panel, Theme, figure};
 use solver::problem::{AdaptiveRefine, BoundaryValue, Obstacle, Problem, Refine};
 use solver::solution::{ContactProfile, Solution, Summary};
 
@@ -198,17 +198,20 @@ fn stresses(name: &str, mesh: &str, radii: &[f64]) -> String {
         frictionless.title.clone().unwrap_or_default()
     );
     figure(
+        Theme::Light,
         &title,
         &[
             Panel {
                 x: x.to_owned(),
                 y: "−πσ_n / 2Y".to_owned(),
                 curves: normal,
+                ..Panel::default()
             },
             Panel {
                 x: x.to_owned(),
                 y: "σ_t".to_owned(),
                 curves: tangential,
+                ..Panel::default()
             },
         ],
     )
@@ -281,8 +284,10 @@ fn gauss_row() -> String {
         x: "x".to_owned(),
         y: "σ_n".to_owned(),
         curves: curves.to_vec(),
+        ..Panel::default()
     };
     figure(
+        Theme::Light,
         "Thin sheet, row of Gauss points nearest the free edge",
         &[panel],
     )

@@ -9,6 +9,7 @@ mod grpc;
 mod limits;
 mod list;
 mod meshes;
+mod plots;
 mod rest_and_grpc_agree;
 mod restart;
 mod results;

@@ -58,6 +58,28 @@ fn the_whole_document_can_go_to_standard_output() {
 }
 
 #[test]
+fn a_figure_is_named_before_its_ending() {
+    let folder = tempfile::tempdir().unwrap();
+    let drawn = |name: &str, more: &[&str]| {
+        let file = folder.path().join(name);
+        let to = [&["-o", file.to_str().unwrap()], more].concat();
+        assert_eq!(solve(&example("sheet"), &to).status.code(), Some(0));
+        std::fs::read_to_string(file).unwrap()
+    };
+    for (name, text) in [
+        ("x.svg", "friction bound"),
+        ("rho0.05.svg", "friction bound"),
+        ("x.mesh.svg", "taper (contact)"),
+        ("x.deformed.svg", "von Mises stress"),
+        ("x.convergence.svg", "tolerance"),
+    ] {
+        let light = drawn(name, &[]);
+        assert!(light.starts_with("<svg") && light.contains(text), "{name}");
+        assert_ne!(light, drawn(name, &["--theme", "dark"]));
+    }
+}
+
+#[test]
 fn a_problem_that_does_not_converge_exits_with_9_and_is_written_all_the_same() {
     let mut problem = example_json("rectangular_punch");
     problem["solver"] = json!({ "max_iterations": 1 });

@@ -7,9 +7,13 @@ use std::{
 };
 
 use anyhow::Context;
+use solver::{
+    io::plot::{self, Parts, Plot, Theme},
+    problem::Problem,
+};
 
 use crate::{
-    formats::{self, Format, PLOTS},
+    formats::{self, Format},
     run::Document,
 };
 
@@ -17,7 +21,8 @@ use crate::{
 pub(super) const HELP: &str = "\
 Write the result there, by its ending: .json everything; .csv, .jsonl, .arrow the profile of the \
 contact; .npz fields, profiles and history; .vtu the fields; .svg the profile as a figure. A part may \
-be named before the ending: punch.history.csv, punch.fields.npz; of several contacts one must be: \
+be named before the ending: punch.history.csv, punch.fields.npz, and punch.mesh.svg, .deformed.svg, \
+.convergence.svg for the other figures; of several contacts one must be: \
 punch.profile.top.csv. May be repeated; - is JSON on standard output. Without it a summary is printed";
 
 /// One file to write.
@@ -36,8 +41,7 @@ enum Part {
     Profile(String),
     History,
     Fields,
-    /// By its name in [`PLOTS`].
-    Plot(&'static str),
+    Plot(Plot),
 }
 
 impl Output {
@@ -81,18 +85,25 @@ impl Output {
         })
     }
 
-    pub(super) fn write(&self, title: Option<&str>, document: &Document) -> anyhow::Result<()> {
+    /// Writes it; `theme` is that of a figure.
+    pub(super) fn write(
+        &self,
+        problem: &Problem,
+        theme: Theme,
+        document: &Document,
+    ) -> anyhow::Result<()> {
         let Some(path) = &self.path else {
-            return self.write_to(&mut std::io::stdout().lock(), title, document);
+            return self.write_to(&mut std::io::stdout().lock(), problem, theme, document);
         };
-        replace(path, |out| self.write_to(out, title, document))
+        replace(path, |out| self.write_to(out, problem, theme, document))
             .with_context(|| format!("cannot write {}", path.display()))
     }
 
     fn write_to(
         &self,
         out: &mut dyn Write,
-        title: Option<&str>,
+        problem: &Problem,
+        theme: Theme,
         document: &Document,
     ) -> anyhow::Result<()> {
         let mut out = BufWriter::new(out);
@@ -109,8 +120,14 @@ impl Output {
             },
             Part::History => formats::history(&document.history, self.format),
             Part::Fields => formats::fields(&document.fields, self.format),
-            Part::Plot(name) => {
-                formats::plot(name, title.unwrap_or_default(), document).map(String::into_bytes)
+            Part::Plot(plot) => {
+                let parts = Parts {
+                    history: &document.history,
+                    profiles: &document.profiles,
+                    fields: &document.fields,
+                    stored: None,
+                };
+                plot::draw(*plot, theme, problem, &parts).map(String::into_bytes)
             }
         };
         out.write_all(&bytes.map_err(anyhow::Error::msg)?)?;
@@ -126,8 +143,7 @@ fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
     let words: Vec<&str> = stem.split('.').collect();
     let last = words.last().copied().unwrap_or_default();
     if format == Format::Svg {
-        let named = PLOTS.iter().find(|plot| **plot == last);
-        return Ok(Part::Plot(named.unwrap_or(&PLOTS[0])));
+        return Ok(Part::Plot(last.parse().unwrap_or(Plot::Profile)));
     }
     // a boundary may have any name, with dots or a word of ours: one that the problem has goes first
     let after = words.iter().enumerate();
@@ -234,8 +250,9 @@ mod tests {
             ("punch.fields.npz", Part::Fields, Format::Npz),
             ("punch.fields.json", Part::Fields, Format::Json),
             ("punch.vtu", Part::Fields, Format::Vtu),
-            ("punch.svg", Part::Plot("profile"), Format::Svg),
-            ("punch.profile.svg", Part::Plot("profile"), Format::Svg),
+            ("punch.svg", Part::Plot(Plot::Profile), Format::Svg),
+            ("punch.profile.svg", Part::Plot(Plot::Profile), Format::Svg),
+            ("punch.mesh.svg", Part::Plot(Plot::Mesh), Format::Svg),
         ] {
             assert_eq!(asked(name, &["top"]).unwrap(), (part, format), "{name}");
         }

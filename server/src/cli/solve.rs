@@ -11,6 +11,7 @@ use anyhow::Context;
 use clap::Args;
 use solver::{
     error::{SolveError, Violation},
+    io::plot::Theme,
     solution::Progress,
 };
 
@@ -29,6 +30,10 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "OUT", help = output::HELP)]
     output: Vec<PathBuf>,
 
+    /// Colours of a figure: light or dark
+    #[arg(long, default_value = "light")]
+    theme: Theme,
+
     #[command(flatten)]
     memory: MemoryBudget,
 }
@@ -37,6 +42,7 @@ pub(super) fn run(
     Arguments {
         file,
         output,
+        theme,
         memory,
     }: &Arguments,
 ) -> anyhow::Result<Exit> {
@@ -93,7 +99,7 @@ pub(super) fn run(
     };
     let title = problem.title.as_deref();
     for output in &outputs {
-        output.write(title, &document)?;
+        output.write(&problem, *theme, &document)?;
     }
     if outputs.is_empty() {
         print(&report::document(title, &document))?;

@@ -3,6 +3,7 @@
 mod events;
 mod jobs;
 mod meshes;
+mod plots;
 mod reply;
 mod request;
 mod results;
@@ -40,6 +41,7 @@ pub fn router(service: Arc<Service>, max_body_bytes: usize, grpc: Router) -> Rou
         .route("/v1/jobs/{id}/result",               get(results::result))
         .route("/v1/jobs/{id}/profiles/{boundary}",  get(results::profile))
         .route("/v1/jobs/{id}/fields",               get(results::fields))
+        .route("/v1/jobs/{id}/plots/{plot}",         get(plots::plot))
         .route("/v1/jobs/{id}/cancel",               post(jobs::cancel))
         .route("/v1/meshes",                         get(meshes::list).post(meshes::upload))
         .route("/v1/meshes/{hash}",                  get(meshes::get).delete(meshes::delete))

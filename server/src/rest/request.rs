@@ -15,6 +15,7 @@ use crate::{error::ApiError, job::JobId};
 pub(super) struct JobPath {
     pub(super) id: JobId,
     pub(super) boundary: String,
+    pub(super) plot: String,
 }
 
 impl<S: Send + Sync> FromRequestParts<S> for JobPath {
@@ -27,8 +28,9 @@ impl<S: Send + Sync> FromRequestParts<S> for JobPath {
         };
         let id = path.remove("id").unwrap_or_default();
         let boundary = path.remove("boundary").unwrap_or_default();
+        let plot = path.remove("plot").unwrap_or_default();
         match JobId::parse(&id) {
-            Some(id) => Ok(JobPath { id, boundary }),
+            Some(id) => Ok(JobPath { id, boundary, plot }),
             None => Err(ApiError::NotFound(format!("there is no job {id}"))),
         }
     }

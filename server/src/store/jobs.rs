@@ -153,6 +153,17 @@ impl Store {
         Ok(Some(job))
     }
 
+    /// The title of a job, and its problem as JSON without it.
+    pub async fn problem(&self, key: i64) -> Result<(Option<String>, String)> {
+        Ok(sqlx::query_as(
+            "select job.title, problem.body from job join problem on problem.input_hash = job.input_hash
+             where job.id = ?",
+        )
+        .bind(key)
+        .fetch_one(&self.reader)
+        .await?)
+    }
+
     /// Whether the job is terminal, and its `done` so among its events.
     pub async fn has_ended(&self, key: i64) -> Result<bool> {
         let status: String = sqlx::query_scalar("select status from job where id = ?")

@@ -3,6 +3,7 @@
 pub mod jobs;
 pub mod meshes;
 pub mod page;
+pub mod plots;
 pub mod problems;
 pub mod results;
 

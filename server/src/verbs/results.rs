@@ -172,7 +172,7 @@ pub async fn whole_fields(service: &Service, id: JobId) -> Result<Vec<u8>, ApiEr
 }
 
 /// The job, if it has ended with something to show.
-async fn finished(service: &Service, id: JobId) -> Result<Job, ApiError> {
+pub(super) async fn finished(service: &Service, id: JobId) -> Result<Job, ApiError> {
     let job = jobs::get(service, id).await?;
     match (job.status.is_terminal(), job.result_available) {
         (false, _) => Err(ApiError::ResultNotReady(job.status.as_str())),

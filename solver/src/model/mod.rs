@@ -151,6 +151,9 @@ impl Model {
         }
         let analysis = problem.analysis;
         findings.analysis(&analysis);
+        if let Some(units) = &problem.units {
+            findings.units(units);
+        }
         findings.controls(problem);
         findings.thesis(problem);
         findings.steps(&problem.steps);

@@ -6,7 +6,7 @@ use crate::error::escape;
 use crate::mesh::Mesh;
 use crate::problem::{
     Algorithm, Analysis, Condition, Friction, FrictionPoints, History, Measure, NormalOf, Problem,
-    Step, ThesisPressure,
+    Step, ThesisPressure, Units,
 };
 
 impl Findings {
@@ -69,6 +69,28 @@ impl Findings {
                     format!("{count} of them"),
                     format!("at most {MOST}"),
                     "Name boundaries so that fewer are needed.",
+                );
+            }
+        }
+    }
+
+    /// Labels that fit on an axis.
+    pub(super) fn units(&mut self, units: &Units) {
+        const MOST: usize = 20;
+        let Units {
+            length,
+            force,
+            stress,
+        } = units;
+        for (name, label) in [("length", length), ("force", force), ("stress", stress)] {
+            let characters = label.as_ref().map_or(0, |label| label.chars().count());
+            if characters > MOST {
+                self.say(
+                    format!("/units/{name}"),
+                    "too_long",
+                    format!("{characters} characters"),
+                    format!("at most {MOST} characters"),
+                    "It is a label on axes, such as mm or MPa.",
                 );
             }
         }

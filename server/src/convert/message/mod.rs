@@ -6,7 +6,7 @@ use contact::contact_to_pb;
 use solver::problem::{
     AdaptiveRefine, Algorithm, Analysis, BoundaryPart, BoundaryValue, ElementRange, Grid,
     InlineMesh, Load, Material, MeshInput, Orthotropic, Problem, Refine, SolverControls, Spacing,
-    Step, Support, ThesisOptions, ThesisPressure,
+    Step, Support, ThesisOptions, ThesisPressure, Units,
 };
 
 use crate::pb;
@@ -15,6 +15,7 @@ use crate::pb;
 pub fn problem_to_pb(problem: &Problem) -> pb::Problem {
     let Problem {
         title,
+        units,
         analysis,
         mesh,
         materials,
@@ -34,6 +35,7 @@ pub fn problem_to_pb(problem: &Problem) -> pb::Problem {
     };
     pb::Problem {
         title: title.clone(),
+        units: units.as_ref().map(units_to_pb),
         analysis: Some(pb::Analysis { kind: Some(kind) }),
         mesh: Some(mesh_to_pb(mesh)),
         materials: materials.iter().map(material_to_pb).collect(),
@@ -43,6 +45,14 @@ pub fn problem_to_pb(problem: &Problem) -> pb::Problem {
         solver: Some(controls_to_pb(solver)),
         steps: steps.iter().map(step_to_pb).collect(),
         quadrature: Some(*quadrature),
+    }
+}
+
+fn units_to_pb(units: &Units) -> pb::Units {
+    pb::Units {
+        length: units.length.clone(),
+        force: units.force.clone(),
+        stress: units.stress.clone(),
     }
 }
 

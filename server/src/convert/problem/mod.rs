@@ -9,7 +9,7 @@ mod mesh;
 
 use solver::{
     error::Violation,
-    problem::{Analysis, Problem, SolverControls},
+    problem::{Analysis, Problem, SolverControls, Units},
 };
 
 use crate::{pb, violations::Violations};
@@ -113,6 +113,7 @@ impl Reader {
             solver,
             steps,
             quadrature,
+            units,
         } = message;
         let kind = analysis.and_then(|analysis| analysis.kind);
         let analysis = self.need(
@@ -138,8 +139,14 @@ impl Reader {
         let solver = solver.map_or(Some(SolverControls::default()), |controls| {
             self.controls(controls)
         });
+        let units = units.map(|units| Units {
+            length: units.length,
+            force: units.force,
+            stress: units.stress,
+        });
         Some(Problem {
             title,
+            units,
             analysis: analysis?,
             mesh: mesh?,
             materials: materials?,
@@ -198,6 +205,7 @@ mod tests {
     #[test]
     fn every_kind_of_input_survives_the_way_through_grpc() {
         let text = r#"{
+            "units": { "length": "mm", "stress": "MPa" },
             "analysis": { "kind": "plane_stress", "thickness": 0.1 },
             "mesh": {
                 "inline": {

@@ -57,6 +57,7 @@ pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
         contacts: Vec::new(),
         steps: Vec::new(),
         quadrature,
+        units: Default::default(),
         solver: SolverControls::default(),
     })
 }

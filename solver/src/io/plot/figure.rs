@@ -5,32 +5,30 @@ use std::ops::Range;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-const WIDTH: u32 = 720;
-/// Of the title, and of each panel.
-const HEAD: u32 = 30;
-const PANEL: u32 = 280;
-/// Height of one line of the legend above a panel.
-const LEGEND: i32 = 22;
-const FONT: &str = "sans-serif";
+use super::page::{self, Area, Fallible, LETTERS, WIDTH, number, px, say};
+use super::theme::{Palette, Theme};
 
-/// Colours of curves, told apart also by who sees no red or green, and darkest first.
-const COLOURS: [RGBColor; 6] = [
-    RGBColor(31, 78, 121),
-    RGBColor(192, 57, 43),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 142, 115),
-    RGBColor(86, 160, 213),
-    RGBColor(150, 85, 150),
-];
-const GREY: RGBColor = RGBColor(127, 127, 127);
+/// Of a panel without its legend (pixels).
+const PANEL: i32 = 264;
+/// Height of one line of the legend above a panel (pixels).
+const LEGEND: i32 = 22;
+/// Left of the names of axes, and of the axes (pixels).
+const EDGE: i32 = 4;
+const LEFT: i32 = 92;
+/// Decades that a logarithmic axis spans at most, from the largest value down.
+const DECADES: f64 = 18.0;
 
 /// How a curve looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
     /// A line in one of six colours, counted from 0.
     Line(usize),
+    /// A line with a mark at every value.
+    Marked(usize),
     /// A thin grey line: a bound, a reference.
     Reference,
+    /// A dashed line: a limit.
+    Dashed,
     /// Small circles in one of the colours: single values.
     Points(usize),
 }
@@ -46,103 +44,175 @@ pub struct Curve {
     pub points: Vec<(f64, f64)>,
 }
 
+/// What the vertical axis does with the values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Scale {
+    /// Linear; a peak without mesh limit is cut off, and the legend says so.
+    #[default]
+    Stress,
+    /// Linear from 0, over whole numbers.
+    Count,
+    /// Logarithmic, over whole numbers; what is not positive is left out.
+    Log,
+}
+
 /// One pair of axes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Panel {
     /// What x is.
     pub x: String,
     /// What y is.
     pub y: String,
+    /// How y is shown.
+    pub scale: Scale,
     /// Drawn in this order.
     pub curves: Vec<Curve>,
+    /// Vertical lines with a word each at their top, in order of x.
+    pub marks: Vec<(f64, String)>,
 }
 
 /// Panels below one another under a title. `Err` says why the figure could not be drawn.
-pub fn figure(title: &str, panels: &[Panel]) -> Result<String, String> {
+pub fn figure(theme: Theme, title: &str, panels: &[Panel]) -> Result<String, String> {
     if panels
         .iter()
         .all(|panel| panel.curves.iter().all(|c| c.points.is_empty()))
     {
         return Err("there is nothing to draw".to_owned());
     }
-    let mut svg = String::new();
-    draw(&mut svg, title, panels).map_err(|error| error.to_string())?;
-    Ok(svg)
+    let heights: Vec<i32> = panels.iter().map(|p| LEGEND * rows(p) + PANEL).collect();
+    page::page(theme, title, heights.iter().sum(), |area| {
+        let mut rest = area.clone();
+        for (panel, height) in panels.iter().zip(&heights) {
+            let (place, below) = rest.split_vertically(px(*height));
+            rest = below;
+            draw_panel(&place, theme, panel)?;
+        }
+        Ok(String::new())
+    })
 }
 
-fn draw(svg: &mut String, title: &str, panels: &[Panel]) -> Result<(), Box<dyn std::error::Error>> {
-    let heads: Vec<u32> = panels
-        .iter()
-        .map(|p| LEGEND as u32 * rows(p) as u32)
-        .collect();
-    let size = (
-        WIDTH,
-        HEAD + heads
-            .iter()
-            .map(|head| head + PANEL - LEGEND as u32)
-            .sum::<u32>(),
-    );
-    let root = SVGBackend::with_string(svg, size).into_drawing_area();
-    root.fill(&WHITE)?;
-    let mut rest = root.titled(title, (FONT, 18))?;
-    for (panel, head) in panels.iter().zip(heads) {
-        let (page, below) = rest.split_vertically(head + PANEL - LEGEND as u32);
-        rest = below;
-        draw_panel(&page, panel)?;
+fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
+    let palette = theme.palette();
+    let limit = readable_limit(panel);
+    let shown = |curve: &Curve| -> Vec<(f64, f64)> {
+        let place = |&(x, y): &(f64, f64)| match panel.scale {
+            Scale::Stress => Some((x, y.clamp(-limit, limit))),
+            Scale::Count => Some((x, y)),
+            Scale::Log => (y > 0.0).then(|| (x, y.log10())),
+        };
+        curve.points.iter().filter_map(place).collect()
+    };
+    let curves: Vec<Vec<(f64, f64)>> = panel.curves.iter().map(shown).collect();
+    let all = curves.iter().flatten();
+    let whole = panel.scale != Scale::Stress;
+    let mut across = extent(all.clone().map(|p| p.0), 0.0);
+    if whole {
+        across = across.start - 0.5..across.end + 0.5;
     }
-    root.present()?;
-    Ok(())
-}
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-
-fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), Box<dyn std::error::Error>> {
-    let limit = readable_limit(&panel.curves);
-    let (head, body) = area.split_vertically(LEGEND * rows(panel));
-    let all = panel.curves.iter().flat_map(|curve| &curve.points);
-    let places = all.clone().map(|p| p.0);
-    let values = all.map(|p| p.1.clamp(-limit, limit));
+    let up = match panel.scale {
+        Scale::Log => decades(all.map(|p| p.1)),
+        _ => extent(all.map(|p| p.1), 0.06),
+    };
+    let (head, body) = area.split_vertically(px(LEGEND * rows(panel)));
     let mut chart: ChartContext<'_, _, Cartesian2d<RangedCoordf64, RangedCoordf64>> =
         ChartBuilder::on(&body)
-            .margin(10)
-            .x_label_area_size(42)
-            .y_label_area_size(70)
-            .build_cartesian_2d(extent(places, 0.0), extent(values, 0.06))?;
+            .margin_top(px(6))
+            .margin_right(px(20))
+            .margin_bottom(px(14))
+            .margin_left(px(EDGE))
+            .x_label_area_size(px(46))
+            .y_label_area_size(px(LEFT - EDGE))
+            .build_cartesian_2d(across.clone(), up.clone())?;
+    let whole_number = |value: f64| match value.round() {
+        round if (value - round).abs() < 1e-6 => number(round),
+        _ => String::new(),
+    };
+    let x_label = |value: &f64| match whole {
+        true => whole_number(*value),
+        false => number(*value),
+    };
+    let y_label = |value: &f64| match panel.scale {
+        Scale::Log => power_of_ten(*value),
+        Scale::Count => whole_number(*value),
+        Scale::Stress => number(*value),
+    };
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
-        .bold_line_style(RGBColor(225, 225, 225))
-        .axis_style(RGBColor(90, 90, 90))
+        .bold_line_style(palette.grid.stroke_width(px(1) as u32))
+        .axis_style(palette.axis.stroke_width(px(1) as u32))
+        .set_all_tick_mark_size(px(4))
         .x_desc(&panel.x)
         .y_desc(&panel.y)
-        .x_label_formatter(&|value| number(*value))
-        .y_label_formatter(&|value| number(*value))
-        .label_style((FONT, 14))
+        .x_labels(if whole { ticks(&across) } else { 9 })
+        .y_labels(if whole { ticks(&up).min(7) } else { 9 })
+        .x_label_formatter(&x_label)
+        .y_label_formatter(&y_label)
+        .label_style(page::text(theme, LETTERS))
+        .axis_desc_style(page::text(theme, 16))
         .draw()?;
-    for curve in &panel.curves {
-        let points = curve.points.iter().map(|p| (p.0, p.1.clamp(-limit, limit)));
+    let thin = palette.reference.stroke_width(px(1) as u32);
+    let pixels = chart.plotting_area().get_x_axis_pixel_range();
+    let mut free = i32::MIN; // where the next word may start
+    for (x, word) in &panel.marks {
+        chart.draw_series(LineSeries::new([(*x, up.start), (*x, up.end)], thin))?;
+        let part = (x - across.start) / (across.end - across.start);
+        let place = pixels.start + (part * f64::from(pixels.end - pixels.start)) as i32 + px(4);
+        let end = place + px(page::width(word));
+        if place >= free && end <= pixels.end {
+            let text = Text::new(word.clone(), (px(4), px(3)), page::text(theme, 13));
+            chart.draw_series([EmptyElement::at((*x, up.end)) + text])?;
+            free = end + px(6);
+        }
+    }
+    for (curve, points) in panel.curves.iter().zip(&curves) {
+        let style = style(&palette, curve.look);
+        let points = points.iter().copied();
+        let dots = |k: f64| {
+            let radius = (k * f64::from(px(1))) as i32;
+            move |p| Circle::new(p, radius, style.filled())
+        };
         match curve.look {
             Look::Points(_) => {
-                let style = style(curve.look);
-                chart.draw_series(points.map(|p| Circle::new(p, 3, style)))?;
+                chart.draw_series(points.map(|p| Circle::new(p, px(3), style)))?;
             }
-            _ => {
-                chart.draw_series(LineSeries::new(points, style(curve.look)))?;
+            Look::Marked(_) => {
+                chart.draw_series(LineSeries::new(points.clone(), style))?;
+                chart.draw_series(points.map(dots(2.6)))?;
+            }
+            Look::Dashed => {
+                // from edge to edge: also one iteration has a limit
+                let ends = points.clone().next().zip(points.clone().next_back());
+                let points: Vec<_> = ends.map_or(vec![], |(first, last)| {
+                    let inner = points.collect::<Vec<_>>();
+                    [
+                        vec![(across.start, first.1)],
+                        inner,
+                        vec![(across.end, last.1)],
+                    ]
+                    .concat()
+                });
+                chart.draw_series(DashedLineSeries::new(points, px(7), px(5), style))?;
+            }
+            Look::Line(_) | Look::Reference => {
+                chart.draw_series(LineSeries::new(points, style))?;
             }
         }
     }
-    legend(&head, &panel.curves, limit)
+    legend(&head, theme, panel, limit)
 }
 
-fn style(look: Look) -> ShapeStyle {
+fn style(palette: &Palette, look: Look) -> ShapeStyle {
+    let colour = |k: usize| palette.curves[k % palette.curves.len()];
     match look {
-        Look::Line(k) => COLOURS[k % COLOURS.len()].stroke_width(2),
-        Look::Points(k) => COLOURS[k % COLOURS.len()].stroke_width(1),
-        Look::Reference => GREY.stroke_width(1),
+        Look::Line(k) | Look::Marked(k) => colour(k).stroke_width(px(2) as u32),
+        Look::Points(k) => colour(k).stroke_width(px(1) as u32),
+        Look::Reference => palette.reference.stroke_width(px(1) as u32),
+        Look::Dashed => palette.text.stroke_width(px(1) as u32),
     }
 }
 
-/// What the legend says of a curve, and how wide that is.
+/// What the legend says of a curve, and how wide that is (pixels).
 fn entry(curve: &Curve, limit: f64) -> (String, i32) {
     let larger = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
     let peak = curve.points.iter().map(|p| p.1).fold(0.0, larger);
@@ -152,21 +222,19 @@ fn entry(curve: &Curve, limit: f64) -> (String, i32) {
         String::new()
     };
     let text = format!("{}{cut}", curve.label);
-    let width = 28 + 8 * text.chars().count() as i32 + 24;
+    let width = 28 + page::width(&text) + 18;
     (text, width)
 }
 
-/// Where each entry of the legend stands: its line and its place in it.
-fn places(panel: &Panel) -> Vec<(i32, i32)> {
-    const START: i32 = 80;
-    let limit = readable_limit(&panel.curves);
-    let (mut x, mut row) = (START, 0);
+/// Where each entry of the legend stands: its line and its place in it (pixels).
+fn places(panel: &Panel, limit: f64) -> Vec<(i32, i32)> {
+    let (mut x, mut row) = (LEFT, 0);
     let named = panel.curves.iter().filter(|curve| !curve.label.is_empty());
     named
         .map(|curve| {
             let width = entry(curve, limit).1;
-            if x > START && x + width > WIDTH as i32 {
-                (x, row) = (START, row + 1);
+            if x > LEFT && x + width > WIDTH {
+                (x, row) = (LEFT, row + 1);
             }
             let place = (row, x);
             x += width;
@@ -177,50 +245,86 @@ fn places(panel: &Panel) -> Vec<(i32, i32)> {
 
 /// Lines of the legend.
 fn rows(panel: &Panel) -> i32 {
-    places(panel).last().map_or(1, |(row, _)| row + 1)
+    let places = places(panel, readable_limit(panel));
+    places.last().map_or(1, |(row, _)| row + 1)
 }
 
 /// Samples above the panel, where they hide nothing.
-fn legend(area: &Area<'_>, curves: &[Curve], limit: f64) -> Result<(), Box<dyn std::error::Error>> {
-    let panel = Panel {
-        x: String::new(),
-        y: String::new(),
-        curves: curves.to_vec(),
-    };
-    let named = curves.iter().filter(|curve| !curve.label.is_empty());
-    for (curve, (row, x)) in named.zip(places(&panel)) {
+fn legend(area: &Area<'_>, theme: Theme, panel: &Panel, limit: f64) -> Fallible<()> {
+    let palette = theme.palette();
+    let named = panel.curves.iter().filter(|curve| !curve.label.is_empty());
+    for (curve, (row, x)) in named.zip(places(panel, limit)) {
         let middle = LEGEND * row + LEGEND / 2;
+        let style = style(&palette, curve.look);
+        let line = |from: i32, to: i32| {
+            PathElement::new([(px(from), px(middle)), (px(to), px(middle))], style)
+        };
+        let dot = (px(x + 11), px(middle));
         match curve.look {
-            Look::Points(_) => area.draw(&Circle::new((x + 11, middle), 3, style(curve.look)))?,
-            _ => area.draw(&PathElement::new(
-                [(x, middle), (x + 22, middle)],
-                style(curve.look),
-            ))?,
+            Look::Points(_) => area.draw(&Circle::new(dot, px(3), style))?,
+            Look::Marked(_) => {
+                area.draw(&line(x, x + 22))?;
+                area.draw(&Circle::new(dot, px(3), style.filled()))?;
+            }
+            Look::Dashed => {
+                area.draw(&line(x, x + 8))?;
+                area.draw(&line(x + 14, x + 22))?;
+            }
+            Look::Line(_) | Look::Reference => area.draw(&line(x, x + 22))?,
         }
-        let text = entry(curve, limit).0;
-        area.draw(&Text::new(text, (x + 28, middle - 7), (FONT, 14)))?;
+        say(area, theme, &entry(curve, limit).0, (x + 28, middle))?;
     }
     Ok(())
 }
 
-/// A number for an axis: at most six digits, without trailing zeros.
-fn number(value: f64) -> String {
-    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
-        return format!("{value:.3e}");
+/// As many ticks as there are whole numbers, and no more than fit.
+fn ticks(range: &Range<f64>) -> usize {
+    ((range.end - range.start) as usize + 1).clamp(2, 12)
+}
+
+/// 10ⁿ; nothing between the powers.
+fn power_of_ten(exponent: f64) -> String {
+    let round = exponent.round();
+    if (exponent - round).abs() > 1e-6 {
+        return String::new();
     }
-    let digits = 5 - (value.abs().max(1.0).log10().floor() as usize).min(5);
-    let text = format!("{value:.digits$}");
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
+    let raised = |c: char| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32('⁰' as u32 + digit.to_digit(10).unwrap_or(0)).unwrap_or('?'),
+    };
+    format!(
+        "10{}",
+        (round as i32)
+            .to_string()
+            .chars()
+            .map(raised)
+            .collect::<String>()
+    )
+}
+
+/// Whole decades around all exponents.
+fn decades(exponents: impl Iterator<Item = f64>) -> Range<f64> {
+    let (low, high) = exponents.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| {
+        (low.min(e), high.max(e))
+    });
+    if low > high {
+        return -1.0..1.0;
     }
+    let top = (high + 0.1).ceil();
+    (low - 0.1).floor().max(top - DECADES).min(top - 2.0)..top
 }
 
 /// The largest |stress| that is drawn. At a sharp edge one node may dwarf all others, and has no
 /// mesh limit: what exceeds the value that 97 % of the contact stays below is cut off at twice that.
-fn readable_limit(curves: &[Curve]) -> f64 {
+fn readable_limit(panel: &Panel) -> f64 {
+    if panel.scale != Scale::Stress {
+        return f64::INFINITY;
+    }
     let mut pieces: Vec<(f64, f64)> = Vec::new(); // |stress|, length
-    for curve in curves {
+    for curve in &panel.curves {
         for pair in curve.points.windows(2) {
             pieces.push((pair[0].1.abs().max(pair[1].1.abs()), pair[1].0 - pair[0].0));
         }
@@ -253,8 +357,10 @@ fn extent(values: impl Iterator<Item = f64> + Clone, margin: f64) -> Range<f64> 
     let pad = margin * (high - low);
     if low < high {
         low - pad..high + pad
-    } else {
+    } else if low == high {
         low - 1.0..low + 1.0
+    } else {
+        0.0..1.0
     }
 }
 
@@ -273,31 +379,26 @@ mod tests {
             x: "x".to_owned(),
             y: "y".to_owned(),
             curves: vec![curve("short")],
+            ..Panel::default()
         };
         assert_eq!(rows(&panel), 1);
         panel
             .curves
             .extend((0..6).map(|_| curve("a rather long label of a curve")));
         assert!(rows(&panel) > 1);
-        assert!(
-            figure("Title", std::slice::from_ref(&panel))
-                .unwrap()
-                .contains("Title")
-        );
-        assert!(figure("", &[]).is_err());
+        let svg = figure(Theme::Light, "Title", std::slice::from_ref(&panel)).unwrap();
+        assert!(svg.contains("Title"));
+        assert!(figure(Theme::Light, "", &[]).is_err());
     }
 
     #[test]
-    fn axis_numbers_are_short() {
-        for (value, text) in [
-            (0.0, "0"),
-            (0.1 + 0.2, "0.3"),
-            (-11507.26, "-11507.3"),
-            (250.0, "250"),
-            (1e-9, "1.000e-9"),
-            (2.5e7, "2.500e7"),
-        ] {
-            assert_eq!(number(value), text);
-        }
+    fn powers_of_ten_are_raised_and_their_axis_ends_on_them() {
+        assert_eq!(power_of_ten(-10.0), "10⁻¹⁰");
+        assert_eq!(power_of_ten(2.0), "10²");
+        assert_eq!(power_of_ten(0.5), "");
+        assert_eq!(decades([-9.5, 0.3].into_iter()), -10.0..1.0);
+        assert_eq!(decades([-300.0, 0.3].into_iter()), -17.0..1.0);
+        assert_eq!(decades([0.5].into_iter()), -1.0..1.0);
+        assert_eq!(decades(std::iter::empty()), -1.0..1.0);
     }
 }

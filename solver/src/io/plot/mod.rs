@@ -1,7 +1,180 @@
-//! Figures as SVG.
+//! Figures as SVG, made to be put into a paper: 720 pixels wide, light or dark.
+//!
+//! Axes, text and curves are drawn by plotters; bodies ([`body`]) are paths of our own, since plotters
+//! neither clips nor joins shapes.
 
+mod bands;
+mod body;
+mod convergence;
+mod deformed;
 mod figure;
+mod mesh;
+mod page;
 mod profile;
+mod theme;
 
-pub use figure::{Curve, Look, Panel, figure};
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+pub use convergence::convergence_svg;
+pub use deformed::{Stress, deformed_svg};
+pub use figure::{Curve, Look, Panel, Scale, figure};
+pub use mesh::mesh_svg;
 pub use profile::profile_svg;
+pub use theme::Theme;
+
+use crate::mesh::Mesh;
+use crate::problem::Problem;
+use crate::solution::{ContactProfile, Fields, Iteration};
+
+/// What can be drawn of a problem and its solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Plot {
+    /// Elements and named boundaries.
+    Mesh,
+    /// The deformed body with its stresses.
+    Deformed,
+    /// Stresses along the contact boundaries.
+    Profile,
+    /// Residuals and contact set by iteration.
+    Convergence,
+}
+
+impl Plot {
+    /// All of them.
+    pub const ALL: [Plot; 4] = [Plot::Mesh, Plot::Deformed, Plot::Profile, Plot::Convergence];
+
+    /// Its name in paths and file names.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Plot::Mesh => "mesh",
+            Plot::Deformed => "deformed",
+            Plot::Profile => "profile",
+            Plot::Convergence => "convergence",
+        }
+    }
+}
+
+impl FromStr for Plot {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = Plot::ALL.into_iter().find(|plot| plot.as_str() == text);
+        named.ok_or_else(|| "expected mesh, deformed, profile or convergence".to_owned())
+    }
+}
+
+/// The parts of a solution that figures are drawn from. Each figure needs its own; what it does not
+/// need may be empty.
+#[derive(Clone, Copy, Debug)]
+pub struct Parts<'a> {
+    /// For `convergence`.
+    pub history: &'a [Iteration],
+    /// For `profile` and `deformed`.
+    pub profiles: &'a BTreeMap<String, ContactProfile>,
+    /// For `deformed`; `mesh` draws the problem's own mesh without them.
+    pub fields: &'a Fields,
+    /// The mesh that the problem names by its hash, where it does; for `mesh`.
+    pub stored: Option<&'a Mesh>,
+}
+
+/// How a figure is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Style {
+    /// Its colours.
+    pub theme: Theme,
+    /// What the contours of `deformed` show.
+    pub stress: Stress,
+}
+
+impl From<Theme> for Style {
+    fn from(theme: Theme) -> Self {
+        Style {
+            theme,
+            ..Style::default()
+        }
+    }
+}
+
+/// Draws one figure. `Err` says why it could not be drawn.
+pub fn draw(
+    plot: Plot,
+    style: impl Into<Style>,
+    problem: &Problem,
+    parts: &Parts<'_>,
+) -> Result<String, String> {
+    let Style { theme, stress } = style.into();
+    match plot {
+        Plot::Mesh => mesh_svg(theme, problem, parts.stored, parts.fields),
+        Plot::Deformed => deformed_svg(theme, problem, parts.profiles, parts.fields, stress),
+        Plot::Profile => profile_svg(theme, problem, parts.profiles),
+        Plot::Convergence => convergence_svg(theme, problem, parts.history),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::solution::Solution;
+
+    /// A small problem with everything that a figure shows.
+    pub(super) fn problem() -> Problem {
+        serde_json::from_value(serde_json::json!({
+            "title": "Punch",
+            "units": { "length": "mm", "force": "N", "stress": "MPa" },
+            "analysis": { "kind": "plane_strain" },
+            "mesh": { "grid": { "x": [0, 1, 2], "y": [-1, 0] } },
+            "materials": [{ "youngs_modulus": 1000, "poissons_ratio": 0.3 }],
+            "supports": [{ "boundary": "bottom", "ux": 0, "uy": 0 }],
+            "contacts": [{
+                "boundary": "top",
+                "obstacle": { "kind": "circle", "radius": 8 },
+                "indentation": 0.01,
+                "friction": { "coefficient": 0.3, "nonlocal_radius": 0.01, "elastic_slip": 1e-4 }
+            }]
+        }))
+        .unwrap()
+    }
+
+    pub(super) fn solution(problem: &Problem) -> Solution {
+        crate::solve(problem, &mut |_| ControlFlow::Continue(())).unwrap()
+    }
+
+    #[test]
+    fn every_plot_has_a_name_and_is_drawn_in_both_themes() {
+        let problem = problem();
+        let solution = solution(&problem);
+        let parts = Parts {
+            history: &solution.history,
+            profiles: &solution.profiles,
+            fields: &solution.fields,
+            stored: None,
+        };
+        for plot in Plot::ALL {
+            assert_eq!(plot.as_str().parse(), Ok(plot));
+            let drawn = |theme| draw(plot, theme, &problem, &parts).unwrap();
+            let (light, dark) = (drawn(Theme::Light), drawn(Theme::Dark));
+            assert!(light.contains("Punch") && light.starts_with(r#"<svg width="720""#));
+            assert_ne!(light, dark);
+            assert_eq!(light, drawn(Theme::Light), "the same figure, the same text");
+        }
+        assert!("elements".parse::<Plot>().is_err() && "grey".parse::<Theme>().is_err());
+    }
+
+    #[test]
+    fn load_steps_are_marked_by_their_names() {
+        let mut problem = problem();
+        problem.steps = serde_json::from_value(serde_json::json!([
+            { "name": "indent" }, { "tangential_displacement": 1 }
+        ]))
+        .unwrap();
+        let history = solution(&problem).history;
+        let svg = convergence_svg(Theme::Light, &problem, &history).unwrap();
+        for text in ["indent", "step 2", "tolerance", "nodes in contact", "10⁻¹⁰"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert!(convergence_svg(Theme::Light, &problem, &[]).is_err());
+    }
+}

@@ -4,12 +4,16 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::figure::{Curve, Look, Panel, figure};
+use super::page::{self, with_unit};
+use super::theme::Theme;
+use crate::problem::Problem;
 use crate::solution::ContactProfile;
 
 /// For each contact boundary: σ_n above, σ_t with the friction bound ±τ below, against arc length.
 /// Stresses are negative in compression. `Err` says why a figure could not be drawn.
 pub fn profile_svg(
-    title: &str,
+    theme: Theme,
+    problem: &Problem,
     profiles: &BTreeMap<String, ContactProfile>,
 ) -> Result<String, String> {
     if profiles.is_empty() {
@@ -17,12 +21,13 @@ pub fn profile_svg(
     }
     let panels: Vec<Panel> = profiles
         .iter()
-        .flat_map(|(name, profile)| panels(name, profile))
+        .flat_map(|(name, profile)| panels(problem, name, profile))
         .collect();
-    figure(title, &panels)
+    let title = problem.title.as_deref().unwrap_or("Contact stresses");
+    figure(theme, title, &panels)
 }
 
-fn panels(name: &str, profile: &ContactProfile) -> [Panel; 2] {
+fn panels(problem: &Problem, name: &str, profile: &ContactProfile) -> [Panel; 2] {
     let shown = stressed(profile);
     let curve = |label: &str, look: Look, values: &[f64]| Curve {
         label: label.to_owned(),
@@ -31,9 +36,13 @@ fn panels(name: &str, profile: &ContactProfile) -> [Panel; 2] {
     };
     let opposite: Vec<f64> = profile.friction_bound.iter().map(|tau| -tau).collect();
     let panel = |curves: Vec<Curve>| Panel {
-        x: format!("arc length s along `{name}`"),
-        y: "stress".to_owned(),
+        x: with_unit(
+            &format!("arc length s along `{}`", page::shortened(name, 40)),
+            page::length(&problem.units),
+        ),
+        y: with_unit("stress", page::stress(&problem.units)),
         curves,
+        ..Panel::default()
     };
     [
         panel(vec![curve("σ_n", Look::Line(0), &profile.normal_stress)]),
@@ -71,6 +80,7 @@ fn stressed(profile: &ContactProfile) -> Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::plot::tests::problem;
 
     #[test]
     fn a_figure_holds_its_curves_and_survives_a_flat_profile() {
@@ -85,8 +95,10 @@ mod tests {
             ("left".to_owned(), profile.clone()),
             ("top".to_owned(), profile),
         ]);
-        let svg = profile_svg("Punch", &two).unwrap();
-        assert!(svg.starts_with("<svg") && svg.contains("Punch") && svg.contains("`left`"));
+        let problem = problem();
+        let svg = profile_svg(Theme::Light, &problem, &two).unwrap();
+        assert!(svg.starts_with("<svg") && svg.contains("Punch") && svg.contains("`left` [mm]"));
+        assert!(svg.contains("stress [MPa]"));
         assert!(svg.matches("<polyline").count() >= 8);
         let flat = ContactProfile {
             s: vec![0.0, 1.0],
@@ -95,8 +107,9 @@ mod tests {
             friction_bound: vec![0.0; 2],
             ..ContactProfile::default()
         };
-        assert!(profile_svg("", &BTreeMap::from([("top".to_owned(), flat)])).is_ok());
-        assert!(profile_svg("", &BTreeMap::new()).is_err());
+        let flat = BTreeMap::from([("top".to_owned(), flat)]);
+        assert!(profile_svg(Theme::Dark, &problem, &flat).is_ok());
+        assert!(profile_svg(Theme::Light, &problem, &BTreeMap::new()).is_err());
     }
 
     #[test]

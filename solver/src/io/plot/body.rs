@@ -1,0 +1,332 @@
+//! Bodies between equal axes. What lies inside of the axes is written as paths: they are clipped,
+//! keep the parabolas that the sides of elements are, and one path may hold thousands of shapes.
+
+use std::fmt::Write;
+
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+
+use super::page::{self, Area, Fallible, HEAD, WIDTH, number, px, say};
+use super::theme::{Theme, hex};
+use crate::element::Element;
+
+/// Around the axes (pixels): numbers and names left and below, a caption above.
+const EDGE: i32 = 4;
+const LEFT: i32 = 84;
+const RIGHT: i32 = 16;
+const BELOW: i32 = 46;
+const GAP: i32 = 12;
+const CAPTION: i32 = 26;
+/// Highest axes: one above the other and beside one another (pixels).
+const HIGHEST: [f64; 2] = [430.0, 420.0];
+
+/// A rectangle in space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Window {
+    pub(super) low: [f64; 2],
+    pub(super) high: [f64; 2],
+}
+
+impl Window {
+    /// Around points; `None` without any.
+    pub(super) fn around(points: impl Iterator<Item = [f64; 2]>) -> Option<Window> {
+        let mut window: Option<Window> = None;
+        for p in points {
+            let w = window.get_or_insert(Window { low: p, high: p });
+            for a in 0..2 {
+                w.low[a] = w.low[a].min(p[a]);
+                w.high[a] = w.high[a].max(p[a]);
+            }
+        }
+        window
+    }
+
+    pub(super) fn size(&self) -> [f64; 2] {
+        [self.high[0] - self.low[0], self.high[1] - self.low[1]]
+    }
+
+    pub(super) fn largest(&self) -> f64 {
+        self.size()[0].max(self.size()[1])
+    }
+
+    /// With a margin, as a part of the larger side.
+    pub(super) fn grown(&self, part: f64) -> Window {
+        let by = part * self.largest();
+        Window {
+            low: self.low.map(|x| x - by),
+            high: self.high.map(|x| x + by),
+        }
+    }
+}
+
+/// Where a window stands on the page.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    pub(super) window: Window,
+    /// Left upper corner below the title, and size, in the units of the drawing.
+    corner: [i32; 2],
+    size: [i32; 2],
+}
+
+impl Frame {
+    /// A place in space, from the corner of the axes, in the units of the drawing.
+    pub(super) fn at(&self, point: [f64; 2]) -> [f64; 2] {
+        let part = |a: usize| (point[a] - self.window.low[a]) / self.window.size()[a];
+        [
+            part(0) * f64::from(self.size[0]),
+            (1.0 - part(1)) * f64::from(self.size[1]),
+        ]
+    }
+
+    /// Whether something between two corners (as of `at`) is to be seen.
+    pub(super) fn shows(&self, low: [f64; 2], high: [f64; 2]) -> bool {
+        (0..2).all(|a| high[a] >= 0.0 && low[a] <= f64::from(self.size[a]))
+    }
+}
+
+/// Frames for one window or two, and the height that they take (pixels). Two stand side by side, but
+/// below one another where the first is wide.
+pub(super) fn layout(windows: &[Window]) -> (Vec<Frame>, i32) {
+    let wide = |w: &Window| w.size()[0] > 1.7 * w.size()[1];
+    let beside = windows.len() > 1 && !wide(&windows[0]);
+    let columns = if beside { 2 } else { 1 };
+    let column = WIDTH / columns;
+    let space = f64::from(column - LEFT - RIGHT);
+    let sizes: Vec<[i32; 2]> = windows
+        .iter()
+        .map(|window| {
+            let [w, h] = window.size();
+            let scale = (space / w).min(HIGHEST[(columns - 1) as usize] / h);
+            // numbers need their room also where a body is thin
+            [w, h].map(|side| ((scale * side).max(24.0) * f64::from(page::FINE)).round() as i32)
+        })
+        .collect();
+    let highest = sizes.iter().map(|s| s[1]).max().unwrap_or(0);
+    let (mut left, mut top) = (0, 0);
+    let mut frames = Vec::new();
+    for (window, size) in windows.iter().zip(sizes) {
+        let spare = px(column - LEFT - RIGHT) - size[0];
+        let corner = [px(left + LEFT) + spare / 2, px(top + CAPTION)];
+        frames.push(Frame {
+            window: *window,
+            corner,
+            size,
+        });
+        if beside {
+            left += column;
+        } else {
+            top += CAPTION + size[1] / page::FINE + BELOW + GAP;
+        }
+    }
+    let height = match beside {
+        true => CAPTION + highest / page::FINE + BELOW + GAP,
+        false => top,
+    };
+    (frames, height)
+}
+
+/// Numbers, names and a caption around a frame.
+pub(super) fn axes(
+    area: &Area<'_>,
+    theme: Theme,
+    frame: &Frame,
+    caption: &str,
+    names: [&str; 2],
+) -> Fallible<()> {
+    let palette = theme.palette();
+    let [left, top] = frame.corner;
+    let [w, h] = frame.size;
+    let place = area.clone().shrink(
+        (left - px(LEFT - EDGE), top),
+        ((w + px(LEFT - EDGE)) as u32, (h + px(BELOW)) as u32),
+    );
+    let Window { low, high } = frame.window;
+    let mut chart: ChartContext<'_, _, Cartesian2d<RangedCoordf64, RangedCoordf64>> =
+        ChartBuilder::on(&place)
+            .x_label_area_size(px(BELOW))
+            .y_label_area_size(px(LEFT - EDGE))
+            .build_cartesian_2d(low[0]..high[0], low[1]..high[1])?;
+    let fits = |size: i32, each: i32| ((size / px(each)) as usize).clamp(2, 9);
+    chart
+        .configure_mesh()
+        .disable_mesh()
+        .axis_style(palette.axis.stroke_width(px(1) as u32))
+        .set_all_tick_mark_size(px(4))
+        .x_desc(names[0])
+        .y_desc(names[1])
+        .x_labels(fits(w, 54))
+        .y_labels(fits(h, 40))
+        .x_label_formatter(&|value| number(*value))
+        .y_label_formatter(&|value| number(*value))
+        .label_style(page::text(theme, page::LETTERS))
+        .axis_desc_style(page::text(theme, 16))
+        .draw()?;
+    let corner = (left / page::FINE, top / page::FINE - CAPTION / 2);
+    say(area, theme, caption, corner)
+}
+
+/// What is inside of the axes, clipped, in a border; goes on top of the page.
+pub(super) fn inside(theme: Theme, frame: &Frame, content: &str) -> String {
+    let ([x, y], [w, h]) = (frame.corner, frame.size);
+    let y = y + px(HEAD);
+    let (place, border) = (
+        format!(r#"x="{x}" y="{y}" width="{w}" height="{h}""#),
+        hex(theme.palette().axis),
+    );
+    format!(
+        r#"<svg {place} overflow="hidden" stroke-linejoin="round" stroke-linecap="round">
+{content}</svg>
+<rect {place} fill="none" stroke="{border}" stroke-width="10"/>
+"#
+    )
+}
+
+/// The `d` of a path, in whole units of the drawing.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Path(pub(super) String);
+
+impl Path {
+    /// A closed polygon; nothing where it has shrunk to a point.
+    pub(super) fn polygon(&mut self, points: &[[f64; 2]]) {
+        let points: Vec<[i64; 2]> = points.iter().map(|p| p.map(round)).collect();
+        let Some((first, rest)) = points.split_first() else {
+            return;
+        };
+        if rest.iter().all(|p| p == first) {
+            return;
+        }
+        let mut here = *first;
+        // writing to a string does not fail
+        let _ = write!(self.0, "M{} {}l", first[0], first[1]);
+        for p in rest.iter().filter(|p| *p != first) {
+            let _ = write!(self.0, "{} {} ", p[0] - here[0], p[1] - here[1]);
+            here = *p;
+        }
+        self.0.pop();
+        self.0.push('z');
+    }
+
+    /// Sides as of `Element::sides`, one after the other; `closed` where they go round.
+    pub(super) fn sides(&mut self, sides: &[[[f64; 2]; 3]], closed: bool) {
+        let mut here = None;
+        for &[start, end, mid] in sides {
+            let [a, b, m] = [start, end, mid].map(|p| p.map(round));
+            if here != Some(a) {
+                let _ = write!(self.0, "M{} {}", a[0], a[1]);
+            }
+            // the parabola through the midside node
+            let c = [0, 1].map(|k| round(2.0 * mid[k] - 0.5 * (start[k] + end[k])) - a[k]);
+            let off = (0..2).any(|k| (2 * m[k] - a[k] - b[k]).abs() > 2);
+            let to = [b[0] - a[0], b[1] - a[1]];
+            let _ = match off {
+                true => write!(self.0, "q{} {} {} {}", c[0], c[1], to[0], to[1]),
+                false => write!(self.0, "l{} {}", to[0], to[1]),
+            };
+            here = Some(b);
+        }
+        if closed {
+            self.0.push('z');
+        }
+    }
+
+    /// As an element of SVG with these attributes; nothing when it is empty.
+    pub(super) fn drawn(&self, attributes: &str) -> String {
+        match self.0.is_empty() {
+            true => String::new(),
+            false => format!("<path {attributes} d=\"{}\"/>\n", self.0),
+        }
+    }
+}
+
+/// Far outside is outside: larger numbers say no more, and some viewers fail on them.
+fn round(x: f64) -> i64 {
+    x.clamp(-1e6, 1e6).round() as i64
+}
+
+/// Every side of the mesh once, and those on the surface.
+pub(super) struct Sides {
+    pub(super) all: Vec<[u32; 3]>,
+    pub(super) surface: Vec<[u32; 3]>,
+}
+
+impl Sides {
+    /// A side is known by its midside node.
+    pub(super) fn of(elements: &[Element], nodes: usize) -> Sides {
+        let mut seen = vec![0u8; nodes];
+        let mut all = Vec::new();
+        for side in elements.iter().flat_map(Element::sides) {
+            if let Some(count) = seen.get_mut(side[2] as usize) {
+                if *count == 0 {
+                    all.push(side);
+                }
+                *count = count.saturating_add(1);
+            }
+        }
+        let surface = all
+            .iter()
+            .copied()
+            .filter(|side| seen[side[2] as usize] == 1);
+        Sides {
+            surface: surface.collect(),
+            all,
+        }
+    }
+}
+
+/// Coordinates as the theory names them.
+pub(super) fn coordinates(analysis: &crate::problem::Analysis) -> [&'static str; 2] {
+    match analysis {
+        crate::problem::Analysis::Axisymmetric {} => ["r", "z"],
+        _ => ["x", "y"],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_are_equal_and_two_wide_windows_stand_below_one_another() {
+        let window = |w: f64, h: f64| Window {
+            low: [0.0, 0.0],
+            high: [w, h],
+        };
+        for (windows, beside) in [
+            (vec![window(4.0, 4.0), window(1.0, 1.0)], true),
+            (vec![window(5.0, 1.0), window(1.0, 1.0)], false),
+        ] {
+            let (frames, height) = layout(&windows);
+            assert_eq!(frames[0].corner[1] == frames[1].corner[1], beside);
+            for frame in &frames {
+                let [w, h] = frame.window.size();
+                let [p, q] = frame.size.map(f64::from);
+                assert!((p / w - q / h).abs() < 0.01 * p / w, "{frame:?}");
+                assert!(frame.corner[0] + frame.size[0] <= px(WIDTH));
+                assert!(frame.corner[1] + frame.size[1] <= px(height));
+            }
+            assert_eq!(frames[0].at([0.0, 0.0])[0], 0.0);
+        }
+    }
+
+    #[test]
+    fn a_bent_side_is_a_parabola_and_a_straight_one_a_line() {
+        let mut path = Path::default();
+        path.sides(&[[[0.0, 0.0], [100.0, 0.0], [50.0, 20.0]]], false);
+        path.sides(&[[[0.0, 0.0], [100.0, 0.0], [50.0, 0.0]]], false);
+        assert_eq!(path.0, "M0 0q50 40 100 0M0 0l100 0");
+        path.polygon(&[[0.2, 0.1], [0.3, 0.0], [0.0, 0.4]]);
+        assert_eq!(path.0, "M0 0q50 40 100 0M0 0l100 0", "a point is nothing");
+    }
+
+    #[test]
+    fn the_surface_is_what_one_element_has_alone() {
+        let strip = crate::mesh::grid_mesh(&crate::problem::Grid {
+            x: vec![0.0, 1.0, 2.0],
+            y: vec![0.0, 1.0],
+            top: None,
+            bottom: None,
+        });
+        let sides = Sides::of(&strip.elements, strip.nodes.len());
+        assert_eq!((sides.all.len(), sides.surface.len()), (7, 6));
+    }
+}

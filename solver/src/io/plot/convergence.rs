@@ -1,0 +1,103 @@
+//! How the iterations went: residuals, and the contact set.
+
+use super::figure::{Curve, Look, Panel, Scale, figure};
+use super::theme::Theme;
+use crate::problem::Problem;
+use crate::solution::Iteration;
+
+/// Every residual on a logarithmic axis with the tolerance above, the contact set below, against the
+/// number of the iteration; vertical lines where load steps begin. `Err` says why it could not be drawn.
+pub fn convergence_svg(
+    theme: Theme,
+    problem: &Problem,
+    history: &[Iteration],
+) -> Result<String, String> {
+    if history.is_empty() {
+        return Err("there were no iterations: without contact there is nothing to iterate".into());
+    }
+    let curve = |label: &str, look: Look, value: &dyn Fn(&Iteration) -> Option<f64>| Curve {
+        label: label.to_owned(),
+        look,
+        points: history
+            .iter()
+            .filter_map(|row| Some((f64::from(row.k), value(row)?)))
+            .collect(),
+    };
+    let panel = |y: &str, scale: Scale, marks: Vec<(f64, String)>, curves: Vec<Curve>| Panel {
+        x: "iteration".to_owned(),
+        y: y.to_owned(),
+        scale,
+        marks,
+        curves,
+    };
+    // what cannot be seen as a line of its own is no curve: frictionless contact has no friction points
+    let nonzero = |curve: &Curve| curve.points.iter().any(|p| p.1 != 0.0);
+    let residuals = vec![
+        curve("residual", Look::Marked(0), &|row| Some(row.residual)),
+        curve("friction_residual", Look::Marked(1), &|row| {
+            Some(row.friction_residual)
+        }),
+        curve("r_f (thesis 3.5)", Look::Points(3), &|row| row.r_f),
+        curve("tolerance", Look::Dashed, &|row| Some(row.tolerance)),
+    ];
+    let counts = vec![
+        curve("nodes in contact", Look::Marked(0), &|row| {
+            Some(f64::from(row.contact.active))
+        }),
+        curve("entered", Look::Line(3), &|row| {
+            Some(f64::from(row.contact.entered))
+        }),
+        curve("left", Look::Line(2), &|row| {
+            Some(f64::from(row.contact.left))
+        }),
+        curve("points in slip", Look::Marked(1), &|row| {
+            Some(f64::from(row.friction.slip))
+        }),
+        curve("points in stick", Look::Marked(4), &|row| {
+            Some(f64::from(row.friction.stick))
+        }),
+    ];
+    let residuals = residuals.into_iter().filter(nonzero).collect();
+    figure(
+        theme,
+        problem.title.as_deref().unwrap_or("Convergence"),
+        &[
+            panel(
+                "relative residual",
+                Scale::Log,
+                steps(problem, history, true),
+                residuals,
+            ),
+            panel(
+                "count",
+                Scale::Count,
+                steps(problem, history, false),
+                counts.into_iter().filter(nonzero).collect(),
+            ),
+        ],
+    )
+}
+
+/// Where each load step begins, between two iterations, with its name.
+fn steps(problem: &Problem, history: &[Iteration], named: bool) -> Vec<(f64, String)> {
+    let mut marks = Vec::new();
+    if problem.steps.len() < 2 {
+        return marks;
+    }
+    let mut before = None;
+    for row in history {
+        if before != Some(row.step) {
+            let step = problem.steps.get(row.step as usize);
+            let name = step.and_then(|step| step.name.clone());
+            let name = name.unwrap_or_else(|| format!("step {}", row.step + 1));
+            let word = if named {
+                super::page::shortened(&name, 20)
+            } else {
+                String::new()
+            };
+            marks.push((f64::from(row.k) - 0.5, word));
+            before = Some(row.step);
+        }
+    }
+    marks
+}

@@ -1,0 +1,174 @@
+//! The page of a figure: size, background, title, and how numbers and names are written.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::theme::Theme;
+use crate::problem::Units;
+
+/// Width of every figure (pixels).
+pub(super) const WIDTH: i32 = 720;
+/// Height of the title (pixels).
+pub(super) const HEAD: i32 = 40;
+/// plotters draws in whole units: a tenth of a pixel keeps curves smooth.
+pub(super) const FINE: i32 = 10;
+const FONT: &str = "sans-serif";
+/// Height of numbers, legends and names (pixels): 5 pt or more in a column of 9 cm.
+pub(super) const LETTERS: i32 = 15;
+/// Characters that fit on a line at the size of the title.
+const TITLE: usize = 64;
+
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(super) type Fallible<T> = Result<T, Box<dyn std::error::Error>>;
+
+/// Pixels in the units of the drawing.
+pub(super) const fn px(pixels: i32) -> i32 {
+    pixels * FINE
+}
+
+/// A page `height` pixels high below its title. `draw` gets the area below the title, and answers with
+/// SVG of its own that goes on top, in the units of the drawing from the corner of the page.
+pub(super) fn page(
+    theme: Theme,
+    title: &str,
+    height: i32,
+    draw: impl FnOnce(&Area<'_>) -> Fallible<String>,
+) -> Result<String, String> {
+    let size = (WIDTH, HEAD + height);
+    let mut svg = String::new();
+    let drawn = || -> Fallible<String> {
+        let fine = (px(size.0) as u32, px(size.1) as u32);
+        let root = SVGBackend::with_string(&mut svg, fine).into_drawing_area();
+        let palette = theme.palette();
+        root.fill(&palette.background)?;
+        let middle = (px(WIDTH / 2), px(HEAD / 2));
+        let at = Pos::new(HPos::Center, VPos::Center);
+        let style = text(theme, 19).pos(at);
+        root.draw(&Text::new(shortened(title, TITLE), middle, style))?;
+        let (_, below) = root.split_vertically(px(HEAD));
+        let over = draw(&below)?;
+        root.present()?;
+        Ok(over)
+    };
+    let over = drawn().map_err(|error| error.to_string())?;
+    // the view box stays fine; the size is said in pixels
+    let fine = format!(r#"width="{}" height="{}""#, px(size.0), px(size.1));
+    let said = format!(r#"width="{}" height="{}""#, size.0, size.1);
+    let svg = svg.replacen(&fine, &said, 1);
+    match svg.rfind("</svg>") {
+        Some(end) => Ok(format!("{}{over}{}", &svg[..end], &svg[end..])),
+        None => Err("the drawing has no end".to_owned()),
+    }
+}
+
+/// Text of a height in pixels.
+pub(super) fn text(theme: Theme, pixels: i32) -> TextStyle<'static> {
+    // plotters writes a font of size s as s/1.24
+    (FONT, 1.24 * f64::from(px(pixels)))
+        .into_font()
+        .color(&theme.palette().text)
+}
+
+/// A line of text with its left end and its middle at a place (pixels).
+pub(super) fn say(area: &Area<'_>, theme: Theme, words: &str, (x, y): (i32, i32)) -> Fallible<()> {
+    let style = text(theme, LETTERS).pos(Pos::new(HPos::Left, VPos::Center));
+    area.draw(&Text::new(words.to_owned(), (px(x), px(y)), style))?;
+    Ok(())
+}
+
+/// How wide a text of that height is at most, without asking a font (pixels).
+pub(super) fn width(words: &str) -> i32 {
+    8 * words.chars().count() as i32
+}
+
+/// The first `most` characters.
+pub(super) fn shortened(words: &str, most: usize) -> String {
+    if words.chars().count() <= most {
+        return words.to_owned();
+    }
+    let start: String = words.chars().take(most - 1).collect();
+    format!("{}…", start.trim_end())
+}
+
+/// A quantity with its unit, where there is one.
+pub(super) fn with_unit(name: &str, unit: Option<&str>) -> String {
+    match unit {
+        Some(unit) if !unit.is_empty() => format!("{name} [{unit}]"),
+        _ => name.to_owned(),
+    }
+}
+
+/// The unit of length of a problem.
+pub(super) fn length(units: &Option<Units>) -> Option<&str> {
+    units.as_ref()?.length.as_deref()
+}
+
+/// The unit of stress of a problem.
+pub(super) fn stress(units: &Option<Units>) -> Option<&str> {
+    units.as_ref()?.stress.as_deref()
+}
+
+/// A number for an axis: at most six digits, without trailing zeros, with a true minus.
+pub(super) fn number(value: f64) -> String {
+    digits(value).replace('-', "−")
+}
+
+fn digits(value: f64) -> String {
+    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
+        let text = format!("{value:.3e}");
+        let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+        let digits = digits.trim_end_matches('0').trim_end_matches('.');
+        return format!("{digits}e{power}");
+    }
+    let digits = 5 - (value.abs().max(1.0).log10().floor() as usize).min(5);
+    let text = format!("{value:.digits$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+/// The first of these steps, times a power of ten, that is not below a positive number.
+pub(super) fn round_up(value: f64, steps: &[f64]) -> f64 {
+    let power = 10f64.powf(value.log10().floor());
+    let mut rounds = steps.iter().map(|step| step * power);
+    // a hair above counts as equal
+    let fits = rounds.find(|round| *round >= value * (1.0 - 1e-9));
+    fits.unwrap_or(10.0 * power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axis_numbers_are_short() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.1 + 0.2, "0.3"),
+            (-11507.26, "−11507.3"),
+            (250.0, "250"),
+            (1e-9, "1e−9"),
+            (2.5e7, "2.5e7"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn round_numbers_are_one_two_and_five() {
+        for (value, round) in [(0.9, 1.0), (1.1, 2.0), (3.0, 5.0), (5.0, 5.0), (7e-4, 1e-3)] {
+            assert!((round_up(value, &[1.0, 2.0, 5.0]) - round).abs() < 1e-12 * round);
+        }
+    }
+
+    #[test]
+    fn a_user_s_text_is_text_and_is_shortened() {
+        let title = format!("<script>&{}", "x".repeat(200));
+        let svg = page(Theme::Dark, &title, 50, |_| Ok("<g/>".to_owned())).unwrap();
+        assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;&amp;"));
+        assert!(svg.contains('…') && svg.trim_end().ends_with("<g/></svg>"));
+        assert!(svg.starts_with(r#"<svg width="720" height="90" viewBox="0 0 7200 900""#));
+    }
+}
