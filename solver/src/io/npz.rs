@@ -40,7 +40,7 @@ impl Npz {
         values: &[T],
         width: usize,
     ) -> Result<(), String> {
-        if width == 0 || values.len() % width != 0 {
+        if width == 0 || !values.len().is_multiple_of(width) {
             return Err(format!(
                 "{name}: {} numbers are no rows of {width}",
                 values.len()
@@ -155,7 +155,12 @@ pub(super) mod tests {
             assert_eq!((10 + length) % 64, 0);
             let header = String::from_utf8(bytes[10..10 + length].to_vec()).unwrap();
             assert!(header.ends_with('\n'));
-            let name = file.name().strip_suffix(".npy").unwrap().to_owned();
+            let name = file
+                .name()
+                .unwrap()
+                .strip_suffix(".npy")
+                .unwrap()
+                .to_owned();
             arrays.insert(name, (header, bytes.split_off(10 + length)));
         }
         arrays
