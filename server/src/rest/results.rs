@@ -88,8 +88,8 @@ pub(super) async fn fields(
         let pieces = results::fields(&rest.service, path.id).await?;
         return Ok(data(format, &name, Body::from_stream(pieces)));
     }
-    let stored = results::whole_fields(&rest.service, path.id).await?;
-    let written = rest.service.work(move || {
+    let stored = results::whole_fields(&rest.service, path.id);
+    let written = rest.service.work_on(stored, move |stored| {
         let fields: Fields = serde_json::from_slice(&stored).map_err(|error| error.to_string())?;
         drop(stored); // they may be large
         formats::fields(&fields, format)

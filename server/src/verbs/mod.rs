@@ -23,7 +23,8 @@ pub struct Service {
     pub store: Arc<Store>,
     /// Who solves.
     pub queue: Arc<Queue>,
-    /// Bounds the problems read and checked at the same time: that is work, and the cores are few.
+    /// Bounds the problems read and checked, and the results converted, at the same time: that is
+    /// work, and the cores are few.
     checks: Arc<Semaphore>,
     max_queued: u32,
     memory_budget_bytes: u64,
@@ -57,11 +58,21 @@ impl Service {
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, ApiError> {
+        self.work_on(async { Ok(()) }, |()| work()).await
+    }
+
+    /// The same on something large that is loaded first: who has no place yet holds none of it.
+    pub async fn work_on<L: Send + 'static, T: Send + 'static>(
+        &self,
+        load: impl Future<Output = Result<L, ApiError>>,
+        work: impl FnOnce(L) -> T + Send + 'static,
+    ) -> Result<T, ApiError> {
         let place = self.checks.clone().acquire_owned().await;
         let place = place.map_err(ApiError::internal)?;
+        let loaded = load.await?;
         let working = tokio::task::spawn_blocking(move || {
             let _place = place;
-            work()
+            work(loaded)
         });
         working.await.map_err(ApiError::internal)
     }

@@ -49,17 +49,21 @@ pub async fn history(
     max_points: Option<usize>,
 ) -> Result<Vec<Iteration>, ApiError> {
     let job = jobs::get(service, id).await?;
-    let stored = match job.result_available {
-        ResultAvailable::None => None,
-        ResultAvailable::Partial | ResultAvailable::Final => {
-            service.store.part(job.key, "history").await?
-        }
+    let store = &service.store;
+    let load = async {
+        let stored = match job.result_available {
+            ResultAvailable::None => None,
+            ResultAvailable::Partial | ResultAvailable::Final => {
+                store.part(job.key, "history").await?
+            }
+        };
+        let told = match stored {
+            Some(_) => vec![],
+            None => store.iterations(job.key, job.attempt).await?,
+        };
+        Ok((stored, told))
     };
-    let told = match stored {
-        Some(_) => vec![],
-        None => service.store.iterations(job.key, job.attempt).await?,
-    };
-    let rows = service.work(move || match stored {
+    let rows = service.work_on(load, |(stored, told)| match stored {
         Some(bytes) => serde_json::from_slice(&bytes),
         None => told.iter().map(|line| row(line)).collect(),
     });
