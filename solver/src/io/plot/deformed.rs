@@ -113,7 +113,12 @@ pub fn deformed_svg(
     let windows: Vec<Window> = views.iter().map(|view| view.0).collect();
     let (frames, height) = body::layout(&windows);
     let values: Vec<f64> = (0..nodes).map(|n| stress.at(fields, n)).collect();
-    let bands = Bands::of(&values);
+    // the last panel is the one at the contact
+    let near: Vec<f64> = views.last().map_or(vec![], |(window, factor)| {
+        let inside = |&n: &u32| window.holds(body.place(n, *factor));
+        all().filter(inside).map(|n| values[n as usize]).collect()
+    });
+    let bands = Bands::of(&values, &near);
     let sides = Sides::of(&fields.elements, nodes);
     let mut over = String::new();
     for (frame, (_, factor)) in frames.iter().zip(&views) {

@@ -114,6 +114,12 @@ pub(super) fn number(value: f64) -> String {
     digits(value).replace('-', "−")
 }
 
+/// The number of a tick on an axis of some length: what sums leave of zero is zero.
+pub(super) fn tick(value: f64, length: f64) -> String {
+    let small = value.abs() < 1e-9 * length.abs();
+    number(if small { 0.0 } else { value })
+}
+
 fn digits(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
         let text = format!("{value:.3e}");
@@ -154,6 +160,12 @@ mod tests {
         ] {
             assert_eq!(number(value), text);
         }
+    }
+
+    #[test]
+    fn what_is_left_of_zero_is_zero() {
+        assert_eq!(tick(1.388e-17, 0.1), "0");
+        assert_eq!(tick(1.388e-17, 1e-16), "1.388e−17");
     }
 
     #[test]
