@@ -9,6 +9,7 @@ use plotters::prelude::*;
 use super::page::{self, Area, Fallible, HEAD, WIDTH, px, say, tick};
 use super::theme::{Theme, hex};
 use crate::element::Element;
+use crate::mesh::runs;
 
 /// Around the axes (pixels): numbers and names left and below, a caption above.
 const EDGE: i32 = 4;
@@ -265,14 +266,11 @@ impl Sides {
                 *count = count.saturating_add(1);
             }
         }
-        let surface = all
-            .iter()
-            .copied()
-            .filter(|side| seen[side[2] as usize] == 1);
-        Sides {
-            surface: surface.collect(),
-            all,
-        }
+        let alone = |side: &&[u32; 3]| seen[side[2] as usize] == 1;
+        let surface: Vec<[u32; 3]> = all.iter().filter(alone).copied().collect();
+        // one after the other, so that dashes go on from side to side
+        let surface = runs(&surface).concat();
+        Sides { all, surface }
     }
 }
 

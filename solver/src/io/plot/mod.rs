@@ -160,6 +160,16 @@ mod tests {
     }
 
     #[test]
+    fn units_are_names_and_change_no_number() {
+        let problem = problem();
+        let nameless = Problem {
+            units: None,
+            ..problem.clone()
+        };
+        assert_eq!(solution(&problem), solution(&nameless));
+    }
+
+    #[test]
     fn load_steps_are_marked_by_their_names() {
         let mut problem = problem();
         problem.steps = serde_json::from_value(serde_json::json!([

@@ -55,7 +55,9 @@ pub(super) fn page(
     // the view box stays fine; the size is said in pixels
     let fine = format!(r#"width="{}" height="{}""#, px(size.0), px(size.1));
     let said = format!(r#"width="{}" height="{}""#, size.0, size.1);
-    let svg = svg.replacen(&fine, &said, 1);
+    let mut svg = svg.replacen(&fine, &said, 1);
+    // names are a client's, and XML has no word for these
+    svg.retain(|c| c == '\n' || !(c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}')));
     match svg.rfind("</svg>") {
         Some(end) => Ok(format!("{}{over}{}", &svg[..end], &svg[end..])),
         None => Err("the drawing has no end".to_owned()),
@@ -177,9 +179,13 @@ mod tests {
 
     #[test]
     fn a_user_s_text_is_text_and_is_shortened() {
-        let title = format!("<script>&{}", "x".repeat(200));
+        let title = format!("<script>&\u{1}{}", "x".repeat(200));
         let svg = page(Theme::Dark, &title, 50, |_| Ok("<g/>".to_owned())).unwrap();
-        assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;&amp;"));
+        assert!(
+            !svg.contains("<script>")
+                && !svg.contains('\u{1}')
+                && svg.contains("&lt;script&gt;&amp;")
+        );
         assert!(svg.contains('…') && svg.trim_end().ends_with("<g/></svg>"));
         assert!(svg.starts_with(r#"<svg width="720" height="90" viewBox="0 0 7200 900""#));
     }
