@@ -16,8 +16,8 @@ pub(super) const FINE: i32 = 10;
 const FONT: &str = "sans-serif";
 /// Height of numbers, legends and names (pixels): 5 pt or more in a column of 9 cm.
 pub(super) const LETTERS: i32 = 15;
-/// Characters that fit on a line at the size of the title.
-const TITLE: usize = 64;
+/// Characters of a title that are shown; in smaller letters where it is long.
+const TITLE: usize = 84;
 
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(super) type Fallible<T> = Result<T, Box<dyn std::error::Error>>;
@@ -44,8 +44,11 @@ pub(super) fn page(
         root.fill(&palette.background)?;
         let middle = (px(WIDTH / 2), px(HEAD / 2));
         let at = Pos::new(HPos::Center, VPos::Center);
-        let style = text(theme, 19).pos(at);
-        root.draw(&Text::new(shortened(title, TITLE), middle, style))?;
+        let title = shortened(title, TITLE);
+        // a line holds 62 letters of 19 pixels
+        let letters = (19 * 62 / title.chars().count().max(62)) as i32;
+        let style = text(theme, letters).pos(at);
+        root.draw(&Text::new(title, middle, style))?;
         let (_, below) = root.split_vertically(px(HEAD));
         let over = draw(&below)?;
         root.present()?;
