@@ -1,6 +1,6 @@
 //! Figures as SVG, made to be put into a paper: 720 pixels wide, light or dark.
 //!
-//! Axes, text and curves are drawn by plotters; bodies ([`body`]) are paths of our own, since plotters
+//! Axes, text and curves are drawn by plotters; bodies (`body`) are paths of our own, since plotters
 //! neither clips nor joins shapes.
 
 mod bands;
