@@ -111,6 +111,11 @@ mod tests {
         let mut other = problem.clone();
         other.materials[0].youngs_modulus = Some(1001.0);
         assert_ne!(input_hash(&problem).unwrap(), input_hash(&other).unwrap());
+        let named = Problem {
+            units: Some(solver::problem::Units::default()),
+            ..problem.clone()
+        };
+        assert_ne!(input_hash(&problem).unwrap(), input_hash(&named).unwrap());
     }
 
     #[test]

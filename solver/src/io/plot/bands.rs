@@ -30,25 +30,32 @@ pub(super) struct Bands {
 }
 
 impl Bands {
-    /// For values at nodes. At a sharp edge a few may dwarf all others, and have no mesh limit: then
-    /// the bands end near what 97 % of the nodes stay within, and the bar says what is beyond.
-    pub(super) fn of(values: &[f64]) -> Bands {
-        let mut sorted = values.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let quantile = |q: f64| {
-            let last = sorted.len().saturating_sub(1);
-            sorted.get((q * last as f64).round() as usize).copied()
+    /// For values at nodes. `near`: value and area of those where the reader looks. At a sharp edge a
+    /// few nodes may dwarf all others, and have no mesh limit: then the bands end half their width
+    /// beyond what 97 % of that area stays within, and the bar says what the field reaches.
+    pub(super) fn of(values: &[f64], mut near: Vec<(f64, f64)>) -> Bands {
+        let extreme = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick);
+        let least = extreme(f64::min).unwrap_or(0.0);
+        let most = extreme(f64::max).unwrap_or(0.0);
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let area: f64 = near.iter().map(|node| node.1).sum();
+        let quantile = |part: f64, otherwise: f64| {
+            let mut sum = 0.0;
+            let reaches = |node: &&(f64, f64)| {
+                sum += node.1;
+                sum > part * area
+            };
+            near.iter().find(reaches).map_or(otherwise, |node| node.0)
         };
-        let at = |q: f64| quantile(q).unwrap_or(0.0);
-        let (least, low, high, most) = (at(0.0), at(0.03), at(0.97), at(1.0));
+        let (low, high) = (quantile(0.03, least), quantile(0.97, most));
         let usual = high - low;
-        let lowest = if low - least > 0.5 * usual {
-            low
+        let lowest = if low - least > usual {
+            low - 0.5 * usual
         } else {
             least
         };
-        let highest = if most - high > 0.5 * usual {
-            high
+        let highest = if most - high > usual {
+            high + 0.5 * usual
         } else {
             most
         };
@@ -316,22 +323,22 @@ mod tests {
     #[test]
     fn bands_end_on_round_numbers_and_a_lone_peak_is_said_not_shown() {
         let even: Vec<f64> = (0..=100).map(f64::from).collect();
-        let bands = Bands::of(&even);
+        let bands = Bands::of(&even, vec![]);
         assert_eq!((bands.count(), bands.beyond), (10, [None, None]));
         assert_eq!(bands.edges[10], 100.0);
         let mut peaked: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.1).collect();
         peaked[17] = 5000.0;
-        let bands = Bands::of(&peaked);
+        let bands = Bands::of(&peaked, peaked.iter().map(|v| (*v, 1.0)).collect());
         assert_eq!(bands.beyond, [None, Some(5000.0)]);
-        assert_eq!(*bands.edges.last().unwrap(), 100.0);
-        assert_eq!(Bands::of(&[0.0; 4]).count(), 1);
-        assert_eq!(Bands::of(&[]).count(), 1);
-        assert_eq!(Bands::of(&[-7.3; 4]).count(), 1);
+        assert!(*bands.edges.last().unwrap() < 200.0);
+        assert_eq!(Bands::of(&[0.0; 4], vec![]).count(), 1);
+        assert_eq!(Bands::of(&[], vec![]).count(), 1);
+        assert_eq!(Bands::of(&[-7.3; 4], vec![]).count(), 1);
     }
 
     #[test]
     fn the_parts_of_a_cell_cover_it() {
-        let bands = Bands::of(&[0.0, 10.0]);
+        let bands = Bands::of(&[0.0, 10.0], vec![]);
         let corner = |x: f64, y: f64| Corner {
             place: [x, y],
             value: 3.0 * x + 6.9 * y,

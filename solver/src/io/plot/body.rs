@@ -6,9 +6,10 @@ use std::fmt::Write;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::page::{self, Area, Fallible, HEAD, WIDTH, number, px, say};
+use super::page::{self, Area, Fallible, HEAD, WIDTH, px, say, tick};
 use super::theme::{Theme, hex};
 use crate::element::Element;
+use crate::mesh::runs;
 
 /// Around the axes (pixels): numbers and names left and below, a caption above.
 const EDGE: i32 = 4;
@@ -47,6 +48,10 @@ impl Window {
 
     pub(super) fn largest(&self) -> f64 {
         self.size()[0].max(self.size()[1])
+    }
+
+    pub(super) fn holds(&self, point: [f64; 2]) -> bool {
+        (0..2).all(|a| self.low[a] <= point[a] && point[a] <= self.high[a])
     }
 
     /// With a margin, as a part of the larger side.
@@ -97,8 +102,7 @@ pub(super) fn layout(windows: &[Window]) -> (Vec<Frame>, i32) {
         .map(|window| {
             let [w, h] = window.size();
             let scale = (space / w).min(HIGHEST[(columns - 1) as usize] / h);
-            // numbers need their room also where a body is thin
-            [w, h].map(|side| ((scale * side).max(24.0) * f64::from(page::FINE)).round() as i32)
+            [w, h].map(|side| (scale * side * f64::from(page::FINE)).round() as i32)
         })
         .collect();
     let highest = sizes.iter().map(|s| s[1]).max().unwrap_or(0);
@@ -156,8 +160,8 @@ pub(super) fn axes(
         .y_desc(names[1])
         .x_labels(fits(w, 54))
         .y_labels(fits(h, 40))
-        .x_label_formatter(&|value| number(*value))
-        .y_label_formatter(&|value| number(*value))
+        .x_label_formatter(&|value| tick(*value, high[0] - low[0]))
+        .y_label_formatter(&|value| tick(*value, high[1] - low[1]))
         .label_style(page::text(theme, page::LETTERS))
         .axis_desc_style(page::text(theme, 16))
         .draw()?;
@@ -262,14 +266,11 @@ impl Sides {
                 *count = count.saturating_add(1);
             }
         }
-        let surface = all
-            .iter()
-            .copied()
-            .filter(|side| seen[side[2] as usize] == 1);
-        Sides {
-            surface: surface.collect(),
-            all,
-        }
+        let alone = |side: &&[u32; 3]| seen[side[2] as usize] == 1;
+        let surface: Vec<[u32; 3]> = all.iter().filter(alone).copied().collect();
+        // one after the other, so that dashes go on from side to side
+        let surface = runs(&surface).concat();
+        Sides { all, surface }
     }
 }
 

@@ -12,8 +12,8 @@ pub fn convergence_svg(
     problem: &Problem,
     history: &[Iteration],
 ) -> Result<String, String> {
-    if history.is_empty() {
-        return Err("there were no iterations: without contact there is nothing to iterate".into());
+    if history.is_empty() || problem.contacts.is_empty() {
+        return Err("without contact there are no iterations to draw".to_owned());
     }
     let curve = |label: &str, look: Look, value: &dyn Fn(&Iteration) -> Option<f64>| Curve {
         label: label.to_owned(),
@@ -30,7 +30,7 @@ pub fn convergence_svg(
         marks,
         curves,
     };
-    // what cannot be seen as a line of its own is no curve: frictionless contact has no friction points
+    // frictionless contact has no friction points, and often no node leaves
     let nonzero = |curve: &Curve| curve.points.iter().any(|p| p.1 != 0.0);
     let residuals = vec![
         curve("residual", Look::Marked(0), &|row| Some(row.residual)),

@@ -113,7 +113,14 @@ pub fn deformed_svg(
     let windows: Vec<Window> = views.iter().map(|view| view.0).collect();
     let (frames, height) = body::layout(&windows);
     let values: Vec<f64> = (0..nodes).map(|n| stress.at(fields, n)).collect();
-    let bands = Bands::of(&values);
+    // the last panel is the one at the contact
+    let areas = body.areas();
+    let near = views.last().map_or(vec![], |(window, factor)| {
+        let inside = |&n: &u32| window.holds(body.place(n, *factor));
+        let node = |n: u32| (values[n as usize], areas[n as usize]);
+        all().filter(inside).map(node).collect()
+    });
+    let bands = Bands::of(&values, near);
     let sides = Sides::of(&fields.elements, nodes);
     let mut over = String::new();
     for (frame, (_, factor)) in frames.iter().zip(&views) {
@@ -180,6 +187,24 @@ impl Body<'_> {
 
     fn moved(&self, node: u32) -> f64 {
         self.fields.ux[node as usize].hypot(self.fields.uy[node as usize])
+    }
+
+    /// The part of the body's area that belongs to each node: of its elements, equal parts.
+    fn areas(&self) -> Vec<f64> {
+        let mut areas = vec![0.0; self.fields.x.len()];
+        for element in &self.fields.elements {
+            let corners = &element[..element.family().corners()];
+            let cross = |k: usize| {
+                let (a, b) = (corners[k], corners[(k + 1) % corners.len()]);
+                let ([ax, ay], [bx, by]) = (self.place(a, 0.0), self.place(b, 0.0));
+                0.5 * (ax * by - bx * ay)
+            };
+            let area: f64 = (0..corners.len()).map(cross).sum();
+            for &node in element.iter() {
+                areas[node as usize] += area / element.len() as f64;
+            }
+        }
+        areas
     }
 
     /// The nodes in contact and beside it; profiles know them by their places.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::page::{self, Area, Fallible, LETTERS, WIDTH, number, px, say};
+use super::page::{self, Area, Fallible, LETTERS, WIDTH, number, px, say, tick};
 use super::theme::{Palette, Theme};
 
 /// Of a panel without its legend (pixels).
@@ -105,12 +105,20 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
     let curves: Vec<Vec<(f64, f64)>> = panel.curves.iter().map(shown).collect();
     let all = curves.iter().flatten();
     let whole = panel.scale != Scale::Stress;
-    let mut across = extent(all.clone().map(|p| p.0), 0.0);
-    if whole {
-        across = across.start - 0.5..across.end + 0.5;
-    }
+    let places = all.clone().map(|p| p.0);
+    let across = match whole {
+        // the first and the last whole number stand clear of the ends
+        true => extent(places.flat_map(|x| [x - 0.5, x + 0.5]), 0.0),
+        false => extent(places, 0.0),
+    };
     let up = match panel.scale {
-        Scale::Log => decades(all.map(|p| p.1)),
+        Scale::Log => {
+            let range = decades(all.map(|p| p.1));
+            // words at the marks stand above the curves
+            let room = if panel.marks.is_empty() { 0.0 } else { 0.1 };
+            range.start..range.end + room * (range.end - range.start)
+        }
+        Scale::Count => extent(all.map(|p| p.1).chain(std::iter::once(1.0)), 0.06),
         _ => extent(all.map(|p| p.1), 0.06),
     };
     let (head, body) = area.split_vertically(px(LEGEND * rows(panel)));
@@ -129,12 +137,12 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
     };
     let x_label = |value: &f64| match whole {
         true => whole_number(*value),
-        false => number(*value),
+        false => tick(*value, across.end - across.start),
     };
     let y_label = |value: &f64| match panel.scale {
         Scale::Log => power_of_ten(*value),
         Scale::Count => whole_number(*value),
-        Scale::Stress => number(*value),
+        Scale::Stress => tick(*value, up.end - up.start),
     };
     chart
         .configure_mesh()

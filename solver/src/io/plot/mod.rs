@@ -1,6 +1,6 @@
 //! Figures as SVG, made to be put into a paper: 720 pixels wide, light or dark.
 //!
-//! Axes, text and curves are drawn by plotters; bodies ([`body`]) are paths of our own, since plotters
+//! Axes, text and curves are drawn by plotters; bodies (`body`) are paths of our own, since plotters
 //! neither clips nor joins shapes.
 
 mod bands;
@@ -161,6 +161,16 @@ mod tests {
             assert_eq!(light, drawn(Theme::Light), "the same figure, the same text");
         }
         assert!("elements".parse::<Plot>().is_err() && "grey".parse::<Theme>().is_err());
+    }
+
+    #[test]
+    fn units_are_names_and_change_no_number() {
+        let problem = problem();
+        let nameless = Problem {
+            units: None,
+            ..problem.clone()
+        };
+        assert_eq!(solution(&problem), solution(&nameless));
     }
 
     #[test]

@@ -16,8 +16,8 @@ pub(super) const FINE: i32 = 10;
 const FONT: &str = "sans-serif";
 /// Height of numbers, legends and names (pixels): 5 pt or more in a column of 9 cm.
 pub(super) const LETTERS: i32 = 15;
-/// Characters that fit on a line at the size of the title.
-const TITLE: usize = 64;
+/// Characters of a title that are shown; in smaller letters where it is long.
+const TITLE: usize = 84;
 
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(super) type Fallible<T> = Result<T, Box<dyn std::error::Error>>;
@@ -44,8 +44,11 @@ pub(super) fn page(
         root.fill(&palette.background)?;
         let middle = (px(WIDTH / 2), px(HEAD / 2));
         let at = Pos::new(HPos::Center, VPos::Center);
-        let style = text(theme, 19).pos(at);
-        root.draw(&Text::new(shortened(title, TITLE), middle, style))?;
+        let title = shortened(title, TITLE);
+        // a line holds 62 letters of 19 pixels
+        let letters = (19 * 62 / title.chars().count().max(62)) as i32;
+        let style = text(theme, letters).pos(at);
+        root.draw(&Text::new(title, middle, style))?;
         let (_, below) = root.split_vertically(px(HEAD));
         let over = draw(&below)?;
         root.present()?;
@@ -55,7 +58,9 @@ pub(super) fn page(
     // the view box stays fine; the size is said in pixels
     let fine = format!(r#"width="{}" height="{}""#, px(size.0), px(size.1));
     let said = format!(r#"width="{}" height="{}""#, size.0, size.1);
-    let svg = svg.replacen(&fine, &said, 1);
+    let mut svg = svg.replacen(&fine, &said, 1);
+    // names are a client's, and XML has no word for these
+    svg.retain(|c| c == '\n' || !(c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}')));
     match svg.rfind("</svg>") {
         Some(end) => Ok(format!("{}{over}{}", &svg[..end], &svg[end..])),
         None => Err("the drawing has no end".to_owned()),
@@ -114,6 +119,12 @@ pub(super) fn number(value: f64) -> String {
     digits(value).replace('-', "−")
 }
 
+/// The number of a tick on an axis of some length: what sums leave of zero is zero.
+pub(super) fn tick(value: f64, length: f64) -> String {
+    let small = value.abs() < 1e-9 * length.abs();
+    number(if small { 0.0 } else { value })
+}
+
 fn digits(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
         let text = format!("{value:.3e}");
@@ -157,6 +168,12 @@ mod tests {
     }
 
     #[test]
+    fn what_is_left_of_zero_is_zero() {
+        assert_eq!(tick(1.388e-17, 0.1), "0");
+        assert_eq!(tick(1.388e-17, 1e-16), "1.388e−17");
+    }
+
+    #[test]
     fn round_numbers_are_one_two_and_five() {
         for (value, round) in [(0.9, 1.0), (1.1, 2.0), (3.0, 5.0), (5.0, 5.0), (7e-4, 1e-3)] {
             assert!((round_up(value, &[1.0, 2.0, 5.0]) - round).abs() < 1e-12 * round);
@@ -165,9 +182,13 @@ mod tests {
 
     #[test]
     fn a_user_s_text_is_text_and_is_shortened() {
-        let title = format!("<script>&{}", "x".repeat(200));
+        let title = format!("<script>&\u{1}{}", "x".repeat(200));
         let svg = page(Theme::Dark, &title, 50, |_| Ok("<g/>".to_owned())).unwrap();
-        assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;&amp;"));
+        assert!(
+            !svg.contains("<script>")
+                && !svg.contains('\u{1}')
+                && svg.contains("&lt;script&gt;&amp;")
+        );
         assert!(svg.contains('…') && svg.trim_end().ends_with("<g/></svg>"));
         assert!(svg.starts_with(r#"<svg width="720" height="90" viewBox="0 0 7200 900""#));
     }
