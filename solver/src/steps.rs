@@ -45,7 +45,7 @@ pub fn run(
         summary.increments = march.increments;
         summary.cut_backs = march.cut_backs;
         summary.iterations = rows.len() as u32;
-        let (outcome, converged) = (summary.outcome, summary.converged);
+        let outcome = summary.outcome;
         ends.push(StepSolution {
             name: step
                 .name
@@ -57,7 +57,7 @@ pub fn run(
         });
         history.extend(rows);
         last = Some(reported);
-        if !converged && !goes_on(outcome) {
+        if !goes_on(outcome) {
             break;
         }
     }

@@ -64,7 +64,7 @@ fn one_face_in_four_ways_is_one_obstacle() {
         let other = top(other, "obstacle");
         for i in 0..9 {
             near(other.profile[i], line.profile[i]);
-            near(other.indentation[i], line.indentation[i]);
+            (0..2).for_each(|a| near(other.push[i][a], line.push[i][a]));
             (0..2).for_each(|a| near(other.boundary.normals[i][a], line.boundary.normals[i][a]));
         }
     }

@@ -46,7 +46,7 @@ pub(super) fn sweep(
         contraction: contraction(&measured),
         inner: steps,
         tractions: track.system.tractions(&measured.state.v, &measured.bound),
-        r_f: None,
+        own_r_f: None,
     };
     let answer = track.tell(&measured, row, observe);
     (measured, answer)

@@ -60,7 +60,7 @@ pub(super) fn run(
             contraction: None,
             inner: 1,
             tractions: system.tractions(&measured.state.v, &measured.bound),
-            r_f: None,
+            own_r_f: None,
         };
         let answer = track.tell(&measured, row, observe);
         let converged = !changed && measured.within(tolerance);

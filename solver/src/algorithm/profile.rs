@@ -503,7 +503,7 @@ impl<'a> PatchView<'a> {
                 let moved = self
                     .system
                     .normal_displacement(self.v, self.patch.first + i);
-                (contact.profile[i] - moved) / contact.cosines[i]
+                (contact.profile[i] - moved) / contact.push[i][0]
             };
             let needed = (0..self.count()).map(engages).fold(f64::INFINITY, f64::min);
             warn(

@@ -153,10 +153,12 @@ impl<'a> System<'a> {
         let most =
             |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |a, b| a.max(b.abs()));
         let stiffest = most(&mut (0..system.load.len()).map(|i| body.stiffness.at(i, i)));
-        let pushed = most(&mut model.contacts.iter().flat_map(|contact| {
-            let indented = contact.indentation.iter().copied();
-            indented.chain([contact.tangential_displacement])
-        }));
+        let pushed = most(
+            &mut model
+                .contacts
+                .iter()
+                .flat_map(|contact| [contact.indentation, contact.tangential_displacement]),
+        );
         system.reference_force = (stiffest * pushed).max(most(&mut system.load.iter().copied()));
         system
     }

@@ -79,7 +79,7 @@ pub(super) struct Row {
     /// σ_t at every friction point.
     pub(super) tractions: Vec<f64>,
     /// R_F where the stage tests one of its own; else it is that of the nodal pressures.
-    pub(super) r_f: Option<Option<f64>>,
+    pub(super) own_r_f: Option<f64>,
 }
 
 /// States that repeat.
@@ -141,9 +141,9 @@ impl<'s, 'a> Track<'s, 'a> {
             entered: changes(false),
             left: changes(true),
         };
-        let before = self.before.as_ref();
-        let r_f = row.r_f.unwrap_or_else(|| {
-            before.map(|(_, pressures)| relative_change(&measured.pressures, pressures))
+        let r_f = row.own_r_f.or_else(|| {
+            let (_, pressures) = self.before.as_ref()?;
+            Some(relative_change(&measured.pressures, pressures))
         });
         let (slip, stick) = slipping(system, &measured.state, &measured.implied_bound);
         let points = system.points.iter().zip(&row.tractions);

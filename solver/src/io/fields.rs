@@ -3,7 +3,7 @@
 
 use super::npz::Npz;
 use super::stress::{Stress, principal, von_mises};
-use crate::element::{Element, Family};
+use crate::element::Element;
 use crate::solution::Fields;
 
 /// One quantity at all nodes.
@@ -102,7 +102,7 @@ pub fn add(npz: &mut Npz, prefix: &str, fields: &Fields) -> Result<(), String> {
                 triangle_numbers.push(number);
             }
         }
-        let points = points_of(element.family(), fields.gauss.order);
+        let points = element.family().rule(fields.gauss.order).len();
         element_of_point.extend(std::iter::repeat_n(number, points));
     }
     npz.array(&name("quads"), &quads, 8)?;
@@ -127,15 +127,6 @@ pub fn npz(fields: &Fields) -> Result<Vec<u8>, String> {
     let mut npz = Npz::new();
     add(&mut npz, "", fields)?;
     npz.finish()
-}
-
-/// Integration points of an element, see [`crate::solution::GaussFields`].
-fn points_of(family: Family, order: u32) -> usize {
-    match (family, order) {
-        (Family::Quad, order) => (order * order) as usize,
-        (Family::Triangle, 2) => 3,
-        (Family::Triangle, _) => 7,
-    }
 }
 
 /// That arrays which belong together have equal length, and elements only nodes that exist: a file
@@ -168,7 +159,7 @@ pub(super) fn check(fields: &Fields) -> Result<(), String> {
     }
     let g = &f.gauss;
     let elements = f.elements.iter();
-    let points = elements.map(|e| points_of(e.family(), g.order)).sum();
+    let points = elements.map(|e| e.family().rule(g.order).len()).sum();
     for column in [
         &g.x,
         &g.y,

@@ -1,6 +1,9 @@
 //! Splitting every element in four, every side in two.
 
-use crate::element::{Element, edge3};
+use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
+
+use crate::element::{Element, edge3, quad8, tri6};
 use crate::mesh::{Edge, Mesh};
 
 /// New nodes lie half-way between the old ones, in master coordinates.
@@ -12,81 +15,20 @@ const QUARTER: f64 = 0.25;
 /// Every element becomes four, every edge two; new nodes lie on the parent's own map, so that
 /// curved sides stay the curves they are.
 pub fn refine(mesh: &Mesh) -> Mesh {
-    let mut nodes = mesh.nodes.clone();
-    // An edge is known by its midside node: halves[mid] = (start corner, first half's midside, second's).
-    let mut halves: Vec<Option<(u32, u32, u32)>> = vec![None; mesh.nodes.len()];
-    let mut sets = Sets::new(mesh);
-    let mut split = |nodes: &mut Vec<[f64; 2]>, [a, b, mid]: Edge| -> (u32, u32) {
-        let (start, first, second) = *halves[mid as usize].get_or_insert_with(|| {
-            let ends = [a, b, mid].map(|n| nodes[n as usize]);
-            let number = nodes.len() as u32;
-            nodes.push(edge3::map(&ends, -STEP).0);
-            nodes.push(edge3::map(&ends, STEP).0);
-            sets.inherit(&[a, b, mid], number..number + 2);
-            (a, number, number + 1)
-        });
-        if start == a {
-            (first, second)
-        } else {
-            (second, first)
-        }
+    let mut finer = Finer {
+        nodes: mesh.nodes.clone(),
+        halves: vec![None; mesh.nodes.len()],
+        sets: Sets::new(mesh),
     };
-    let mut elements = Vec::with_capacity(4 * mesh.elements.len());
-    let mut inner = Vec::with_capacity(mesh.elements.len());
-    for parent in &mesh.elements {
-        let (family, positions) = (parent.family(), parent.gather(|n| nodes[n as usize]));
-        let inside = |nodes: &mut Vec<[f64; 2]>, place: [f64; 2]| {
-            let h = family.shape(place);
-            let at = |a: usize| (0..family.nodes()).map(|i| h[i] * positions[i][a]).sum();
-            nodes.push([at(0), at(1)]);
-            nodes.len() as u32 - 1
-        };
-        let halves: Vec<(u32, u32)> = parent.sides().map(|side| split(&mut nodes, side)).collect();
-        let first_inside = nodes.len() as u32;
-        match (parent, &halves[..]) {
-            (Element::Quad(p), &[south, east, north, west]) => {
-                let centre = inside(&mut nodes, [0.0, 0.0]);
-                let [to_south, to_east, to_north, to_west] =
-                    [[0.0, -STEP], [STEP, 0.0], [0.0, STEP], [-STEP, 0.0]]
-                        .map(|place| inside(&mut nodes, place));
-                #[rustfmt::skip]
-                elements.extend([
-                    [p[0], p[4], centre, p[7], south.0, to_south, to_west, west.1],
-                    [p[4], p[1], p[5], centre, south.1, east.0, to_east, to_south],
-                    [centre, p[5], p[2], p[6], to_east, east.1, north.0, to_north],
-                    [p[7], centre, p[6], p[3], to_west, to_north, north.1, west.0],
-                ].map(Element::Quad));
-            }
-            (Element::Triangle(p), &[first, second, third]) => {
-                // the sides of the triangle in the middle, each across one corner
-                let [across_0, across_1, across_2] =
-                    [[QUARTER, QUARTER], [STEP, QUARTER], [QUARTER, STEP]]
-                        .map(|place| inside(&mut nodes, place));
-                #[rustfmt::skip]
-                elements.extend([
-                    [p[0], p[3], p[5], first.0, across_0, third.1],
-                    [p[3], p[1], p[4], first.1, second.0, across_1],
-                    [p[5], p[4], p[2], across_2, second.1, third.0],
-                    [p[3], p[4], p[5], across_1, across_2, across_0],
-                ].map(Element::Triangle));
-            }
-            _ => unreachable!("a quadrilateral has four sides, a triangle three"),
-        }
-        inner.push(first_inside..nodes.len() as u32);
-    }
-    let boundaries = mesh
-        .boundaries
-        .iter()
-        .map(|(name, edges)| {
-            let children = edges.iter().flat_map(|&[a, b, mid]| {
-                let (first, second) = split(&mut nodes, [a, b, mid]);
-                [[a, mid, first], [mid, b, second]]
-            });
-            (name.clone(), children.collect())
-        })
-        .collect();
-    for (parent, inside) in mesh.elements.iter().zip(inner) {
-        sets.inherit(parent, inside);
+    let elements = mesh.elements.iter();
+    let elements = elements.flat_map(|parent| finer.children(parent)).collect();
+    let mut boundaries = BTreeMap::new();
+    for (name, edges) in &mesh.boundaries {
+        let children = edges.iter().flat_map(|&[a, b, mid]| {
+            let (first, second) = finer.split([a, b, mid]);
+            [[a, mid, first], [mid, b, second]]
+        });
+        boundaries.insert(name.clone(), children.collect());
     }
     // the children of an element follow one another
     let four = |e: &u32| (0..4).map(|child| 4 * e + child).collect::<Vec<u32>>();
@@ -95,22 +37,100 @@ pub fn refine(mesh: &Mesh) -> Mesh {
         .map(|(name, group)| (name.clone(), group.iter().flat_map(four).collect()))
         .collect();
     Mesh {
-        nodes,
+        nodes: finer.nodes,
         elements,
         boundaries,
         groups,
-        node_sets: sets.into_named(mesh),
+        node_sets: finer.sets.into_named(mesh),
+    }
+}
+
+/// The finer mesh as it grows.
+struct Finer {
+    nodes: Vec<[f64; 2]>,
+    /// A side is known by its midside node: start corner, midside of the first half, of the second.
+    halves: Vec<Option<(u32, u32, u32)>>,
+    sets: Sets,
+}
+
+impl Finer {
+    /// The midsides of a side's two halves, from its start on.
+    fn split(&mut self, [a, b, mid]: Edge) -> (u32, u32) {
+        let (start, first, second) = match self.halves[mid as usize] {
+            Some(known) => known,
+            None => {
+                let ends = [a, b, mid].map(|n| self.nodes[n as usize]);
+                let number = self.nodes.len() as u32;
+                self.nodes.push(edge3::map(&ends, -STEP).0);
+                self.nodes.push(edge3::map(&ends, STEP).0);
+                self.sets.inherit(&[a, b, mid], number..number + 2);
+                *self.halves[mid as usize].insert((a, number, number + 1))
+            }
+        };
+        if start == a {
+            (first, second)
+        } else {
+            (second, first)
+        }
+    }
+
+    /// New nodes inside of an element, at places in master coordinates.
+    fn inside<const N: usize>(&mut self, parent: &Element, places: [[f64; 2]; N]) -> [u32; N] {
+        let (family, positions) = (parent.family(), parent.gather(|n| self.nodes[n as usize]));
+        let first = self.nodes.len() as u32;
+        for place in places {
+            let h = family.shape(place);
+            let at = |a: usize| (0..family.nodes()).map(|i| h[i] * positions[i][a]).sum();
+            self.nodes.push([at(0), at(1)]);
+        }
+        self.sets.inherit(parent, first..first + N as u32);
+        std::array::from_fn(|i| first + i as u32)
+    }
+
+    #[rustfmt::skip]
+    fn children(&mut self, parent: &Element) -> [Element; 4] {
+        match parent {
+            Element::Quad(p) => {
+                let [south, east, north, west] =
+                    quad8::SIDES.map(|side| self.split(side.map(|i| p[i])));
+                let [centre, to_south, to_east, to_north, to_west] = self.inside(
+                    parent,
+                    [[0.0, 0.0], [0.0, -STEP], [STEP, 0.0], [0.0, STEP], [-STEP, 0.0]],
+                );
+                [
+                    [p[0], p[4], centre, p[7], south.0, to_south, to_west, west.1],
+                    [p[4], p[1], p[5], centre, south.1, east.0, to_east, to_south],
+                    [centre, p[5], p[2], p[6], to_east, east.1, north.0, to_north],
+                    [p[7], centre, p[6], p[3], to_west, to_north, north.1, west.0],
+                ].map(Element::Quad)
+            }
+            Element::Triangle(p) => {
+                let [first, second, third] =
+                    tri6::SIDES.map(|side| self.split(side.map(|i| p[i])));
+                // the sides of the triangle in the middle, each across one corner
+                let [across_0, across_1, across_2] = self.inside(
+                    parent,
+                    [[QUARTER, QUARTER], [STEP, QUARTER], [QUARTER, STEP]],
+                );
+                [
+                    [p[0], p[3], p[5], first.0, across_0, third.1],
+                    [p[3], p[1], p[4], first.1, second.0, across_1],
+                    [p[5], p[4], p[2], across_2, second.1, third.0],
+                    [p[3], p[4], p[5], across_1, across_2, across_0],
+                ].map(Element::Triangle)
+            }
+        }
     }
 }
 
 /// Which sets each node is in: a new node is in those that hold all nodes of its side or element.
 struct Sets {
-    of_node: std::collections::HashMap<u32, Vec<usize>>,
+    of_node: HashMap<u32, Vec<usize>>,
 }
 
 impl Sets {
     fn new(mesh: &Mesh) -> Self {
-        let mut of_node: std::collections::HashMap<u32, Vec<usize>> = Default::default();
+        let mut of_node: HashMap<u32, Vec<usize>> = Default::default();
         for (k, set) in mesh.node_sets.values().enumerate() {
             for node in set {
                 of_node.entry(*node).or_default().push(k);
@@ -119,7 +139,7 @@ impl Sets {
         Sets { of_node }
     }
 
-    fn inherit(&mut self, parents: &[u32], children: std::ops::Range<u32>) {
+    fn inherit(&mut self, parents: &[u32], children: Range<u32>) {
         let Some(sets) = self.of_node.get(&parents[0]) else {
             return;
         };
@@ -131,7 +151,7 @@ impl Sets {
         }
     }
 
-    fn into_named(self, mesh: &Mesh) -> std::collections::BTreeMap<String, Vec<u32>> {
+    fn into_named(self, mesh: &Mesh) -> BTreeMap<String, Vec<u32>> {
         let mut sets = vec![Vec::new(); mesh.node_sets.len()];
         for (node, of) in self.of_node {
             of.into_iter().for_each(|k| sets[k].push(node));

@@ -80,26 +80,20 @@ impl Findings {
                     "End one of them an edge earlier with `from` or `to`.",
                 );
             }
-            let cosines = turn_normals(&mut boundary, &run, contact.normal);
-            let along = |length: &dyn Fn(usize) -> f64| -> Vec<f64> {
-                let along = |(i, cosine): (usize, &f64)| cosine * length(i);
-                cosines.iter().enumerate().map(along).collect()
-            };
+            let push = turn_normals(&mut boundary, &run, contact.normal);
             let model = ContactModel {
                 name: contact.boundary.clone(),
                 pointer,
                 boundary,
-                profile: along(&|i| run.profile[i].distance),
-                indentation: along(&|_| contact.indentation),
-                cosines: cosines.clone(),
+                profile: run
+                    .profile
+                    .iter()
+                    .zip(&push)
+                    .map(|(p, push)| p.distance * push[0])
+                    .collect(),
+                indentation: contact.indentation,
+                push,
                 tangential_displacement: contact.tangential_displacement,
-                // the obstacle moves by −δ n, and n·t is the sine of the slope
-                indentation_drag: match contact.normal {
-                    NormalOf::Body => vec![0.0; cosines.len()],
-                    NormalOf::Obstacle => {
-                        along(&|i| -contact.indentation * run.profile[i].slope + 0.0)
-                    }
-                },
                 normal: contact.normal,
                 condition: contact.condition,
                 power: power(&contact.obstacle),
@@ -375,23 +369,27 @@ impl Findings {
     }
 }
 
-/// Turns the normals to those of the obstacle where they are asked for; the cosine of each turn. At
-/// the angle whose tangent is the slope p′ of the profile, m = (n − p′ t)/√(1 + p′²).
-fn turn_normals(boundary: &mut ContactBoundary, run: &FacingRun, normal: NormalOf) -> Vec<f64> {
-    let count = boundary.nodes.len();
+/// Turns the normals to those of the obstacle where they are asked for; says what of a push against the
+/// body then acts along normal and tangent. At the angle whose tangent is the slope p′ of the profile,
+/// m = (n − p′ t)/√(1 + p′²); the push is along −n.
+fn turn_normals(
+    boundary: &mut ContactBoundary,
+    run: &FacingRun,
+    normal: NormalOf,
+) -> Vec<[f64; 2]> {
+    let mut push = vec![[1.0, 0.0]; boundary.nodes.len()];
     if normal == NormalOf::Body {
-        return vec![1.0; count];
+        return push;
     }
-    let mut cosines = Vec::with_capacity(count);
-    for i in 0..count {
+    for (i, push) in push.iter_mut().enumerate() {
         let slope = run.profile[i].slope;
         let cosine = 1.0 / slope.hypot(1.0);
         let (n, t) = (boundary.normals[i], boundary.tangent(i));
         // + 0.0 turns −0 into 0, so that an axis-parallel normal is exactly that
         boundary.normals[i] = [0, 1].map(|a| cosine * (n[a] - slope * t[a]) + 0.0);
-        cosines.push(cosine);
+        *push = [cosine, -cosine * slope + 0.0];
     }
-    cosines
+    push
 }
 
 /// The power of a profile.

@@ -103,16 +103,13 @@ pub struct ContactModel {
     pub boundary: ContactBoundary,
     /// Profile of the obstacle at each node, along the contact's normal (length).
     pub profile: Vec<f64>,
-    /// The obstacle's indentation at each node, along the contact's normal (length).
-    pub indentation: Vec<f64>,
-    /// Part of an indentation that acts along the contact's normal, at each node: 1 with the body's
-    /// normal, the cosine of the slope with the obstacle's.
-    pub cosines: Vec<f64>,
+    /// How far the obstacle is pushed against the body (length).
+    pub indentation: f64,
+    /// The parts of that push along the contact's normal and along its t, at each node: 1 and 0 with
+    /// the body's normal; with the obstacle's the cosine and minus the sine of the slope.
+    pub push: Vec<[f64; 2]>,
     /// The obstacle's own displacement along the contact's t (length).
     pub tangential_displacement: f64,
-    /// What its indentation moves it along the contact's t at each node (length): nothing with the
-    /// body's normal, but along a face that slopes.
-    pub indentation_drag: Vec<f64>,
     /// Whose normal it is.
     pub normal: NormalOf,
     /// What the obstacle does.
@@ -126,13 +123,13 @@ pub struct ContactModel {
 impl ContactModel {
     /// Gap at a node (length) when the obstacle is pushed by `factor` times its indentation.
     pub fn gap(&self, node: usize, factor: f64) -> f64 {
-        self.profile[node] - factor * self.indentation[node]
+        self.profile[node] - factor * self.indentation * self.push[node][0]
     }
 
     /// d: the obstacle's displacement along the contact's t at a node (length).
     pub fn drag(&self, node: usize, level: &Level) -> f64 {
         level.tangential_displacement * self.tangential_displacement
-            + level.indentation * self.indentation_drag[node]
+            + level.indentation * self.indentation * self.push[node][1]
     }
 }
 

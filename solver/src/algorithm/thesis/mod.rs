@@ -74,7 +74,7 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
             contraction: None,
             inner: 1,
             tractions: friction.traction.clone(),
-            r_f: Some(r_f),
+            own_r_f: r_f,
         };
         let answer = track.tell(&measured, row, observe);
         // a slow approach passes the same states again and again; only a full step cycles
