@@ -28,7 +28,7 @@ pub struct App {
 impl App {
     /// Starts everything. When this returns, the address answers.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
-        let store = Arc::new(Store::open(&config.data).await?);
+        let store = Store::open(&config.data).await?;
         // Before the listener opens: nobody sees a job running that nobody runs.
         let interrupted = store.requeue_interrupted().await?;
         if interrupted > 0 {
@@ -44,10 +44,10 @@ impl App {
                 "{orphans} pieces of meshes were left by uploads that broke off"
             );
         }
-        let queue = Queue::new(store.clone(), solver::solve_on);
+        let queue = Queue::new(store.clone(), solver::solve_on, config.workers);
         let service = Arc::new(Service::new(config, store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;
-        let router = rest::router(service, config.max_body_bytes, grpc);
+        let router = rest::router(service, grpc);
 
         let listener = TcpListener::bind(config.listen)
             .await
@@ -66,7 +66,7 @@ impl App {
                 .with_graceful_shutdown(closed)
                 .into_future(),
         );
-        queue.start(config.workers);
+        queue.start();
         info!(%address, workers = config.workers, "listening on {address}");
         Ok(App {
             address,

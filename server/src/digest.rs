@@ -15,8 +15,13 @@ pub fn input_hash(problem: &Problem) -> serde_json::Result<String> {
         title: None,
         ..problem.clone()
     };
+    of_json(&untitled)
+}
+
+/// Fingerprint of anything that has a canonical form.
+pub fn of_json(value: &impl Serialize) -> serde_json::Result<String> {
     let mut hash = Hash::default();
-    hash.json(&untitled)?;
+    hash.json(value)?;
     Ok(hash.text())
 }
 

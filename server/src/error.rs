@@ -1,14 +1,18 @@
-//! Everything that a request can be told went wrong. This one enum is the source of the HTTP
-//! status and document and of the gRPC code and details.
+//! Everything that a request can be told went wrong, with what is known of this time; `catalog` says of each
+//! kind what clients may rely on. Here it becomes the HTTP document, and the gRPC status with its details.
 
 use axum::http::StatusCode;
 use serde_json::{Value, json};
 use solver::{Estimate, error::Violation};
-use tonic::{Code, Status};
+use tonic::Status;
 use tonic_types::{ErrorDetails, StatusExt};
 use uuid::Uuid;
 
-use crate::violations::shortened;
+use crate::{
+    catalog::{Code, Kind},
+    job::JobId,
+    violations::shortened,
+};
 
 /// Why a request was not answered as asked.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -37,9 +41,15 @@ pub enum ApiError {
     /// A page token that this service did not make for this list.
     #[error("the page token does not belong to this list; start again without one")]
     BadPageToken,
+    /// Something for many jobs, without saying for which.
+    #[error("say for which jobs: at least one of {0}")]
+    MissingFilter(&'static str),
     /// No such thing.
     #[error("{0}")]
     NotFound(String),
+    /// The job was there.
+    #[error("{0} was deleted")]
+    Deleted(JobId),
     /// The job ended without a result.
     #[error("the job ended without a result (status {0})")]
     NoResult(&'static str),
@@ -52,6 +62,21 @@ pub enum ApiError {
     /// A body in a format that is not understood.
     #[error("expected a body of type application/json, got {0}")]
     UnsupportedMedia(String),
+    /// The job has not ended.
+    #[error("the job is {0}; cancel it, or wait for its end")]
+    JobActive(&'static str),
+    /// The name belongs to a job with other content.
+    #[error("{0} was handed in with other content")]
+    IdConflict(JobId),
+    /// The key belongs to a request with other content.
+    #[error("this key was used for another request")]
+    KeyReuse,
+    /// The job was changed since.
+    #[error("the job is of version {0}")]
+    StaleVersion(i64),
+    /// A range that begins behind the end.
+    #[error("there are {0} bytes")]
+    RangeNotSatisfiable(u64),
     /// Jobs that wait or run need the mesh.
     #[error("jobs that wait or run need this mesh; cancel them or let them end first")]
     MeshInUse,
@@ -98,16 +123,6 @@ pub enum ApiError {
     StorageFull,
 }
 
-/// What clients may rely on about an error.
-struct Row {
-    code: &'static str,
-    title: &'static str,
-    http: u16,
-    grpc: Code,
-    /// Seconds after which the same request may succeed.
-    retry_after_s: Option<u64>,
-}
-
 impl ApiError {
     /// Logs an unexpected cause once, here, and keeps it from strangers.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
@@ -116,63 +131,66 @@ impl ApiError {
         ApiError::Internal { incident }
     }
 
-    #[rustfmt::skip]
-    fn row(&self) -> Row {
-        let (code, title, http, grpc, retry_after_s) = match self {
-            ApiError::MalformedJson(_)        => ("malformed-json",     "The body is not JSON",              400, Code::InvalidArgument,    None),
-            ApiError::UnknownParameter { .. } => ("unknown-parameter",  "Unknown parameter",                 400, Code::InvalidArgument,    None),
-            ApiError::BadParameter { .. }     => ("bad-parameter",      "A parameter has a wrong value",     400, Code::InvalidArgument,    None),
-            ApiError::BadPageToken            => ("bad-page-token",     "The page token is not ours",        400, Code::InvalidArgument,    None),
-            ApiError::NotFound(_)             => ("not-found",          "Not found",                         404, Code::NotFound,           None),
-            ApiError::NoResult(_)             => ("no-result",          "The job has no result",             404, Code::NotFound,           None),
-            ApiError::MethodNotAllowed        => ("method-not-allowed", "Method not allowed",                405, Code::Unimplemented,      None),
-            ApiError::NotAcceptable(_)        => ("not-acceptable",     "No such format",                    406, Code::Unimplemented,      None),
-            ApiError::MeshInUse               => ("job-active",         "Jobs need it",                      409, Code::FailedPrecondition, None),
-            ApiError::ResultNotReady(_)       => ("result-not-ready",   "The result is not ready",           409, Code::FailedPrecondition, Some(1)),
-            ApiError::PayloadTooLarge { .. }  => ("payload-too-large",  "The body is too large",             413, Code::OutOfRange,         None),
-            ApiError::ProblemTooLarge { .. }  => ("problem-too-large",  "The problem is too large",          413, Code::OutOfRange,         None),
-            ApiError::UnsupportedMedia(_)     => ("unsupported-media",  "Unsupported type of body",          415, Code::Unimplemented,      None),
-            ApiError::InvalidProblem(_)       => ("invalid-problem",    "The problem is invalid",            422, Code::InvalidArgument,    None),
-            ApiError::Internal { .. }         => ("internal",           "Internal error",                    500, Code::Internal,           Some(1)),
-            ApiError::QueueFull { .. }        => ("queue-full",         "The queue is full",                 503, Code::Unavailable,        Some(10)),
-            ApiError::Draining                => ("draining",           "The service is stopping",           503, Code::Unavailable,        Some(5)),
-            ApiError::StorageFull             => ("storage-full",       "The disk is full",                  507, Code::ResourceExhausted,  Some(60)),
-        };
-        Row { code, title, http, grpc, retry_after_s }
-    }
-
-    /// Stable name of the kind of error.
-    pub fn code(&self) -> &'static str {
-        self.row().code
+    /// Its kind.
+    pub fn code(&self) -> Code {
+        match self {
+            ApiError::MalformedJson(_) => Code::MalformedJson,
+            ApiError::UnknownParameter { .. } => Code::UnknownParameter,
+            ApiError::BadParameter { .. } => Code::BadParameter,
+            ApiError::BadPageToken => Code::BadPageToken,
+            ApiError::MissingFilter(_) => Code::MissingFilter,
+            ApiError::NotFound(_) => Code::NotFound,
+            ApiError::Deleted(_) => Code::Deleted,
+            ApiError::NoResult(_) => Code::NoResult,
+            ApiError::MethodNotAllowed => Code::MethodNotAllowed,
+            ApiError::NotAcceptable(_) => Code::NotAcceptable,
+            ApiError::UnsupportedMedia(_) => Code::UnsupportedMedia,
+            ApiError::JobActive(_) | ApiError::MeshInUse => Code::JobActive,
+            ApiError::IdConflict(_) => Code::IdConflict,
+            ApiError::KeyReuse => Code::IdempotencyKeyReuse,
+            ApiError::StaleVersion(_) => Code::StaleVersion,
+            ApiError::RangeNotSatisfiable(_) => Code::RangeNotSatisfiable,
+            ApiError::ResultNotReady(_) => Code::ResultNotReady,
+            ApiError::PayloadTooLarge { .. } => Code::PayloadTooLarge,
+            ApiError::ProblemTooLarge { .. } => Code::ProblemTooLarge,
+            ApiError::InvalidProblem(_) => Code::InvalidProblem,
+            ApiError::Internal { .. } => Code::Internal,
+            ApiError::QueueFull { .. } => Code::QueueFull,
+            ApiError::Draining => Code::Draining,
+            ApiError::StorageFull => Code::StorageFull,
+        }
     }
 
     /// The HTTP status.
     pub fn http_status(&self) -> StatusCode {
-        StatusCode::from_u16(self.row().http).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR)
+        let status = self.code().kind().status;
+        status
+            .and_then(|status| StatusCode::from_u16(status).ok())
+            .unwrap_or(StatusCode::INTERNAL_SERVER_ERROR)
     }
 
     /// Seconds after which the same request may succeed.
     pub fn retry_after_s(&self) -> Option<u64> {
-        self.row().retry_after_s
+        self.code().kind().retry_after_s
     }
 
     /// The problem document of RFC 9457; `instance` is the path that was asked for.
     pub fn document(&self, instance: &str) -> Value {
-        let Row {
+        let kind = self.code().kind();
+        let Kind {
             code,
             title,
-            http,
-            retry_after_s,
+            status,
             ..
-        } = self.row();
+        } = kind;
         let mut document = json!({
             "type": format!("/v1/errors/{code}"),
             "title": title,
-            "status": http,
+            "status": status,
             "code": code,
             "detail": self.to_string(),
             "instance": instance,
-            "retryable": retry_after_s.is_some(),
+            "retryable": kind.retryable(),
             "errors": self.violations(),
         });
         match self {
@@ -199,7 +217,8 @@ impl ApiError {
 
 impl From<ApiError> for Status {
     fn from(error: ApiError) -> Status {
-        let row = error.row();
+        let kind = error.code().kind();
+        let grpc = kind.grpc.unwrap_or(tonic::Code::Internal);
         let mut details = ErrorDetails::new();
         let mut metadata = std::collections::HashMap::new();
         match &error {
@@ -219,8 +238,8 @@ impl From<ApiError> for Status {
             }
             _ => {}
         }
-        details.set_error_info(row.code, "signorini", metadata);
-        if let Some(seconds) = row.retry_after_s {
+        details.set_error_info(kind.code, "signorini", metadata);
+        if let Some(seconds) = kind.retry_after_s {
             details.set_retry_info(Some(std::time::Duration::from_secs(seconds)));
         }
         // Details travel in a header; a mesh with a thousand bad elements would burst it.
@@ -233,7 +252,7 @@ impl From<ApiError> for Status {
             // They quote their input, and so may be as long as that.
             details.add_bad_request_violation(shortened(&v.pointer, 300), shortened(&text, 300));
         }
-        Status::with_error_details(row.grpc, format!("{}: {error}", row.code), details)
+        Status::with_error_details(grpc, format!("{}: {error}", kind.code), details)
     }
 }
 
@@ -257,6 +276,7 @@ fn summed_up(violations: &[Violation]) -> String {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use tonic::Code;
 
     fn violation(pointer: &str) -> Violation {
         Violation {

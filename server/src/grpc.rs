@@ -4,22 +4,26 @@ use std::{pin::Pin, sync::Arc};
 
 use axum::Router;
 use futures_util::{Stream, StreamExt};
-use solver::{error::Violation, problem::Problem};
-use tonic::{Request, Response, Status, Streaming, service::Routes};
+use sha2::{Digest, Sha256};
+use tonic::{Request, Response, Status, Streaming, metadata::MetadataValue, service::Routes};
 use tonic_health::server::HealthReporter;
 
 use crate::{
-    convert::{judgement, problem_from_pb, status},
+    convert::{bad, draft, edit, filter, judgement, problem_from_pb, problem_to_pb},
     error::ApiError,
-    job::JobId,
+    formats::Format,
+    job::{Job, JobId},
     pb::{
         self,
         job_service_server::{JobService, JobServiceServer},
     },
+    store::{GroupBy, Order, PIECE_BYTES},
     verbs::{
         Service,
-        jobs::{self, Envelope, MAX_PAGE_SIZE, PAGE_SIZE},
-        meshes, problems, results,
+        jobs::{self, MAX_PAGE_SIZE, Many, PAGE_SIZE},
+        meshes, problems, queue, results,
+        submit::{self, Draft, Handed},
+        watch::{self, Until},
     },
     violations,
 };
@@ -68,31 +72,64 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::ValidateProblemRequest>,
     ) -> Reply<pb::ValidateProblemResponse> {
-        let problem = problem(&self.service, request.into_inner().problem).await?;
+        let message = request.into_inner().problem.unwrap_or_default(); // which lacks everything, and is told so
+        let read = || {
+            problem_from_pb(message)
+                .map_err(|violations| problems::prefixed(problems::AT, violations))
+        };
+        let problem = self.service.work(read).await?;
         let judged = problems::validate(&self.service, problem).await?;
         Ok(Response::new(judgement(judged)))
     }
 
     async fn create_job(&self, request: Request<pb::CreateJobRequest>) -> Reply<pb::Job> {
-        let pb::CreateJobRequest {
-            problem: message,
-            name,
-            labels,
-            priority,
-            wait: wait_s,
-        } = request.into_inner();
-        let wait_s = wait(wait_s)?;
-        let envelope = Envelope {
-            name,
-            labels,
-            priority,
-        };
-        let problem = problem(&self.service, message).await?;
-        let mut job = jobs::create(&self.service, envelope, problem).await?;
+        let request = request.into_inner();
+        let wait_s = request.wait.map(wait).transpose()?;
+        let Handed {
+            accepted: mut job,
+            replayed,
+        } = self.hand_in(request).await?;
         if let Some(wait_s) = wait_s {
-            job = jobs::wait(&self.service, job.id, wait_s).await?;
+            (job, _) = watch::wait(&self.service, job.id, Until::Terminal, wait_s).await?;
         }
-        Ok(Response::new(job.into()))
+        Ok(noting_replay(Response::new(job.into()), replayed))
+    }
+
+    type SubmitAndWatchStream = EventStream;
+
+    async fn submit_and_watch(&self, request: Request<pb::CreateJobRequest>) -> Reply<EventStream> {
+        let request = request.into_inner();
+        if request.wait.is_some() {
+            return Err(bad(
+                "wait",
+                "a time",
+                "none: the events say when the job is done",
+            )
+            .into());
+        }
+        let handed = self.hand_in(request).await?;
+        let events = self.events(handed.accepted.key, 0);
+        Ok(noting_replay(Response::new(events), handed.replayed))
+    }
+
+    async fn batch_create_jobs(
+        &self,
+        request: Request<pb::BatchCreateJobsRequest>,
+    ) -> Reply<pb::BatchCreateJobsResponse> {
+        let pb::BatchCreateJobsRequest { jobs, request_id } = request.into_inner();
+        let own = |job: &pb::CreateJobRequest| {
+            job.wait.is_some() || job.request_id.is_some() || job.job_id.is_some()
+        };
+        if let Some(n) = jobs.iter().position(own) {
+            let expected = "jobs without wait, request_id and job_id";
+            return Err(bad("jobs", format!("one, number {n}, with them"), expected).into());
+        }
+        let read = move || jobs.into_iter().map(draft).collect();
+        let drafts: Vec<Draft> = self.service.work(read).await?;
+        let handed = submit::create_batch(&self.service, drafts, request_id).await?;
+        let jobs = handed.accepted.into_iter().map(Into::into).collect();
+        let response = Response::new(pb::BatchCreateJobsResponse { jobs });
+        Ok(noting_replay(response, handed.replayed))
     }
 
     async fn get_job(&self, request: Request<pb::GetJobRequest>) -> Reply<pb::Job> {
@@ -100,37 +137,82 @@ impl JobService for Grpc {
         Ok(Response::new(job.into()))
     }
 
+    async fn get_job_problem(
+        &self,
+        request: Request<pb::GetJobProblemRequest>,
+    ) -> Reply<pb::Problem> {
+        let problem = jobs::problem(&self.service, id(&request.into_inner().id)?).await?;
+        Ok(Response::new(problem_to_pb(&problem)))
+    }
+
     async fn list_jobs(
         &self,
         request: Request<pb::ListJobsRequest>,
     ) -> Reply<pb::ListJobsResponse> {
         let pb::ListJobsRequest {
-            status: numbers,
+            filter: jobs,
             page_size: size,
             page_token,
+            order_by,
         } = request.into_inner();
-        let statuses = numbers
-            .into_iter()
-            .map(|number| {
-                status(number)
-                    .ok_or_else(|| bad("status", number, "a value of the enum other than 0"))
-            })
-            .collect::<Result<Vec<_>, _>>()?;
+        let order = match order_by.as_str() {
+            "" => Order::NEWEST_FIRST,
+            text => Order::parse(text).ok_or_else(|| bad("order_by", text, Order::EXPECTED))?,
+        };
+        let filter = filter(jobs)?;
         let page_size = page_size(size)?;
         let token = Some(page_token.as_str()).filter(|token| !token.is_empty());
-        let page = jobs::list(&self.service, &statuses, page_size, token).await?;
+        let page = jobs::list(&self.service, &filter, order, page_size, token).await?;
         Ok(Response::new(pb::ListJobsResponse {
             jobs: page.jobs.into_iter().map(Into::into).collect(),
             next_page_token: page.next.unwrap_or_default(),
         }))
     }
 
-    type WatchJobStream = Pin<Box<dyn Stream<Item = Result<pb::Event, Status>> + Send>>;
-
-    async fn watch_job(
+    async fn count_jobs(
         &self,
-        request: Request<pb::WatchJobRequest>,
-    ) -> Reply<Self::WatchJobStream> {
+        request: Request<pb::CountJobsRequest>,
+    ) -> Reply<pb::CountJobsResponse> {
+        let pb::CountJobsRequest {
+            filter: jobs,
+            group_by,
+        } = request.into_inner();
+        let group_by = match group_by.as_str() {
+            "" => None,
+            word => {
+                Some(GroupBy::parse(word).ok_or_else(|| bad("group_by", word, GroupBy::EXPECTED))?)
+            }
+        };
+        let count = jobs::count(&self.service, &filter(jobs)?, group_by).await?;
+        Ok(Response::new(pb::CountJobsResponse {
+            total: count.total,
+            groups: count.groups,
+        }))
+    }
+
+    async fn wait_job(&self, request: Request<pb::WaitJobRequest>) -> Reply<pb::WaitJobResponse> {
+        let pb::WaitJobRequest {
+            id: name,
+            wait: wait_s,
+            version,
+            until_terminal,
+        } = request.into_inner();
+        let (id, wait_s) = (id(&name)?, wait(wait_s)?);
+        let until = match (until_terminal, version) {
+            (true, _) => Until::Terminal,
+            (false, Some(version)) => Until::Changed(version),
+            (false, None) => Until::Changed(jobs::get(&self.service, id).await?.version),
+        };
+        let (job, met) = watch::wait(&self.service, id, until, wait_s).await?;
+        Ok(Response::new(pb::WaitJobResponse {
+            job: Some(job.into()),
+            met,
+        }))
+    }
+
+    type WatchJobStream = EventStream;
+
+    async fn watch_job(&self, request: Request<pb::WatchJobRequest>) -> Reply<EventStream> {
         let pb::WatchJobRequest {
             id: name,
             after_seq,
@@ -139,15 +221,10 @@ impl JobService for Grpc {
             return Err(bad("after_seq", after_seq, "0 or more").into());
         }
         let job = jobs::get(&self.service, id(&name)?).await?;
-        if jobs::is_silent(&self.service, &job, after_seq).await? {
+        if watch::is_silent(&self.service, &job, after_seq).await? {
             return Ok(Response::new(futures_util::stream::empty().boxed()));
         }
-        let events = jobs::watch(self.service.clone(), job.key, after_seq);
-        Ok(Response::new(
-            events
-                .map(|event| event.map(Into::into).map_err(Into::into))
-                .boxed(),
-        ))
+        Ok(Response::new(self.events(job.key, after_seq)))
     }
 
     async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {
@@ -171,6 +248,139 @@ impl JobService for Grpc {
         let step = step.as_deref();
         let profile = results::profile(&self.service, id(&name)?, &boundary, step).await?;
         Ok(Response::new(profile.into()))
+    }
+
+    async fn list_iterations(
+        &self,
+        request: Request<pb::ListIterationsRequest>,
+    ) -> Reply<pb::ListIterationsResponse> {
+        let pb::ListIterationsRequest {
+            id: name,
+            max_points,
+        } = request.into_inner();
+        if let Some(few @ 0..2) = max_points {
+            return Err(bad("max_points", few, "a whole number, 2 or more").into());
+        }
+        let most = max_points.map(|most| most as usize);
+        let rows = results::history(&self.service, id(&name)?, most).await?;
+        Ok(Response::new(pb::ListIterationsResponse {
+            iterations: rows.into_iter().map(Into::into).collect(),
+        }))
+    }
+
+    type StreamResultStream =
+        Pin<Box<dyn Stream<Item = Result<pb::StreamResultResponse, Status>> + Send>>;
+
+    async fn stream_result(
+        &self,
+        request: Request<pb::StreamResultRequest>,
+    ) -> Reply<Self::StreamResultStream> {
+        let pb::StreamResultRequest {
+            id: name,
+            format,
+            offset,
+        } = request.into_inner();
+        let id = id(&name)?;
+        let format = match pb::FieldFormat::try_from(format) {
+            Ok(pb::FieldFormat::Unspecified | pb::FieldFormat::Vtu) => Format::Vtu,
+            Ok(pb::FieldFormat::Npz) => Format::Npz,
+            Ok(pb::FieldFormat::Json) => Format::Json,
+            Err(_) => return Err(bad("format", format, "a value of the enum FieldFormat").into()),
+        };
+        let (pieces, total_bytes, sha256) = if format == Format::Json {
+            let fields = results::fields(&self.service, id).await?;
+            let info = fields.info.clone();
+            beyond(offset, info.bytes)?;
+            let pieces = fields.bytes(&self.service, offset, info.bytes).boxed();
+            (pieces, info.bytes, info.digest)
+        } else {
+            let bytes = results::converted_fields(&self.service, id, format).await?;
+            let total = bytes.len() as u64;
+            beyond(offset, total)?;
+            let digest = Sha256::digest(&bytes).to_vec();
+            let pieces = async_stream::stream! {
+                for piece in bytes[offset as usize..].chunks(PIECE_BYTES) {
+                    yield Ok(piece.to_vec());
+                }
+            };
+            (pieces.boxed(), total, digest)
+        };
+        let mut place = offset;
+        let chunks = pieces.map(move |piece| {
+            let data = piece?;
+            let offset = place;
+            place += data.len() as u64;
+            Ok(pb::StreamResultResponse {
+                data,
+                offset,
+                total_bytes,
+                sha256: sha256.clone(),
+            })
+        });
+        Ok(Response::new(chunks.boxed()))
+    }
+
+    async fn cancel_jobs(
+        &self,
+        request: Request<pb::CancelJobsRequest>,
+    ) -> Reply<pb::CancelJobsResponse> {
+        let filter = filter(request.into_inner().filter)?;
+        let Many { matched, changed } = jobs::cancel_many(&self.service, filter).await?;
+        Ok(Response::new(pb::CancelJobsResponse { matched, changed }))
+    }
+
+    async fn retry_job(&self, request: Request<pb::RetryJobRequest>) -> Reply<pb::Job> {
+        let pb::RetryJobRequest {
+            id: name,
+            request_id,
+        } = request.into_inner();
+        let handed = submit::retry(&self.service, id(&name)?, request_id).await?;
+        let response = Response::new(handed.accepted.into());
+        Ok(noting_replay(response, handed.replayed))
+    }
+
+    async fn update_job(&self, request: Request<pb::UpdateJobRequest>) -> Reply<pb::Job> {
+        let request = request.into_inner();
+        let (id, version) = (id(&request.id)?, request.version);
+        let job = jobs::update(&self.service, id, edit(request)?, version).await?;
+        Ok(Response::new(job.into()))
+    }
+
+    async fn delete_job(
+        &self,
+        request: Request<pb::DeleteJobRequest>,
+    ) -> Reply<pb::DeleteJobResponse> {
+        jobs::delete(&self.service, id(&request.into_inner().id)?).await?;
+        Ok(Response::new(pb::DeleteJobResponse {}))
+    }
+
+    async fn delete_jobs(
+        &self,
+        request: Request<pb::DeleteJobsRequest>,
+    ) -> Reply<pb::DeleteJobsResponse> {
+        let filter = filter(request.into_inner().filter)?;
+        let Many { matched, changed } = jobs::delete_many(&self.service, filter).await?;
+        Ok(Response::new(pb::DeleteJobsResponse { matched, changed }))
+    }
+
+    async fn get_server_info(&self, _: Request<pb::GetServerInfoRequest>) -> Reply<pb::ServerInfo> {
+        Ok(Response::new(queue::info(&self.service).into()))
+    }
+
+    async fn get_caller(&self, _: Request<pb::GetCallerRequest>) -> Reply<pb::Caller> {
+        Ok(Response::new(queue::caller().into()))
+    }
+
+    async fn get_queue(&self, _: Request<pb::GetQueueRequest>) -> Reply<pb::QueueState> {
+        Ok(Response::new(queue::state(&self.service).into()))
+    }
+
+    async fn pause_queue(&self, _: Request<pb::PauseQueueRequest>) -> Reply<pb::QueueState> {
+        Ok(Response::new(queue::pause(&self.service).await?.into()))
+    }
+
+    async fn resume_queue(&self, _: Request<pb::ResumeQueueRequest>) -> Reply<pb::QueueState> {
+        Ok(Response::new(queue::resume(&self.service).await?.into()))
     }
 
     async fn cancel_job(
@@ -231,16 +441,41 @@ impl JobService for Grpc {
     }
 }
 
-/// The problem of a request, or what is wrong with it, with pointers into the request.
-async fn problem(
-    service: &Service,
-    message: Option<pb::Problem>,
-) -> Result<Result<Problem, Vec<Violation>>, ApiError> {
-    let message = message.unwrap_or_default(); // which lacks everything, and is told so
-    let read = || {
-        problem_from_pb(message).map_err(|violations| problems::prefixed(problems::AT, violations))
-    };
-    service.work(read).await
+type EventStream = Pin<Box<dyn Stream<Item = Result<pb::Event, Status>> + Send>>;
+
+impl Grpc {
+    async fn hand_in(&self, request: pb::CreateJobRequest) -> Result<Handed<Job>, Status> {
+        let key = request.request_id.clone();
+        let id = request.job_id.as_deref().map(id).transpose()?;
+        let draft = self.service.work(|| draft(request)).await?;
+        Ok(submit::create(&self.service, draft, id, key).await?)
+    }
+
+    fn events(&self, key: i64, after: i64) -> EventStream {
+        watch::watch(self.service.clone(), key, after)
+            .map(|event| event.map(Into::into).map_err(Into::into))
+            .boxed()
+    }
+}
+
+/// The same header as over REST, as metadata.
+fn noting_replay<T>(mut response: Response<T>, replayed: bool) -> Response<T> {
+    if replayed {
+        let value = MetadataValue::from_static("true");
+        response
+            .metadata_mut()
+            .insert("idempotency-replayed", value);
+    }
+    response
+}
+
+/// An offset behind the end.
+fn beyond(offset: u64, total: u64) -> Result<(), ApiError> {
+    if offset > total {
+        Err(ApiError::RangeNotSatisfiable(total))
+    } else {
+        Ok(())
+    }
 }
 
 fn id(text: &str) -> Result<JobId, ApiError> {
@@ -260,19 +495,10 @@ fn page_size(asked: i32) -> Result<i64, ApiError> {
     }
 }
 
-fn wait(wait_s: Option<f64>) -> Result<Option<f64>, ApiError> {
-    match wait_s {
-        Some(seconds) if !(0.0..=jobs::MAX_WAIT_S).contains(&seconds) => {
-            Err(bad("wait", seconds, "0 … 60 seconds"))
-        }
-        fine => Ok(fine),
-    }
-}
-
-fn bad(name: &'static str, got: impl ToString, expected: &'static str) -> ApiError {
-    ApiError::BadParameter {
-        name,
-        got: got.to_string(),
-        expected,
+fn wait(wait_s: f64) -> Result<f64, ApiError> {
+    if (0.0..=watch::MAX_WAIT_S).contains(&wait_s) {
+        Ok(wait_s)
+    } else {
+        Err(bad("wait", wait_s, "0 … 60 seconds"))
     }
 }

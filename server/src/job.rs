@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use uuid::Uuid;
 
-use crate::time::Time;
+use crate::{catalog::Code, time::Time};
 
 /// A problem on its way through the service, as clients see it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -13,6 +13,12 @@ pub struct Job {
     /// The store's own number, in order of arrival; never shown.
     #[serde(skip)]
     pub key: i64,
+    /// Where the store keeps what there is of its result.
+    #[serde(skip)]
+    pub result_key: i64,
+    /// The key of the job whose end will be its own.
+    #[serde(skip)]
+    pub twin_of: Option<i64>,
     /// The public name.
     pub id: JobId,
     /// Where it stands.
@@ -37,6 +43,15 @@ pub struct Job {
     pub max_attempts: i32,
     /// SHA-256 of the problem with its defaults, without its title.
     pub input_hash: String,
+    /// The job whose result answered this one.
+    #[serde(default)]
+    pub cached_from: Option<JobId>,
+    /// The job that this one tries again.
+    #[serde(default)]
+    pub parent: Option<JobId>,
+    /// Never removed by age.
+    #[serde(default)]
+    pub pinned: bool,
     /// When it was accepted.
     pub created_at: Time,
     /// When it was last started.
@@ -51,12 +66,22 @@ pub struct Job {
     pub queue: Option<QueuePosition>,
     /// How far it has come, once started.
     pub progress: Option<Progress>,
+    /// What it may take.
+    #[serde(default)]
+    pub limits: Limits,
     /// What went wrong.
     pub failure: Option<Failure>,
     /// Whether there is something to fetch.
     pub result_available: ResultAvailable,
     /// Where to go from here.
     pub links: BTreeMap<String, String>,
+}
+
+impl Job {
+    /// It waits, for a worker and not for another job.
+    pub fn waits_in_line(&self) -> bool {
+        self.status == Status::Queued && self.twin_of.is_none()
+    }
 }
 
 /// The public name of a job, `job_<uuidv7>`.
@@ -181,6 +206,10 @@ pub enum Reason {
     SingularSystem,
     /// A number that is not finite came up.
     NonFinite,
+    /// It ran longer than it may.
+    TimedOut,
+    /// It waited longer than it may.
+    QueueExpired,
     /// It needs more than there is.
     ResourceExhausted,
     /// The process died under it once too often.
@@ -193,17 +222,36 @@ pub enum Reason {
 
 impl Reason {
     /// All of them.
-    pub const ALL: [Reason; 9] = [
+    pub const ALL: [Reason; 11] = [
         Reason::NotConverged,
         Reason::ContactCycling,
         Reason::FalseConvergence,
         Reason::SingularSystem,
         Reason::NonFinite,
+        Reason::TimedOut,
+        Reason::QueueExpired,
         Reason::ResourceExhausted,
         Reason::WorkerLost,
         Reason::Internal,
         Reason::UserCancel,
     ];
+
+    /// A property of the problem: whoever solves it again ends the same way.
+    pub fn belongs_to_the_problem(self) -> bool {
+        match self {
+            Reason::NotConverged
+            | Reason::ContactCycling
+            | Reason::FalseConvergence
+            | Reason::SingularSystem
+            | Reason::NonFinite => true,
+            Reason::TimedOut
+            | Reason::QueueExpired
+            | Reason::ResourceExhausted
+            | Reason::WorkerLost
+            | Reason::Internal
+            | Reason::UserCancel => false,
+        }
+    }
 
     /// The word used in JSON and in the store.
     pub fn as_str(self) -> &'static str {
@@ -213,6 +261,8 @@ impl Reason {
             Reason::FalseConvergence => "false_convergence",
             Reason::SingularSystem => "singular_system",
             Reason::NonFinite => "non_finite",
+            Reason::TimedOut => "timed_out",
+            Reason::QueueExpired => "queue_expired",
             Reason::ResourceExhausted => "resource_exhausted",
             Reason::WorkerLost => "worker_lost",
             Reason::Internal => "internal",
@@ -229,7 +279,7 @@ impl Reason {
 }
 
 /// Whether a job has something to fetch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ResultAvailable {
     /// Nothing.
@@ -258,15 +308,88 @@ impl ResultAvailable {
     }
 }
 
+/// What a job may take.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Limits {
+    /// Seconds from a start to the end; then it fails with `timed_out`.
+    pub timeout_s: f64,
+    /// Seconds that it may wait for a start; then it fails with `queue_expired`.
+    pub queue_ttl_s: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits {
+            timeout_s: 600.0,
+            queue_ttl_s: 86_400.0,
+        }
+    }
+}
+
+/// Whether earlier results may answer a job.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cache {
+    /// The result of the same input answers it at once; a job at work on that input is joined.
+    #[default]
+    Use,
+    /// It is solved anew, and its result answers later ones.
+    Refresh,
+    /// It is solved anew, and its result answers nobody else.
+    Off,
+}
+
+impl Cache {
+    /// The word used in JSON and in the store.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Cache::Use => "use",
+            Cache::Refresh => "refresh",
+            Cache::Off => "off",
+        }
+    }
+
+    /// The value of that name.
+    pub fn parse(word: &str) -> Option<Self> {
+        [Cache::Use, Cache::Refresh, Cache::Off]
+            .into_iter()
+            .find(|cache| cache.as_str() == word)
+    }
+}
+
 /// The place of a queued job.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct QueuePosition {
-    /// From 1.
+    /// From 1; 0 for a job that another one, already running, will answer.
     pub position: i64,
     /// Jobs before this one.
     pub ahead: i64,
     /// What it waits for.
-    pub reason: String,
+    pub reason: Waiting,
+}
+
+/// What a queued job waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Waiting {
+    /// All workers have something to do.
+    WorkersBusy,
+    /// The queue was paused.
+    Paused,
+    /// A job with the same input is ahead of it; its result will answer both.
+    Joined,
+}
+
+impl Waiting {
+    /// The word used in JSON.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Waiting::WorkersBusy => "workers_busy",
+            Waiting::Paused => "paused",
+            Waiting::Joined => "joined",
+        }
+    }
 }
 
 /// How far a job has come.
@@ -304,18 +427,8 @@ pub struct Failure {
 impl Failure {
     /// A failure of this kind.
     pub fn new(reason: Reason, detail: impl Into<String>) -> Self {
-        let title = match reason {
-            Reason::NotConverged => "The iteration did not converge",
-            Reason::ContactCycling => "The contact set repeats itself without settling",
-            Reason::FalseConvergence => "The iteration settled, but not in a solution",
-            Reason::SingularSystem => "The stiffness matrix is singular",
-            Reason::NonFinite => "A number that is not finite came up",
-            Reason::ResourceExhausted => "The job needs more than there is",
-            Reason::WorkerLost => "The worker was lost once too often",
-            Reason::Internal => "The service failed",
-            Reason::UserCancel => "The job was canceled",
-        };
         let code = reason.as_str().replace('_', "-");
+        let title = Code::parse(&code).map_or("", |code| code.kind().title);
         Failure {
             r#type: format!("/v1/errors/{code}"),
             title: title.into(),
@@ -373,6 +486,13 @@ mod tests {
                 .into_iter()
                 .all(|reason| Reason::parse(reason.as_str()) == Some(reason))
         );
+    }
+
+    #[test]
+    fn every_reason_is_explained() {
+        for reason in Reason::ALL {
+            assert!(!Failure::new(reason, "").title.is_empty(), "{reason:?}");
+        }
     }
 
     #[test]

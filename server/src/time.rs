@@ -20,9 +20,20 @@ impl Time {
         Time(micros)
     }
 
+    /// Reads RFC 3339.
+    pub fn parse(text: &str) -> Option<Self> {
+        let time: Timestamp = text.parse().ok()?;
+        Some(Time(time.as_microsecond()))
+    }
+
     /// Microseconds since 1970.
     pub fn micros(self) -> i64 {
         self.0
+    }
+
+    /// So many seconds later.
+    pub fn after_s(self, seconds: f64) -> Self {
+        Time(self.0.saturating_add((seconds * 1e6) as i64))
     }
 
     /// Seconds from here to `later`. A clock set back in between gives 0, not a negative duration.

@@ -60,7 +60,7 @@ async fn a_wrong_method_is_told_the_right_ones() {
     let server = server().await;
     let client = suite::harness::client();
     for (method, path, allowed) in [
-        (Method::DELETE, "/v1/jobs", "GET,HEAD,POST"),
+        (Method::PATCH, "/v1/jobs", "GET,HEAD,POST,DELETE"),
         (Method::GET, "/v1/problems/validate", "POST"),
         (Method::POST, "/livez", "GET,HEAD"),
     ] {

@@ -40,7 +40,7 @@ async fn a_job_goes_all_the_way_over_grpc() {
         ..Default::default()
     };
     let job = grpc.create_job(request).await.unwrap().into_inner();
-    assert_eq!(job.status(), pb::Status::Queued);
+    assert_eq!(job.status(), pb::Status::Running, "a worker was free");
 
     let mut stream = grpc
         .watch_job(pb::WatchJobRequest {

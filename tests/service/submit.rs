@@ -26,9 +26,10 @@ async fn a_submitted_job_is_accepted_with_its_address_and_version() {
         (&job["name"], &job["labels"]["a"], &job["priority"]),
         (&json!("first"), &json!("b"), &json!(3))
     );
+    // both workers are free: the job is in the hands of one with the commit that accepts it
     assert_eq!(
         (&job["status"], &job["attempt"], &job["owner"]),
-        (&json!("queued"), &json!(0), &json!("local"))
+        (&json!("running"), &json!(1), &json!("local"))
     );
     assert!(job["input_hash"].as_str().unwrap().starts_with("sha256:"));
 }

@@ -20,7 +20,12 @@ use crate::{
     pb,
     run::{Summary, phase_name},
     time::Time,
-    verbs::{jobs::Cancellation, problems::Judgement, results::StepResult},
+    verbs::{
+        jobs::Cancellation,
+        problems::Judgement,
+        queue::{Caller, Info, QueueState, ServiceLimits},
+        results::StepResult,
+    },
 };
 
 /// A status as the contract numbers it.
@@ -82,7 +87,7 @@ impl From<Job> for pb::Job {
                  }| pb::QueuePosition {
                     position,
                     ahead,
-                    reason,
+                    reason: reason.as_str().into(),
                 },
             ),
             progress: job.progress.map(
@@ -122,7 +127,72 @@ impl From<Job> for pb::Job {
                 ResultAvailable::Partial => pb::ResultAvailable::Partial.into(),
                 ResultAvailable::Final => pb::ResultAvailable::Final.into(),
             },
+            cached_from: job.cached_from.map(|id| id.to_string()),
+            parent: job.parent.map(|id| id.to_string()),
+            pinned: job.pinned,
+            limits: Some(pb::Limits {
+                timeout_s: Some(job.limits.timeout_s),
+                queue_ttl_s: Some(job.limits.queue_ttl_s),
+            }),
         }
+    }
+}
+
+impl From<QueueState> for pb::QueueState {
+    fn from(state: QueueState) -> Self {
+        let QueueState {
+            paused,
+            queued,
+            running,
+            workers,
+            idle,
+            max_queued,
+        } = state;
+        pb::QueueState {
+            paused,
+            queued,
+            running,
+            workers,
+            idle,
+            max_queued,
+        }
+    }
+}
+
+impl From<Info> for pb::ServerInfo {
+    fn from(info: Info) -> Self {
+        let ServiceLimits {
+            max_body_bytes,
+            max_mesh_bytes,
+            memory_budget_bytes,
+            max_queued,
+            max_batch,
+            max_page_size,
+            max_wait_s,
+        } = info.limits;
+        pb::ServerInfo {
+            name: info.name,
+            version: info.version,
+            api_version: info.api_version,
+            workers: info.workers,
+            limits: Some(pb::ServiceLimits {
+                max_body_bytes,
+                max_mesh_bytes,
+                memory_budget_bytes,
+                max_queued,
+                max_batch,
+                max_page_size,
+                max_wait_s,
+            }),
+            table_formats: info.table_formats,
+            field_formats: info.field_formats,
+        }
+    }
+}
+
+impl From<Caller> for pb::Caller {
+    fn from(Caller { owner, scopes }: Caller) -> Self {
+        pb::Caller { owner, scopes }
     }
 }
 

@@ -1,57 +1,64 @@
 //! The queue: which task may do what, and what wakes it.
 //!
-//! `workers` tasks each take the next job from the store, have it solved on a blocking thread and
-//! record what it says. A worker *subscribes* to the wake-up before it looks for work, so that a
-//! job accepted in between is not overlooked. Beside each running solver a recorder task commits
-//! its events in batches and then announces the number of the last one; watchers read rows from
-//! the store up to that number. No event travels through a channel to a watcher, so none is seen
-//! twice, missed, or taken back by a crash.
+//! `workers` slots each hold one job at a time. The dispatcher claims the next job of the store whenever a
+//! slot is free; a submit that finds one free has that done in its own transaction, and hands the claim to
+//! the slot. Each claim is solved on a blocking thread. Beside each running solver a recorder task commits
+//! its events in batches and then announces the number of the last one; watchers read rows from the store
+//! up to that number. No event travels through a channel to a watcher, so none is seen twice, missed, or
+//! taken back by a crash.
 //!
-//! Who may end a job? Any of worker, canceler and drain may try; the store lets one of them, by
+//! Who may end a job? Any of worker, canceler, clock and drain may try; the store lets one of them, by
 //! checking in one transaction that the start is still current. The others are too late.
 
 mod live;
 mod recorder;
+mod stop;
 mod worker;
 
 use std::{
     collections::HashMap,
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
 
-use tokio::sync::Notify;
+use tokio::sync::{Notify, OwnedSemaphorePermit, RwLock, Semaphore};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info};
 
 use live::Live;
 pub use live::Subscription;
+use stop::{Stop, Why};
 
 use crate::{
     job::{Job, Status},
     run::Solve,
-    store::{CancelOutcome, Claim, Ending, Result, Store},
+    store::{Accepted, CancelOutcome, Claim, Ending, LastWords, Result, Store, Submission, Told},
+    time::Time,
 };
 
 /// A solver that was asked to stop gets this long; then the job is canceled over its head and only
 /// the worker's slot waits for it. Half of what the API promises, the rest is for commits.
 const COOPERATION: Duration = Duration::from_millis(250);
 
-/// Accepts no jobs itself (the store does), but runs, cancels and announces them.
+/// The longest that a job waits for its end after the end of its time in the queue.
+const TICK: Duration = Duration::from_secs(1);
+
+/// Runs, cancels and announces jobs.
 #[derive(Debug)]
 pub struct Queue {
     store: Arc<Store>,
     solve: Solve,
+    /// One permit for each worker that has nothing to do.
+    slots: Arc<Semaphore>,
+    workers: u16,
+    /// Something may be ready to be claimed.
     wake: Notify,
     live: Live,
     /// Jobs in the hands of a worker of this process.
     running: Mutex<HashMap<i64, Running>>,
-    /// Held while a job is claimed and entered into `running`, and while one is asked to stop: a
+    /// Read while a job is claimed and entered into `running`, written while one is asked to stop: a
     /// cancel never falls between the two.
-    gate: tokio::sync::Mutex<()>,
+    gate: RwLock<()>,
     stopping: CancellationToken,
 }
 
@@ -59,33 +66,76 @@ pub struct Queue {
 #[derive(Clone, Debug)]
 struct Running {
     attempt: i32,
-    stop: Arc<AtomicBool>,
+    stop: Arc<Stop>,
+}
+
+/// How the queue stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct State {
+    /// No new job is started.
+    pub paused: bool,
+    /// Jobs that wait for a worker.
+    pub queued: usize,
+    /// Jobs in the hands of workers.
+    pub running: usize,
+    /// How many workers there are.
+    pub workers: u16,
+    /// How many of them have nothing to do. A worker whose job was ended over its solver's head is not
+    /// free before the solver is.
+    pub idle: usize,
 }
 
 impl Queue {
-    /// A queue over `store`, its workers not yet started.
-    pub fn new(store: Arc<Store>, solve: Solve) -> Arc<Queue> {
+    /// A queue over `store`, not yet started.
+    pub fn new(store: Arc<Store>, solve: Solve, workers: u16) -> Arc<Queue> {
         Arc::new(Queue {
             store,
             solve,
+            slots: Arc::new(Semaphore::new(0)),
+            workers,
             wake: Notify::new(),
             live: Live::default(),
             running: Mutex::default(),
-            gate: tokio::sync::Mutex::default(),
+            gate: RwLock::default(),
             stopping: CancellationToken::new(),
         })
     }
 
     /// Starts the workers. They run until the drain.
-    pub fn start(self: &Arc<Self>, workers: u16) {
-        for _ in 0..workers {
-            tokio::spawn(worker::work(self.clone()));
-        }
+    pub fn start(self: &Arc<Self>) {
+        self.slots.add_permits(usize::from(self.workers));
+        tokio::spawn(self.clone().dispatch());
+        tokio::spawn(self.clone().watch_the_clock());
     }
 
-    /// Says that there is a new job.
-    pub fn wake(&self) {
-        self.wake.notify_waiters();
+    /// Accepts jobs. They are on the disk when this returns; if a worker is free, the first of the queue is
+    /// in its hands with the same commit.
+    pub async fn submit(self: &Arc<Self>, mut submission: Submission) -> Result<Accepted> {
+        let slot = self.free_slot();
+        submission.claim = false;
+        let Some(slot) = slot else {
+            let accepted = self.store.submit(submission).await?;
+            self.wake.notify_one();
+            return Ok(accepted);
+        };
+        let _gate = self.gate.read().await;
+        submission.claim = !self.stopping.is_cancelled() && !self.store.is_paused();
+        let submitted = self.store.submit(submission).await;
+        match submitted {
+            Ok(mut accepted) => {
+                match accepted.claim.take() {
+                    Some(claim) => self.begin(claim, slot),
+                    None => drop(slot),
+                }
+                self.wake.notify_one(); // several may have come, or the slot is free again
+                Ok(accepted)
+            }
+            Err(cause) => {
+                drop(slot);
+                self.wake.notify_one();
+                Err(cause)
+            }
+        }
     }
 
     /// Listens to a job. Subscribe before reading its rows.
@@ -93,57 +143,106 @@ impl Queue {
         self.live.subscribe(key)
     }
 
+    /// Says that events are on the disk.
+    fn announce(&self, told: &[Told]) {
+        for Told { key, seq } in told {
+            self.live.announce(*key, *seq);
+        }
+    }
+
+    /// Says that something was edited about a job.
+    pub fn stir(&self, key: i64) {
+        self.live.announce(key, 0);
+    }
+
     /// Ends when the service is about to stop; streams end with it.
     pub fn stopping(&self) -> &CancellationToken {
         &self.stopping
     }
 
+    /// How the queue stands.
+    pub fn state(&self) -> State {
+        State {
+            paused: self.store.is_paused(),
+            queued: self.store.waiting(),
+            running: self.running().len(),
+            workers: self.workers,
+            idle: self.slots.available_permits(),
+        }
+    }
+
+    /// Lets no job start until the queue is resumed, also after a restart; those that run go on.
+    pub async fn pause(&self) -> Result<()> {
+        let _gate = self.gate.write().await; // whoever is claiming has done so
+        self.store.set_paused(true).await
+    }
+
+    /// Lets jobs start again.
+    pub async fn resume(&self) -> Result<()> {
+        self.store.set_paused(false).await?;
+        self.wake.notify_one();
+        Ok(())
+    }
+
     /// Asks a job to stop. A queued one is canceled when this returns, a running one within half a
     /// second.
     pub async fn cancel(self: &Arc<Self>, key: i64) -> Result<CancelOutcome> {
-        let _gate = self.gate.lock().await;
+        let _gate = self.gate.write().await;
         let mut outcome = self.store.request_cancel(key).await?;
         if let CancelOutcome::Requested { attempt } = outcome {
             let running = self.running().get(&key).cloned();
             match running {
                 Some(running) => {
-                    running.stop.store(true, Ordering::Relaxed);
+                    running.stop.ask(Why::Canceled);
                     tokio::spawn(self.clone().cancel_over_its_head(key, running.attempt));
                 }
                 // Its worker could not end it and has given it up: nobody else would.
                 None => {
-                    let ended = self.store.finish(key, attempt, &Ending::canceled()).await?;
-                    outcome = ended.map_or(CancelOutcome::AlreadyTerminal, CancelOutcome::Canceled);
+                    let ended = self.end(key, attempt, &Ending::canceled()).await?;
+                    outcome = match ended {
+                        true => CancelOutcome::Canceled(vec![]),
+                        false => CancelOutcome::AlreadyTerminal,
+                    };
                 }
             }
         }
-        if let CancelOutcome::Canceled(seq) = outcome {
-            self.live.announce(key, seq);
+        if let CancelOutcome::Canceled(told) = &outcome {
+            self.announce(told);
+            self.wake.notify_one(); // a twin may have taken its place
         }
         Ok(outcome)
     }
 
     async fn cancel_over_its_head(self: Arc<Self>, key: i64, attempt: i32) {
         tokio::time::sleep(COOPERATION).await;
-        match self.store.finish(key, attempt, &Ending::canceled()).await {
-            Ok(Some(seq)) => self.live.announce(key, seq),
-            Ok(None) => {} // it stopped by itself
-            Err(cause) => error!(job.key = key, %cause, "job could not be canceled: {cause}"),
+        if let Err(cause) = self.end(key, attempt, &Ending::canceled()).await {
+            error!(job.key = key, %cause, "job could not be canceled: {cause}");
         }
+    }
+
+    /// Ends a start of a job without its solver; false if it was no longer current.
+    async fn end(&self, key: i64, attempt: i32, ending: &Ending) -> Result<bool> {
+        let last = LastWords::default();
+        let told = self.store.finish(key, attempt, ending, last, None).await?;
+        if let Some(told) = &told {
+            self.announce(told);
+            self.wake.notify_one();
+        }
+        Ok(told.is_some())
     }
 
     /// Takes no more jobs and puts those that are running back for the next start of the service,
     /// without waiting for their solvers.
     pub async fn drain(&self) {
         self.stopping.cancel();
-        let _gate = self.gate.lock().await; // whoever is claiming has entered its job
+        let _gate = self.gate.write().await; // whoever is claiming has entered its job
         let running: Vec<(i64, Running)> = self
             .running()
             .iter()
             .map(|(key, running)| (*key, running.clone()))
             .collect();
         for (key, Running { attempt, stop }) in running {
-            stop.store(true, Ordering::Relaxed);
+            stop.ask(Why::Drained);
             match self.store.requeue_drained(key, attempt).await {
                 Ok(Some(Status::Canceled)) => {
                     info!(
@@ -159,22 +258,88 @@ impl Queue {
         }
     }
 
-    /// Takes the next job and enters it as running.
-    async fn claim(&self) -> Result<Option<(Claim, Running)>> {
-        let _gate = self.gate.lock().await;
-        if self.stopping.is_cancelled() {
-            return Ok(None);
+    /// Claims whenever a slot is free and something waits, until the drain.
+    async fn dispatch(self: Arc<Self>) {
+        loop {
+            // A word said from here on is kept for the wait below: nothing is overlooked.
+            while let Some(slot) = self.free_slot() {
+                match self.claim(slot).await {
+                    Ok(true) => {}
+                    Ok(false) => break,
+                    Err(cause) => {
+                        error!(%cause, "no job could be claimed: {cause}");
+                        tokio::time::sleep(Duration::from_secs(1)).await; // a full disk may pass
+                    }
+                }
+            }
+            tokio::select! {
+                () = self.wake.notified() => {}
+                () = self.stopping.cancelled() => return,
+            }
         }
-        let Some(claim) = self.store.claim_next().await? else {
-            return Ok(None);
-        };
+    }
+
+    /// A worker that may start something.
+    fn free_slot(&self) -> Option<OwnedSemaphorePermit> {
+        if self.store.is_paused() || self.stopping.is_cancelled() {
+            return None;
+        }
+        self.slots.clone().try_acquire_owned().ok()
+    }
+
+    /// Takes the next job, if there is one.
+    async fn claim(self: &Arc<Self>, slot: OwnedSemaphorePermit) -> Result<bool> {
+        let _gate = self.gate.read().await;
+        if self.stopping.is_cancelled() || self.store.is_paused() {
+            return Ok(false);
+        }
+        match self.store.claim_next().await? {
+            Some(claim) => {
+                self.begin(claim, slot);
+                Ok(true)
+            }
+            None => Ok(false),
+        }
+    }
+
+    /// Hands a claimed job to a worker. Under the gate.
+    fn begin(self: &Arc<Self>, claim: Claim, slot: OwnedSemaphorePermit) {
         let running = Running {
             attempt: claim.job.attempt,
             stop: Arc::default(),
         };
         self.running().insert(claim.job.key, running.clone());
         self.live.announce(claim.job.key, claim.seq);
-        Ok(Some((claim, running)))
+        let queue = self.clone();
+        tokio::spawn(async move {
+            worker::attempt(&queue, claim, running).await;
+            drop(slot);
+            queue.wake.notify_one();
+        });
+    }
+
+    /// Ends jobs that have waited too long, and forgets what was deleted long ago, until the drain.
+    async fn watch_the_clock(self: Arc<Self>) {
+        loop {
+            match self.store.expire_queued(Time::now()).await {
+                Ok(told) if told.is_empty() => {}
+                Ok(told) => {
+                    self.announce(&told);
+                    self.wake.notify_one();
+                    continue; // there may be more
+                }
+                Err(cause) => {
+                    error!(%cause, "jobs that waited too long could not be ended: {cause}")
+                }
+            }
+            if let Err(cause) = self.store.forget_deleted(Time::now()).await {
+                error!(%cause, "names of deleted jobs could not be forgotten: {cause}");
+            }
+            tokio::select! {
+                () = tokio::time::sleep(TICK) => {}
+                () = self.stopping.cancelled() => return,
+            }
+        }
     }
 
     fn release(&self, job: &Job) {

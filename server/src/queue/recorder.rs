@@ -1,6 +1,6 @@
 //! The scribe beside a running solver: commits what it says in batches, then announces it.
 
-use std::{sync::atomic::Ordering, time::Duration};
+use std::time::Duration;
 
 use solver::solution::Iteration;
 use tokio::{
@@ -8,12 +8,12 @@ use tokio::{
     time::{Instant, sleep_until},
 };
 
-use super::{Queue, Running};
+use super::{Queue, Running, stop::Why};
 use crate::{
     event::Payload,
     job::{Job, Progress},
     run::phase_name,
-    store::Result,
+    store::{LastWords, Result},
     time::Time,
 };
 
@@ -25,40 +25,46 @@ const LATENCY: Duration = Duration::from_millis(50);
 /// What a solver says, with the moment it said it.
 pub(super) type Line = (Time, Payload);
 
-/// Writes until the solver hangs up. When the start is no longer current, or the store fails, the
-/// solver is told to stop and the rest is thrown away.
+/// Writes until the solver hangs up, and gives what it said last: that is written with the job's end, in
+/// one commit. When the start is no longer current, or the store fails, the solver is told to stop and the
+/// rest is thrown away.
 pub(super) async fn record(
     queue: &Queue,
     job: &Job,
     running: &Running,
     mut lines: mpsc::Receiver<Line>,
-) -> Result<()> {
+) -> Result<LastWords> {
     let mut progress = Progress::default();
     let written = loop {
-        let batch = match next_batch(&mut lines).await {
-            Some(batch) => batch,
-            None => return Ok(()),
-        };
+        let (batch, last) = next_batch(&mut lines).await;
         batch
             .iter()
             .for_each(|(_, payload)| follow(&mut progress, payload));
+        if last {
+            let lines = batch;
+            return Ok(LastWords { lines, progress });
+        }
         match queue
             .store
             .append_events(job.key, running.attempt, &batch, &progress)
             .await
         {
             Ok(Some(seq)) => queue.live.announce(job.key, seq),
-            Ok(None) => break Ok(()),
+            Ok(None) => break Ok(LastWords::default()),
             Err(error) => break Err(error),
         }
     };
-    running.stop.store(true, Ordering::Relaxed);
+    running.stop.ask(Why::Lost);
     while lines.recv().await.is_some() {} // the solver must not block on a full channel
     written
 }
 
-async fn next_batch(lines: &mut mpsc::Receiver<Line>) -> Option<Vec<Line>> {
-    let mut batch = vec![lines.recv().await?];
+/// The next lines, and whether they are the last.
+async fn next_batch(lines: &mut mpsc::Receiver<Line>) -> (Vec<Line>, bool) {
+    let Some(first) = lines.recv().await else {
+        return (vec![], true);
+    };
+    let mut batch = vec![first];
     let end = sleep_until(Instant::now() + LATENCY);
     tokio::pin!(end);
     while batch.len() < ROWS {
@@ -66,12 +72,12 @@ async fn next_batch(lines: &mut mpsc::Receiver<Line>) -> Option<Vec<Line>> {
             biased;
             line = lines.recv() => match line {
                 Some(line) => batch.push(line),
-                None => break,
+                None => return (batch, true),
             },
             () = &mut end => break,
         }
     }
-    Some(batch)
+    (batch, false)
 }
 
 /// Keeps up with what the solver says.
@@ -122,9 +128,10 @@ mod tests {
                 .unwrap();
         }
         drop(sender);
-        assert_eq!(next_batch(&mut lines).await.unwrap().len(), 50);
-        assert_eq!(next_batch(&mut lines).await.unwrap().len(), 1);
-        assert!(next_batch(&mut lines).await.is_none());
+        let (batch, last) = next_batch(&mut lines).await;
+        assert_eq!((batch.len(), last), (50, false));
+        let (batch, last) = next_batch(&mut lines).await;
+        assert_eq!((batch.len(), last), (1, true));
     }
 
     #[test]

@@ -15,6 +15,7 @@ use crate::{
     digest,
     event::{Event, Payload},
     fake,
+    job::{Cache, Limits},
     job::{Reason, ResultAvailable},
     store::NewJob,
 };
@@ -27,8 +28,8 @@ struct Rig {
 
 async fn rig(solve: Solve) -> Rig {
     let folder = tempfile::tempdir().unwrap();
-    let store = Arc::new(Store::open(folder.path()).await.unwrap());
-    let queue = Queue::new(store.clone(), solve);
+    let store = Store::open(folder.path()).await.unwrap();
+    let queue = Queue::new(store.clone(), solve, 1);
     Rig {
         store,
         queue,
@@ -36,21 +37,47 @@ async fn rig(solve: Solve) -> Rig {
     }
 }
 
+/// A job that is solved on its own.
+fn new(priority: i32) -> NewJob {
+    let problem = fake::problem();
+    NewJob {
+        id: None,
+        name: None,
+        labels: Default::default(),
+        priority,
+        limits: Limits::default(),
+        cache: Cache::Off,
+        parent: None,
+        title: problem.title.clone(),
+        input_hash: digest::input_hash(&problem).unwrap(),
+        problem: serde_json::to_string(&problem).unwrap(),
+        mesh: None,
+        payload: "payload".into(),
+    }
+}
+
 impl Rig {
     async fn submit(&self) -> Job {
-        let problem = fake::problem();
-        let new = NewJob {
-            name: None,
-            labels: Default::default(),
-            priority: 0,
-            title: problem.title.clone(),
-            input_hash: digest::input_hash(&problem).unwrap(),
-            problem: serde_json::to_string(&problem).unwrap(),
-            mesh: None,
+        self.submit_as(new(0)).await
+    }
+
+    async fn submit_as(&self, new: NewJob) -> Job {
+        let submission = Submission {
+            jobs: vec![new],
+            key: None,
+            max_queued: 10,
+            claim: false,
         };
-        let job = self.store.insert_job(&new, 10).await.unwrap();
-        self.queue.wake();
-        job
+        let accepted = self.queue.submit(submission).await.unwrap();
+        accepted.jobs.into_iter().next().unwrap()
+    }
+
+    /// Ends a start by hand.
+    async fn finish(&self, job: &Job, attempt: i32) -> Option<Vec<Told>> {
+        let last = LastWords::default();
+        let ending = Ending::canceled();
+        let finished = self.store.finish(job.key, attempt, &ending, last, None);
+        finished.await.unwrap()
     }
 
     async fn until(&self, job: &Job, done: impl Fn(&Event) -> bool) -> Vec<Event> {
@@ -79,6 +106,7 @@ impl Rig {
             // The number in our store is not part of the story.
             Payload::Done { job: done } => Job {
                 key: job.key,
+                result_key: job.key,
                 ..*done
             },
             other => unreachable!("{other:?} after done"),
@@ -89,7 +117,7 @@ impl Rig {
 #[tokio::test]
 async fn a_job_runs_to_its_end_and_its_result_is_stored() {
     let rig = rig(fake::solve).await;
-    rig.queue.start(1);
+    rig.queue.start();
     let job = rig.submit().await;
     let done = rig.until_done(&job).await;
     assert_eq!(
@@ -106,7 +134,7 @@ async fn a_job_runs_to_its_end_and_its_result_is_stored() {
 #[tokio::test]
 async fn a_panicking_solver_fails_its_job_and_not_its_worker() {
     let rig = rig(fake::solve_with_a_panic).await;
-    rig.queue.start(1);
+    rig.queue.start();
     for _ in 0..2 {
         let job = rig.submit().await;
         let done = rig.until_done(&job).await;
@@ -125,7 +153,7 @@ async fn a_panicking_solver_fails_its_job_and_not_its_worker() {
 #[tokio::test]
 async fn a_canceled_running_job_keeps_its_last_state() {
     let rig = rig(fake::solve_until_stopped).await;
-    rig.queue.start(1);
+    rig.queue.start();
     let job = rig.submit().await;
     rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
         .await;
@@ -160,7 +188,7 @@ fn unbalanced(
 #[tokio::test]
 async fn a_job_that_converged_to_no_balance_fails_and_keeps_its_result() {
     let rig = rig(unbalanced).await;
-    rig.queue.start(1);
+    rig.queue.start();
     let job = rig.submit().await;
     let done = rig.until_done(&job).await;
     assert_eq!(
@@ -192,7 +220,7 @@ fn busy(
 #[tokio::test]
 async fn a_pulse_is_answered_and_not_recorded() {
     let rig = rig(busy).await;
-    rig.queue.start(1);
+    rig.queue.start();
     let job = rig.submit().await;
     rig.until(&job, |event| event.seq == 2).await; // running
     let start = Instant::now();
@@ -218,7 +246,7 @@ fn deaf(
 #[tokio::test]
 async fn a_deaf_solver_delays_only_its_slot_and_not_the_cancel() {
     let rig = rig(deaf).await;
-    rig.queue.start(1);
+    rig.queue.start();
     let job = rig.submit().await;
     rig.until(&job, |event| {
         matches!(
@@ -265,7 +293,7 @@ async fn a_running_job_that_no_worker_holds_is_canceled_at_once() {
 #[tokio::test]
 async fn a_drain_puts_a_running_job_back_without_using_up_a_start() {
     let rig = rig(fake::solve_until_stopped).await;
-    rig.queue.start(1);
+    rig.queue.start();
     let job = rig.submit().await;
     rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
         .await;
@@ -335,13 +363,7 @@ async fn what_an_overtaken_start_says_is_not_recorded() {
             .unwrap(),
         None
     );
-    assert_eq!(
-        rig.store
-            .finish(job.key, 1, &Ending::canceled())
-            .await
-            .unwrap(),
-        None
-    );
+    assert_eq!(rig.finish(&job, 1).await, None);
     assert!(
         rig.store
             .append_events(job.key, again.job.attempt, &line, &Default::default())
@@ -354,19 +376,9 @@ async fn what_an_overtaken_start_says_is_not_recorded() {
 #[tokio::test]
 async fn the_queue_is_ordered_by_priority_then_by_arrival() {
     let rig = rig(fake::solve).await;
-    let problem = fake::problem();
-    let new = |priority| NewJob {
-        name: None,
-        labels: Default::default(),
-        priority,
-        title: None,
-        input_hash: digest::input_hash(&problem).unwrap(),
-        problem: serde_json::to_string(&problem).unwrap(),
-        mesh: None,
-    };
     let mut jobs = vec![];
     for priority in [0, 5, 0, -1] {
-        jobs.push(rig.store.insert_job(&new(priority), 10).await.unwrap());
+        jobs.push(rig.submit_as(new(priority)).await);
     }
     let places: Vec<i64> = jobs
         .iter()

@@ -1,8 +1,6 @@
-//! A worker: takes a job, has it solved, ends it.
+//! A worker: has a claimed job solved, and ends it.
 
-use std::{
-    any::Any, ops::ControlFlow, sync::Arc, sync::atomic::Ordering, time::Duration, time::Instant,
-};
+use std::{any::Any, ops::ControlFlow, sync::Arc, time::Duration, time::Instant};
 
 use solver::{
     error::SolveError,
@@ -14,43 +12,26 @@ use tokio::{sync::mpsc, task::JoinError};
 use tracing::{error, info, warn};
 use uuid::Uuid;
 
-use super::{Queue, Running, recorder};
+use super::{
+    Queue, Running, recorder,
+    stop::{Stop, Why},
+};
 use crate::{
     event::Payload,
     job::{Failure, Job, Reason, ResultAvailable, Status},
     run::{self, Document, Solve},
-    store::{Claim, Ending, Parts, Store},
+    store::{Claim, Ending, LastWords, Parts, Store},
     time::Time,
 };
 
 /// Lines that a solver may be ahead of its recorder; then it waits.
 const AHEAD: usize = 256;
 
-/// Works until the drain.
-pub(super) async fn work(queue: Arc<Queue>) {
-    while !queue.stopping.is_cancelled() {
-        // First subscribe, then look: a job accepted after the look wakes us.
-        let woken = queue.wake.notified();
-        tokio::pin!(woken);
-        woken.as_mut().enable();
-        match queue.claim().await {
-            Ok(Some((claim, running))) => attempt(&queue, claim, running).await,
-            Ok(None) => {
-                tokio::select! {
-                    () = woken => {}
-                    () = queue.stopping.cancelled() => {}
-                }
-            }
-            Err(cause) => {
-                error!(%cause, "no job could be claimed: {cause}");
-                tokio::time::sleep(Duration::from_secs(1)).await; // a full disk may pass
-            }
-        }
-    }
-}
+/// A solver whose job has run out of time gets this long to leave its last state.
+const LAST_STATE: Duration = Duration::from_secs(2);
 
 /// One start of a job, from claim to end.
-async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) {
+pub(super) async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) {
     let Claim {
         job, problem, mesh, ..
     } = claim;
@@ -64,7 +45,7 @@ async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) {
         solve_aloud(&problem, mesh.as_ref(), solve, |payload| {
             // An error means that the recorder is gone, and with it everybody who would listen.
             let heard = payload.is_none_or(|said| say.blocking_send((Time::now(), said)).is_ok());
-            if heard && !stop.load(Ordering::Relaxed) {
+            if heard && stop.why().is_none() {
                 ControlFlow::Continue(())
             } else {
                 ControlFlow::Break(())
@@ -72,14 +53,35 @@ async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) {
         })
         .map_err(Unsolved::Solve)
     });
+    let clock = tokio::spawn(time_out(queue.clone(), job.clone(), running.clone()));
     let recorded = recorder::record(queue, &job, &running, lines).await;
     let solved = solving.await;
-    let (ending, parts) = match recorded {
-        Ok(()) => judge(&job, solved),
-        Err(cause) => (internal(&job, &cause), None),
+    clock.abort();
+    let (last, (ending, parts)) = match recorded {
+        Ok(last) => (last, judge(&job, solved, &running.stop)),
+        Err(cause) => (LastWords::default(), (internal(&job, &cause), None)),
     };
-    end(queue, &job, ending, parts).await;
+    end(queue, &job, ending, last, parts).await;
     queue.release(&job);
+}
+
+/// Stops a job that runs longer than it may, if need be over its solver's head.
+async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
+    tokio::time::sleep(Duration::from_secs_f64(job.limits.timeout_s)).await;
+    running.stop.ask(Why::TimedOut);
+    tokio::time::sleep(LAST_STATE).await;
+    let ending = timed_out(&job);
+    if let Err(cause) = queue.end(job.key, running.attempt, &ending).await {
+        error!(job.id = %job.id, %cause, "job {} could not be ended: {cause}", job.id);
+    }
+}
+
+fn timed_out(job: &Job) -> Ending {
+    let detail = format!(
+        "it was stopped after {} s; see limits.timeout_s",
+        job.limits.timeout_s
+    );
+    Ending::failed(Reason::TimedOut, detail)
 }
 
 /// Why there is no solution.
@@ -179,7 +181,9 @@ fn ending_of(document: &Document) -> Ending {
 fn judge(
     job: &Job,
     solved: Result<Result<Solved, Unsolved>, JoinError>,
+    stop: &Stop,
 ) -> (Ending, Option<Parts>) {
+    let out_of_time = stop.why() == Some(Why::TimedOut);
     let solved = match solved {
         Ok(Err(Unsolved::Mesh(cause))) => return (internal(job, &cause), None),
         Ok(Err(Unsolved::Solve(error))) => Ok(Err(error)),
@@ -192,10 +196,19 @@ fn judge(
             iterations,
             parts,
         })) => {
+            let ending = match ending.status {
+                // it stopped because it was asked to, and says no more than that
+                Status::Canceled if out_of_time => Ending {
+                    result: ending.result,
+                    ..timed_out(job)
+                },
+                _ => ending,
+            };
             let status = ending.status.as_str();
             info!(job.id = %job.id, status, iterations, "job {} solved: {status} after {iterations} iterations", job.id);
             (ending, Some(parts))
         }
+        Ok(Err(SolveError::Stopped)) if out_of_time => (timed_out(job), None),
         Ok(Err(SolveError::Stopped)) => (Ending::canceled(), None),
         Ok(Err(error @ (SolveError::SingularSystem { .. } | SolveError::Unheld { .. }))) => {
             failed(Reason::SingularSystem, &error)
@@ -239,9 +252,9 @@ fn panicked(error: JoinError) -> String {
 
 /// Stores the result, then the end. What fails is tried again, since a job must not stay running;
 /// if the store stays broken, the next start of the service puts the job back.
-async fn end(queue: &Queue, job: &Job, ending: Ending, parts: Option<Parts>) {
+async fn end(queue: &Queue, job: &Job, ending: Ending, last: LastWords, parts: Option<Parts>) {
     for pause_ms in [100, 1000, 5000, 0] {
-        let cause = match try_to_end(queue, job, &ending, parts.as_ref()).await {
+        let cause = match try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
             Ok(()) => return,
             Err(cause) => cause,
         };
@@ -255,19 +268,22 @@ async fn try_to_end(
     queue: &Queue,
     job: &Job,
     ending: &Ending,
+    last: &LastWords,
     parts: Option<&Parts>,
 ) -> crate::store::Result<()> {
-    let stored = match parts {
-        Some(parts) => {
-            queue
-                .store
-                .write_result(job.key, job.attempt, parts)
-                .await?
-        }
+    let (key, attempt) = (job.key, job.attempt);
+    let current = match parts {
+        Some(parts) => queue.store.write_ahead(key, attempt, parts).await?,
         None => true,
     };
-    if stored && let Some(seq) = queue.store.finish(job.key, job.attempt, ending).await? {
-        queue.live.announce(job.key, seq);
+    if !current {
+        return Ok(());
+    }
+    let told = queue
+        .store
+        .finish(key, attempt, ending, last.clone(), parts);
+    if let Some(told) = told.await? {
+        queue.announce(&told);
     }
     Ok(())
 }

@@ -1,10 +1,11 @@
-//! `/v1/jobs/{id}/events`: server-sent events, replayed and then live.
+//! `/v1/jobs/{id}/events`: replayed and then live, as server-sent events or as JSON Lines.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use axum::{
+    body::Body,
     extract::{RawQuery, State},
-    http::{HeaderMap, StatusCode},
+    http::{HeaderMap, StatusCode, header},
     response::{
         IntoResponse, Response,
         sse::{self, KeepAlive, Sse},
@@ -14,12 +15,21 @@ use futures_util::{StreamExt, TryStreamExt};
 
 use super::{
     Rest,
-    request::{JobPath, Params},
+    request::{JobPath, Params, wants},
 };
-use crate::{error::ApiError, event::Event, verbs::jobs};
+use crate::{
+    error::ApiError,
+    event::Event,
+    job::Job,
+    verbs::{Service, jobs, watch as verbs},
+};
 
 /// Tells proxies and clients that the line still stands.
 const PING: Duration = Duration::from_secs(15);
+/// Server-sent events.
+pub(super) const SSE: &str = "text/event-stream";
+/// A JSON object per line, by its names.
+const LINES: [&str; 2] = ["application/jsonl", "application/x-ndjson"];
 
 pub(super) async fn watch(
     State(rest): State<Rest>,
@@ -46,17 +56,41 @@ pub(super) async fn watch(
     };
     let after = seen.or(asked).unwrap_or(0);
     let job = jobs::get(&rest.service, path.id).await?;
-    if jobs::is_silent(&rest.service, &job, after).await? {
+    if verbs::is_silent(&rest.service, &job, after).await? {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
+    if wants(&headers, &LINES) {
+        return Ok(lines(&rest.service, &job, after));
+    }
+    Ok(stream(&rest.service, &job, after))
+}
+
+/// The events of a job after number `after` as server-sent events.
+pub(super) fn stream(service: &Arc<Service>, job: &Job, after: i64) -> Response {
     // An error just ends the stream: without `done` the client knows that there is more to come.
-    let events = jobs::watch(rest.service, job.key, after)
+    let events = verbs::watch(service.clone(), job.key, after)
         .map(|event| event.and_then(|event| told(&event)))
         .inspect_err(|error| tracing::debug!(%error, "event stream ended: {error}"))
         .take_while(|event| std::future::ready(event.is_ok()));
-    Ok(Sse::new(events)
+    Sse::new(events)
         .keep_alive(KeepAlive::new().interval(PING).text("ping"))
-        .into_response())
+        .into_response()
+}
+
+/// The same, a line each.
+fn lines(service: &Arc<Service>, job: &Job, after: i64) -> Response {
+    let lines = verbs::watch(service.clone(), job.key, after)
+        .map(|event| {
+            let mut line = serde_json::to_vec(&event?).map_err(ApiError::internal)?;
+            line.push(b'\n');
+            Ok::<_, ApiError>(line)
+        })
+        .take_while(|line| std::future::ready(line.is_ok()));
+    let headers = [
+        (header::CONTENT_TYPE, LINES[0]),
+        (header::CACHE_CONTROL, "no-cache"),
+    ];
+    (headers, Body::from_stream(lines)).into_response()
 }
 
 fn told(event: &Event) -> Result<sse::Event, ApiError> {

@@ -1,124 +1,118 @@
-//! `/v1/jobs`, `/v1/jobs/{id}`, `…/cancel` and `/v1/problems/validate`.
+//! `/v1/jobs` as a list, `/v1/jobs/{id}`, `…/problem` and `…/cancel`.
 
 use axum::{
     Json,
     body::Body,
     extract::{RawQuery, State},
-    http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
+    http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use serde::Serialize;
+use solver::problem::Problem;
 
 use super::{
-    Rest,
-    request::{JobPath, Params, json_text, preferred_wait_s},
-    submission::{bare_problem, submission},
+    Rest, filters,
+    request::{JobPath, Params, Tags, json_text, versions},
+    submission::edit,
 };
 use crate::{
     error::ApiError,
-    job::{Job, Status},
+    job::Job,
     verbs::{
-        jobs::{self as verbs, Cancellation, MAX_PAGE_SIZE, MAX_WAIT_S, PAGE_SIZE},
-        problems,
+        jobs::{self as verbs, Cancellation, Count, MAX_PAGE_SIZE, Many, PAGE_SIZE},
+        watch::{self, Until},
     },
 };
-
-/// Seconds after which to look again for a job that was accepted.
-const LOOK_AGAIN_S: u64 = 1;
-
-pub(super) async fn create(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    body: Body,
-) -> Result<Response, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    rest.service.accepting()?;
-    let text = json_text(&headers, body, rest.max_body_bytes).await?;
-    let (envelope, problem) = rest.service.work(move || submission(&text)).await??;
-    let mut job = verbs::create(&rest.service, envelope, problem).await?;
-    let wait_s = preferred_wait_s(&headers).map(|seconds| seconds.min(MAX_WAIT_S as u64));
-    if let Some(wait_s) = wait_s {
-        job = verbs::wait(&rest.service, job.id, wait_s as f64).await?;
-    }
-    let done = wait_s.is_some() && job.status.is_terminal();
-    let status = if done {
-        StatusCode::CREATED
-    } else {
-        StatusCode::ACCEPTED
-    };
-    let mut response = (status, one(&job)).into_response();
-    let mut set = |name: HeaderName, value: String| {
-        if let Ok(value) = HeaderValue::from_str(&value) {
-            response.headers_mut().insert(name, value);
-        }
-    };
-    set(header::LOCATION, format!("/v1/jobs/{}", job.id));
-    match wait_s {
-        Some(wait_s) if done => set(
-            HeaderName::from_static("preference-applied"),
-            format!("wait={wait_s}"),
-        ),
-        _ => set(header::RETRY_AFTER, LOOK_AGAIN_S.to_string()),
-    }
-    Ok(response)
-}
-
-pub(super) async fn validate(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    body: Body,
-) -> Result<Json<problems::Judgement>, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    let text = json_text(&headers, body, rest.max_body_bytes).await?;
-    let problem = rest.service.work(move || bare_problem(&text)).await??;
-    Ok(Json(problems::validate(&rest.service, problem).await?))
-}
 
 pub(super) async fn get(
     State(rest): State<Rest>,
     RawQuery(query): RawQuery,
+    headers: HeaderMap,
     path: JobPath,
 ) -> Result<Response, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    Ok(one(&verbs::get(&rest.service, path.id).await?))
+    let params = Params::parse(query.as_deref(), &["wait", "until"])?;
+    let wait_s = params.wait_s("wait")?;
+    let terminal = |word: &str| (word == "terminal").then_some(Until::Terminal);
+    let until = params.word("until", terminal, "terminal")?;
+    let seen = versions(&headers, header::IF_NONE_MATCH);
+    let mut job = verbs::get(&rest.service, path.id).await?;
+    if let Some(wait_s) = wait_s {
+        let known = seen.as_ref().and_then(Tags::version);
+        let until = until.unwrap_or(Until::Changed(known.unwrap_or(job.version)));
+        (job, _) = watch::wait(&rest.service, path.id, until, wait_s).await?;
+    }
+    let tag = tag(&job);
+    if seen.is_some_and(|seen| seen.contain(&tag)) {
+        return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
+    }
+    Ok(one(&job))
+}
+
+/// A page of jobs.
+#[derive(Serialize)]
+pub(super) struct List {
+    jobs: Vec<Job>,
+    next_page_token: Option<String>,
 }
 
 pub(super) async fn list(
     State(rest): State<Rest>,
     RawQuery(query): RawQuery,
 ) -> Result<Json<List>, ApiError> {
-    let params = Params::parse(query.as_deref(), &["status", "page_size", "page_token"])?;
-    let statuses = params
-        .all("status")
-        .flat_map(|list| list.split(','))
-        .map(|word| {
-            let expected = "queued, running, succeeded, failed or canceled";
-            Status::parse(word).ok_or(ApiError::BadParameter {
-                name: "status",
-                got: word.into(),
-                expected,
-            })
-        })
-        .collect::<Result<Vec<_>, _>>()?;
+    let more = ["page_size", "page_token", "order_by"];
+    let (filter, params) = filters::parse(query.as_deref(), &more)?;
+    let order = filters::order(&params)?;
     let page_size = params.number(
         "page_size",
         1..=MAX_PAGE_SIZE,
         "a whole number from 1 to 1000",
     )?;
+    let page_size = page_size.unwrap_or(PAGE_SIZE);
     let token = params.one("page_token").filter(|token| !token.is_empty());
-    let page = verbs::list(
-        &rest.service,
-        &statuses,
-        page_size.unwrap_or(PAGE_SIZE),
-        token,
-    )
-    .await?;
+    let page = verbs::list(&rest.service, &filter, order, page_size, token).await?;
     Ok(Json(List {
         jobs: page.jobs,
         next_page_token: page.next,
     }))
+}
+
+pub(super) async fn count(
+    State(rest): State<Rest>,
+    RawQuery(query): RawQuery,
+) -> Result<Json<Count>, ApiError> {
+    let (filter, params) = filters::parse(query.as_deref(), &["group_by"])?;
+    let group_by = filters::group_by(&params)?;
+    Ok(Json(verbs::count(&rest.service, &filter, group_by).await?))
+}
+
+pub(super) async fn problem(
+    State(rest): State<Rest>,
+    RawQuery(query): RawQuery,
+    path: JobPath,
+) -> Result<Json<Problem>, ApiError> {
+    Params::parse(query.as_deref(), &[])?;
+    Ok(Json(verbs::problem(&rest.service, path.id).await?))
+}
+
+pub(super) async fn update(
+    State(rest): State<Rest>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+    path: JobPath,
+    body: Body,
+) -> Result<Response, ApiError> {
+    Params::parse(query.as_deref(), &[])?;
+    let text = json_text(&headers, body, rest.service.max_body_bytes).await?;
+    let edit = edit(&text)?;
+    let version = match versions(&headers, header::IF_MATCH) {
+        None => None,
+        Some(tags) if tags.any() => None,
+        // a tag that is not ours matches no version
+        Some(tags) => Some(tags.version().unwrap_or(-1)),
+    };
+    Ok(one(
+        &verbs::update(&rest.service, path.id, edit, version).await?
+    ))
 }
 
 pub(super) async fn cancel(
@@ -131,20 +125,43 @@ pub(super) async fn cancel(
     Ok(tagged(&job, Canceled { outcome, job: &job }))
 }
 
+pub(super) async fn delete(
+    State(rest): State<Rest>,
+    RawQuery(query): RawQuery,
+    path: JobPath,
+) -> Result<StatusCode, ApiError> {
+    Params::parse(query.as_deref(), &[])?;
+    verbs::delete(&rest.service, path.id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+pub(super) async fn cancel_many(
+    State(rest): State<Rest>,
+    RawQuery(query): RawQuery,
+) -> Result<Json<Many>, ApiError> {
+    let (filter, _) = filters::parse(query.as_deref(), &[])?;
+    Ok(Json(verbs::cancel_many(&rest.service, filter).await?))
+}
+
+pub(super) async fn delete_many(
+    State(rest): State<Rest>,
+    RawQuery(query): RawQuery,
+) -> Result<Json<Many>, ApiError> {
+    let (filter, _) = filters::parse(query.as_deref(), &[])?;
+    Ok(Json(verbs::delete_many(&rest.service, filter).await?))
+}
+
 /// One job with its version as entity tag.
-fn one(job: &Job) -> Response {
+pub(super) fn one(job: &Job) -> Response {
     tagged(job, job)
 }
 
 fn tagged(job: &Job, body: impl Serialize) -> Response {
-    ([(header::ETAG, format!("\"{}\"", job.version))], Json(body)).into_response()
+    ([(header::ETAG, tag(job))], Json(body)).into_response()
 }
 
-/// A page of jobs.
-#[derive(Serialize)]
-pub(super) struct List {
-    jobs: Vec<Job>,
-    next_page_token: Option<String>,
+fn tag(job: &Job) -> String {
+    format!("\"{}\"", job.version)
 }
 
 /// What asking a job to stop did, and the job.

@@ -9,7 +9,7 @@ use axum::{
 };
 use futures_util::StreamExt;
 
-use crate::{error::ApiError, job::JobId};
+use crate::{error::ApiError, job::JobId, time::Time, verbs::watch::MAX_WAIT_S, violations};
 
 /// A job's name in a path, and what follows it. An ill-formed name is a job that does not exist.
 pub(super) struct JobPath {
@@ -31,10 +31,17 @@ impl<S: Send + Sync> FromRequestParts<S> for JobPath {
         let plot = path.remove("plot").unwrap_or_default();
         match JobId::parse(&id) {
             Some(id) => Ok(JobPath { id, boundary, plot }),
-            None => Err(ApiError::NotFound(format!("there is no job {id}"))),
+            None => Err(ApiError::NotFound(format!(
+                "there is no job {:?}",
+                violations::name(&id)
+            ))),
         }
     }
 }
+
+/// Parameters `label.{key}` stand for any key.
+pub(super) const ANY_LABEL: &str = "label.{key}";
+const LABEL: &str = "label.";
 
 /// The parameters of a query, each of them known.
 pub(super) struct Params(Vec<(String, String)>);
@@ -46,10 +53,10 @@ impl Params {
             form_urlencoded::parse(query.unwrap_or_default().as_bytes())
                 .into_owned()
                 .collect();
-        match pairs
-            .iter()
-            .find(|(name, _)| !known.contains(&name.as_str()))
-        {
+        match pairs.iter().find(|(name, _)| {
+            let label = name.starts_with(LABEL) && known.contains(&ANY_LABEL);
+            !label && !known.contains(&name.as_str())
+        }) {
             Some((name, _)) => {
                 let known = if known.is_empty() {
                     "none".into()
@@ -82,6 +89,58 @@ impl Params {
             .map(|(_, value)| value.as_str())
     }
 
+    /// Keys and values of the parameters `label.{key}`.
+    pub(super) fn labels(&self) -> impl Iterator<Item = (String, String)> {
+        self.0.iter().filter_map(|(name, value)| {
+            let key = name.strip_prefix(LABEL)?;
+            Some((key.to_owned(), value.clone()))
+        })
+    }
+
+    /// A point in time.
+    pub(super) fn time(&self, name: &'static str) -> Result<Option<Time>, ApiError> {
+        let Some(text) = self.one(name) else {
+            return Ok(None);
+        };
+        let time = Time::parse(text);
+        time.map(Some).ok_or_else(|| ApiError::BadParameter {
+            name,
+            got: text.into(),
+            expected: "a time as 2026-01-31T12:00:00Z (RFC 3339)",
+        })
+    }
+
+    /// Seconds that a request may wait.
+    pub(super) fn wait_s(&self, name: &'static str) -> Result<Option<f64>, ApiError> {
+        let Some(text) = self.one(name) else {
+            return Ok(None);
+        };
+        let seconds = text.parse::<f64>().ok();
+        let seconds = seconds.filter(|seconds| (0.0..=MAX_WAIT_S).contains(seconds));
+        seconds.map(Some).ok_or_else(|| ApiError::BadParameter {
+            name,
+            got: text.into(),
+            expected: "0 … 60 seconds",
+        })
+    }
+
+    /// One of several words; none when nothing was said.
+    pub(super) fn word<T>(
+        &self,
+        name: &'static str,
+        read: impl Fn(&str) -> Option<T>,
+        expected: &'static str,
+    ) -> Result<Option<T>, ApiError> {
+        let Some(text) = self.one(name) else {
+            return Ok(None);
+        };
+        read(text).map(Some).ok_or_else(|| ApiError::BadParameter {
+            name,
+            got: text.into(),
+            expected,
+        })
+    }
+
     /// A number, within bounds.
     pub(super) fn number(
         &self,
@@ -101,6 +160,72 @@ impl Params {
             }),
         }
     }
+}
+
+/// The versions that a header of entity tags names; `None`: the header is absent. Tags that are not ours
+/// name none.
+pub(super) fn versions(headers: &HeaderMap, name: header::HeaderName) -> Option<Tags> {
+    let mut values = headers.get_all(name).iter().peekable();
+    values.peek()?;
+    let tags: Vec<String> = values
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','))
+        .map(|tag| tag.trim().to_owned())
+        .collect();
+    Some(Tags(tags))
+}
+
+/// Entity tags of a conditional request.
+#[derive(Debug)]
+pub(super) struct Tags(Vec<String>);
+
+impl Tags {
+    /// Whether this tag, with its quotes, is among them, as `If-None-Match` compares: weakly.
+    pub(super) fn contain(&self, tag: &str) -> bool {
+        let same = |own: &String| own == "*" || own.strip_prefix("W/").unwrap_or(own) == tag;
+        self.0.iter().any(same)
+    }
+
+    /// Whether anything matches.
+    pub(super) fn any(&self) -> bool {
+        self.0.iter().any(|own| own == "*")
+    }
+
+    /// The first number among them.
+    pub(super) fn version(&self) -> Option<i64> {
+        let number = |tag: &String| {
+            let tag = tag.strip_prefix("W/").unwrap_or(tag);
+            tag.trim_matches('"').parse().ok()
+        };
+        self.0.iter().find_map(number)
+    }
+}
+
+/// The client's key for a request that it may repeat.
+pub(super) fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
+    let Some(value) = headers.get("idempotency-key") else {
+        return Ok(None);
+    };
+    let text = value.to_str().map_err(|_| ApiError::BadParameter {
+        name: "Idempotency-Key",
+        got: String::from_utf8_lossy(value.as_bytes()).into_owned(),
+        expected: "printable ASCII",
+    })?;
+    Ok(Some(text.to_owned()))
+}
+
+/// Whether the client wants this media type rather than JSON.
+pub(super) fn wants(headers: &HeaderMap, media: &[&str]) -> bool {
+    let values = headers.get_all(header::ACCEPT).iter();
+    let first = values
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','))
+        .map(|range| {
+            let name = range.split(';').next().unwrap_or_default();
+            name.trim().to_ascii_lowercase()
+        })
+        .find(|name| name == "application/json" || media.contains(&name.as_str()));
+    first.is_some_and(|name| name != "application/json")
 }
 
 /// The body as text, if it says that it is JSON and is not too large.

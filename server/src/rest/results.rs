@@ -5,13 +5,12 @@ use axum::{
     body::Body,
     extract::{RawQuery, State},
     http::{HeaderMap, header},
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use serde::Serialize;
-use solver::solution::Fields;
 
 use super::{
-    Rest,
+    Rest, data,
     request::{JobPath, Params},
 };
 use crate::{
@@ -53,7 +52,7 @@ pub(super) async fn history(
     let rows = results::history(&rest.service, path.id, most).await?;
     let bytes = rest.service.work(move || formats::history(&rows, format));
     let bytes = bytes.await?.map_err(ApiError::internal)?;
-    Ok(data(format, &format!("{}.history", path.id), bytes))
+    data::whole(&headers, format, format!("{}.history", path.id), bytes)
 }
 
 pub(super) async fn profile(
@@ -71,7 +70,7 @@ pub(super) async fn profile(
         .work(move || formats::profile(&profile, format));
     let bytes = bytes.await?.map_err(ApiError::internal)?;
     let name = format!("{}.profile.{}", path.id, path.boundary);
-    Ok(data(format, &name, bytes))
+    data::whole(&headers, format, name, bytes)
 }
 
 pub(super) async fn fields(
@@ -83,43 +82,21 @@ pub(super) async fn fields(
     let params = Params::parse(query.as_deref(), &["format"])?;
     let format = choose(Format::OF_FIELDS, params.one("format"), &headers)?;
     let name = format!("{}.fields", path.id);
-    if format == Format::Json {
-        // as they are stored, so they are passed on
-        let pieces = results::fields(&rest.service, path.id).await?;
-        return Ok(data(format, &name, Body::from_stream(pieces)));
+    if format != Format::Json {
+        let bytes = results::converted_fields(&rest.service, path.id, format).await?;
+        return data::whole(&headers, format, name, bytes);
     }
-    let stored = results::whole_fields(&rest.service, path.id);
-    let written = rest.service.work_on(stored, move |stored| {
-        let fields: Fields = serde_json::from_slice(&stored).map_err(|error| error.to_string())?;
-        drop(stored); // they may be large
-        formats::fields(&fields, format)
-    });
-    let bytes = written.await?.map_err(ApiError::internal)?;
-    Ok(data(format, &name, bytes))
-}
-
-/// Data under a name for the file that they may become.
-fn data(format: Format, name: &str, body: impl Into<Body>) -> Response {
-    // a boundary's name may be any text; a file's should be a plain one everywhere
-    let plain = |c: char| {
-        if c.is_ascii_alphanumeric() || "._-".contains(c) {
-            c
-        } else {
-            '_'
-        }
+    // as they are stored, so they are passed on
+    let fields = results::fields(&rest.service, path.id).await?;
+    let file = data::File {
+        format,
+        name,
+        bytes: fields.info.bytes,
+        digest: fields.info.digest.clone(),
     };
-    let name: String = name.chars().map(plain).collect();
-    let kind = match format {
-        Format::Csv => "text/csv; charset=utf-8",
-        other => other.media_type(),
-    };
-    let disposition = format!("attachment; filename=\"{name}.{}\"", format.name());
-    let headers = [
-        (header::CONTENT_TYPE, kind.to_string()),
-        (header::CONTENT_DISPOSITION, disposition),
-        (header::VARY, "Accept".to_string()),
-    ];
-    (headers, body.into()).into_response()
+    data::answer(&headers, &file, |range| {
+        Body::from_stream(fields.bytes(&rest.service, range.start, range.end))
+    })
 }
 
 /// The format to answer in: the parameter overrides the header, the first is the default.
@@ -211,16 +188,5 @@ mod tests {
         assert_eq!(chosen(None, Some("image/png")), None);
         assert_eq!(chosen(Some("xml"), None), None);
         assert_eq!(chosen(Some("vtu"), None), None);
-    }
-
-    #[test]
-    fn a_file_has_a_plain_name_whatever_the_boundary_is_called() {
-        let response = data(Format::Csv, "job_1.profile.a\"; b/\r\nñ", vec![]);
-        let headers = response.headers();
-        assert_eq!(
-            headers["content-disposition"],
-            "attachment; filename=\"job_1.profile.a___b____.csv\""
-        );
-        assert_eq!(headers["content-type"], "text/csv; charset=utf-8");
     }
 }

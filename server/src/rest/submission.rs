@@ -10,9 +10,10 @@ use solver::{
 
 use crate::{
     error::ApiError,
+    store::Edit,
     verbs::{
-        jobs::Envelope,
         problems::{AT, prefixed},
+        submit::{Draft, Envelope, MOST_JOBS},
     },
     violations::{self, Violations},
 };
@@ -20,10 +21,10 @@ use crate::{
 /// What is wrong with a body whose JSON is well formed, or what it holds.
 type Read<T> = Result<T, Vec<Violation>>;
 
-/// A body `{problem, name, labels, priority}`. The problem's text goes to the solver's own strict
-/// parser; what is wrong with it comes together with what is wrong around it.
-pub(super) fn submission(text: &str) -> Result<(Envelope, Read<Problem>), ApiError> {
-    let mut fields = object(text)?;
+/// A body `{problem, name, labels, priority, limits, cache}`. The problem's text goes to the solver's own
+/// strict parser; what is wrong with it comes together with what is wrong around it.
+pub(super) fn submission(text: &str) -> Result<Draft, ApiError> {
+    let mut fields = object(text, "an object with the field problem")?;
     if let Some(violation) = unwrapped(&fields) {
         return Ok((Envelope::default(), Err(vec![violation])));
     }
@@ -51,13 +52,122 @@ pub(super) fn submission(text: &str) -> Result<(Envelope, Read<Problem>), ApiErr
         &mut violations,
         &mut envelope.priority,
     );
-    unknown(fields, "problem, name, labels, priority", &mut violations);
+    let limits = "an object {timeout_s, queue_ttl_s} of numbers";
+    take(
+        &mut fields,
+        "limits",
+        limits,
+        &mut violations,
+        &mut envelope.limits,
+    );
+    let cache = "use, refresh or off";
+    take(
+        &mut fields,
+        "cache",
+        cache,
+        &mut violations,
+        &mut envelope.cache,
+    );
+    let known = "problem, name, labels, priority, limits, cache";
+    unknown(fields, known, &mut violations);
     Ok((envelope, together(violations, problem)))
+}
+
+/// A body `{jobs: […]}`, each as a submission of its own.
+pub(super) fn batch(text: &str) -> Result<Read<Vec<Draft>>, ApiError> {
+    let mut fields = object(text, "an object with the field jobs")?;
+    let mut violations = Violations::default();
+    let mut texts: Vec<&RawValue> = vec![];
+    match fields.remove("jobs") {
+        Some(raw) => match serde_json::from_str(raw.get()) {
+            Ok(jobs) => texts = jobs,
+            Err(_) => violations.add(wrong_type("/jobs", raw, "an array of submissions")),
+        },
+        None => violations.add(Violation {
+            pointer: "/jobs".into(),
+            reason: "missing".into(),
+            got: "nothing".into(),
+            expected: "1 … 1000 submissions".into(),
+            hint: "Send {\"jobs\": [{\"problem\": {…}}, …]}.".into(),
+        }),
+    }
+    unknown(fields, "jobs", &mut violations);
+    let mut drafts = vec![];
+    // one more than there may be: the verb says that they are too many
+    for (n, text) in texts.iter().take(MOST_JOBS + 1).enumerate() {
+        let at = format!("/jobs/{n}");
+        match submission(text.get()) {
+            Ok((envelope, problem)) => {
+                if let Err(found) = &problem {
+                    violations.extend(prefixed(&at, found.clone()));
+                }
+                drafts.push((envelope, problem));
+            }
+            Err(ApiError::InvalidProblem(found)) => violations.extend(prefixed(&at, found)),
+            Err(other) => return Err(other),
+        }
+    }
+    Ok(if violations.is_empty() {
+        Ok(drafts)
+    } else {
+        Err(violations.into_vec())
+    })
+}
+
+/// A body `{name, labels, priority, pinned}`: what is absent stays, and a name of null is taken away.
+pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
+    let mut fields = object(text, "an object with what to change")?;
+    let mut violations = Violations::default();
+    let mut edit = Edit::default();
+    if fields.get("name").is_some_and(|raw| raw.get() == "null") {
+        fields.remove("name");
+        edit.name = Some(None);
+    }
+    let mut name: Option<String> = None;
+    take(
+        &mut fields,
+        "name",
+        "a string or null",
+        &mut violations,
+        &mut name,
+    );
+    if name.is_some() {
+        edit.name = Some(name);
+    }
+    let labels = "an object of strings";
+    take(
+        &mut fields,
+        "labels",
+        labels,
+        &mut violations,
+        &mut edit.labels,
+    );
+    let priority = "a whole number from -10 to 10";
+    take(
+        &mut fields,
+        "priority",
+        priority,
+        &mut violations,
+        &mut edit.priority,
+    );
+    take(
+        &mut fields,
+        "pinned",
+        "true or false",
+        &mut violations,
+        &mut edit.pinned,
+    );
+    unknown(fields, "name, labels, priority, pinned", &mut violations);
+    if violations.is_empty() {
+        Ok(edit)
+    } else {
+        Err(ApiError::InvalidProblem(violations.into_vec()))
+    }
 }
 
 /// A body `{problem}`.
 pub(super) fn bare_problem(text: &str) -> Result<Read<Problem>, ApiError> {
-    let mut fields = object(text)?;
+    let mut fields = object(text, "an object with the field problem")?;
     if let Some(violation) = unwrapped(&fields) {
         return Ok(Err(vec![violation]));
     }
@@ -67,17 +177,12 @@ pub(super) fn bare_problem(text: &str) -> Result<Read<Problem>, ApiError> {
     Ok(together(violations, problem))
 }
 
-fn object(text: &str) -> Result<BTreeMap<String, &RawValue>, ApiError> {
+fn object<'a>(text: &'a str, expected: &str) -> Result<BTreeMap<String, &'a RawValue>, ApiError> {
     // First only the syntax, so that a well-formed array is told that it should be an object.
     let whole: &RawValue =
         serde_json::from_str(text).map_err(|error| ApiError::MalformedJson(error.to_string()))?;
-    serde_json::from_str(whole.get()).map_err(|_| {
-        ApiError::InvalidProblem(vec![wrong_type(
-            "",
-            whole,
-            "an object with the field problem",
-        )])
-    })
+    serde_json::from_str(whole.get())
+        .map_err(|_| ApiError::InvalidProblem(vec![wrong_type("", whole, expected)]))
 }
 
 /// The problem itself where an envelope around it was expected: to call each of its names unknown

@@ -23,12 +23,7 @@ impl Store {
         if !is_current(&mut tx, key, attempt).await? {
             return Ok(None);
         }
-        let seq = append(&mut tx, key, attempt, payloads).await?;
-        sqlx::query("update job set progress = ? where id = ?")
-            .bind(serde_json::to_string(progress)?)
-            .bind(key)
-            .execute(&mut *tx)
-            .await?;
+        let seq = tell(&mut tx, key, attempt, payloads, progress).await?;
         tx.commit().await?;
         Ok(Some(seq))
     }
@@ -68,6 +63,23 @@ impl Store {
         .fetch_all(&self.reader)
         .await?)
     }
+}
+
+/// Appends what a solver says, with the progress that it amounts to.
+pub(super) async fn tell(
+    tx: &mut SqliteConnection,
+    key: i64,
+    attempt: i32,
+    payloads: &[(Time, Payload)],
+    progress: &Progress,
+) -> Result<i64> {
+    let seq = append(tx, key, attempt, payloads).await?;
+    sqlx::query("update job set progress = ? where id = ?")
+        .bind(serde_json::to_string(progress)?)
+        .bind(key)
+        .execute(tx)
+        .await?;
+    Ok(seq)
 }
 
 /// Numbers and appends within a transaction; gives the last number.

@@ -1,37 +1,21 @@
-//! Jobs: accepted, claimed, ended, listed. Every change of status goes through `change`.
+//! The life of a job: claimed, ended, put back, edited. Every change of status goes through `change`.
 
-use std::collections::BTreeMap;
-
-use sqlx::{QueryBuilder, Sqlite, SqliteConnection};
+use sqlx::SqliteConnection;
 
 use super::{
-    Result, Store, StoreError, events, meshes,
-    rows::{from_row, place, read},
+    Result, Store, StoreError,
+    change::{Change, Told},
+    events,
+    line::Move,
+    results::{self, Parts, running},
+    rows::{from_row, read},
+    submit,
 };
 use crate::{
     event::{Payload, Requeue},
-    job::{Failure, Job, JobId, Reason, ResultAvailable, Status},
+    job::{Failure, Job, JobId, Progress, Reason, ResultAvailable, Status},
     time::Time,
 };
-
-/// A job that is about to be accepted.
-#[derive(Clone, Debug)]
-pub struct NewJob {
-    /// A name for people.
-    pub name: Option<String>,
-    /// Labels for programs.
-    pub labels: BTreeMap<String, String>,
-    /// −10 … 10.
-    pub priority: i32,
-    /// The problem's title, exactly.
-    pub title: Option<String>,
-    /// Fingerprint of the problem.
-    pub input_hash: String,
-    /// The problem as JSON, without its title.
-    pub problem: String,
-    /// The stored mesh that it names.
-    pub mesh: Option<String>,
-}
 
 /// A job that a worker has just taken.
 #[derive(Debug)]
@@ -55,7 +39,7 @@ pub struct Ending {
     pub reason: Option<Reason>,
     /// What went wrong, if it failed.
     pub failure: Option<Failure>,
-    /// What was stored before.
+    /// What is stored with it.
     pub result: ResultAvailable,
 }
 
@@ -83,11 +67,20 @@ impl Ending {
     }
 }
 
+/// The last that a solver has said, with what it amounts to.
+#[derive(Clone, Debug, Default)]
+pub struct LastWords {
+    /// Events not yet written.
+    pub lines: Vec<(Time, Payload)>,
+    /// How far it has come.
+    pub progress: Progress,
+}
+
 /// What asking a job to stop did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CancelOutcome {
-    /// Nobody ran it and it is canceled, by the event of this number.
-    Canceled(i64),
+    /// Nobody ran it and it is canceled.
+    Canceled(Vec<Told>),
     /// This start of it is running and should stop.
     Requested {
         /// The number of the start.
@@ -97,224 +90,240 @@ pub enum CancelOutcome {
     AlreadyTerminal,
 }
 
+/// What is changed of a job; what is absent stays.
+#[derive(Clone, Debug, Default)]
+pub struct Edit {
+    /// A name, or none.
+    pub name: Option<Option<String>>,
+    /// All labels.
+    pub labels: Option<std::collections::BTreeMap<String, String>>,
+    /// −10 … 10.
+    pub priority: Option<i32>,
+    /// Never removed by age.
+    pub pinned: Option<bool>,
+}
+
 impl Store {
-    /// Accepts a job, unless `max_queued` are waiting. It is on the disk when this returns.
-    pub async fn insert_job(&self, new: &NewJob, max_queued: u32) -> Result<Job> {
-        let mut tx = self.begin().await?;
-        let full: bool = sqlx::query_scalar(
-            "select count(*) >= ?1 from (select 1 from job where status = 'queued' limit ?1)",
-        )
-        .bind(max_queued)
-        .fetch_one(&mut *tx)
-        .await?;
-        if full {
-            return Err(StoreError::QueueFull);
-        }
-        meshes::require(&mut tx, new.mesh.as_deref()).await?;
-        sqlx::query(
-            "insert into problem (input_hash, body, mesh) values (?, ?, ?) on conflict do nothing",
-        )
-        .bind(&new.input_hash)
-        .bind(&new.problem)
-        .bind(&new.mesh)
-        .execute(&mut *tx)
-        .await?;
-        let now = Time::now();
-        let key: i64 = sqlx::query_scalar(
-            "insert into job (uuid, status, name, title, labels, priority, input_hash, created_at)
-             values (?, 'queued', ?, ?, ?, ?, ?, ?) returning id",
-        )
-        .bind(JobId::new().0.to_string())
-        .bind(&new.name)
-        .bind(&new.title)
-        .bind(serde_json::to_string(&new.labels)?)
-        .bind(new.priority)
-        .bind(&new.input_hash)
-        .bind(now.micros())
-        .fetch_one(&mut *tx)
-        .await?;
-        events::append(&mut tx, key, 0, &[(now, Payload::status(Status::Queued))]).await?;
-        let mut job = read(&mut tx, key).await?;
-        place(&mut tx, std::slice::from_mut(&mut job)).await?;
-        tx.commit().await?;
-        Ok(job)
-    }
-
-    /// The job of that name.
-    pub async fn job(&self, id: JobId) -> Result<Option<Job>> {
-        let mut connection = self.reader.acquire().await?;
-        let row = sqlx::query("select * from job where uuid = ?")
-            .bind(id.0.to_string())
-            .fetch_optional(&mut *connection)
-            .await?;
-        let Some(row) = row else { return Ok(None) };
-        let mut job = from_row(&row)?;
-        place(&mut connection, std::slice::from_mut(&mut job)).await?;
-        Ok(Some(job))
-    }
-
-    /// The title of a job, and its problem as JSON without it.
-    pub async fn problem(&self, key: i64) -> Result<(Option<String>, String)> {
-        Ok(sqlx::query_as(
-            "select job.title, problem.body from job join problem on problem.input_hash = job.input_hash
-             where job.id = ?",
-        )
-        .bind(key)
-        .fetch_one(&self.reader)
-        .await?)
-    }
-
-    /// Whether the job is terminal, and its `done` so among its events.
-    pub async fn has_ended(&self, key: i64) -> Result<bool> {
-        let status: String = sqlx::query_scalar("select status from job where id = ?")
-            .bind(key)
-            .fetch_one(&self.reader)
-            .await?;
-        Ok(Status::parse(&status).is_some_and(Status::is_terminal))
-    }
-
-    /// Jobs of these statuses (none: all), newest first, that arrived before the one numbered
-    /// `before`.
-    pub async fn jobs(
-        &self,
-        statuses: &[Status],
-        before: Option<i64>,
-        limit: i64,
-    ) -> Result<Vec<Job>> {
-        let mut query = QueryBuilder::<Sqlite>::new("select * from job where true");
-        if !statuses.is_empty() {
-            query.push(" and status in (");
-            let mut list = query.separated(", ");
-            statuses.iter().for_each(|status| {
-                list.push_bind(status.as_str());
-            });
-            query.push(")");
-        }
-        if let Some(before) = before {
-            query.push(" and id < ").push_bind(before);
-        }
-        query.push(" order by id desc limit ").push_bind(limit);
-        let mut connection = self.reader.acquire().await?;
-        let rows = query.build().fetch_all(&mut *connection).await?;
-        let mut jobs = rows.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
-        place(&mut connection, &mut jobs).await?;
-        Ok(jobs)
-    }
-
     /// The next job of the queue, now running; highest priority first, then in order of arrival.
     pub async fn claim_next(&self) -> Result<Option<Claim>> {
-        let mut tx = self.begin().await?;
-        let now = Time::now();
-        let row = sqlx::query(
-            "update job set status = 'running', attempt = attempt + 1, version = version + 1, started_at = ?,
-                            progress = null
-             where id = (select id from job where status = 'queued' order by priority desc, id limit 1)
-             returning *",
-        )
-        .bind(now.micros())
-        .fetch_optional(&mut *tx)
-        .await?;
-        let Some(row) = row else { return Ok(None) };
-        let job = from_row(&row)?;
-        let (problem, mesh) = sqlx::query_as("select body, mesh from problem where input_hash = ?")
-            .bind(&job.input_hash)
-            .fetch_one(&mut *tx)
-            .await?;
-        let started = [(now, Payload::status(Status::Running))];
-        let seq = events::append(&mut tx, job.key, job.attempt, &started).await?;
-        tx.commit().await?;
-        Ok(Some(Claim {
-            job,
-            problem,
-            mesh,
-            seq,
-        }))
+        let mut change = self.change().await?;
+        let claim = claim(&mut change).await?;
+        change.commit().await?;
+        Ok(claim)
     }
 
     /// Notes that somebody wants the job to stop; a queued one is canceled at once.
     pub async fn request_cancel(&self, key: i64) -> Result<CancelOutcome> {
-        let mut tx = self.begin().await?;
-        let job = read(&mut tx, key).await?;
-        let requested = CancelOutcome::Requested {
-            attempt: job.attempt,
+        let mut change = self.change().await?;
+        let Some(job) = find(change.sql(), key).await? else {
+            return Ok(CancelOutcome::AlreadyTerminal); // and deleted since
         };
-        let outcome = match job.status {
+        let attempt = job.attempt;
+        match job.status {
             Status::Queued => {
-                CancelOutcome::Canceled(end(&mut tx, &job, &Ending::canceled()).await?)
+                end(&mut change, &job, &Ending::canceled()).await?;
+                return Ok(CancelOutcome::Canceled(change.commit().await?));
             }
-            Status::Running if job.cancel_requested => requested,
+            Status::Running if job.cancel_requested => {}
             Status::Running => {
                 sqlx::query(
                     "update job set cancel_requested = 1, version = version + 1 where id = ?",
                 )
                 .bind(key)
-                .execute(&mut *tx)
+                .execute(change.sql())
                 .await?;
-                requested
+                change.commit().await?;
             }
-            Status::Succeeded | Status::Failed | Status::Canceled => CancelOutcome::AlreadyTerminal,
-        };
-        tx.commit().await?;
-        Ok(outcome)
+            Status::Succeeded | Status::Failed | Status::Canceled => {
+                return Ok(CancelOutcome::AlreadyTerminal);
+            }
+        }
+        Ok(CancelOutcome::Requested { attempt })
     }
 
-    /// Ends this start of a job, and gives the number of its last event; `None` when the start is
-    /// no longer current, because the job was canceled or put back meanwhile.
-    pub async fn finish(&self, key: i64, attempt: i32, ending: &Ending) -> Result<Option<i64>> {
-        let mut tx = self.begin().await?;
-        if !is_current(&mut tx, key, attempt).await? {
+    /// Ends this start of a job, with the last that it said and the rest of its result; `None` when the
+    /// start is no longer current, because the job was canceled or put back meanwhile.
+    pub async fn finish(
+        &self,
+        key: i64,
+        attempt: i32,
+        ending: &Ending,
+        last: LastWords,
+        result: Option<&Parts>,
+    ) -> Result<Option<Vec<Told>>> {
+        let mut change = self.change().await?;
+        if !is_current(change.sql(), key, attempt).await? {
             return Ok(None);
         }
-        let job = read(&mut tx, key).await?;
-        let seq = end(&mut tx, &job, ending).await?;
-        tx.commit().await?;
-        Ok(Some(seq))
+        if !last.lines.is_empty() {
+            events::tell(change.sql(), key, attempt, &last.lines, &last.progress).await?;
+        }
+        if let Some(parts) = result {
+            results::write_last(change.sql(), key, parts).await?;
+        }
+        let job = read(change.sql(), key).await?;
+        end(&mut change, &job, ending).await?;
+        Ok(Some(change.commit().await?))
     }
 
     /// Puts a running job back for a drain, which does not count against it; one that was asked to
     /// stop is canceled instead. Gives its new status; `None` when the start is no longer current.
     pub async fn requeue_drained(&self, key: i64, attempt: i32) -> Result<Option<Status>> {
-        let mut tx = self.begin().await?;
-        if !is_current(&mut tx, key, attempt).await? {
+        let mut change = self.change().await?;
+        if !is_current(change.sql(), key, attempt).await? {
             return Ok(None);
         }
-        let job = read(&mut tx, key).await?;
+        let job = read(change.sql(), key).await?;
         // Somebody who asked it to stop is not made to wait for the restart.
         let status = if job.cancel_requested {
-            end(&mut tx, &job, &Ending::canceled()).await?;
+            end(&mut change, &job, &Ending::canceled()).await?;
             Status::Canceled
         } else {
-            requeue(&mut tx, &job, Requeue::Drain).await?;
+            requeue(&mut change, &job, Requeue::Drain).await?;
             Status::Queued
         };
-        tx.commit().await?;
+        change.commit().await?;
         Ok(Some(status))
     }
 
     /// Takes care of jobs that were running when the process died: back to the queue, or to their
     /// end when somebody wanted that or when too many starts were lost. Before the listener opens.
     pub async fn requeue_interrupted(&self) -> Result<usize> {
-        let mut tx = self.begin().await?;
+        let mut change = self.change().await?;
         let rows = sqlx::query("select * from job where status = 'running'")
-            .fetch_all(&mut *tx)
+            .fetch_all(change.sql())
             .await?;
         for row in &rows {
             let job = from_row(row)?;
             if job.cancel_requested {
-                end(&mut tx, &job, &Ending::canceled()).await?;
+                end(&mut change, &job, &Ending::canceled()).await?;
             } else if job.attempt >= job.max_attempts {
                 let detail = format!(
                     "the process died during each of {} starts",
                     job.max_attempts
                 );
-                end(&mut tx, &job, &Ending::failed(Reason::WorkerLost, detail)).await?;
+                end(
+                    &mut change,
+                    &job,
+                    &Ending::failed(Reason::WorkerLost, detail),
+                )
+                .await?;
             } else {
-                requeue(&mut tx, &job, Requeue::WorkerLost).await?;
+                requeue(&mut change, &job, Requeue::WorkerLost).await?;
             }
         }
-        tx.commit().await?;
+        change.commit().await?;
         Ok(rows.len())
     }
+
+    /// Ends jobs that have waited longer than they may, some at a time. A job that another one, already
+    /// running, will answer does not wait for a start.
+    pub async fn expire_queued(&self, now: Time) -> Result<Vec<Told>> {
+        const AT_ONCE: i64 = 100;
+        let late = "from job where status = 'queued' and expires_at <= ?
+                    and (twin_of is null or twin_of in (select id from job where status = 'queued'))";
+        // nearly always there is none: readers do not hold up the writer to find that out
+        let some: bool = sqlx::query_scalar(sqlx::AssertSqlSafe(format!(
+            "select exists (select 1 {late})"
+        )))
+        .bind(now.micros())
+        .fetch_one(&self.reader)
+        .await?;
+        if !some {
+            return Ok(vec![]);
+        }
+        let mut change = self.change().await?;
+        let rows = sqlx::query(sqlx::AssertSqlSafe(format!("select * {late} limit ?")))
+            .bind(now.micros())
+            .bind(AT_ONCE)
+            .fetch_all(change.sql())
+            .await?;
+        for row in &rows {
+            let job = from_row(row)?;
+            let detail = format!(
+                "no worker was free within {} s; see limits.queue_ttl_s",
+                job.limits.queue_ttl_s
+            );
+            end(
+                &mut change,
+                &job,
+                &Ending::failed(Reason::QueueExpired, detail),
+            )
+            .await?;
+        }
+        change.commit().await
+    }
+
+    /// Changes what may be changed of a job, if it still is of that version. `Err` holds the version
+    /// that it is of instead; `None`: there is no such job.
+    pub async fn edit(
+        &self,
+        id: JobId,
+        edit: &Edit,
+        version: Option<i64>,
+    ) -> Result<Option<std::result::Result<Job, i64>>> {
+        let mut change = self.change().await?;
+        let row = sqlx::query("select * from job where uuid = ?")
+            .bind(id.0.to_string())
+            .fetch_optional(change.sql())
+            .await?;
+        let Some(row) = row else { return Ok(None) };
+        let job = from_row(&row)?;
+        if version.is_some_and(|version| version != job.version) {
+            return Ok(Some(Err(job.version)));
+        }
+        let key = job.key;
+        let name = edit.name.as_ref().unwrap_or(&job.name);
+        let labels = edit.labels.as_ref().unwrap_or(&job.labels);
+        let priority = edit.priority.unwrap_or(job.priority);
+        let pinned = edit.pinned.unwrap_or(job.pinned);
+        let same = *name == job.name
+            && *labels == job.labels
+            && priority == job.priority
+            && pinned == job.pinned;
+        if !same {
+            sqlx::query(
+                "update job set name = ?, labels = ?, priority = ?, pinned = ?, version = version + 1 where id = ?",
+            )
+            .bind(name)
+            .bind(serde_json::to_string(labels)?)
+            .bind(priority)
+            .bind(pinned)
+            .bind(key)
+            .execute(change.sql())
+            .await?;
+            if *labels != job.labels {
+                sqlx::query("delete from job_label where job_id = ?")
+                    .bind(key)
+                    .execute(change.sql())
+                    .await?;
+                submit::write_labels(&mut change, key, job.created_at, labels).await?;
+            }
+            if job.waits_in_line() && priority != job.priority {
+                let left = job.priority;
+                change.moves(Move::Leave {
+                    priority: left,
+                    key,
+                });
+                change.moves(Move::Enter { priority, key });
+            }
+        }
+        let edited = read(change.sql(), key).await?;
+        change.commit().await?;
+        let mut edited = [edited];
+        let mut connection = self.reader.acquire().await?;
+        self.place(&mut connection, &mut edited).await?;
+        let [edited] = edited;
+        Ok(Some(Ok(edited)))
+    }
+}
+
+pub(super) async fn find(connection: &mut SqliteConnection, key: i64) -> Result<Option<Job>> {
+    let row = sqlx::query("select * from job where id = ?")
+        .bind(key)
+        .fetch_optional(connection)
+        .await?;
+    row.as_ref().map(from_row).transpose()
 }
 
 /// Whether this start of the job still has the word.
@@ -328,8 +337,101 @@ pub(super) async fn is_current(tx: &mut SqliteConnection, key: i64, attempt: i32
     .await?)
 }
 
-/// Ends a job with its one `done` event. The last word of a transaction.
-async fn end(tx: &mut SqliteConnection, job: &Job, ending: &Ending) -> Result<i64> {
+pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
+    let key: Option<i64> = sqlx::query_scalar(
+        "select id from job where status = 'queued' and twin_of is null order by priority desc, id limit 1",
+    )
+    .fetch_optional(change.sql())
+    .await?;
+    let Some(key) = key else { return Ok(None) };
+    let waiting = read(change.sql(), key).await?;
+    let (job, seq) = start(change, &waiting).await?;
+    let (problem, mesh) = sqlx::query_as("select body, mesh from problem where input_hash = ?")
+        .bind(&job.input_hash)
+        .fetch_one(change.sql())
+        .await?;
+    Ok(Some(Claim {
+        job,
+        problem,
+        mesh,
+        seq,
+    }))
+}
+
+/// A start of a queued job.
+async fn start(change: &mut Change<'_>, job: &Job) -> Result<(Job, i64)> {
+    let now = Time::now();
+    self::change(change, job, Status::Running).await?;
+    sqlx::query(
+        "update job set attempt = attempt + 1, started_at = ?, progress = null, result_available = 'none'
+         where id = ?",
+    )
+    .bind(now.micros())
+    .bind(job.key)
+    .execute(change.sql())
+    .await?;
+    let job = read(change.sql(), job.key).await?;
+    let started = [(now, Payload::status(Status::Running))];
+    let seq = events::append(change.sql(), job.key, job.attempt, &started).await?;
+    change.told(job.key, seq);
+    Ok((job, seq))
+}
+
+/// Ends a job with its one `done` event, and decides what becomes of its twins.
+async fn end(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
+    close(change, job, ending).await?;
+    let twins = sqlx::query("select * from job where twin_of = ? order by id")
+        .bind(job.key)
+        .fetch_all(change.sql())
+        .await?;
+    let twins = twins.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
+    if submit::is_shared(ending.status, ending.reason) {
+        let source = read(change.sql(), job.key).await?;
+        for twin in &twins {
+            answer(change, twin, &source).await?;
+        }
+    } else if let Some((first, others)) = twins.split_first() {
+        // the first takes the place of its source; the others wait for it
+        let (priority, key) = (first.priority, first.key);
+        sqlx::query("update job set twin_of = null where id = ?")
+            .bind(key)
+            .execute(change.sql())
+            .await?;
+        change.moves(Move::Enter { priority, key });
+        for other in others {
+            sqlx::query("update job set twin_of = ? where id = ?")
+                .bind(key)
+                .bind(other.key)
+                .execute(change.sql())
+                .await?;
+        }
+    }
+    Ok(())
+}
+
+/// Answers a queued job with the end of another one of the same input: it runs, and has ended.
+pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> Result<()> {
+    let (job, _) = start(change, job).await?;
+    sqlx::query(
+        "update job set cached_from = ?, twin_of = null,
+                        result_job = (select coalesce(result_job, id) from job where id = ?) where id = ?",
+    )
+    .bind(source.id.0.to_string())
+    .bind(source.key)
+    .bind(job.key)
+    .execute(change.sql())
+    .await?;
+    let ending = Ending {
+        status: source.status,
+        reason: source.reason,
+        failure: source.failure.clone(),
+        result: source.result_available,
+    };
+    close(change, &job, &ending).await
+}
+
+/// The end itself. The last word on a job.
+async fn close(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
     debug_assert!(ending.status.is_terminal());
     let now = Time::now();
     let failure = ending
@@ -337,48 +439,56 @@ async fn end(tx: &mut SqliteConnection, job: &Job, ending: &Ending) -> Result<i6
         .as_ref()
         .map(serde_json::to_string)
         .transpose()?;
-    change(tx, job, ending.status).await?;
-    sqlx::query("update job set reason = ?, failure = ?, result_available = ?, finished_at = ? where id = ?")
-        .bind(ending.reason.map(Reason::as_str))
-        .bind(failure)
-        .bind(ending.result.as_str())
-        .bind(now.micros())
-        .bind(job.key)
-        .execute(&mut *tx)
-        .await?;
-    if ending.result == ResultAvailable::None {
-        // Pieces of a result that came too late.
-        sqlx::query("delete from result_part where job_id = ?")
-            .bind(job.key)
-            .execute(&mut *tx)
-            .await?;
+    // what finished load steps have left stays, however the job ends
+    let result = ending.result.max(job.result_available);
+    self::change(change, job, ending.status).await?;
+    sqlx::query(
+        "update job set reason = ?, failure = ?, result_available = ?, finished_at = ?, twin_of = null,
+                        solver_version = ? where id = ?",
+    )
+    .bind(ending.reason.map(Reason::as_str))
+    .bind(failure)
+    .bind(result.as_str())
+    .bind(now.micros())
+    .bind(env!("CARGO_PKG_VERSION"))
+    .bind(job.key)
+    .execute(change.sql())
+    .await?;
+    match (ending.result, result) {
+        (ResultAvailable::None, ResultAvailable::None) => {
+            // Pieces of a result that came too late.
+            results::remove(change.sql(), job.key).await?;
+            results::remove(change.sql(), running(job.key)).await?;
+        }
+        (ResultAvailable::None, _) => results::promote(change.sql(), job.key).await?,
+        _ => results::remove(change.sql(), running(job.key)).await?,
     }
     let done = Payload::Done {
-        job: Box::new(read(tx, job.key).await?),
+        job: Box::new(read(change.sql(), job.key).await?),
     };
-    events::append(tx, job.key, job.attempt, &[(now, done)]).await
+    let seq = events::append(change.sql(), job.key, job.attempt, &[(now, done)]).await?;
+    change.told(job.key, seq);
+    Ok(())
 }
 
-async fn requeue(tx: &mut SqliteConnection, job: &Job, why: Requeue) -> Result<i64> {
-    change(tx, job, Status::Queued).await?;
-    if why == Requeue::Drain {
-        // The start keeps its number, so that events tell starts apart, but is given back.
-        sqlx::query("update job set max_attempts = max_attempts + 1 where id = ?")
-            .bind(job.key)
-            .execute(&mut *tx)
-            .await?;
-    }
-    events::append(
-        tx,
-        job.key,
-        job.attempt,
-        &[(Time::now(), Payload::requeued(why))],
-    )
-    .await
+async fn requeue(change: &mut Change<'_>, job: &Job, why: Requeue) -> Result<()> {
+    self::change(change, job, Status::Queued).await?;
+    // The start keeps its number, so that events tell starts apart, but a drain gives it back.
+    let given_back = i32::from(why == Requeue::Drain);
+    sqlx::query("update job set max_attempts = max_attempts + ?, expires_at = ? where id = ?")
+        .bind(given_back)
+        .bind(Time::now().after_s(job.limits.queue_ttl_s).micros())
+        .bind(job.key)
+        .execute(change.sql())
+        .await?;
+    let back = [(Time::now(), Payload::requeued(why))];
+    let seq = events::append(change.sql(), job.key, job.attempt, &back).await?;
+    change.told(job.key, seq);
+    Ok(())
 }
 
-/// The one place where a status changes, apart from the claim.
-async fn change(tx: &mut SqliteConnection, job: &Job, next: Status) -> Result<()> {
+/// The one place where a status changes, and with it the line.
+async fn change(change: &mut Change<'_>, job: &Job, next: Status) -> Result<()> {
     if !job.status.may_become(next) {
         return Err(StoreError::Corrupt(format!(
             "{} cannot go from {:?} to {next:?}",
@@ -388,7 +498,14 @@ async fn change(tx: &mut SqliteConnection, job: &Job, next: Status) -> Result<()
     sqlx::query("update job set status = ?, version = version + 1 where id = ?")
         .bind(next.as_str())
         .bind(job.key)
-        .execute(tx)
+        .execute(change.sql())
         .await?;
+    let (priority, key) = (job.priority, job.key);
+    if job.waits_in_line() {
+        change.moves(Move::Leave { priority, key });
+    }
+    if next == Status::Queued {
+        change.moves(Move::Enter { priority, key });
+    }
     Ok(())
 }

@@ -4,15 +4,22 @@
 //! for want of a lock; others read at the same time (WAL). A commit is on the disk when it returns
 //! (synchronous FULL). Each method answers one question, in one transaction.
 
+mod change;
+mod delete;
 mod events;
 mod jobs;
+mod line;
+mod list;
 mod meshes;
 mod results;
 mod rows;
+mod settings;
+mod submit;
 
 use std::{
     fs::{File, OpenOptions, TryLockError},
     path::Path,
+    sync::{Arc, Mutex, MutexGuard, PoisonError, atomic::AtomicBool},
     time::Duration,
 };
 
@@ -22,15 +29,30 @@ use sqlx::{
     sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
 };
 
-pub use jobs::{CancelOutcome, Claim, Ending, NewJob};
+pub use change::Told;
+pub use delete::Deletion;
+pub use jobs::{CancelOutcome, Claim, Edit, Ending, LastWords};
+use line::{Line, Move};
+pub use list::{Cursor, Filter, GroupBy, Order, OrderBy};
 pub use meshes::{Removal, StoredMesh};
-pub use results::Parts;
+pub use results::{PIECE_BYTES, PartInfo, Parts};
+pub use submit::{Accepted, NewJob, OWNER, RequestKey, Submission};
+
+use crate::job::JobId;
 
 /// The database of one server.
 #[derive(Debug)]
 pub struct Store {
     writer: SqlitePool,
     reader: SqlitePool,
+    /// Jobs that wait, in order; true to the disk after every commit.
+    line: Mutex<Line>,
+    /// True to the disk too.
+    paused: AtomicBool,
+    /// One transaction at a time moves the line.
+    turn: tokio::sync::Mutex<()>,
+    /// Where submissions wait for the next commit.
+    door: submit::Door,
     /// Held as long as we live: a second server on the same folder would run our jobs again.
     _lock: File,
 }
@@ -44,6 +66,15 @@ pub enum StoreError {
     /// The queue holds as many jobs as it may.
     #[error("the queue is full")]
     QueueFull,
+    /// The key was used for another request.
+    #[error("the key was used for another request")]
+    KeyReuse,
+    /// The name belongs to another job.
+    #[error("{0} is another job")]
+    IdConflict(JobId),
+    /// The job was deleted.
+    #[error("{0} was deleted")]
+    Deleted(JobId),
     /// The job's mesh is not there.
     #[error("the mesh is not stored")]
     UnknownMesh,
@@ -73,6 +104,16 @@ impl From<sqlx::Error> for StoreError {
     }
 }
 
+impl StoreError {
+    /// The same for another one whose transaction it was too.
+    fn again(&self) -> StoreError {
+        match self {
+            StoreError::Full => StoreError::Full,
+            other => StoreError::Corrupt(other.to_string()),
+        }
+    }
+}
+
 impl From<serde_json::Error> for StoreError {
     fn from(error: serde_json::Error) -> Self {
         StoreError::Corrupt(error.to_string())
@@ -84,7 +125,7 @@ pub type Result<T> = std::result::Result<T, StoreError>;
 
 impl Store {
     /// Opens the store in `folder`, made if need be, and brings its tables up to date.
-    pub async fn open(folder: &Path) -> Result<Store> {
+    pub async fn open(folder: &Path) -> Result<Arc<Store>> {
         let lock = lock(folder)?;
         let options = SqliteConnectOptions::new()
             .filename(folder.join("signorini.db"))
@@ -98,11 +139,41 @@ impl Store {
         let writer = pool(1).connect_with(writing).await?;
         sqlx::migrate!("../migrations").run(&writer).await?;
         let reader = pool(4).connect_with(options.read_only(true)).await?;
-        Ok(Store {
+        let mut line = Line::default();
+        let waiting: Vec<(i32, i64)> = sqlx::query_as(
+            "select priority, id from job where status = 'queued' and twin_of is null order by priority desc, id",
+        )
+        .fetch_all(&reader)
+        .await?;
+        for (priority, key) in waiting {
+            line.make(Move::Enter { priority, key });
+        }
+        let paused = AtomicBool::new(settings::was_paused(&reader).await?);
+        let (door, submissions) = submit::Door::new();
+        let store = Arc::new(Store {
             writer,
             reader,
+            line: Mutex::new(line),
+            paused,
+            turn: tokio::sync::Mutex::default(),
+            door,
             _lock: lock,
-        })
+        });
+        tokio::spawn(submit::commit_submissions(
+            Arc::downgrade(&store),
+            submissions,
+        ));
+        Ok(store)
+    }
+
+    /// How many jobs wait for a worker.
+    pub fn waiting(&self) -> usize {
+        self.line().len()
+    }
+
+    fn line(&self) -> MutexGuard<'_, Line> {
+        // No code panics while it holds this lock; if one did, the line would still be whole.
+        self.line.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Ends every connection, and with the last one the write-ahead log.

@@ -1,19 +1,46 @@
 //! Results: named parts, each in pieces, written before the job's end and served after it.
+//!
+//! Pieces stand under the number of the job that wrote them, which may serve several jobs. What a job that
+//! still runs has found so far (its finished load steps) stands under the negative of its number: the
+//! final result can then be written beside it, and takes its place with the job's end.
 
 use serde_json::json;
+use sha2::{Digest, Sha256};
+use sqlx::SqliteConnection;
 
 use super::{Result, Store, jobs::is_current};
 use crate::run::Document;
 
 /// Bytes of one piece; larger rows make SQLite chain pages and readers hold more.
-const PIECE_BYTES: usize = 256 << 10;
+pub const PIECE_BYTES: usize = 256 << 10;
 /// Pieces per transaction: 1 MiB holds the single writer for some ten milliseconds, so that a
 /// cancel or a submit beside a large result still answers at once.
 const PIECES_PER_COMMIT: usize = 4;
 
-/// A document as it is stored: the name and the JSON of each part.
+/// A document as it is stored: name, JSON and SHA-256 of each part.
 #[derive(Debug)]
-pub struct Parts(Vec<(String, Vec<u8>)>);
+pub struct Parts(Vec<Part>);
+
+#[derive(Debug)]
+struct Part {
+    name: String,
+    body: Vec<u8>,
+    digest: Vec<u8>,
+}
+
+/// What a part is, as bytes.
+#[derive(Clone, Debug)]
+pub struct PartInfo {
+    /// Its length.
+    pub bytes: u64,
+    /// Its SHA-256.
+    pub digest: Vec<u8>,
+}
+
+/// Where a running job keeps what it has found so far.
+pub(super) fn running(key: i64) -> i64 {
+    -key
+}
 
 impl Parts {
     /// Cuts a document into the parts that routes serve.
@@ -47,8 +74,42 @@ impl Parts {
         if !document.fields.x.is_empty() {
             parts.push(("fields".to_string(), serde_json::to_vec(&document.fields)?));
         }
-        Ok(Parts(parts))
+        let hashed = |(name, body): (String, Vec<u8>)| Part {
+            digest: Sha256::digest(&body).to_vec(),
+            name,
+            body,
+        };
+        Ok(Parts(parts.into_iter().map(hashed).collect()))
     }
+
+    /// All pieces, in groups that are written together.
+    fn groups(&self) -> Vec<Vec<Piece<'_>>> {
+        let mut groups: Vec<Vec<Piece<'_>>> = vec![vec![]];
+        let mut bytes = 0;
+        for part in &self.0 {
+            for (number, body) in (0..).zip(part.body.chunks(PIECE_BYTES)) {
+                if bytes + body.len() > PIECES_PER_COMMIT * PIECE_BYTES {
+                    groups.push(vec![]);
+                    bytes = 0;
+                }
+                bytes += body.len();
+                if let Some(group) = groups.last_mut() {
+                    group.push(Piece {
+                        name: &part.name,
+                        number,
+                        body,
+                    });
+                }
+            }
+        }
+        groups
+    }
+}
+
+struct Piece<'a> {
+    name: &'a str,
+    number: i64,
+    body: &'a [u8],
 }
 
 /// The part that holds the profile of a boundary, at the end or at the end of a load step.
@@ -60,45 +121,66 @@ fn profile_part(boundary: &str, step: Option<usize>) -> String {
 }
 
 impl Store {
-    /// Writes the result of this start of a job over several short transactions; false when the
-    /// start is no longer current. It counts only when the job's end says so.
-    pub async fn write_result(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
-        let pieces: Vec<(&str, usize, &[u8])> = parts
-            .0
-            .iter()
-            .flat_map(|(name, bytes)| {
-                bytes
-                    .chunks(PIECE_BYTES)
-                    .enumerate()
-                    .map(move |(n, piece)| (name.as_str(), n, piece))
-            })
-            .collect();
-        for (n, group) in pieces.chunks(PIECES_PER_COMMIT).enumerate() {
+    /// Writes the result of this start of a job over several short transactions, all but its last
+    /// megabyte, which is written with the job's end; false when the start is no longer current.
+    pub async fn write_ahead(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
+        let groups = parts.groups();
+        let Some((_, ahead)) = groups.split_last() else {
+            return Ok(true);
+        };
+        for (n, group) in ahead.iter().enumerate() {
             let mut tx = self.begin().await?;
             if !is_current(&mut tx, key, attempt).await? {
                 return Ok(false);
             }
             if n == 0 {
                 // Pieces of an earlier start that died while it wrote them.
-                sqlx::query("delete from result_part where job_id = ?")
-                    .bind(key)
-                    .execute(&mut *tx)
-                    .await?;
+                remove(&mut tx, key).await?;
             }
-            for (name, piece, body) in group {
-                sqlx::query(
-                    "insert into result_part (job_id, name, piece, body) values (?, ?, ?, ?)",
-                )
-                .bind(key)
-                .bind(name)
-                .bind(*piece as i64)
-                .bind(body)
-                .execute(&mut *tx)
-                .await?;
-            }
+            insert(&mut tx, key, group).await?;
             tx.commit().await?;
         }
         Ok(true)
+    }
+
+    /// Keeps what a running job has found so far, in place of what it had before; false when the start is
+    /// no longer current.
+    pub async fn write_partial(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
+        let mut tx = self.begin().await?;
+        if !is_current(&mut tx, key, attempt).await? {
+            return Ok(false);
+        }
+        remove(&mut tx, running(key)).await?;
+        for group in parts.groups() {
+            insert(&mut tx, running(key), &group).await?;
+        }
+        describe(&mut tx, running(key), parts).await?;
+        sqlx::query("update job set result_available = 'partial' where id = ?")
+            .bind(key)
+            .execute(&mut *tx)
+            .await?;
+        tx.commit().await?;
+        Ok(true)
+    }
+
+    /// What a part is, as bytes.
+    pub async fn part_info(&self, key: i64, part: &str) -> Result<Option<PartInfo>> {
+        let found: Option<(i64, Vec<u8>)> =
+            sqlx::query_as("select bytes, digest from result_info where job_id = ? and name = ?")
+                .bind(key)
+                .bind(part)
+                .fetch_optional(&self.reader)
+                .await?;
+        if let Some((bytes, digest)) = found {
+            let bytes = bytes as u64;
+            return Ok(Some(PartInfo { bytes, digest }));
+        }
+        // stored before lengths and fingerprints were
+        let body = self.part(key, part).await?;
+        Ok(body.map(|body| PartInfo {
+            bytes: body.len() as u64,
+            digest: Sha256::digest(&body).to_vec(),
+        }))
     }
 
     /// One piece of a part, from 0; `None` after the last.
@@ -151,4 +233,69 @@ impl Store {
             .map(|name| name[prefix.len()..].to_string())
             .collect())
     }
+}
+
+/// The last pieces of a result, with what its parts are. In the transaction of the job's end.
+pub(super) async fn write_last(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
+    let groups = parts.groups();
+    if groups.len() == 1 {
+        remove(tx, key).await?;
+    }
+    if let Some(last) = groups.last() {
+        insert(tx, key, last).await?;
+    }
+    describe(tx, key, parts).await
+}
+
+/// What a job has found while it ran becomes its result.
+pub(super) async fn promote(tx: &mut SqliteConnection, key: i64) -> Result<()> {
+    remove(tx, key).await?;
+    for table in ["result_part", "result_info"] {
+        let statement = format!("update {table} set job_id = ? where job_id = ?");
+        sqlx::query(sqlx::AssertSqlSafe(statement))
+            .bind(key)
+            .bind(running(key))
+            .execute(&mut *tx)
+            .await?;
+    }
+    Ok(())
+}
+
+/// Removes all that is kept under this number.
+pub(super) async fn remove(tx: &mut SqliteConnection, key: i64) -> Result<()> {
+    for statement in [
+        "delete from result_part where job_id = ?",
+        "delete from result_info where job_id = ?",
+    ] {
+        sqlx::query(statement).bind(key).execute(&mut *tx).await?;
+    }
+    Ok(())
+}
+
+async fn insert(tx: &mut SqliteConnection, key: i64, group: &[Piece<'_>]) -> Result<()> {
+    for Piece { name, number, body } in group {
+        sqlx::query("insert into result_part (job_id, name, piece, body) values (?, ?, ?, ?)")
+            .bind(key)
+            .bind(*name)
+            .bind(number)
+            .bind(*body)
+            .execute(&mut *tx)
+            .await?;
+    }
+    Ok(())
+}
+
+async fn describe(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
+    for part in &parts.0 {
+        sqlx::query(
+            "insert or replace into result_info (job_id, name, bytes, digest) values (?, ?, ?, ?)",
+        )
+        .bind(key)
+        .bind(&part.name)
+        .bind(part.body.len() as i64)
+        .bind(&part.digest)
+        .execute(&mut *tx)
+        .await?;
+    }
+    Ok(())
 }

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection, sqlite::SqliteRow};
+use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use uuid::Uuid;
 
-use super::{Result, StoreError};
+use super::{Result, Store, StoreError, results::running};
 use crate::{
-    job::{Job, JobId, QueuePosition, Reason, ResultAvailable, Status},
+    job::{Job, JobId, Limits, QueuePosition, Reason, ResultAvailable, Status, Waiting},
     time::Time,
 };
 
@@ -20,36 +20,46 @@ pub(super) async fn read(tx: &mut SqliteConnection, key: i64) -> Result<Job> {
     )
 }
 
-/// Fills in the places of those that are queued, all from one look at the queue.
-pub(super) async fn place(connection: &mut SqliteConnection, jobs: &mut [Job]) -> Result<()> {
-    let queued: Vec<i64> = jobs
-        .iter()
-        .filter(|job| job.status == Status::Queued)
-        .map(|job| job.key)
-        .collect();
-    if queued.is_empty() {
-        return Ok(());
+impl Store {
+    /// Fills in the places of those that are queued. A job that another one will answer is where that one
+    /// is, and has come as far.
+    pub(super) async fn place(
+        &self,
+        connection: &mut SqliteConnection,
+        jobs: &mut [Job],
+    ) -> Result<()> {
+        for job in jobs.iter_mut().filter(|job| job.status == Status::Queued) {
+            let position = |priority, key| {
+                let ahead = self.line().ahead(priority, key)? as i64;
+                Some((ahead + 1, ahead))
+            };
+            let Some(source) = job.twin_of else {
+                let reason = match self.is_paused() {
+                    true => Waiting::Paused,
+                    false => Waiting::WorkersBusy,
+                };
+                // none: it left the line since it was read
+                job.queue =
+                    position(job.priority, job.key).map(|(position, ahead)| QueuePosition {
+                        position,
+                        ahead,
+                        reason,
+                    });
+                continue;
+            };
+            let Some(source) = super::jobs::find(connection, source).await? else {
+                continue; // it ended, and was deleted, since this job was read
+            };
+            let (position, ahead) = position(source.priority, source.key).unwrap_or_default();
+            job.progress = source.progress;
+            job.queue = Some(QueuePosition {
+                position,
+                ahead,
+                reason: Waiting::Joined,
+            });
+        }
+        Ok(())
     }
-    let mut query = QueryBuilder::<Sqlite>::new(
-        "with place as (select id, row_number() over (order by priority desc, id) as position
-                        from job where status = 'queued')
-         select id, position from place where id in (",
-    );
-    let mut list = query.separated(", ");
-    queued.iter().for_each(|key| {
-        list.push_bind(*key);
-    });
-    query.push(")");
-    let places: Vec<(i64, i64)> = query.build_query_as().fetch_all(connection).await?;
-    let places: BTreeMap<i64, i64> = places.into_iter().collect();
-    for job in jobs {
-        job.queue = places.get(&job.key).map(|&position| QueuePosition {
-            position,
-            ahead: position - 1,
-            reason: "workers_busy".into(),
-        });
-    }
-    Ok(())
 }
 
 pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
@@ -67,8 +77,21 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
     let failure: Option<&str> = row.try_get("failure")?;
     let result_available = ResultAvailable::parse(row.try_get("result_available")?)
         .ok_or_else(|| corrupt("result_available"))?;
+    let other = |name: &str| -> Result<Option<JobId>> {
+        let uuid: Option<&str> = row.try_get(name)?;
+        let read = |text| Uuid::try_parse(text).map(JobId).map_err(|_| corrupt(name));
+        uuid.map(read).transpose()
+    };
+    let key: i64 = row.try_get("id")?;
+    let result_key = match row.try_get::<Option<i64>, _>("result_job")? {
+        Some(other) => other,
+        None if status.is_terminal() => key,
+        None => running(key),
+    };
     Ok(Job {
-        key: row.try_get("id")?,
+        key,
+        result_key,
+        twin_of: row.try_get("twin_of")?,
         id,
         status,
         reason: reason
@@ -83,6 +106,9 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
         attempt: row.try_get("attempt")?,
         max_attempts: row.try_get("max_attempts")?,
         input_hash: row.try_get("input_hash")?,
+        cached_from: other("cached_from")?,
+        parent: other("parent")?,
+        pinned: row.try_get("pinned")?,
         created_at,
         started_at,
         finished_at,
@@ -92,6 +118,10 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
             .map(|(start, end)| start.seconds_until(end)),
         queue: None,
         progress: progress.map(serde_json::from_str).transpose()?,
+        limits: Limits {
+            timeout_s: row.try_get("timeout_s")?,
+            queue_ttl_s: row.try_get("queue_ttl_s")?,
+        },
         failure: failure.map(serde_json::from_str).transpose()?,
         result_available,
         links: links(id),
@@ -99,7 +129,7 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
 }
 
 fn links(id: JobId) -> BTreeMap<String, String> {
-    ["events", "history", "result", "fields", "cancel"]
+    ["problem", "events", "history", "result", "fields", "cancel"]
         .into_iter()
         .map(|verb| (verb.to_string(), format!("/v1/jobs/{id}/{verb}")))
         .chain([

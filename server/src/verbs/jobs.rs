@@ -1,194 +1,49 @@
-//! The life of a job: create, get, list, watch, wait, cancel.
+//! Jobs that were handed in: get, list, count, edit, cancel, delete; and the problem of one.
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{collections::BTreeMap, sync::Arc};
 
-use async_stream::try_stream;
-use futures_util::Stream;
-use solver::{
-    error::{Violation, escape},
-    problem::Problem,
-};
-use tokio::time::{Instant, timeout_at};
-use tracing::info;
+use solver::problem::Problem;
 
-use super::{
-    Service, detached, meshes, page,
-    problems::{self, Admitted},
-};
+use super::{Service, detached, page, submit};
 use crate::{
     error::ApiError,
-    event::{Event, Payload},
-    job::{Job, JobId, Status},
-    store::{CancelOutcome, NewJob, StoreError},
-    violations::{Violations, shortened},
+    job::{Job, JobId},
+    store::{CancelOutcome, Deletion, Edit, Filter, GroupBy, Order},
+    violations::Violations,
 };
 
-/// Longest time that a request may wait for a job, in seconds.
-pub const MAX_WAIT_S: f64 = 60.0;
-/// Jobs on a page, unless asked for otherwise; and at most.
+/// Jobs on a page, unless asked for otherwise.
 pub const PAGE_SIZE: i64 = 50;
 /// Most jobs on a page.
 pub const MAX_PAGE_SIZE: i64 = 1000;
-/// Events read at a time by a watcher.
-const EVENTS_PER_READ: i64 = 256;
-
-/// What a client hands in beside the problem.
-#[derive(Clone, Debug, Default)]
-pub struct Envelope {
-    /// A name for people.
-    pub name: Option<String>,
-    /// Labels for programs.
-    pub labels: BTreeMap<String, String>,
-    /// Higher first.
-    pub priority: i32,
-}
-
-/// Accepts a job. It is durable when this returns. Violations of envelope and problem come
-/// together.
-pub async fn create(
-    service: &Arc<Service>,
-    envelope: Envelope,
-    problem: Result<Problem, Vec<Violation>>,
-) -> Result<Job, ApiError> {
-    service.accepting()?;
-    let service = service.clone();
-    detached(async move {
-        let mut violations = envelope.violations();
-        let admitted = match problem {
-            Ok(problem) => match problems::admit(&service, problem).await {
-                Err(ApiError::InvalidProblem(more)) => Err(more),
-                admitted => Ok(admitted?),
-            },
-            Err(more) => Err(more),
-        };
-        let Admitted {
-            title,
-            input_hash,
-            json,
-            mesh,
-        } = match admitted {
-            Ok(admitted) if violations.is_empty() => admitted,
-            refused => {
-                violations.extend(refused.err().into_iter().flatten());
-                return Err(ApiError::InvalidProblem(violations.into_vec()));
-            }
-        };
-        let Envelope {
-            name,
-            labels,
-            priority,
-        } = envelope;
-        let new = NewJob {
-            name,
-            labels,
-            priority,
-            title,
-            input_hash,
-            problem: json,
-            mesh,
-        };
-        let limit = service.max_queued;
-        let job = service
-            .store
-            .insert_job(&new, limit)
-            .await
-            .map_err(|error| match error {
-                StoreError::QueueFull => ApiError::QueueFull { limit },
-                // it was there when the problem was checked, and has been removed since
-                StoreError::UnknownMesh => {
-                    let hash = new.mesh.as_deref().unwrap_or_default();
-                    ApiError::InvalidProblem(vec![meshes::missing(hash)])
-                }
-                other => other.into(),
-            })?;
-        service.queue.wake();
-        info!(job.id = %job.id, job.input_hash, "job {} accepted", job.id);
-        Ok(job)
-    })
-    .await
-}
-
-impl Envelope {
-    /// What is out of bounds.
-    fn violations(&self) -> Violations {
-        const MOST: usize = 256; // characters of a name or label
-        const LABELS: usize = 64;
-        let mut found = Violations::default();
-        let mut add = |pointer: String, got: String, expected: &str, hint: &str| {
-            found.add(Violation {
-                pointer,
-                reason: "out_of_range".into(),
-                got,
-                expected: expected.into(),
-                hint: hint.into(),
-            });
-        };
-        let length = |text: &str| text.chars().count();
-        if let Some(name) = self.name.as_deref().filter(|name| length(name) > MOST) {
-            add(
-                "/name".into(),
-                format!("{} characters", length(name)),
-                "at most 256 characters",
-                "Shorten it.",
-            );
-        }
-        if !(-10..=10).contains(&self.priority) {
-            add(
-                "/priority".into(),
-                self.priority.to_string(),
-                "-10 … 10",
-                "Higher runs first; 0 is usual.",
-            );
-        }
-        if self.labels.len() > LABELS {
-            add(
-                "/labels".into(),
-                self.labels.len().to_string(),
-                "at most 64 labels",
-                "Leave some out.",
-            );
-        }
-        for (key, value) in self.labels.iter().take(LABELS) {
-            let longest = length(key).max(length(value));
-            if longest > MOST || key.is_empty() {
-                let pointer = format!("/labels/{}", escape(&shortened(key, MOST)));
-                add(
-                    pointer,
-                    format!("{longest} characters"),
-                    "1 … 256 characters, as key and as value",
-                    "Shorten it.",
-                );
-            }
-        }
-        found
-    }
-}
+/// The filters that there are, as they are named where one is missing.
+const FILTERS: &str = "status, owner, label.{key}, name, input_hash, created_after, created_before, finished_after, finished_before";
 
 /// The job as it is now.
 pub async fn get(service: &Service, id: JobId) -> Result<Job, ApiError> {
-    let job = service.store.job(id).await?;
-    job.ok_or_else(|| ApiError::NotFound(format!("there is no job {id}")))
-}
-
-/// The job when it is terminal, or as it is after `seconds` or when the service stops.
-pub async fn wait(service: &Service, id: JobId, seconds: f64) -> Result<Job, ApiError> {
-    let until = Instant::now() + Duration::from_secs_f64(seconds.clamp(0.0, MAX_WAIT_S));
-    let mut job = get(service, id).await?;
-    let mut news = service.queue.subscribe(job.key);
-    loop {
-        // Read after subscribing: an end in between is not overlooked.
-        job = get(service, id).await?;
-        if job.status.is_terminal() {
-            return Ok(job);
-        }
-        tokio::select! {
-            heard = timeout_at(until, news.news()) => if heard.is_err() { return Ok(job) },
-            () = service.queue.stopping().cancelled() => return Ok(job),
-        }
+    match service.store.job(id).await? {
+        Some(job) => Ok(job),
+        None => Err(absent(service, id).await?),
     }
 }
 
-/// A page of jobs, newest first.
+async fn absent(service: &Service, id: JobId) -> Result<ApiError, ApiError> {
+    Ok(match service.store.was_deleted(id).await? {
+        true => ApiError::Deleted(id),
+        false => ApiError::NotFound(format!("there is no job {id}")),
+    })
+}
+
+/// The problem that was handed in, with its defaults filled in.
+pub async fn problem(service: &Service, id: JobId) -> Result<Problem, ApiError> {
+    let job = get(service, id).await?;
+    let (title, body) = service.store.problem(job.key).await?;
+    let read = service.work(move || serde_json::from_str(&body)).await?;
+    let problem: Problem = read.map_err(ApiError::internal)?;
+    Ok(Problem { title, ..problem })
+}
+
+/// A page of jobs.
 #[derive(Debug)]
 pub struct Page {
     /// The jobs.
@@ -197,25 +52,82 @@ pub struct Page {
     pub next: Option<String>,
 }
 
-/// Lists jobs of these statuses (none: all), newest first.
+/// Lists jobs.
 pub async fn list(
     service: &Service,
-    statuses: &[Status],
+    filter: &Filter,
+    order: Order,
     page_size: i64,
     page_token: Option<&str>,
 ) -> Result<Page, ApiError> {
-    let before = page_token
-        .map(|token| page::before(token, statuses).ok_or(ApiError::BadPageToken))
+    let list = page::list_of_jobs(filter, order);
+    let cursor = page_token
+        .map(|token| page::cursor(token, &list).ok_or(ApiError::BadPageToken))
         .transpose()?;
     // One more than asked for tells whether there is another page.
-    let mut jobs = service.store.jobs(statuses, before, page_size + 1).await?;
+    let jobs = service
+        .store
+        .jobs(filter, order, cursor, page_size + 1)
+        .await?;
+    let mut jobs = jobs;
     let more = jobs.len() as i64 > page_size;
     jobs.truncate(page_size as usize);
-    let next = jobs
-        .last()
-        .filter(|_| more)
-        .map(|job| page::token(job.key, statuses));
+    let last = jobs.last().filter(|_| more);
+    let next = last.map(|job| page::token(page::after(job, order), &list));
     Ok(Page { jobs, next })
+}
+
+/// How many jobs there are, and in groups how many of each.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Count {
+    /// All that the filters leave.
+    pub total: i64,
+    /// By the group's name; empty when no groups were asked for.
+    pub groups: BTreeMap<String, i64>,
+}
+
+/// Counts jobs.
+pub async fn count(
+    service: &Service,
+    filter: &Filter,
+    group_by: Option<GroupBy>,
+) -> Result<Count, ApiError> {
+    let groups = service.store.count(filter, group_by).await?;
+    let total = groups.iter().map(|(_, jobs)| jobs).sum();
+    let groups = match group_by {
+        Some(_) => groups.into_iter().collect(),
+        None => BTreeMap::new(),
+    };
+    Ok(Count { total, groups })
+}
+
+/// Changes what may be changed of a job, if it is still of that version.
+pub async fn update(
+    service: &Arc<Service>,
+    id: JobId,
+    edit: Edit,
+    version: Option<i64>,
+) -> Result<Job, ApiError> {
+    let mut violations = Violations::default();
+    let name = edit.name.iter().flatten().next();
+    violations.extend(name.and_then(|name| submit::name_violation(name)));
+    violations.extend(edit.priority.and_then(submit::priority_violation));
+    violations.extend(edit.labels.iter().flat_map(submit::label_violations));
+    if !violations.is_empty() {
+        return Err(ApiError::InvalidProblem(violations.into_vec()));
+    }
+    let service = service.clone();
+    detached(async move {
+        match service.store.edit(id, &edit, version).await? {
+            Some(Ok(job)) => {
+                service.queue.stir(job.key);
+                Ok(job)
+            }
+            Some(Err(version)) => Err(ApiError::StaleVersion(version)),
+            None => Err(absent(&service, id).await?),
+        }
+    })
+    .await
 }
 
 /// Asks a job to stop.
@@ -245,55 +157,79 @@ pub enum Cancellation {
     AlreadyTerminal,
 }
 
-/// Stored events after number `after`, then live ones; ends after `done`, or with the job if `after`
-/// lies beyond that. When the service stops it ends with an error, so that nobody takes that for the
-/// end of the job.
-pub fn watch(
-    service: Arc<Service>,
-    key: i64,
-    after: i64,
-) -> impl Stream<Item = Result<Event, ApiError>> + Send {
-    try_stream! {
-        let mut cursor = after;
-        let mut news = service.queue.subscribe(key);
-        let mut ended = false;
-        loop {
-            let events = service.store.events_after(key, cursor, EVENTS_PER_READ).await?;
-            let idle = events.is_empty();
-            for event in events {
-                cursor = event.seq;
-                let done = matches!(event.payload, Payload::Done { .. });
-                yield event;
-                if done {
-                    return;
-                }
+/// Deletes a job that has ended, with its events and its result.
+pub async fn delete(service: &Arc<Service>, id: JobId) -> Result<(), ApiError> {
+    let job = get(service, id).await?;
+    let service = service.clone();
+    detached(async move {
+        match service.store.delete(job.key).await? {
+            Deletion::Deleted => {
+                service.queue.stir(job.key);
+                Ok(())
             }
-            if idle && ended {
-                return;
-            }
-            if idle && service.store.has_ended(key).await? {
-                ended = true;
-                continue; // once more: `done` may have come after the look for events
-            }
-            if service.queue.stopping().is_cancelled() {
-                Err(ApiError::Draining)?;
-            }
-            if idle {
-                tokio::select! {
-                    () = news.news() => {}
-                    () = service.queue.stopping().cancelled() => {}
-                }
-            }
+            Deletion::Active => Err(ApiError::JobActive(job.status.as_str())),
+            Deletion::Unknown => Err(absent(&service, id).await?),
         }
-    }
+    })
+    .await
 }
 
-/// Whether a finished job has nothing to tell after number `after`.
-pub async fn is_silent(service: &Service, job: &Job, after: i64) -> Result<bool, ApiError> {
-    Ok(job.status.is_terminal()
-        && service
-            .store
-            .events_after(job.key, after, 1)
-            .await?
-            .is_empty())
+/// What was done to many jobs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Many {
+    /// Jobs that the filters leave.
+    pub matched: u64,
+    /// Those of them that changed.
+    pub changed: u64,
+}
+
+/// Asks all jobs of a filter to stop; jobs that come later are not meant.
+pub async fn cancel_many(service: &Arc<Service>, filter: Filter) -> Result<Many, ApiError> {
+    for_each(service, filter, |service: Arc<Service>, key| async move {
+        let outcome = service.queue.cancel(key).await?;
+        Ok(outcome != CancelOutcome::AlreadyTerminal)
+    })
+    .await
+}
+
+/// Deletes all jobs of a filter that have ended.
+pub async fn delete_many(service: &Arc<Service>, filter: Filter) -> Result<Many, ApiError> {
+    for_each(service, filter, |service: Arc<Service>, key| async move {
+        let deleted = service.store.delete(key).await? == Deletion::Deleted;
+        if deleted {
+            service.queue.stir(key);
+        }
+        Ok(deleted)
+    })
+    .await
+}
+
+/// Does the same to every job of a filter, each in a transaction of its own: nobody else waits for all of
+/// them. A client that hangs up changes nothing.
+async fn for_each<F: Future<Output = Result<bool, ApiError>> + Send>(
+    service: &Arc<Service>,
+    filter: Filter,
+    act: impl Fn(Arc<Service>, i64) -> F + Send + 'static,
+) -> Result<Many, ApiError> {
+    const AT_ONCE: i64 = 1000;
+    if filter.is_empty() {
+        return Err(ApiError::MissingFilter(FILTERS));
+    }
+    let service = service.clone();
+    detached(async move {
+        let last = service.store.last_key().await?;
+        let (mut after, mut many) = (0, Many::default());
+        loop {
+            let keys = service.store.keys(&filter, after, last, AT_ONCE).await?;
+            let Some(end) = keys.last() else {
+                return Ok(many);
+            };
+            after = *end;
+            for key in keys {
+                many.matched += 1;
+                many.changed += u64::from(act(service.clone(), key).await?);
+            }
+        }
+    })
+    .await
 }

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{BufReader, BufWriter, Read, Seek, Write},
+    io::{BufReader, BufWriter, Seek, Write},
     path::Path,
     sync::Arc,
 };
@@ -10,11 +10,17 @@ use std::{
 use futures_util::{Stream, StreamExt};
 use sha2::{Digest, Sha256};
 use solver::{error::Violation, io::ReadError, mesh::Mesh};
-use tokio::io::AsyncWriteExt;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tracing::info;
 
 use super::{Service, detached, page};
-use crate::{digest, error::ApiError, mesh::MeshInfo, store::Removal, violations};
+use crate::{
+    digest,
+    error::ApiError,
+    mesh::MeshInfo,
+    store::{Cursor, Removal, StoredMesh},
+    violations,
+};
 
 /// As of a result: larger pieces make SQLite chain pages.
 const PIECE_BYTES: usize = 256 << 10;
@@ -99,17 +105,16 @@ fn refused(error: ReadError) -> ApiError {
     }
 }
 
-async fn store(service: &Service, hash: &str, mut encoded: File) -> Result<(), ApiError> {
+async fn store(service: &Service, hash: &str, encoded: File) -> Result<(), ApiError> {
+    let mut encoded = tokio::fs::File::from_std(encoded);
     let mut first = 0;
     loop {
-        // 1 MiB from the page cache: no work for another thread
         let mut group = Vec::with_capacity(PIECES_PER_COMMIT);
         while group.len() < PIECES_PER_COMMIT {
             let mut piece = Vec::with_capacity(PIECE_BYTES);
             let mut limited = (&mut encoded).take(PIECE_BYTES as u64);
-            limited
-                .read_to_end(&mut piece)
-                .map_err(ApiError::internal)?;
+            let read = limited.read_to_end(&mut piece).await;
+            read.map_err(ApiError::internal)?;
             if piece.is_empty() {
                 break;
             }
@@ -149,6 +154,9 @@ pub struct Page {
     pub next: Option<String>,
 }
 
+/// The one list of meshes that there is, for its page tokens.
+const LIST: &str = "meshes";
+
 /// Lists meshes, newest first.
 pub async fn list(
     service: &Service,
@@ -156,13 +164,18 @@ pub async fn list(
     page_token: Option<&str>,
 ) -> Result<Page, ApiError> {
     let before = page_token
-        .map(|token| page::before(token, &[]).ok_or(ApiError::BadPageToken))
+        .map(|token| page::cursor(token, LIST).ok_or(ApiError::BadPageToken))
         .transpose()?;
+    let before = before.map(|cursor| cursor.key);
     let mut meshes = service.store.meshes(before, page_size + 1).await?;
     let more = meshes.len() as i64 > page_size;
     meshes.truncate(page_size as usize);
     let last = meshes.last().filter(|_| more);
-    let next = last.map(|mesh| page::token(mesh.key, &[]));
+    let after = |mesh: &StoredMesh| Cursor {
+        micros: mesh.info.created_at.micros(),
+        key: mesh.key,
+    };
+    let next = last.map(|mesh| page::token(after(mesh), LIST));
     let meshes = meshes.into_iter().map(|mesh| mesh.info).collect();
     Ok(Page { meshes, next })
 }
@@ -182,19 +195,23 @@ pub async fn delete(service: &Arc<Service>, hash: &str) -> Result<(), ApiError> 
 
 /// The mesh that a problem names, or the violation that there is none.
 pub async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mesh), ApiError> {
-    let found = match service.store.mesh(hash).await? {
-        Some(info) => service
-            .store
-            .mesh_body(hash)
-            .await?
-            .map(|body| (info, body)),
-        None => None,
+    // who has no place yet holds no mesh
+    let load = async {
+        let found = match service.store.mesh(hash).await? {
+            Some(info) => service
+                .store
+                .mesh_body(hash)
+                .await?
+                .map(|body| (info, body)),
+            None => None,
+        };
+        found.ok_or_else(|| ApiError::InvalidProblem(vec![missing(hash)]))
     };
-    let (info, body) = found.ok_or_else(|| ApiError::InvalidProblem(vec![missing(hash)]))?;
-    let mesh = service
-        .work(move || postcard::from_bytes(&body).map_err(ApiError::internal))
-        .await??;
-    Ok((info, mesh))
+    let read = |(info, body): (MeshInfo, Vec<u8>)| {
+        let mesh = postcard::from_bytes(&body).map_err(ApiError::internal)?;
+        Ok((info, mesh))
+    };
+    service.work_on(load, read).await?
 }
 
 /// What is said where a problem names a mesh that is not there.

@@ -5,7 +5,10 @@ pub mod meshes;
 pub mod page;
 pub mod plots;
 pub mod problems;
+pub mod queue;
 pub mod results;
+pub mod submit;
+pub mod watch;
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -30,6 +33,8 @@ pub struct Service {
     checks: Arc<Semaphore>,
     max_queued: u32,
     memory_budget_bytes: u64,
+    /// Largest body of a request over REST.
+    pub max_body_bytes: usize,
     /// Largest mesh file.
     pub max_mesh_bytes: usize,
     /// Where uploads lie until they are read.
@@ -45,6 +50,7 @@ impl Service {
             checks: Arc::new(Semaphore::new(2)),
             max_queued: config.max_queued,
             memory_budget_bytes: config.memory.bytes(),
+            max_body_bytes: config.max_body_bytes,
             max_mesh_bytes: config.max_mesh_bytes,
             data: config.data.clone(),
         }
@@ -100,6 +106,9 @@ impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
         match error {
             StoreError::Full => ApiError::StorageFull,
+            StoreError::KeyReuse => ApiError::KeyReuse,
+            StoreError::IdConflict(id) => ApiError::IdConflict(id),
+            StoreError::Deleted(id) => ApiError::Deleted(id),
             other => ApiError::internal(other),
         }
     }
@@ -124,8 +133,8 @@ mod tests {
             max_mesh_bytes: 1 << 20,
             grace_s: 1,
         };
-        let store = Arc::new(Store::open(folder.path()).await.unwrap());
-        let queue = Queue::new(store.clone(), fake::solve);
+        let store = Store::open(folder.path()).await.unwrap();
+        let queue = Queue::new(store.clone(), fake::solve, 1);
         Service::new(&config, store, queue)
     }
 

@@ -5,14 +5,16 @@ use std::sync::Arc;
 use async_stream::try_stream;
 use futures_util::Stream;
 use serde::{Deserialize, Serialize};
-use solver::solution::{ContactProfile, Iteration};
+use solver::solution::{ContactProfile, Fields, Iteration};
 
 use super::{Service, jobs};
 use crate::{
     error::ApiError,
     event::Payload,
+    formats::{self, Format},
     job::{Job, JobId, ResultAvailable},
     run::Summary,
+    store::{PIECE_BYTES, PartInfo},
     violations,
 };
 
@@ -25,17 +27,17 @@ pub struct StepResult {
     pub summary: solver::solution::Summary,
 }
 
-/// The summary of a job that has one, and those of its load steps.
+/// The summary of a job that has one, and those of its load steps: of one that runs, those that are done.
 pub async fn summary(service: &Service, id: JobId) -> Result<(Summary, Vec<StepResult>), ApiError> {
-    let job = finished(service, id).await?;
-    let bytes = service.store.part(job.key, "summary").await?;
+    let job = with_result(service, id).await?;
+    let bytes = service.store.part(job.result_key, "summary").await?;
     let bytes = bytes.ok_or_else(|| ApiError::internal(format!("{id} has no summary")))?;
     let summary = serde_json::from_slice(&bytes).map_err(ApiError::internal)?;
     Ok((summary, steps(service, &job).await?))
 }
 
 async fn steps(service: &Service, job: &Job) -> Result<Vec<StepResult>, ApiError> {
-    let bytes = service.store.part(job.key, "steps").await?;
+    let bytes = service.store.part(job.result_key, "steps").await?;
     bytes.map_or(Ok(vec![]), |bytes| {
         serde_json::from_slice(&bytes).map_err(ApiError::internal)
     })
@@ -51,11 +53,12 @@ pub async fn history(
     let job = jobs::get(service, id).await?;
     let store = &service.store;
     let load = async {
-        let stored = match job.result_available {
-            ResultAvailable::None => None,
-            ResultAvailable::Partial | ResultAvailable::Final => {
-                store.part(job.key, "history").await?
+        let stored = match (job.status.is_terminal(), job.result_available) {
+            (true, ResultAvailable::Partial | ResultAvailable::Final) => {
+                store.part(job.result_key, "history").await?
             }
+            // of one that runs, its watchers were told more than its finished load steps hold
+            (false, _) | (true, ResultAvailable::None) => None,
         };
         let told = match stored {
             Some(_) => vec![],
@@ -109,13 +112,21 @@ pub async fn profile(
     boundary: &str,
     step: Option<&str>,
 ) -> Result<ContactProfile, ApiError> {
-    let job = finished(service, id).await?;
+    let job = with_result(service, id).await?;
     let step = match step {
         None => None,
         Some(wanted) => Some(step_number(&steps(service, &job).await?, wanted, id)?),
     };
-    let Some(bytes) = service.store.profile(job.key, boundary, step).await? else {
-        let known = service.store.profiled_boundaries(job.key).await?.join(", ");
+    let Some(bytes) = service
+        .store
+        .profile(job.result_key, boundary, step)
+        .await?
+    else {
+        let known = service
+            .store
+            .profiled_boundaries(job.result_key)
+            .await?
+            .join(", ");
         return Err(ApiError::NotFound(format!(
             "{id} has no contact boundary {:?}; it has: {known}",
             violations::name(boundary)
@@ -142,42 +153,81 @@ fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, A
     })
 }
 
-/// The fields at all nodes as JSON, piece by piece: they may be large.
-pub async fn fields(
-    service: &Arc<Service>,
-    id: JobId,
-) -> Result<impl Stream<Item = Result<Vec<u8>, ApiError>> + Send + use<>, ApiError> {
-    let job = finished(service, id).await?;
-    let Some(first) = service.store.piece(job.key, "fields", 0).await? else {
-        // A canceled job keeps its history and profiles, but no fields.
-        return Err(ApiError::NoResult(job.status.as_str()));
-    };
-    let service = service.clone();
-    Ok(try_stream! {
-        yield first;
-        for piece in 1.. {
-            match service.store.piece(job.key, "fields", piece).await? {
-                Some(bytes) => yield bytes,
-                None => return,
+/// The fields of a job as they are stored: JSON, of known length and fingerprint, in pieces.
+#[derive(Debug)]
+pub struct StoredFields {
+    /// Length and fingerprint.
+    pub info: PartInfo,
+    result_key: i64,
+}
+
+/// The fields at all nodes as they are stored.
+pub async fn fields(service: &Service, id: JobId) -> Result<StoredFields, ApiError> {
+    let job = with_result(service, id).await?;
+    let result_key = job.result_key;
+    match service.store.part_info(result_key, "fields").await? {
+        Some(info) => Ok(StoredFields { info, result_key }),
+        None => Err(no_fields(&job)),
+    }
+}
+
+/// A job that was canceled, or still runs, has history and profiles, but no fields.
+fn no_fields(job: &Job) -> ApiError {
+    match job.status.is_terminal() {
+        true => ApiError::NoResult(job.status.as_str()),
+        false => ApiError::ResultNotReady(job.status.as_str()),
+    }
+}
+
+impl StoredFields {
+    /// The bytes from `start` to before `end`, piece by piece: they may be many.
+    pub fn bytes(
+        &self,
+        service: &Arc<Service>,
+        start: u64,
+        end: u64,
+    ) -> impl Stream<Item = Result<Vec<u8>, ApiError>> + Send + use<> {
+        let (service, key) = (service.clone(), self.result_key);
+        const PIECE: u64 = PIECE_BYTES as u64;
+        try_stream! {
+            for piece in start / PIECE..end.div_ceil(PIECE) {
+                let found = service.store.piece(key, "fields", piece as i64).await?;
+                let mut bytes = found.ok_or_else(|| ApiError::internal("a piece of a result is missing"))?;
+                let first = piece * PIECE;
+                bytes.truncate(end.saturating_sub(first) as usize);
+                let skipped = start.saturating_sub(first) as usize;
+                yield bytes.split_off(skipped.min(bytes.len()));
             }
         }
-    })
+    }
 }
 
-/// The same at once, for who writes them in another format.
-pub async fn whole_fields(service: &Service, id: JobId) -> Result<Vec<u8>, ApiError> {
-    let job = finished(service, id).await?;
-    let fields = service.store.part(job.key, "fields").await?;
-    fields.ok_or(ApiError::NoResult(job.status.as_str()))
+/// The same in another format, at once.
+pub async fn converted_fields(
+    service: &Service,
+    id: JobId,
+    format: Format,
+) -> Result<Vec<u8>, ApiError> {
+    let load = async {
+        let job = with_result(service, id).await?;
+        let fields = service.store.part(job.result_key, "fields").await?;
+        fields.ok_or_else(|| no_fields(&job))
+    };
+    let written = service.work_on(load, move |stored| {
+        let fields: Fields = serde_json::from_slice(&stored).map_err(|error| error.to_string())?;
+        drop(stored); // they may be large
+        formats::fields(&fields, format)
+    });
+    written.await?.map_err(ApiError::internal)
 }
 
-/// The job, if it has ended with something to show.
-pub(super) async fn finished(service: &Service, id: JobId) -> Result<Job, ApiError> {
+/// The job, if it has something to show: at its end, or of finished load steps while it runs.
+pub(super) async fn with_result(service: &Service, id: JobId) -> Result<Job, ApiError> {
     let job = jobs::get(service, id).await?;
     match (job.status.is_terminal(), job.result_available) {
-        (false, _) => Err(ApiError::ResultNotReady(job.status.as_str())),
+        (_, ResultAvailable::Partial | ResultAvailable::Final) => Ok(job),
+        (false, ResultAvailable::None) => Err(ApiError::ResultNotReady(job.status.as_str())),
         (true, ResultAvailable::None) => Err(ApiError::NoResult(job.status.as_str())),
-        (true, ResultAvailable::Partial | ResultAvailable::Final) => Ok(job),
     }
 }
 

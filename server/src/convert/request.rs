@@ -1,0 +1,155 @@
+//! What requests hold beside a problem.
+
+use prost_types::Timestamp;
+use solver::error::Violation;
+
+use super::{problem_from_pb, status};
+use crate::{
+    error::ApiError,
+    job::{Cache, Limits},
+    pb,
+    store::{Edit, Filter},
+    time::Time,
+    verbs::{
+        problems,
+        submit::{Draft, Envelope},
+    },
+};
+
+/// A job as it is handed in. Pointers go into the request.
+pub fn draft(request: pb::CreateJobRequest) -> Draft {
+    let pb::CreateJobRequest {
+        problem,
+        name,
+        labels,
+        priority,
+        limits,
+        cache,
+        ..
+    } = request;
+    let mut violations = vec![];
+    let defaults = Limits::default();
+    let limits = limits.unwrap_or_default();
+    let cache = match pb::Cache::try_from(cache) {
+        Ok(pb::Cache::Unspecified | pb::Cache::Use) => Cache::Use,
+        Ok(pb::Cache::Refresh) => Cache::Refresh,
+        Ok(pb::Cache::Off) => Cache::Off,
+        Err(_) => {
+            violations.push(Violation {
+                pointer: "/cache".into(),
+                reason: "wrong_type".into(),
+                got: cache.to_string(),
+                expected: "use, refresh or off".into(),
+                hint: "Take a value of the enum Cache.".into(),
+            });
+            Cache::Use
+        }
+    };
+    let envelope = Envelope {
+        name,
+        labels,
+        priority,
+        limits: Limits {
+            timeout_s: limits.timeout_s.unwrap_or(defaults.timeout_s),
+            queue_ttl_s: limits.queue_ttl_s.unwrap_or(defaults.queue_ttl_s),
+        },
+        cache,
+    };
+    let problem = problem_from_pb(problem.unwrap_or_default()); // which lacks everything, and is told so
+    let problem = problem.map_err(|found| problems::prefixed(problems::AT, found));
+    let problem = match problem {
+        Ok(problem) if violations.is_empty() => Ok(problem),
+        Ok(_) => Err(violations),
+        Err(found) => Err(found.into_iter().chain(violations).collect()),
+    };
+    (envelope, problem)
+}
+
+/// Which jobs.
+pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
+    let pb::JobFilter {
+        status: numbers,
+        owner,
+        labels,
+        name,
+        input_hash,
+        created_after,
+        created_before,
+        finished_after,
+        finished_before,
+    } = message.unwrap_or_default();
+    let read = |number| {
+        status(number).ok_or_else(|| bad("status", number, "a value of the enum other than 0"))
+    };
+    Ok(Filter {
+        statuses: numbers.into_iter().map(read).collect::<Result<_, _>>()?,
+        owner,
+        labels: labels.into_iter().collect(),
+        name,
+        input_hash,
+        created_after: time("created_after", created_after)?,
+        created_before: time("created_before", created_before)?,
+        finished_after: time("finished_after", finished_after)?,
+        finished_before: time("finished_before", finished_before)?,
+    })
+}
+
+fn time(name: &'static str, stamp: Option<Timestamp>) -> Result<Option<Time>, ApiError> {
+    let Some(stamp) = stamp else { return Ok(None) };
+    let micros = stamp
+        .seconds
+        .checked_mul(1_000_000)
+        .and_then(|micros| micros.checked_add(i64::from(stamp.nanos) / 1000));
+    match micros {
+        Some(micros) if (0..1_000_000_000).contains(&stamp.nanos) => {
+            Ok(Some(Time::from_micros(micros)))
+        }
+        _ => Err(bad(name, stamp, "a time within the range of a Timestamp")),
+    }
+}
+
+/// What is changed of a job.
+pub fn edit(request: pb::UpdateJobRequest) -> Result<Edit, ApiError> {
+    let pb::UpdateJobRequest {
+        update_mask,
+        name,
+        labels,
+        priority,
+        pinned,
+        ..
+    } = request;
+    let Some(mask) = update_mask else {
+        return Ok(Edit {
+            name: name.map(Some),
+            labels: (!labels.is_empty()).then_some(labels),
+            priority,
+            pinned,
+        });
+    };
+    let mut edit = Edit::default();
+    for path in mask.paths {
+        match path.as_str() {
+            "name" => edit.name = Some(name.clone()),
+            "labels" => edit.labels = Some(labels.clone()),
+            "priority" => edit.priority = Some(priority.unwrap_or_default()),
+            "pinned" => edit.pinned = Some(pinned.unwrap_or_default()),
+            _ => {
+                return Err(bad(
+                    "update_mask",
+                    path,
+                    "paths among name, labels, priority, pinned",
+                ));
+            }
+        }
+    }
+    Ok(edit)
+}
+
+/// A field with a value that it cannot have.
+pub fn bad(name: &'static str, got: impl ToString, expected: &'static str) -> ApiError {
+    ApiError::BadParameter {
+        name,
+        got: got.to_string(),
+        expected,
+    }
+}

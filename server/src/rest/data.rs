@@ -1,0 +1,218 @@
+//! Data as files: entity tags, digests, ranges.
+
+use std::ops::Range;
+
+use axum::{
+    body::Body,
+    http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use base64::{Engine, engine::general_purpose::STANDARD};
+use sha2::{Digest, Sha256};
+
+use super::request::versions;
+use crate::{error::ApiError, formats::Format};
+
+/// What a file is, before its bytes are looked at.
+pub(super) struct File {
+    pub(super) format: Format,
+    /// Without its ending.
+    pub(super) name: String,
+    pub(super) bytes: u64,
+    /// SHA-256.
+    pub(super) digest: Vec<u8>,
+}
+
+/// Answers with bytes that are there.
+pub(super) fn whole(
+    headers: &HeaderMap,
+    format: Format,
+    name: String,
+    bytes: Vec<u8>,
+) -> Result<Response, ApiError> {
+    let file = File {
+        format,
+        name,
+        bytes: bytes.len() as u64,
+        digest: Sha256::digest(&bytes).to_vec(),
+    };
+    answer(headers, &file, |range| {
+        let range = range.start as usize..range.end as usize;
+        Body::from(bytes.get(range).unwrap_or_default().to_vec())
+    })
+}
+
+/// Answers with a file or a range of it, or with the word that the client has it already. `body` gives the
+/// bytes of a range.
+pub(super) fn answer(
+    headers: &HeaderMap,
+    file: &File,
+    body: impl FnOnce(Range<u64>) -> Body,
+) -> Result<Response, ApiError> {
+    let hex: String = file
+        .digest
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    let tag = format!("\"{hex}\"");
+    let digest = format!("sha-256=:{}:", STANDARD.encode(&file.digest));
+    let vary = "Accept".to_owned();
+    let known = [
+        (header::ETAG, tag.clone()),
+        (header::VARY, vary),
+        // of the whole file, whatever part of it is sent
+        (HeaderName::from_static("repr-digest"), digest.clone()),
+        (header::ACCEPT_RANGES, "bytes".to_owned()),
+    ];
+    if versions(headers, header::IF_NONE_MATCH).is_some_and(|tags| tags.contain(&tag)) {
+        return Ok(with(StatusCode::NOT_MODIFIED.into_response(), known));
+    }
+    let range = match asked_range(headers, &tag, file.bytes) {
+        Asked::All => None,
+        Asked::Part(range) => Some(range),
+        Asked::Nothing => return Err(ApiError::RangeNotSatisfiable(file.bytes)),
+    };
+    let (status, content) = match &range {
+        None => (
+            StatusCode::OK,
+            (HeaderName::from_static("content-digest"), digest),
+        ),
+        Some(Range { start, end }) => (
+            StatusCode::PARTIAL_CONTENT,
+            (
+                header::CONTENT_RANGE,
+                format!("bytes {start}-{}/{}", end - 1, file.bytes),
+            ),
+        ),
+    };
+    let range = range.unwrap_or(0..file.bytes);
+    let length = range.end - range.start;
+    // a boundary's name may be any text; a file's should be a plain one everywhere
+    let plain = |c: char| {
+        if c.is_ascii_alphanumeric() || "._-".contains(c) {
+            c
+        } else {
+            '_'
+        }
+    };
+    let name: String = file.name.chars().map(plain).collect();
+    let kind = match file.format {
+        Format::Csv => "text/csv; charset=utf-8",
+        other => other.media_type(),
+    };
+    let disposition = format!("attachment; filename=\"{name}.{}\"", file.format.name());
+    let response = with((status, body(range)).into_response(), known);
+    Ok(with(
+        response,
+        [
+            content,
+            (header::CONTENT_TYPE, kind.to_owned()),
+            (header::CONTENT_DISPOSITION, disposition),
+            (header::CONTENT_LENGTH, length.to_string()),
+        ],
+    ))
+}
+
+fn with<const N: usize>(mut response: Response, headers: [(HeaderName, String); N]) -> Response {
+    for (name, value) in headers {
+        if let Ok(value) = HeaderValue::from_str(&value) {
+            response.headers_mut().insert(name, value);
+        }
+    }
+    response
+}
+
+/// What of a file is asked for.
+#[derive(Debug, PartialEq, Eq)]
+enum Asked {
+    All,
+    Part(Range<u64>),
+    /// A range behind its end.
+    Nothing,
+}
+
+/// The one range of a request, unless it holds for another version of the file. Several ranges, and what
+/// is not understood, are answered with everything, as RFC 9110 has it.
+fn asked_range(headers: &HeaderMap, tag: &str, length: u64) -> Asked {
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+    if text(header::IF_RANGE).is_some_and(|condition| condition.trim() != tag) {
+        return Asked::All;
+    }
+    let Some(range) = text(header::RANGE).and_then(|range| range.trim().strip_prefix("bytes="))
+    else {
+        return Asked::All;
+    };
+    let Some((first, last)) = range.split_once('-') else {
+        return Asked::All;
+    };
+    let number = |text: &str| text.trim().parse::<u64>().ok();
+    let (start, end) = match (number(first), number(last)) {
+        (Some(start), Some(last)) if start <= last => (start, last.saturating_add(1)),
+        (Some(start), None) if last.trim().is_empty() => (start, length),
+        (None, Some(suffix)) if first.trim().is_empty() => {
+            if suffix == 0 {
+                return Asked::Nothing;
+            }
+            (length.saturating_sub(suffix), length)
+        }
+        _ => return Asked::All,
+    };
+    if start >= length {
+        return Asked::Nothing;
+    }
+    Asked::Part(start..end.min(length))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn asked(range: &str) -> Asked {
+        let mut headers = HeaderMap::new();
+        headers.insert("range", range.parse().unwrap());
+        asked_range(&headers, "\"t\"", 10)
+    }
+
+    #[test]
+    fn ranges_are_read_as_the_rfc_has_them() {
+        assert_eq!(asked("bytes=0-3"), Asked::Part(0..4));
+        assert_eq!(asked("bytes=3-"), Asked::Part(3..10));
+        assert_eq!(asked("bytes=-3"), Asked::Part(7..10));
+        assert_eq!(asked("bytes=-30"), Asked::Part(0..10));
+        assert_eq!(asked("bytes=8-99"), Asked::Part(8..10));
+        assert_eq!(asked("bytes=10-"), Asked::Nothing);
+        assert_eq!(asked("bytes=-0"), Asked::Nothing);
+        for all in [
+            "bytes=0-1,3-4",
+            "bytes=5-2",
+            "lines=0-1",
+            "bytes=a-b",
+            "bytes=-",
+        ] {
+            assert_eq!(asked(all), Asked::All, "{all}");
+        }
+    }
+
+    #[test]
+    fn a_range_of_another_version_is_not_mixed_with_this_one() {
+        let mut headers = HeaderMap::new();
+        headers.insert("range", "bytes=2-3".parse().unwrap());
+        headers.insert("if-range", "\"other\"".parse().unwrap());
+        assert_eq!(asked_range(&headers, "\"t\"", 10), Asked::All);
+        headers.insert("if-range", "\"t\"".parse().unwrap());
+        assert_eq!(asked_range(&headers, "\"t\"", 10), Asked::Part(2..4));
+    }
+
+    #[test]
+    fn a_file_has_a_plain_name_whatever_the_boundary_is_called() {
+        let name = "job_1.profile.a\"; b/\r\nñ".to_owned();
+        let response = whole(&HeaderMap::new(), Format::Csv, name, vec![]).unwrap();
+        let headers = response.headers();
+        assert_eq!(
+            headers["content-disposition"],
+            "attachment; filename=\"job_1.profile.a___b____.csv\""
+        );
+        assert_eq!(headers["content-type"], "text/csv; charset=utf-8");
+    }
+}

@@ -1,0 +1,400 @@
+//! Jobs by name, and lists of them: filters, pages, counts.
+//!
+//! A page costs as many rows as it shows, not as many as there are: each filter has an index in the order of
+//! the list, and of the filters given the one that usually leaves the fewest jobs leads. A second filter is
+//! checked on the rows that the first one finds.
+
+use sqlx::{QueryBuilder, Row, Sqlite};
+
+use super::{Result, Store, rows::from_row};
+use crate::{
+    job::{Job, JobId, Status},
+    time::Time,
+};
+
+/// Which jobs; what is absent leaves none out.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Filter {
+    /// Of one of these statuses.
+    pub statuses: Vec<Status>,
+    /// Of this owner.
+    pub owner: Option<String>,
+    /// With all of these labels.
+    pub labels: Vec<(String, String)>,
+    /// Of exactly this name.
+    pub name: Option<String>,
+    /// With this input.
+    pub input_hash: Option<String>,
+    /// Accepted at this time or later.
+    pub created_after: Option<Time>,
+    /// Accepted before this time.
+    pub created_before: Option<Time>,
+    /// Ended at this time or later.
+    pub finished_after: Option<Time>,
+    /// Ended before this time.
+    pub finished_before: Option<Time>,
+}
+
+impl Filter {
+    /// Leaves no job out.
+    pub fn is_empty(&self) -> bool {
+        *self == Filter::default()
+    }
+}
+
+/// The order of a list; of equal times the order of arrival decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Order {
+    /// By which time.
+    pub by: OrderBy,
+    /// Latest first.
+    pub descending: bool,
+}
+
+/// The time that orders a list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OrderBy {
+    /// When they were accepted.
+    CreatedAt,
+    /// When they ended; jobs that have not are left out.
+    FinishedAt,
+}
+
+/// The last job of a page, after which the next one begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cursor {
+    /// Its time in the list's order, in microseconds.
+    pub micros: i64,
+    /// Its number.
+    pub key: i64,
+}
+
+/// What jobs are counted by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GroupBy {
+    /// Their status.
+    Status,
+    /// Their owner.
+    Owner,
+    /// Their name; jobs without one stand under the empty name.
+    Name,
+}
+
+/// What finds the rows of a list.
+#[derive(Clone, Copy)]
+enum Lead<'a> {
+    Label(&'a (String, String)),
+    InputHash(&'a str),
+    Name(&'a str),
+    Status(Status),
+    Owner(&'a str),
+    All,
+}
+
+impl Store {
+    /// The job of that name.
+    pub async fn job(&self, id: JobId) -> Result<Option<Job>> {
+        let mut connection = self.reader.acquire().await?;
+        let row = sqlx::query("select * from job where uuid = ?")
+            .bind(id.0.to_string())
+            .fetch_optional(&mut *connection)
+            .await?;
+        let Some(row) = row else { return Ok(None) };
+        let mut job = from_row(&row)?;
+        self.place(&mut connection, std::slice::from_mut(&mut job))
+            .await?;
+        Ok(Some(job))
+    }
+
+    /// The title of a job, and its problem as JSON without it.
+    pub async fn problem(&self, key: i64) -> Result<(Option<String>, String)> {
+        Ok(sqlx::query_as(
+            "select job.title, problem.body from job join problem on problem.input_hash = job.input_hash
+             where job.id = ?",
+        )
+        .bind(key)
+        .fetch_one(&self.reader)
+        .await?)
+    }
+
+    /// Whether the job is terminal, and its `done` so among its events; also when it is no longer there.
+    pub async fn has_ended(&self, key: i64) -> Result<bool> {
+        let status: Option<String> = sqlx::query_scalar("select status from job where id = ?")
+            .bind(key)
+            .fetch_optional(&self.reader)
+            .await?;
+        Ok(status.is_none_or(|word| Status::parse(&word).is_some_and(Status::is_terminal)))
+    }
+
+    /// At most `limit` jobs of a list, after `cursor`.
+    pub async fn jobs(
+        &self,
+        filter: &Filter,
+        order: Order,
+        cursor: Option<Cursor>,
+        limit: i64,
+    ) -> Result<Vec<Job>> {
+        let mut query = QueryBuilder::<Sqlite>::new("");
+        let leads = leads(filter);
+        for (n, lead) in leads.iter().enumerate() {
+            query.push(if n == 0 {
+                "select * from ("
+            } else {
+                " union all select * from ("
+            });
+            page(&mut query, filter, *lead, order, cursor);
+            query.push(" limit ").push_bind(limit).push(")");
+        }
+        if leads.len() > 1 {
+            let (by, direction) = (order.by.column(), order.direction());
+            query.push(format!(" order by {by} {direction}, id {direction} limit "));
+            query.push_bind(limit);
+        }
+        let mut connection = self.reader.acquire().await?;
+        let rows = query.build().fetch_all(&mut *connection).await?;
+        let mut jobs = rows.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
+        self.place(&mut connection, &mut jobs).await?;
+        Ok(jobs)
+    }
+
+    /// How many jobs there are, in groups if asked for, the groups by name.
+    pub async fn count(
+        &self,
+        filter: &Filter,
+        group_by: Option<GroupBy>,
+    ) -> Result<Vec<(String, i64)>> {
+        let group = match group_by {
+            Some(GroupBy::Status) => "status",
+            Some(GroupBy::Owner) => "owner",
+            Some(GroupBy::Name) => "coalesce(name, '')",
+            None => "''",
+        };
+        let mut query = QueryBuilder::<Sqlite>::new(format!(
+            "select {group} as kind, count(*) as jobs from job where true"
+        ));
+        conditions(&mut query, filter, None);
+        query.push(" group by kind order by kind");
+        let rows = query.build().fetch_all(&self.reader).await?;
+        rows.iter()
+            .map(|row| Ok((row.try_get("kind")?, row.try_get("jobs")?)))
+            .collect()
+    }
+
+    /// The numbers of at most `limit` jobs, in order of arrival, after one number and up to another.
+    pub async fn keys(
+        &self,
+        filter: &Filter,
+        after: i64,
+        up_to: i64,
+        limit: i64,
+    ) -> Result<Vec<i64>> {
+        let mut query = QueryBuilder::<Sqlite>::new("select id from job where id > ");
+        query.push_bind(after).push(" and id <= ").push_bind(up_to);
+        conditions(&mut query, filter, None);
+        query.push(" order by id limit ").push_bind(limit);
+        Ok(query.build_query_scalar().fetch_all(&self.reader).await?)
+    }
+
+    /// The number of the job that came last; 0 when there is none.
+    pub async fn last_key(&self) -> Result<i64> {
+        let last = sqlx::query_scalar("select coalesce(max(id), 0) from job");
+        Ok(last.fetch_one(&self.reader).await?)
+    }
+}
+
+impl OrderBy {
+    fn column(self) -> &'static str {
+        match self {
+            OrderBy::CreatedAt => "created_at",
+            OrderBy::FinishedAt => "finished_at",
+        }
+    }
+}
+
+impl Order {
+    /// What can be said.
+    pub const EXPECTED: &str = "created_at or finished_at, then desc (the default) or asc";
+
+    /// Reads `created_at`, `created_at asc`, `finished_at desc`, ….
+    pub fn parse(text: &str) -> Option<Order> {
+        let (by, direction) = text.split_once(' ').unwrap_or((text, "desc"));
+        let by = match by {
+            "created_at" => OrderBy::CreatedAt,
+            "finished_at" => OrderBy::FinishedAt,
+            _ => return None,
+        };
+        let descending = match direction {
+            "desc" => true,
+            "asc" => false,
+            _ => return None,
+        };
+        Some(Order { by, descending })
+    }
+
+    /// Newest first.
+    pub const NEWEST_FIRST: Order = Order {
+        by: OrderBy::CreatedAt,
+        descending: true,
+    };
+
+    fn direction(self) -> &'static str {
+        if self.descending { "desc" } else { "asc" }
+    }
+}
+
+impl GroupBy {
+    /// What can be said.
+    pub const EXPECTED: &str = "status, owner or name";
+
+    /// Reads the word.
+    pub fn parse(word: &str) -> Option<GroupBy> {
+        match word {
+            "status" => Some(GroupBy::Status),
+            "owner" => Some(GroupBy::Owner),
+            "name" => Some(GroupBy::Name),
+            _ => None,
+        }
+    }
+}
+
+/// What leads: one lead, or where only statuses can one for each of them, since their lists are merged.
+fn leads(filter: &Filter) -> Vec<Lead<'_>> {
+    if let Some(label) = filter.labels.first() {
+        return vec![Lead::Label(label)];
+    }
+    if let Some(hash) = &filter.input_hash {
+        return vec![Lead::InputHash(hash)];
+    }
+    if let Some(name) = &filter.name {
+        return vec![Lead::Name(name)];
+    }
+    if !filter.statuses.is_empty() {
+        let mut statuses = filter.statuses.clone();
+        statuses.sort_by_key(|status| status.as_str());
+        statuses.dedup();
+        return statuses.into_iter().map(Lead::Status).collect();
+    }
+    vec![filter.owner.as_deref().map_or(Lead::All, Lead::Owner)]
+}
+
+/// One ordered list without its limit.
+fn page(
+    query: &mut QueryBuilder<Sqlite>,
+    filter: &Filter,
+    lead: Lead<'_>,
+    order: Order,
+    cursor: Option<Cursor>,
+) {
+    let by_creation = order.by == OrderBy::CreatedAt;
+    // `indexed by`: the planner knows nothing of how many jobs a filter leaves, and would guess
+    match lead {
+        Lead::Label((key, value)) => {
+            query.push("select job.* from job_label cross join job on job.id = job_label.job_id where job_label.key = ");
+            query.push_bind(key.clone());
+            query.push(" and job_label.value = ");
+            query.push_bind(value.clone());
+        }
+        Lead::InputHash(hash) => {
+            query.push("select * from job indexed by job_by_input where input_hash = ");
+            query.push_bind(hash.to_owned());
+        }
+        Lead::Name(name) => {
+            query.push("select * from job indexed by job_by_name where name = ");
+            query.push_bind(name.to_owned());
+        }
+        Lead::Status(status) => {
+            let index = if by_creation {
+                "job_by_status"
+            } else {
+                "job_by_status_finished"
+            };
+            query.push(format!(
+                "select * from job indexed by {index} where status = "
+            ));
+            query.push_bind(status.as_str());
+        }
+        Lead::Owner(owner) if by_creation => {
+            query.push("select * from job indexed by job_by_owner where owner = ");
+            query.push_bind(owner.to_owned());
+        }
+        Lead::Owner(_) | Lead::All => {
+            let index = if by_creation {
+                "job_by_created"
+            } else {
+                "job_by_finished"
+            };
+            query.push(format!("select * from job indexed by {index} where true"));
+        }
+    }
+    if order.by == OrderBy::FinishedAt {
+        query.push(" and job.finished_at is not null");
+    }
+    conditions(query, filter, Some(lead));
+    let (by, id) = match lead {
+        Lead::Label(_) if by_creation => ("job_label.created_at", "job_label.job_id"),
+        _ if by_creation => ("job.created_at", "job.id"),
+        _ => ("job.finished_at", "job.id"),
+    };
+    if let Some(Cursor { micros, key }) = cursor {
+        let beyond = if order.descending { "<" } else { ">" };
+        query.push(format!(" and ({by}, {id}) {beyond} ("));
+        query.push_bind(micros).push(", ").push_bind(key).push(")");
+    }
+    let direction = order.direction();
+    query.push(format!(" order by {by} {direction}, {id} {direction}"));
+}
+
+/// All conditions of a filter; the one that leads is said twice, which costs nothing, but for statuses, of
+/// which each leads a list of its own, and labels, which are rows elsewhere.
+fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, lead: Option<Lead<'_>>) {
+    let Filter {
+        statuses,
+        owner,
+        labels,
+        name,
+        input_hash,
+        created_after,
+        created_before,
+        finished_after,
+        finished_before,
+    } = filter;
+    if !statuses.is_empty() && !matches!(lead, Some(Lead::Status(_))) {
+        query.push(" and job.status in (");
+        let mut list = query.separated(", ");
+        statuses.iter().for_each(|status| {
+            list.push_bind(status.as_str());
+        });
+        query.push(")");
+    }
+    let by_label = matches!(lead, Some(Lead::Label(_)));
+    for (key, value) in labels.iter().skip(usize::from(by_label)) {
+        query.push(" and job.id in (select job_id from job_label where key = ");
+        query.push_bind(key.clone()).push(" and value = ");
+        query.push_bind(value.clone()).push(")");
+    }
+    let texts = [("owner", owner), ("name", name), ("input_hash", input_hash)];
+    for (column, text) in texts {
+        if let Some(text) = text {
+            query.push(format!(" and job.{column} = "));
+            query.push_bind(text.clone());
+        }
+    }
+    // a list by label has the times of the label's rows, in its own order
+    let created = if by_label {
+        "job_label.created_at"
+    } else {
+        "job.created_at"
+    };
+    let times = [
+        (created, ">=", created_after),
+        (created, "<", created_before),
+        ("job.finished_at", ">=", finished_after),
+        ("job.finished_at", "<", finished_before),
+    ];
+    for (column, comparison, time) in times {
+        if let Some(time) = time {
+            query.push(format!(" and {column} {comparison} "));
+            query.push_bind(time.micros());
+        }
+    }
+}

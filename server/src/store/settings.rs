@@ -1,0 +1,35 @@
+//! What was set while the service ran, and stays set.
+
+use std::sync::atomic::Ordering;
+
+use sqlx::SqlitePool;
+
+use super::{Result, Store};
+
+/// Whether the queue was paused when the store was last open.
+pub(super) async fn was_paused(reader: &SqlitePool) -> Result<bool> {
+    let paused =
+        sqlx::query_scalar("select exists (select 1 from setting where name = 'queue_paused')");
+    Ok(paused.fetch_one(reader).await?)
+}
+
+impl Store {
+    /// Whether the queue is paused.
+    pub fn is_paused(&self) -> bool {
+        self.paused.load(Ordering::Relaxed)
+    }
+
+    /// Pauses the queue or lets it go on, until the opposite is said, also after a restart.
+    pub async fn set_paused(&self, paused: bool) -> Result<()> {
+        let mut tx = self.begin().await?;
+        let statement = if paused {
+            "insert into setting (name, value) values ('queue_paused', 'true') on conflict do nothing"
+        } else {
+            "delete from setting where name = 'queue_paused'"
+        };
+        sqlx::query(statement).execute(&mut *tx).await?;
+        tx.commit().await?;
+        self.paused.store(paused, Ordering::Relaxed);
+        Ok(())
+    }
+}

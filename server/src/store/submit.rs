@@ -1,0 +1,445 @@
+//! Accepting jobs: keys, names, answers from earlier results, and one commit for many clients.
+//!
+//! A commit costs a flush of the disk, whatever it holds. Submissions that arrive while one is under
+//! way therefore wait together and share the next: each in a part of its own, so that one that is
+//! refused undoes nothing of the others.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use tokio::sync::{mpsc, oneshot};
+
+use super::{
+    Result, Store, StoreError,
+    change::Change,
+    events,
+    jobs::{self, Claim},
+    line::Move,
+    meshes,
+    rows::{from_row, read},
+};
+use crate::{
+    event::Payload,
+    job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status},
+    time::Time,
+};
+
+/// Submissions that share a commit at most.
+const TOGETHER: usize = 64;
+
+/// A job that is about to be accepted.
+#[derive(Clone, Debug)]
+pub struct NewJob {
+    /// Its name, if the client made it.
+    pub id: Option<JobId>,
+    /// A name for people.
+    pub name: Option<String>,
+    /// Labels for programs.
+    pub labels: BTreeMap<String, String>,
+    /// −10 … 10.
+    pub priority: i32,
+    /// What it may take.
+    pub limits: Limits,
+    /// Whether earlier results may answer it.
+    pub cache: Cache,
+    /// The job that it tries again.
+    pub parent: Option<JobId>,
+    /// The problem's title, exactly.
+    pub title: Option<String>,
+    /// Fingerprint of the problem.
+    pub input_hash: String,
+    /// The problem as JSON, without its title.
+    pub problem: String,
+    /// The stored mesh that it names.
+    pub mesh: Option<String>,
+    /// Fingerprint of all that the client handed in.
+    pub payload: String,
+}
+
+/// A key that makes a request repeatable.
+#[derive(Clone, Debug)]
+pub struct RequestKey {
+    /// The client's own.
+    pub key: String,
+    /// Fingerprint of the whole request.
+    pub payload: String,
+}
+
+/// Jobs that are accepted together or not at all.
+#[derive(Clone, Debug)]
+pub struct Submission {
+    /// One or more.
+    pub jobs: Vec<NewJob>,
+    /// The client's key.
+    pub key: Option<RequestKey>,
+    /// Most jobs that may wait.
+    pub max_queued: u32,
+    /// Somebody is free to run a job: the next one of the queue is claimed with the same commit.
+    pub claim: bool,
+}
+
+/// What became of a submission.
+#[derive(Debug)]
+pub struct Accepted {
+    /// Its jobs, in order.
+    pub jobs: Vec<Job>,
+    /// They were there already: the key, or the job's name, was used before.
+    pub replayed: bool,
+    /// The next job of the queue, if that was asked for and there is one.
+    pub claim: Option<Claim>,
+}
+
+type Waiting = (Submission, oneshot::Sender<Result<Accepted>>);
+
+/// Where submissions wait for the next commit.
+#[derive(Debug)]
+pub(super) struct Door(mpsc::Sender<Waiting>);
+
+impl Door {
+    /// A door, and what comes through it.
+    pub(super) fn new() -> (Door, mpsc::Receiver<Waiting>) {
+        let (sender, receiver) = mpsc::channel(4 * TOGETHER);
+        (Door(sender), receiver)
+    }
+}
+
+impl Store {
+    /// Accepts jobs. They are on the disk when this returns.
+    pub async fn submit(&self, submission: Submission) -> Result<Accepted> {
+        let (reply, answer) = oneshot::channel();
+        let gone = || StoreError::Folder("the store is closed".into());
+        let sent = self.door.0.send((submission, reply)).await;
+        sent.map_err(|_| gone())?;
+        let mut accepted = answer.await.map_err(|_| gone())??;
+        // only now, since only now they stand in line
+        let queued = |job: &Job| job.status == Status::Queued;
+        if accepted.jobs.iter().any(queued) {
+            let mut connection = self.reader.acquire().await?;
+            self.place(&mut connection, &mut accepted.jobs).await?;
+        }
+        Ok(accepted)
+    }
+
+    /// The jobs of a key that was used before.
+    pub async fn replay(&self, key: &RequestKey) -> Result<Option<Vec<Job>>> {
+        let mut connection = self.reader.acquire().await?;
+        let Some(keys) = keyed(&mut connection, OWNER, key).await? else {
+            return Ok(None);
+        };
+        let mut jobs = vec![];
+        for number in keys {
+            jobs.push(still_there(&mut connection, number).await?);
+        }
+        self.place(&mut connection, &mut jobs).await?;
+        Ok(Some(jobs))
+    }
+
+    async fn commit_together(&self, waiting: Vec<Waiting>) {
+        let mut replies = vec![];
+        let committed = async {
+            let mut change = self.change().await?;
+            for (submission, reply) in waiting {
+                let mark = change.mark().await?;
+                let accepted = accept(&mut change, submission).await;
+                match &accepted {
+                    Ok(_) => change.keep().await?,
+                    Err(_) => change.undo(mark).await?,
+                }
+                replies.push((reply, accepted));
+            }
+            change.commit().await
+        }
+        .await;
+        match committed {
+            // nobody watches a job before its name is known; of claims the queue tells
+            Ok(_) => {
+                for (reply, accepted) in replies {
+                    let _ = reply.send(accepted); // who asked may have gone
+                }
+            }
+            Err(cause) => {
+                // those not reached yet hear that the store is closed, by their dropped senders
+                for (reply, _) in replies {
+                    let _ = reply.send(Err(cause.again()));
+                }
+            }
+        }
+    }
+}
+
+async fn accept(change: &mut Change<'_>, submission: Submission) -> Result<Accepted> {
+    let Submission {
+        jobs,
+        key,
+        max_queued,
+        claim,
+    } = submission;
+    if let Some(old) = known(change, &jobs, key.as_ref()).await? {
+        return Ok(Accepted {
+            jobs: old,
+            replayed: true,
+            claim: None,
+        });
+    }
+    let mut keys = vec![];
+    for new in &jobs {
+        keys.push(insert(change, new, max_queued).await?);
+    }
+    if let (Some(key), Some(first)) = (&key, keys.first()) {
+        sqlx::query(
+            "insert into request_key (owner, key, payload, first_job, jobs, created_at) values (?, ?, ?, ?, ?, ?)",
+        )
+        .bind(OWNER)
+        .bind(&key.key)
+        .bind(&key.payload)
+        .bind(first)
+        .bind(keys.len() as i64)
+        .bind(Time::now().micros())
+        .execute(change.sql())
+        .await?;
+    }
+    let claim = match claim {
+        true => jobs::claim(change).await?,
+        false => None,
+    };
+    let mut accepted = vec![];
+    for key in keys {
+        accepted.push(read(change.sql(), key).await?);
+    }
+    Ok(Accepted {
+        jobs: accepted,
+        replayed: false,
+        claim,
+    })
+}
+
+/// The jobs that a key or a client's own name stands for already.
+async fn known(
+    change: &mut Change<'_>,
+    jobs: &[NewJob],
+    key: Option<&RequestKey>,
+) -> Result<Option<Vec<Job>>> {
+    if let Some(key) = key
+        && let Some(keys) = keyed(change.sql(), OWNER, key).await?
+    {
+        let mut old = vec![];
+        for key in keys {
+            old.push(still_there(change.sql(), key).await?);
+        }
+        return Ok(Some(old));
+    }
+    let mut old = vec![];
+    for new in jobs {
+        let Some(id) = new.id else { continue };
+        let found: Option<(i64, Option<String>)> =
+            sqlx::query_as("select id, payload from job where uuid = ?")
+                .bind(id.0.to_string())
+                .fetch_optional(change.sql())
+                .await?;
+        match found {
+            Some((key, Some(payload))) if payload == new.payload && jobs.len() == 1 => {
+                old.push(still_there(change.sql(), key).await?);
+            }
+            Some(_) => return Err(StoreError::IdConflict(id)),
+            None if was_deleted(change.sql(), id).await? => {
+                return Err(StoreError::Deleted(id));
+            }
+            None => {}
+        }
+    }
+    Ok((!old.is_empty()).then_some(old))
+}
+
+/// Without tokens there is one owner.
+pub const OWNER: &str = "local";
+
+/// Commits submissions until the store is dropped.
+pub(super) async fn commit_submissions(
+    store: std::sync::Weak<Store>,
+    mut door: mpsc::Receiver<Waiting>,
+) {
+    while let Some(first) = door.recv().await {
+        let Some(store) = store.upgrade() else { return };
+        let mut waiting = vec![first];
+        while waiting.len() < TOGETHER
+            && let Ok(next) = door.try_recv()
+        {
+            waiting.push(next);
+        }
+        // In a task of its own: a panic there must not close the door for all who come later.
+        let store: Arc<Store> = store;
+        let done = tokio::spawn(async move { store.commit_together(waiting).await }).await;
+        if let Err(panic) = done {
+            tracing::error!(%panic, "submissions were lost to a panic: {panic}");
+        }
+    }
+}
+
+/// The keys of the jobs that a request key stands for.
+async fn keyed(
+    connection: &mut sqlx::SqliteConnection,
+    owner: &str,
+    key: &RequestKey,
+) -> Result<Option<std::ops::Range<i64>>> {
+    let found: Option<(String, i64, i64)> = sqlx::query_as(
+        "select payload, first_job, jobs from request_key where owner = ? and key = ?",
+    )
+    .bind(owner)
+    .bind(&key.key)
+    .fetch_optional(connection)
+    .await?;
+    match found {
+        None => Ok(None),
+        Some((payload, first, jobs)) if payload == key.payload => Ok(Some(first..first + jobs)),
+        Some(_) => Err(StoreError::KeyReuse),
+    }
+}
+
+pub(super) async fn was_deleted(
+    connection: &mut sqlx::SqliteConnection,
+    id: JobId,
+) -> Result<bool> {
+    Ok(
+        sqlx::query_scalar("select exists (select 1 from deleted_job where uuid = ?)")
+            .bind(id.0.to_string())
+            .fetch_one(connection)
+            .await?,
+    )
+}
+
+async fn still_there(connection: &mut sqlx::SqliteConnection, key: i64) -> Result<Job> {
+    match jobs::find(connection, key).await? {
+        Some(job) => Ok(job),
+        None => Err(StoreError::Deleted(deleted_name(connection, key).await?)),
+    }
+}
+
+async fn deleted_name(connection: &mut sqlx::SqliteConnection, key: i64) -> Result<JobId> {
+    let uuid: Option<String> = sqlx::query_scalar("select uuid from deleted_job where id = ?")
+        .bind(key)
+        .fetch_optional(connection)
+        .await?;
+    // forgotten by now: any name that is not a job's says the same
+    let uuid = uuid.and_then(|text| text.parse().ok());
+    Ok(JobId(uuid.unwrap_or_default()))
+}
+
+/// Inserts a job: waiting, or answered at once by an earlier result, or joined to a twin.
+async fn insert(change: &mut Change<'_>, new: &NewJob, max_queued: u32) -> Result<i64> {
+    let answer = match new.cache {
+        Cache::Use => earlier(change, &new.input_hash).await?,
+        Cache::Refresh | Cache::Off => None,
+    };
+    let twin_of = match (&answer, new.cache) {
+        (Some(source), _) => Some(source.key), // for a moment
+        (None, Cache::Use) => under_way(change, new).await?,
+        (None, _) => None,
+    };
+    let waits = twin_of.is_none();
+    if waits && change.waiting() >= max_queued as usize {
+        return Err(StoreError::QueueFull);
+    }
+    if answer.is_none() {
+        meshes::require(change.sql(), new.mesh.as_deref()).await?;
+    }
+    sqlx::query(
+        "insert into problem (input_hash, body, mesh) values (?, ?, ?) on conflict do nothing",
+    )
+    .bind(&new.input_hash)
+    .bind(&new.problem)
+    .bind(&new.mesh)
+    .execute(change.sql())
+    .await?;
+    let now = Time::now();
+    let expires_at = now.after_s(new.limits.queue_ttl_s);
+    let key: i64 = sqlx::query_scalar(
+        "insert into job (uuid, status, name, title, labels, priority, input_hash, created_at, payload, parent,
+                          cache, twin_of, timeout_s, queue_ttl_s, expires_at, owner)
+         values (?, 'queued', ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) returning id",
+    )
+    .bind(new.id.unwrap_or_default().0.to_string())
+    .bind(&new.name)
+    .bind(&new.title)
+    .bind(serde_json::to_string(&new.labels)?)
+    .bind(new.priority)
+    .bind(&new.input_hash)
+    .bind(now.micros())
+    .bind(&new.payload)
+    .bind(new.parent.map(|id| id.0.to_string()))
+    .bind(new.cache.as_str())
+    .bind(twin_of)
+    .bind(new.limits.timeout_s)
+    .bind(new.limits.queue_ttl_s)
+    .bind(expires_at.micros())
+    .bind(OWNER)
+    .fetch_one(change.sql())
+    .await?;
+    write_labels(change, key, now, &new.labels).await?;
+    let queued = [(now, Payload::status(Status::Queued))];
+    events::append(change.sql(), key, 0, &queued).await?;
+    if waits {
+        let priority = new.priority;
+        change.moves(Move::Enter { priority, key });
+    }
+    if let Some(source) = answer {
+        let job = read(change.sql(), key).await?;
+        jobs::answer(change, &job, &source).await?;
+    }
+    Ok(key)
+}
+
+/// Labels as rows to search.
+pub(super) async fn write_labels(
+    change: &mut Change<'_>,
+    key: i64,
+    created_at: Time,
+    labels: &BTreeMap<String, String>,
+) -> Result<()> {
+    for (name, value) in labels {
+        sqlx::query("insert into job_label (key, value, created_at, job_id) values (?, ?, ?, ?)")
+            .bind(name)
+            .bind(value)
+            .bind(created_at.micros())
+            .bind(key)
+            .execute(change.sql())
+            .await?;
+    }
+    Ok(())
+}
+
+/// The newest job of this input with a final result of this very program that may answer others.
+async fn earlier(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job>> {
+    let row = sqlx::query(
+        "select * from job where input_hash = ? and +status = 'succeeded' and result_available = ?
+                and cache <> 'off' and solver_version = ?
+         order by created_at desc, id desc limit 1",
+    )
+    .bind(input_hash)
+    .bind(ResultAvailable::Final.as_str())
+    .bind(env!("CARGO_PKG_VERSION"))
+    .fetch_optional(change.sql())
+    .await?;
+    row.as_ref().map(from_row).transpose()
+}
+
+/// A job at work on this input that will answer the new one too. One that waits behind the new one's
+/// priority, or that is about to be canceled, would make it late.
+async fn under_way(change: &mut Change<'_>, new: &NewJob) -> Result<Option<i64>> {
+    Ok(sqlx::query_scalar(
+        "select id from job where input_hash = ?1 and +status in ('queued', 'running') and cache <> 'off'
+                and twin_of is null and cancel_requested = 0 and (status = 'running' or priority >= ?2)
+         order by created_at, id limit 1",
+    )
+    .bind(&new.input_hash)
+    .bind(new.priority)
+    .fetch_optional(change.sql())
+    .await?)
+}
+
+/// Whether the end of a job is that of its twins too.
+pub(super) fn is_shared(status: Status, reason: Option<Reason>) -> bool {
+    match status {
+        Status::Succeeded => true,
+        Status::Failed => reason.is_some_and(Reason::belongs_to_the_problem),
+        Status::Queued | Status::Running | Status::Canceled => false,
+    }
+}

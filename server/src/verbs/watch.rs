@@ -1,0 +1,114 @@
+//! Watching a job: to its next version, to its end, event by event.
+
+use std::{sync::Arc, time::Duration};
+
+use async_stream::try_stream;
+use futures_util::Stream;
+use tokio::time::{Instant, timeout_at};
+
+use super::{Service, jobs};
+use crate::{
+    error::ApiError,
+    event::{Event, Payload},
+    job::{Job, JobId},
+};
+
+/// Longest time that a request may wait for a job, in seconds.
+pub const MAX_WAIT_S: f64 = 60.0;
+/// Events read at a time by a watcher.
+const EVENTS_PER_READ: i64 = 256;
+
+/// What a waiting client waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Until {
+    /// The job has ended.
+    Terminal,
+    /// Its version is another than this one.
+    Changed(i64),
+}
+
+impl Until {
+    fn is_met_by(self, job: &Job) -> bool {
+        match self {
+            Until::Terminal => job.status.is_terminal(),
+            Until::Changed(version) => job.version != version,
+        }
+    }
+}
+
+/// The job when that has come to pass, or as it is after `seconds` or when the service stops; and whether
+/// it has.
+pub async fn wait(
+    service: &Service,
+    id: JobId,
+    until: Until,
+    seconds: f64,
+) -> Result<(Job, bool), ApiError> {
+    let end = Instant::now() + Duration::from_secs_f64(seconds.clamp(0.0, MAX_WAIT_S));
+    let mut job = jobs::get(service, id).await?;
+    let mut news = service.queue.subscribe(job.key);
+    loop {
+        // Read after subscribing: a change in between is not overlooked.
+        job = jobs::get(service, id).await?;
+        if until.is_met_by(&job) {
+            return Ok((job, true));
+        }
+        tokio::select! {
+            heard = timeout_at(end, news.news()) => if heard.is_err() { return Ok((job, false)) },
+            () = service.queue.stopping().cancelled() => return Ok((job, false)),
+        }
+    }
+}
+
+/// Stored events after number `after`, then live ones; ends after `done`, or with the job if `after`
+/// lies beyond that. When the service stops it ends with an error, so that nobody takes that for the
+/// end of the job.
+pub fn watch(
+    service: Arc<Service>,
+    key: i64,
+    after: i64,
+) -> impl Stream<Item = Result<Event, ApiError>> + Send {
+    try_stream! {
+        let mut cursor = after;
+        let mut news = service.queue.subscribe(key);
+        let mut ended = false;
+        loop {
+            let events = service.store.events_after(key, cursor, EVENTS_PER_READ).await?;
+            let idle = events.is_empty();
+            for event in events {
+                cursor = event.seq;
+                let done = matches!(event.payload, Payload::Done { .. });
+                yield event;
+                if done {
+                    return;
+                }
+            }
+            if idle && ended {
+                return;
+            }
+            if idle && service.store.has_ended(key).await? {
+                ended = true;
+                continue; // once more: `done` may have come after the look for events
+            }
+            if service.queue.stopping().is_cancelled() {
+                Err(ApiError::Draining)?;
+            }
+            if idle {
+                tokio::select! {
+                    () = news.news() => {}
+                    () = service.queue.stopping().cancelled() => {}
+                }
+            }
+        }
+    }
+}
+
+/// Whether a finished job has nothing to tell after number `after`.
+pub async fn is_silent(service: &Service, job: &Job, after: i64) -> Result<bool, ApiError> {
+    Ok(job.status.is_terminal()
+        && service
+            .store
+            .events_after(job.key, after, 1)
+            .await?
+            .is_empty())
+}
