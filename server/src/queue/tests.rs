@@ -15,9 +15,8 @@ use crate::{
     digest,
     event::{Event, Payload},
     fake,
-    job::{Cache, Limits},
-    job::{Reason, ResultAvailable},
-    store::NewJob,
+    job::{Cache, JobId, Limits, Reason, ResultAvailable, Waiting},
+    store::{Edit, Filter, GroupBy, NewJob, Order, RequestKey, StoreError},
 };
 
 struct Rig {
@@ -397,4 +396,306 @@ async fn a_second_server_on_the_same_folder_is_refused() {
     let rig = rig(fake::solve).await;
     let refused = Store::open(rig.folder.path()).await.unwrap_err();
     assert!(refused.to_string().contains("another server"), "{refused}");
+}
+
+/// With the input of the others, and ready to be answered with theirs.
+fn same() -> NewJob {
+    NewJob {
+        cache: Cache::Use,
+        ..new(0)
+    }
+}
+
+#[tokio::test]
+async fn an_earlier_result_answers_at_once_and_survives_its_source() {
+    let rig = rig(fake::solve).await;
+    rig.queue.start();
+    let source = rig.submit_as(same()).await;
+    rig.until_done(&source).await;
+    let cached = rig.submit_as(same()).await;
+    assert_eq!(
+        (cached.status, cached.cached_from, cached.attempt),
+        (Status::Succeeded, Some(source.id), 1)
+    );
+    let events = rig.store.events_after(cached.key, 0, 100).await.unwrap();
+    let kinds: Vec<_> = events.iter().map(|event| event.payload.kind()).collect();
+    assert_eq!(kinds, ["status", "status", "done"]);
+    let part = |key| rig.store.part(key, "fields");
+    let bytes = part(source.key).await.unwrap().unwrap();
+    assert_eq!(cached.result_key, source.key);
+    rig.store.delete(source.key).await.unwrap();
+    assert_eq!(part(cached.result_key).await.unwrap(), Some(bytes));
+    // and goes with the last that serves it
+    rig.store.delete(cached.key).await.unwrap();
+    assert_eq!(part(cached.result_key).await.unwrap(), None);
+    let fresh = rig.submit_as(same()).await;
+    assert_eq!(fresh.cached_from, None);
+}
+
+#[tokio::test]
+async fn who_wants_no_earlier_result_gets_none_and_may_keep_his_own() {
+    let rig = rig(fake::solve).await;
+    rig.queue.start();
+    let off = rig.submit().await;
+    rig.until_done(&off).await;
+    let used = rig.submit_as(same()).await;
+    assert_eq!(used.cached_from, None, "an answer that was to stay private");
+    rig.until_done(&used).await;
+    let anew = NewJob {
+        cache: Cache::Refresh,
+        ..new(0)
+    };
+    let anew = rig.submit_as(anew).await;
+    assert_eq!(anew.cached_from, None);
+    rig.until_done(&anew).await;
+    let later = rig.submit_as(same()).await;
+    assert_eq!(later.cached_from, Some(anew.id));
+}
+
+#[tokio::test]
+async fn a_twin_ends_as_its_source_ends() {
+    let rig = rig(fake::solve).await; // its workers start later
+    let source = rig.submit_as(same()).await;
+    let twin = rig.submit_as(same()).await;
+    let place = twin.queue.clone().unwrap();
+    assert_eq!((place.position, place.reason), (1, Waiting::Joined));
+    assert_eq!(rig.store.waiting(), 1, "only one of them is solved");
+    rig.queue.start();
+    let done = rig.until_done(&twin).await;
+    assert_eq!(
+        (done.status, done.cached_from, done.attempt),
+        (Status::Succeeded, Some(source.id), 1)
+    );
+    let twin = rig.store.job(twin.id).await.unwrap().unwrap();
+    assert_eq!(twin.result_key, source.key);
+}
+
+#[tokio::test]
+async fn canceling_one_of_two_twins_leaves_the_other() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start();
+    let source = rig.submit_as(same()).await;
+    let first = rig.submit_as(same()).await;
+    let second = rig.submit_as(same()).await;
+    // the twin alone
+    rig.queue.cancel(first.key).await.unwrap();
+    assert_eq!(rig.until_done(&first).await.status, Status::Canceled);
+    let source_now = rig.store.job(source.id).await.unwrap().unwrap();
+    assert_eq!(source_now.status, Status::Running);
+    // the source: the other twin takes its place
+    rig.queue.cancel(source.key).await.unwrap();
+    assert_eq!(rig.until_done(&source).await.status, Status::Canceled);
+    rig.until(&second, |event| event.seq == 2).await;
+    let second_now = rig.store.job(second.id).await.unwrap().unwrap();
+    assert_eq!(
+        (
+            second_now.status,
+            second_now.cached_from,
+            second_now.twin_of
+        ),
+        (Status::Running, None, None)
+    );
+}
+
+#[tokio::test]
+async fn a_job_out_of_time_fails_and_keeps_its_last_state() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start();
+    let mut short = new(0);
+    short.limits.timeout_s = 0.05;
+    let job = rig.submit_as(short).await;
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.reason, done.result_available),
+        (
+            Status::Failed,
+            Some(Reason::TimedOut),
+            ResultAvailable::Partial
+        )
+    );
+    assert_eq!(done.failure.unwrap().code, "timed-out");
+}
+
+#[tokio::test]
+async fn a_deaf_solver_out_of_time_is_ended_over_its_head() {
+    fn very_deaf(
+        _: &Problem,
+        _: Option<&Mesh>,
+        _: &mut Observer<'_>,
+    ) -> std::result::Result<Solution, SolveError> {
+        std::thread::sleep(Duration::from_secs(4));
+        Err(SolveError::Stopped)
+    }
+    let rig = rig(very_deaf).await;
+    rig.queue.start();
+    let mut short = new(0);
+    short.limits.timeout_s = 0.05;
+    let job = rig.submit_as(short).await;
+    let start = Instant::now();
+    let done = rig.until_done(&job).await;
+    assert_eq!(done.reason, Some(Reason::TimedOut));
+    assert!(
+        start.elapsed() < Duration::from_secs(3),
+        "{:?}",
+        start.elapsed()
+    );
+    assert_eq!(rig.queue.state().idle, 0, "its slot waits for the solver");
+}
+
+#[tokio::test]
+async fn a_job_that_waits_too_long_fails_with_a_reason_of_its_own() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start();
+    let busy = rig.submit().await;
+    let mut short = new(0);
+    short.limits.queue_ttl_s = 0.1;
+    let job = rig.submit_as(short).await;
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.reason, done.attempt),
+        (Status::Failed, Some(Reason::QueueExpired), 0)
+    );
+    assert_eq!(rig.store.waiting(), 0);
+    let busy = rig.store.job(busy.id).await.unwrap().unwrap();
+    assert_eq!(busy.status, Status::Running);
+}
+
+#[tokio::test]
+async fn a_paused_queue_starts_nothing_until_it_is_resumed_also_after_a_restart() {
+    let rig = rig(fake::solve).await;
+    rig.queue.start();
+    rig.queue.pause().await.unwrap();
+    let job = rig.submit().await;
+    assert_eq!(job.status, Status::Queued);
+    assert_eq!(job.queue.as_ref().unwrap().reason, Waiting::Paused);
+    rig.store.close().await;
+    let Rig {
+        store,
+        queue,
+        folder,
+    } = rig;
+    queue.drain().await;
+    drop((store, queue));
+    // the committing task lets go of the store when it next looks
+    let store = loop {
+        match Store::open(folder.path()).await {
+            Ok(store) => break store,
+            Err(_) => tokio::time::sleep(Duration::from_millis(10)).await,
+        }
+    };
+    let queue = Queue::new(store.clone(), fake::solve, 1);
+    queue.start();
+    assert!(queue.state().paused);
+    let rig = Rig {
+        store,
+        queue,
+        folder,
+    };
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    let waiting = rig.store.job(job.id).await.unwrap().unwrap();
+    assert_eq!(waiting.status, Status::Queued);
+    rig.queue.resume().await.unwrap();
+    assert_eq!(rig.until_done(&job).await.status, Status::Succeeded);
+}
+
+fn submission(jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
+    let key = key.map(|key| RequestKey {
+        key: key.into(),
+        payload: jobs[0].payload.clone(),
+    });
+    Submission {
+        jobs,
+        key,
+        max_queued: 1000,
+        claim: false,
+    }
+}
+
+#[tokio::test]
+async fn one_key_is_one_job_however_many_ask_at_once() {
+    let rig = rig(fake::solve).await;
+    let asking = (0..50).map(|_| rig.queue.submit(submission(vec![new(0)], Some("k"))));
+    let answers = futures_util::future::join_all(asking).await;
+    let answers: Vec<Accepted> = answers.into_iter().map(|answer| answer.unwrap()).collect();
+    let id = answers[0].jobs[0].id;
+    assert!(answers.iter().all(|answer| answer.jobs[0].id == id));
+    let new_ones = answers.iter().filter(|answer| !answer.replayed).count();
+    assert_eq!((new_ones, rig.store.waiting()), (1, 1));
+    let mut other = submission(vec![new(0)], Some("k"));
+    other.key.as_mut().unwrap().payload = "another".into();
+    let refused = rig.queue.submit(other).await.unwrap_err();
+    assert!(matches!(refused, StoreError::KeyReuse), "{refused}");
+    // a key outlives its job, and says so
+    rig.queue
+        .cancel(rig.store.last_key().await.unwrap())
+        .await
+        .unwrap();
+    rig.store
+        .delete(rig.store.last_key().await.unwrap())
+        .await
+        .unwrap();
+    let gone = rig.queue.submit(submission(vec![new(0)], Some("k")));
+    assert!(matches!(gone.await, Err(StoreError::Deleted(gone)) if gone == id));
+}
+
+#[tokio::test]
+async fn one_that_is_refused_undoes_nothing_of_those_in_the_same_commit() {
+    let rig = rig(fake::solve).await;
+    let id = JobId::new();
+    let named = |payload: &str| NewJob {
+        id: Some(id),
+        payload: payload.into(),
+        ..new(0)
+    };
+    rig.queue
+        .submit(submission(vec![named("a")], None))
+        .await
+        .unwrap();
+    // two of three are new, the one between belongs to somebody else: none is accepted
+    let batch = vec![new(0), named("b"), new(0)];
+    let asking = [
+        submission(vec![new(0)], None),
+        submission(batch, None),
+        submission(vec![new(0), new(0)], None),
+        submission(vec![named("a")], None),
+    ];
+    let asking = asking.map(|submission| rig.queue.submit(submission));
+    let answers = futures_util::future::join_all(asking).await;
+    assert!(answers[0].is_ok() && answers[2].is_ok());
+    assert!(matches!(answers[1], Err(StoreError::IdConflict(other)) if other == id));
+    let again = answers[3].as_ref().unwrap();
+    assert!(again.replayed && again.jobs[0].id == id);
+    assert_eq!(rig.store.waiting(), 4);
+    let all = Filter::default();
+    let by_status = rig.store.count(&all, Some(GroupBy::Status));
+    assert_eq!(by_status.await.unwrap(), [("queued".to_string(), 4)]);
+}
+
+#[tokio::test]
+async fn the_line_in_memory_is_the_queue_on_the_disk() {
+    let rig = rig(fake::solve).await;
+    let all = Filter::default();
+    for priority in [0, 3, 0, -2, 3] {
+        rig.submit_as(new(priority)).await;
+    }
+    let moved = rig.store.jobs(&all, Order::NEWEST_FIRST, None, 10);
+    let moved = moved.await.unwrap();
+    let edit = Edit {
+        priority: Some(9),
+        ..Edit::default()
+    };
+    rig.store.edit(moved[1].id, &edit, None).await.unwrap();
+    rig.queue.cancel(moved[2].key).await.unwrap();
+    let jobs = rig.store.jobs(&all, Order::NEWEST_FIRST, None, 10);
+    let mut places: Vec<(i64, JobId)> = (jobs.await.unwrap().into_iter())
+        .filter_map(|job| Some((job.queue?.position, job.id)))
+        .collect();
+    places.sort_by_key(|(position, _)| *position);
+    let mut claimed = vec![];
+    while let Some(claim) = rig.store.claim_next().await.unwrap() {
+        claimed.push((claimed.len() as i64 + 1, claim.job.id));
+    }
+    assert_eq!(places, claimed);
+    assert_eq!(claimed[0].1, moved[1].id);
+    assert_eq!(rig.store.waiting(), 0);
 }

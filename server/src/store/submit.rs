@@ -88,15 +88,15 @@ pub struct Accepted {
     pub claim: Option<Claim>,
 }
 
-type Waiting = (Submission, oneshot::Sender<Result<Accepted>>);
+type Asking = (Submission, oneshot::Sender<Result<Accepted>>);
 
 /// Where submissions wait for the next commit.
 #[derive(Debug)]
-pub(super) struct Door(mpsc::Sender<Waiting>);
+pub(super) struct Door(mpsc::Sender<Asking>);
 
 impl Door {
     /// A door, and what comes through it.
-    pub(super) fn new() -> (Door, mpsc::Receiver<Waiting>) {
+    pub(super) fn new() -> (Door, mpsc::Receiver<Asking>) {
         let (sender, receiver) = mpsc::channel(4 * TOGETHER);
         (Door(sender), receiver)
     }
@@ -133,7 +133,7 @@ impl Store {
         Ok(Some(jobs))
     }
 
-    async fn commit_together(&self, waiting: Vec<Waiting>) {
+    async fn commit_together(&self, waiting: Vec<Asking>) {
         let mut replies = vec![];
         let committed = async {
             let mut change = self.change().await?;
@@ -255,7 +255,7 @@ pub const OWNER: &str = "local";
 /// Commits submissions until the store is dropped.
 pub(super) async fn commit_submissions(
     store: std::sync::Weak<Store>,
-    mut door: mpsc::Receiver<Waiting>,
+    mut door: mpsc::Receiver<Asking>,
 ) {
     while let Some(first) = door.recv().await {
         let Some(store) = store.upgrade() else { return };
