@@ -2,10 +2,14 @@
 //! Nothing sleeps to wait: a test listens to events.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod cache;
 mod cancel;
+mod control;
 mod demo;
 mod errors;
+mod files;
 mod grpc;
+mod keys;
 mod limits;
 mod list;
 mod meshes;
@@ -16,6 +20,7 @@ mod results;
 mod solve_command;
 mod submit;
 mod validate;
+mod waiting;
 mod watch;
 
 /// The binary under test.

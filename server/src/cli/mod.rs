@@ -2,6 +2,7 @@
 
 mod demo;
 pub mod examples;
+mod explain;
 mod output;
 mod report;
 mod serve;
@@ -44,6 +45,8 @@ enum Command {
     Solve(solve::Arguments),
     /// Print the JSON Schema of a problem: every name, what it means and its default
     Schema,
+    /// Say what an error code means, and what to do
+    Explain(explain::Arguments),
     /// Start a service for the occasion, submit five examples over REST and gRPC, watch them converge
     Demo,
 }
@@ -61,6 +64,7 @@ pub fn main() -> ExitCode {
             solve::run(&arguments)
         }
         Command::Schema => solve::schema(),
+        Command::Explain(arguments) => explain::run(&arguments),
         Command::Demo => {
             log(LevelFilter::WARN);
             with_runtime(demo::run())

@@ -1,0 +1,46 @@
+//! `signorini explain CODE`: what a kind of error means, and what to do.
+
+use clap::Args;
+
+use super::Exit;
+use crate::catalog::{Code, Kind, grpc_code_name};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// The code, as in `code` of an error or a failure; without one, all of them are listed
+    code: Option<String>,
+}
+
+pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
+    let Some(code) = code else {
+        for code in Code::ALL {
+            let Kind { code, title, .. } = code.kind();
+            println!("{code:<24} {title}");
+        }
+        return Ok(Exit::Ok);
+    };
+    // a job's reason is the same word with underscores
+    let Some(found) = Code::parse(&code.replace('_', "-")) else {
+        eprintln!(
+            "signorini: there is no error {code:?}; `signorini explain` lists those that there are"
+        );
+        return Ok(Exit::Invalid);
+    };
+    let Kind {
+        code,
+        title,
+        status,
+        grpc,
+        retry_after_s,
+        explanation,
+    } = found.kind();
+    println!("{title} ({code})");
+    if let (Some(status), Some(grpc)) = (status, grpc) {
+        println!("HTTP {status}, gRPC {}", grpc_code_name(grpc));
+    }
+    if let Some(seconds) = retry_after_s {
+        println!("It may pass by itself: the same request may succeed after {seconds} s.");
+    }
+    println!("\n{explanation}");
+    Ok(Exit::Ok)
+}

@@ -1,0 +1,147 @@
+//! Answers from earlier results, and jobs that share one solution.
+
+use serde_json::{Value, json};
+use service::pb;
+use suite::{
+    example, example_json,
+    harness::{Server, block},
+};
+
+use crate::{
+    SIGNORINI,
+    grpc::{connect, message},
+    server,
+};
+
+async fn submit(server: &Server, body: Value) -> Value {
+    let request = server.post("/v1/jobs").header("Prefer", "wait=60");
+    request
+        .json(&body)
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap()
+}
+
+#[tokio::test]
+async fn the_same_input_is_answered_from_the_first_result() {
+    let server = server().await;
+    let mut problem = example_json("cylinder");
+    let first = submit(&server, json!({ "problem": problem })).await;
+    assert_eq!(
+        (&first["status"], &first["cached_from"]),
+        (&json!("succeeded"), &Value::Null)
+    );
+    problem["title"] = json!("the title is for people");
+    let second = submit(&server, json!({ "problem": problem, "name": "mine" })).await;
+    assert_eq!(second["cached_from"], first["id"]);
+    assert_eq!(second["name"], "mine");
+    let id = second["id"].as_str().unwrap();
+    let events = server.events(id, 0).await.rest().await;
+    let kinds: Vec<&str> = events
+        .iter()
+        .map(|event| event["type"].as_str().unwrap())
+        .collect();
+    assert_eq!(kinds, ["status", "status", "done"]);
+
+    // everything of the source's is there, also when the source is not
+    let everything = async |id: &str| {
+        let at = |what: &str| format!("/v1/jobs/{id}/{what}");
+        let mut all = vec![];
+        for what in ["result", "history", "profiles/top", "fields?format=json"] {
+            all.push(server.json(&at(what)).await);
+        }
+        all
+    };
+    let source = first["id"].as_str().unwrap();
+    let before = everything(source).await;
+    assert!(
+        server
+            .delete(&format!("/v1/jobs/{source}"))
+            .send()
+            .await
+            .unwrap()
+            .status()
+            .is_success()
+    );
+    assert_eq!(everything(id).await, before);
+    assert_eq!(
+        server.json(&format!("/v1/jobs/{id}/problem")).await["title"],
+        "the title is for people"
+    );
+
+    // over gRPC likewise, and in the two other ways not
+    let mut grpc = connect(&server).await;
+    let create = |cache: pb::Cache| pb::CreateJobRequest {
+        problem: Some(message(&example("cylinder"))),
+        cache: cache.into(),
+        wait: Some(60.0),
+        ..Default::default()
+    };
+    let twin = grpc
+        .create_job(create(pb::Cache::Unspecified))
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(twin.cached_from.as_deref(), Some(id));
+    for cache in [pb::Cache::Refresh, pb::Cache::Off] {
+        let twin = grpc.create_job(create(cache)).await.unwrap().into_inner();
+        assert_eq!(
+            (twin.status(), twin.cached_from),
+            (pb::Status::Succeeded, None)
+        );
+    }
+}
+
+#[tokio::test]
+async fn two_of_the_same_input_are_solved_once_and_canceled_apart() {
+    let server = Server::start_alone(SIGNORINI, &["--workers", "2"]).await;
+    let post = async || {
+        let request = server
+            .post("/v1/jobs")
+            .json(&json!({ "problem": block(120, 110) }));
+        let job: Value = request.send().await.unwrap().json().await.unwrap();
+        job["id"].as_str().unwrap().to_owned()
+    };
+    let (source, twin, canceled) = (post().await, post().await, post().await);
+    let waiting = server.job(&twin).await;
+    assert_eq!(waiting["queue"]["reason"], "joined");
+    assert_eq!(
+        server.json("/v1/queue").await["running"],
+        1,
+        "one worker of two"
+    );
+    assert_eq!(server.cancel(&canceled).await["outcome"], "canceled");
+    assert_eq!(server.until_done(&source).await["status"], "succeeded");
+    let done = server.until_done(&twin).await;
+    assert_eq!(
+        (&done["status"], &done["cached_from"]),
+        (&json!("succeeded"), &json!(source))
+    );
+    let digest = async |id: &str| {
+        server.json(&format!("/v1/jobs/{id}/result")).await["summary"]["digest"].take()
+    };
+    assert_eq!(digest(&source).await, digest(&twin).await);
+    // a problem that does not converge fails both of them, with what there is
+    let mut problem = block(60, 60);
+    problem["solver"] = json!({ "max_iterations": 2 });
+    let post = async || {
+        let request = server.post("/v1/jobs").json(&json!({ "problem": problem }));
+        let job: Value = request.send().await.unwrap().json().await.unwrap();
+        job["id"].as_str().unwrap().to_owned()
+    };
+    for id in [post().await, post().await] {
+        let done = server.until_done(&id).await;
+        assert_eq!(
+            (&done["status"], &done["reason"]),
+            (&json!("failed"), &json!("not_converged"))
+        );
+        assert_eq!(done["result_available"], "partial");
+        assert_eq!(
+            server.json(&format!("/v1/jobs/{id}/result")).await["summary"]["converged"],
+            false
+        );
+    }
+}
