@@ -1,0 +1,167 @@
+//! Filters and orders of lists of jobs.
+
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use suite::{example_json, harness::Server};
+
+use crate::{SIGNORINI, server};
+
+async fn submit(server: &Server, name: &str, labels: Value) -> Value {
+    let body =
+        json!({ "problem": example_json("sheet"), "name": name, "labels": labels, "cache": "off" });
+    let request = server.post("/v1/jobs").header("Prefer", "wait=60");
+    request
+        .json(&body)
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap()
+}
+
+#[tokio::test]
+async fn every_filter_finds_its_jobs_alone_and_with_others() {
+    let server = server().await;
+    let mut jobs = vec![];
+    for n in 0..9 {
+        let labels = json!({ "third": (n % 3).to_string(), "both": "yes", "a b/c": "d&e" });
+        jobs.push(submit(&server, if n % 2 == 0 { "even" } else { "odd" }, labels).await);
+    }
+    let failing = {
+        let mut problem = example_json("rectangular_punch");
+        problem["solver"] = json!({ "max_iterations": 2 });
+        server.submit(&problem).await
+    };
+    server.until_done(&failing).await;
+    let found = async |query: &str| -> Vec<usize> {
+        // page by page: the pages are one list
+        let (mut found, mut token) = (vec![], String::new());
+        loop {
+            let page = server
+                .json(&format!("/v1/jobs?page_size=2&page_token={token}&{query}"))
+                .await;
+            for job in page["jobs"].as_array().unwrap() {
+                let place = jobs.iter().position(|known| known["id"] == job["id"]);
+                found.push(place.unwrap_or(jobs.len()));
+            }
+            match page["next_page_token"].as_str() {
+                Some(next) => token = next.to_owned(),
+                None => break,
+            }
+        }
+        let count = server.json(&format!("/v1/jobs/count?{query}")).await;
+        assert_eq!(count["total"], found.len(), "{query}");
+        found
+    };
+    assert_eq!(found("").await, [9, 8, 7, 6, 5, 4, 3, 2, 1, 0]);
+    assert_eq!(found("name=even").await, [8, 6, 4, 2, 0]);
+    assert_eq!(found("label.third=1").await, [7, 4, 1]);
+    assert_eq!(found("label.third=1&label.both=yes&name=odd").await, [7, 1]);
+    assert_eq!(
+        found("label.a%20b%2Fc=d%26e&label.third=0").await,
+        [6, 3, 0]
+    );
+    assert_eq!(found("label.third=1&label.third=2").await, [0usize; 0]);
+    assert_eq!(found("status=failed").await, [9]);
+    assert_eq!(
+        found("status=failed,succeeded&name=odd").await,
+        [7, 5, 3, 1]
+    );
+    assert_eq!(found("status=failed,succeeded,queued").await.len(), 10);
+    assert_eq!(found("owner=local&status=succeeded").await.len(), 9);
+    assert_eq!(found("owner=nobody").await, [0usize; 0]);
+    let hash = jobs[0]["input_hash"].as_str().unwrap();
+    assert_eq!(
+        found(&format!("input_hash={hash}&label.third=2")).await,
+        [8, 5, 2]
+    );
+    let at = |n: usize, name: &str| jobs[n][name].as_str().unwrap().to_owned();
+    let (from, to) = (at(3, "created_at"), at(6, "created_at"));
+    let between = format!("created_after={from}&created_before={to}");
+    assert_eq!(found(&between).await, [5, 4, 3], "from, and before");
+    assert_eq!(found(&format!("{between}&label.third=1")).await, [4]);
+    assert_eq!(
+        found(&format!("{between}&status=succeeded,failed")).await,
+        [5, 4, 3]
+    );
+    let ended = at(2, "finished_at");
+    assert_eq!(found(&format!("finished_before={ended}")).await, [1, 0]);
+    assert_eq!(
+        found(&format!("finished_after={ended}&name=even")).await,
+        [8, 6, 4, 2]
+    );
+}
+
+#[tokio::test]
+async fn lists_go_by_the_time_that_is_asked_for_in_both_directions() {
+    let server = Server::start(SIGNORINI, &["--workers", "1"]).await;
+    server.post("/v1/queue/pause").send().await.unwrap();
+    let mut ids = vec![];
+    for priority in [0, 5, -5, 9] {
+        let body = json!({ "problem": example_json("sheet"), "priority": priority, "cache": "off", "labels": { "l": "x" } });
+        let job: Value = server
+            .post("/v1/jobs")
+            .json(&body)
+            .send()
+            .await
+            .unwrap()
+            .json()
+            .await
+            .unwrap();
+        ids.push(job["id"].as_str().unwrap().to_owned());
+    }
+    server.post("/v1/queue/resume").send().await.unwrap();
+    for id in &ids {
+        server.until_done(id).await;
+    }
+    let waiting = {
+        server.post("/v1/queue/pause").send().await.unwrap();
+        server.submit(&example_json("sheet")).await
+    };
+    ids.push(waiting);
+    let order = async |query: &str| -> Vec<usize> {
+        let (mut found, mut token) = (vec![], String::new());
+        loop {
+            let page = server
+                .json(&format!("/v1/jobs?page_size=2&page_token={token}&{query}"))
+                .await;
+            found.extend(
+                page["jobs"]
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .map(|job| ids.iter().position(|id| job["id"] == id.as_str()).unwrap()),
+            );
+            match page["next_page_token"].as_str() {
+                Some(next) => token = next.to_owned(),
+                None => return found,
+            }
+        }
+    };
+    assert_eq!(order("").await, [4, 3, 2, 1, 0]);
+    assert_eq!(order("order_by=created_at").await, [4, 3, 2, 1, 0]);
+    assert_eq!(order("order_by=created_at%20asc").await, [0, 1, 2, 3, 4]);
+    // by the end: by priority, and without the one that has none
+    assert_eq!(order("order_by=finished_at%20asc").await, [3, 1, 0, 2]);
+    assert_eq!(order("order_by=finished_at").await, [2, 0, 1, 3]);
+    assert_eq!(
+        order("order_by=finished_at&status=succeeded,queued").await,
+        [2, 0, 1, 3]
+    );
+    assert_eq!(order("order_by=finished_at&label.l=x").await, [2, 0, 1, 3]);
+    assert_eq!(
+        order("order_by=finished_at&owner=local").await,
+        [2, 0, 1, 3]
+    );
+    for bad in [
+        "order_by=priority",
+        "order_by=created_at%20up",
+        "created_after=yesterday",
+        "color=red",
+        "label=x",
+    ] {
+        let response = server.get(&format!("/v1/jobs?{bad}")).send().await.unwrap();
+        assert_eq!(response.status(), StatusCode::BAD_REQUEST, "{bad}");
+    }
+}
