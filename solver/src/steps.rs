@@ -54,6 +54,7 @@ pub fn run(
             summary: summary.clone(),
             history: rows.clone(),
             profiles: reported.profiles.clone(),
+            friction_profiles: reported.friction_profiles.clone(),
         });
         history.extend(rows);
         last = Some(reported);
@@ -76,6 +77,7 @@ pub fn run(
         summary: last.summary,
         history,
         profiles: last.profiles,
+        friction_profiles: last.friction_profiles,
         steps: ends,
         fields: last.fields,
     })

@@ -451,11 +451,64 @@ impl<'a> PatchView<'a> {
             profile.nonlocal_pressure.push(averaged);
             profile.friction_bound.push(bound);
             profile.friction_ratio.push(ratio.abs());
-            profile.state.push(match (self.engaged(i), sticks) {
-                (false, _) => NodeState::Open,
-                (true, true) => NodeState::Stick,
-                (true, false) => NodeState::Slip,
-            });
+            profile.state.push(state(self.engaged(i), sticks));
+        }
+        profile
+    }
+
+    /// The columns where friction acts, see [`ContactProfile`]; `nodal` are those at the nodes.
+    pub(super) fn friction_profile(&self, nodal: &ContactProfile) -> ContactProfile {
+        let (points, tractions) = (&self.system.points, &self.finished.tractions);
+        let own: Vec<usize> = (0..points.len())
+            .filter(|&g| points[g].patch == self.p)
+            .collect();
+        let mut profile = ContactProfile::default();
+        if !own.is_empty() && !self.at_gauss_points() {
+            for g in own {
+                profile.push_row(nodal, points[g].nodes[0] - self.patch.first);
+                profile.tangential_stress.pop();
+                profile.tangential_stress.push(tractions[g] + 0.0);
+            }
+            return profile;
+        }
+        let law = self.patch.law.as_ref();
+        let places = self.patch.contact.boundary.friction_points.iter();
+        for (k, place) in places.enumerate() {
+            let (edge, xi) = (k / 3, GAUSS_3[k % 3].0);
+            let along = |column: &[f64]| {
+                edge3::interpolate(&place.shape, &place.nodes.map(|i| column[i])) + 0.0
+            };
+            let (averaged, bound) = self.averaged_and_bound(place.s);
+            let slip = self.slip_at(edge, xi);
+            let stress = match own.get(k) {
+                Some(&g) => tractions[g],
+                None => self.tangential_stress_at(edge, xi),
+            };
+            let sticks = match law {
+                None => self.patch.contact.condition == Condition::Bonded,
+                Some(law) => slip.abs() < law.elastic_slip,
+            };
+            let [start, end, middle] = place.nodes;
+            let beside = [[start, middle], [middle; 2], [middle, end]][k % 3];
+            profile.s.push(place.s);
+            profile.x.push(along(&nodal.x));
+            profile.y.push(along(&nodal.y));
+            profile.gap.push(along(&nodal.gap));
+            profile
+                .normal_displacement
+                .push(along(&nodal.normal_displacement));
+            profile
+                .tangential_displacement
+                .push(along(&nodal.tangential_displacement));
+            profile.normal_stress.push(along(&nodal.normal_stress));
+            profile.tangential_stress.push(stress + 0.0);
+            profile.nonlocal_pressure.push(averaged);
+            profile.friction_bound.push(bound);
+            profile
+                .friction_ratio
+                .push(law.map_or(0.0, |law| law.phi(slip)).abs());
+            let engaged = beside.iter().all(|&i| self.engaged(i));
+            profile.state.push(state(engaged, sticks));
         }
         profile
     }
@@ -645,6 +698,14 @@ impl<'a> PatchView<'a> {
     fn symmetric(&self, i: usize) -> bool {
         let node = &self.system.nodes[self.patch.first + i];
         node.follows.is_some() || matches!(node.tangent, Dof::Fixed(value) if value == 0.0)
+    }
+}
+
+fn state(engaged: bool, sticks: bool) -> NodeState {
+    match (engaged, sticks) {
+        (false, _) => NodeState::Open,
+        (true, true) => NodeState::Stick,
+        (true, false) => NodeState::Slip,
     }
 }
 
