@@ -487,6 +487,10 @@ pub enum Progress<'a> {
     Iteration(&'a mut Iteration),
     /// A finding, as soon as it is known; all stand in the summary again.
     Warning(&'a Warning),
+    /// A load step that is not the last has ended: the solution so far, without fields. Only of
+    /// problems with several steps, and not on the meshes of adaptive refinement; who wants to break
+    /// off says so at the next iteration.
+    Step(&'a Solution),
     /// Nothing to tell: the solver is at work and asks whether to go on.
     Pulse,
 }
