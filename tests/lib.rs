@@ -3,7 +3,7 @@
 
 pub mod harness;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// One of the problems in `examples/`, as text.
 pub fn example(name: &str) -> String {
@@ -14,4 +14,17 @@ pub fn example(name: &str) -> String {
 /// The same as JSON.
 pub fn example_json(name: &str) -> Value {
     serde_json::from_str(&example(name)).unwrap()
+}
+
+/// A cylinder pressed on the top of the plate with the fillet (`data/gmsh`), and dragged.
+pub fn pressed(mesh: Value) -> Value {
+    json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": mesh,
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [{"boundary": "top", "obstacle": {"kind": "parabola", "radius": 5, "center": 1},
+            "indentation": 0.05, "tangential_displacement": 0.01,
+            "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}}],
+    })
 }

@@ -72,7 +72,7 @@ pub fn run(
                 // JSON has no word for it, and to go on is pointless.
                 broken |= !finite::iteration(row);
             }
-            Progress::Warning(_) | Progress::Pulse => {}
+            Progress::Warning(_) | Progress::Step(_) | Progress::Pulse => {}
         }
         if broken {
             ControlFlow::Break(())

@@ -31,7 +31,7 @@ const SETTLED: f64 = 0.1;
 /// Solves on finer and finer grids; the finest solution comes back with the sequence of them.
 ///
 /// `solve` solves one problem without adaptive refinement. The observer sees the phases of every
-/// mesh, and the iterations of the last one only, when it is known to be the last.
+/// mesh, and the iterations (but no load steps) of the last one only, when it is known to be the last.
 pub fn run(
     problem: &Problem,
     goal: &AdaptiveRefine,
@@ -51,7 +51,7 @@ pub fn run(
         let mut stopped = false;
         let mut solution = solve(&problem, &mut |progress| {
             let answer = match progress {
-                Progress::Iteration(_) => observe(Progress::Pulse),
+                Progress::Iteration(_) | Progress::Step(_) => observe(Progress::Pulse),
                 Progress::Warning(warning) => {
                     warnings.push(warning.clone());
                     ControlFlow::Continue(())

@@ -3,13 +3,13 @@
 
 use std::ops::ControlFlow;
 
-use crate::algorithm::{self, Finished, Place, Reported, System, report};
+use crate::algorithm::{self, Finished, Place, System, report};
 use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::model::{Level, Model};
 use crate::problem::{Algorithm, Spacing, Step};
 use crate::solution::{
-    Comparison, Iteration, Observer, Outcome, Phase, Progress, Solution, StepSolution,
+    Comparison, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution, StepSolution,
 };
 
 /// An increment that does not converge is halved this often before the step ends there.
@@ -28,57 +28,69 @@ pub fn run(
         &model.steps
     };
     let mut march = March::new(model, body);
-    let (mut history, mut ends) = (Vec::new(), Vec::new());
-    let mut last: Option<Reported> = None;
+    let mut so_far: Option<Solution> = None;
+    let mut fields = Fields::default();
     for (number, step) in steps.iter().enumerate() {
+        if let Some(solution) = &so_far {
+            let _ = observe(Progress::Step(solution));
+        }
         let _ = observe(Progress::Phase(Phase::Iterate));
         let (finished, rows) = march.step(number as u32, step, 1, observe);
         // the last state is kept also when the observer broke off: its answer no longer matters
         let _ = observe(Progress::Phase(Phase::Recover));
-        let mut reported = report(model, body, &march.system, &finished)?;
-        let summary = &mut reported.summary;
+        let reported = report(model, body, &march.system, &finished)?;
+        let mut summary = reported.summary;
         if model.controls.check_uniqueness && summary.converged {
             let (system, controls) = (&march.system, &model.controls);
             let second = algorithm::other_solution(system, controls, &finished, observe);
-            algorithm::note_uniqueness(summary, second);
+            algorithm::note_uniqueness(&mut summary, second);
         }
         summary.increments = march.increments;
         summary.cut_backs = march.cut_backs;
         summary.iterations = rows.len() as u32;
         let outcome = summary.outcome;
+        let (mut history, mut ends) = match so_far.take() {
+            Some(solution) => (solution.history, solution.steps),
+            None => (Vec::new(), Vec::new()),
+        };
+        history.extend(rows.iter().cloned());
         ends.push(StepSolution {
             name: step
                 .name
                 .clone()
                 .unwrap_or_else(|| (number + 1).to_string()),
             summary: summary.clone(),
-            history: rows.clone(),
+            history: rows,
             profiles: reported.profiles.clone(),
+            friction_profiles: reported.friction_profiles.clone(),
         });
-        history.extend(rows);
-        last = Some(reported);
+        summary.iterations = history.len() as u32;
+        fields = reported.fields;
+        so_far = Some(Solution {
+            summary,
+            history,
+            profiles: reported.profiles,
+            friction_profiles: reported.friction_profiles,
+            steps: ends,
+            fields: Fields::default(),
+        });
         if !goes_on(outcome) {
             break;
         }
     }
-    let Some(mut last) = last else {
+    let Some(mut solution) = so_far else {
         return Err(SolveError::NonFinite { phase: "steps" });
     };
-    if model.controls.check_increments && last.summary.converged {
+    if model.controls.check_increments && solution.summary.converged {
         let second = doubled(model, body, steps, observe);
-        algorithm::note_doubled_increments(&mut last.summary, second, model.controls.tolerance);
+        let summary = &mut solution.summary;
+        algorithm::note_doubled_increments(summary, second, model.controls.tolerance);
     }
-    last.summary.iterations = history.len() as u32;
     if model.steps.is_empty() {
-        ends.clear();
+        solution.steps.clear();
     }
-    Ok(Solution {
-        summary: last.summary,
-        history,
-        profiles: last.profiles,
-        steps: ends,
-        fields: last.fields,
-    })
+    solution.fields = fields;
+    Ok(solution)
 }
 
 /// The forces that twice the increments lead to, without a word to the observer.

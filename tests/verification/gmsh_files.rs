@@ -180,16 +180,8 @@ fn a_block_pressed_on_gmshs_plate_bears_the_same_on_every_family() {
         .map(|family| {
             let mut mesh = on_file(&format!("fillet-{family}-msh22-ascii"));
             mesh["refine"] = json!(1);
-            let text = json!({
-                "analysis": {"kind": "plane_strain"},
-                "mesh": mesh,
-                "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
-                "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
-                "contacts": [{"boundary": "top", "obstacle": {"kind": "parabola", "radius": 5, "center": 1},
-                    "indentation": 0.05, "tangential_displacement": 0.01,
-                    "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}}],
-            });
-            let summary = crate::support::solve(&problem(&text.to_string())).summary;
+            let text = suite::pressed(mesh).to_string();
+            let summary = crate::support::solve(&problem(&text)).summary;
             assert!(summary.residuals.equilibrium < 1e-9);
             [summary.normal_force, summary.tangential_force]
         })

@@ -342,6 +342,55 @@ fn an_observer_that_stops_before_the_first_state_gets_none() {
     assert_eq!(end, Err(solver::error::SolveError::Stopped));
 }
 
+/// What a running job can show of a problem in steps: every step but the last, as the solution of
+/// the problem that ends there has it.
+#[test]
+fn an_observer_is_told_the_solution_so_far_after_every_step_but_the_last() {
+    let mut p = example("cylinder");
+    let step = |indentation: f64, increments: u32| solver::problem::Step {
+        indentation,
+        increments,
+        ..solver::problem::Step::whole()
+    };
+    p.steps = vec![step(0.3, 2), step(0.6, 1), step(1.0, 1)];
+    let mut told = Vec::new();
+    let solution = solver::solve(&p, &mut |progress| {
+        match progress {
+            solver::solution::Progress::Step(so_far) => told.push(so_far.clone()),
+            solver::solution::Progress::Iteration(row) => row.wall_s = 1.5,
+            _ => {}
+        }
+        std::ops::ControlFlow::Continue(())
+    })
+    .unwrap();
+    assert_eq!(told.len(), 2);
+    for (k, so_far) in told.iter().enumerate() {
+        assert_eq!(so_far.fields, solver::solution::Fields::default());
+        assert_eq!(so_far.steps, solution.steps[..=k]);
+        let rows = so_far.history.len();
+        assert_eq!(so_far.history, solution.history[..rows]);
+        assert!(so_far.history.iter().all(|row| row.wall_s == 1.5));
+        let mut p = p.clone();
+        p.steps.truncate(k + 1);
+        let shorter = solve(&p);
+        assert_eq!(so_far.summary, shorter.summary);
+        assert_eq!(so_far.profiles, shorter.profiles);
+        assert_eq!(so_far.friction_profiles, shorter.friction_profiles);
+    }
+    assert!(!solution.fields.ux.is_empty());
+
+    let mut told = 0;
+    for steps in [vec![], vec![step(1.0, 3)]] {
+        p.steps = steps;
+        solver::solve(&p, &mut |progress| {
+            told += u32::from(matches!(progress, solver::solution::Progress::Step(_)));
+            std::ops::ControlFlow::Continue(())
+        })
+        .unwrap();
+    }
+    assert_eq!(told, 0, "one step has no partial result");
+}
+
 /// A mechanism must not come back as converged: two squares that touch in a corner only.
 #[test]
 fn parts_that_touch_in_a_corner_only_do_not_hold_each_other() {

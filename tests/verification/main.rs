@@ -26,6 +26,7 @@ mod manufactured;
 mod oblique;
 mod obstacle_normals;
 mod patch;
+mod profiles;
 mod record;
 mod refusals;
 mod robustness;

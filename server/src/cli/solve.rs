@@ -88,7 +88,7 @@ pub(super) fn run(
             Progress::Warning(warning) => {
                 eprintln!("warning: {}: {}", warning.pointer, warning.message)
             }
-            Progress::Pulse => {} // Ctrl-C ends the process anyway
+            Progress::Step(_) | Progress::Pulse => {} // Ctrl-C ends the process anyway
         }
         ControlFlow::Continue(())
     });

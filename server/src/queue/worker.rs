@@ -116,7 +116,7 @@ fn solve_aloud(
             Progress::Phase(stage) => Some(Payload::Stage { stage }),
             Progress::Iteration(row) => Some(Payload::Iteration(row.clone())),
             Progress::Warning(warning) => Some(Payload::Warning(warning.clone())),
-            Progress::Pulse => None,
+            Progress::Step(_) | Progress::Pulse => None,
         })
     })?;
     let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite { phase: "recover" })?;

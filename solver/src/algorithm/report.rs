@@ -33,6 +33,8 @@ pub struct Reported {
     pub summary: Summary,
     /// Columns along each contact boundary, by its name.
     pub profiles: BTreeMap<String, ContactProfile>,
+    /// The same where friction acts.
+    pub friction_profiles: BTreeMap<String, ContactProfile>,
     /// Displacements and stresses.
     pub fields: Fields,
 }
@@ -68,6 +70,7 @@ pub fn report(
     let mut contact_state = vec![-1; model.mesh.nodes.len()];
     let mut warnings = model.warnings.clone();
     let (mut contacts, mut profiles) = (BTreeMap::new(), BTreeMap::new());
+    let mut friction_profiles = BTreeMap::new();
     for (p, patch) in system.patches.iter().enumerate() {
         let view = PatchView::new(system, p, finished, &forces);
         let summary = view.summary();
@@ -81,6 +84,7 @@ pub fn report(
                 NodeState::Slip => 2,
             });
         }
+        friction_profiles.insert(patch.contact.name.clone(), view.friction_profile(&profile));
         profiles.insert(patch.contact.name.clone(), profile);
         contacts.insert(patch.contact.name.clone(), summary);
     }
@@ -160,6 +164,7 @@ pub fn report(
     Ok(Reported {
         summary,
         profiles,
+        friction_profiles,
         fields,
     })
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ReadError, abaqus, gmsh};
 use crate::error::Violation;
-use crate::mesh::{Mesh, inline_mesh};
+use crate::mesh::{Mesh, inline_mesh, inverted};
 use crate::problem::InlineMesh;
 use crate::solution::Warning;
 
@@ -52,21 +52,12 @@ fn json(reader: impl BufRead) -> Result<Mesh, ReadError> {
         )
     })?;
     let mesh = inline_mesh(&inline, "").map_err(ReadError::Invalid)?;
-    let folded = mesh.inverted_elements(true);
-    if folded.is_empty() {
-        return Ok(mesh);
+    let faults = inverted(&mesh, true, |e| format!("/elements/{e}"), "");
+    if faults.is_empty() {
+        Ok(mesh)
+    } else {
+        Err(ReadError::Invalid(faults))
     }
-    let fault = |(e, place, det): &(usize, String, f64)| Violation {
-        pointer: format!("/elements/{e}"),
-        reason: "inverted_element".to_owned(),
-        got: format!("det J = {det:.3e} at {place}"),
-        expected: "det J > 0 at all Gauss points and at the nodes".to_owned(),
-        hint: "List corners counter-clockwise, and keep midsides near the middle of their sides."
-            .to_owned(),
-    };
-    Err(ReadError::Invalid(
-        folded.iter().take(20).map(fault).collect(),
-    ))
 }
 
 fn invalid(reason: &str, got: String, expected: &str, hint: &str) -> ReadError {

@@ -2,16 +2,14 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::{Edge, Mesh};
+use super::faults::Faults;
+use super::{Edge, Mesh, key};
 use crate::element::Element;
 use crate::error::Violation;
 use crate::solution::Warning;
 
 /// Stands for the midsides of an element that has none yet.
 pub const NO_NODE: u32 = u32::MAX;
-
-/// More violations of one kind than this say nothing new.
-const MOST_LISTED: usize = 20;
 
 /// A mesh as a file has it. Labels are the file's own numbers, for messages.
 #[derive(Debug, Default)]
@@ -39,15 +37,16 @@ pub struct RawMesh {
 /// The mesh and what was changed on the way, or everything that is wrong with it. Pointers are empty:
 /// only the caller knows where the file came from.
 pub fn build(mut raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
-    let mut found = Faults::default();
+    let mut found = Faults::new("");
     if raw.elements.is_empty() {
         found.say(
+            "",
             "too_few",
-            "no element of two dimensions".to_owned(),
+            "no element of two dimensions",
             "at least one quadrilateral or triangle",
             "Mesh the surface, and save its elements (in Gmsh: put it in a physical group).",
         );
-        return Err(found.list);
+        return Err(found.counted());
     }
     let mut notes = Vec::new();
     let mut note = |code: &str, message: String| {
@@ -87,7 +86,7 @@ pub fn build(mut raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
     drop_unused(&mut raw);
     let owners = Owners::new(&raw, &mut found);
     found.end()?;
-    let surface = owners.surface(&raw.elements);
+    let surface = surface(&raw.elements, &owners.count);
     let by_corners = by_corners(&surface, &owners, &raw, &mut found);
     found.end()?;
     let mut boundaries = BTreeMap::new();
@@ -136,6 +135,7 @@ pub fn build(mut raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
     };
     for (e, place, det) in mesh.inverted_elements(true) {
         found.say(
+            "",
             "inverted_element",
             format!(
                 "element {} with det J = {det:.3e} at {place}",
@@ -149,12 +149,13 @@ pub fn build(mut raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
     Ok((mesh, notes))
 }
 
-fn distinct(raw: &RawMesh, found: &mut Faults) {
+fn distinct(raw: &RawMesh, found: &mut Faults<'_>) {
     for (element, label) in raw.elements.iter().zip(&raw.element_labels) {
         let repeated = (1..element.len())
             .find(|&i| element[i] != NO_NODE && element[..i].contains(&element[i]));
         if let Some(i) = repeated {
             found.say(
+                "",
                 "repeated_node",
                 format!(
                     "node {} twice in element {label}",
@@ -280,7 +281,7 @@ struct Owners {
 }
 
 impl Owners {
-    fn new(raw: &RawMesh, found: &mut Faults) -> Self {
+    fn new(raw: &RawMesh, found: &mut Faults<'_>) -> Self {
         let mut owners = Owners {
             count: vec![0; raw.nodes.len()],
             first: vec![0; raw.nodes.len()],
@@ -303,16 +304,17 @@ impl Owners {
         }
         owners
     }
+}
 
-    /// Sides with one element, directed with the body on the right; in the order of the elements.
-    fn surface(&self, elements: &[Element]) -> Vec<Edge> {
-        elements
-            .iter()
-            .flat_map(Element::sides)
-            .filter(|[_, _, mid]| self.count[*mid as usize] == 1)
-            .map(|[a, b, mid]| [b, a, mid])
-            .collect()
-    }
+/// Sides with one element, directed with the body on the right; in the order of the elements. `count`:
+/// how many elements have a node as a midside.
+fn surface(elements: &[Element], count: &[u8]) -> Vec<Edge> {
+    elements
+        .iter()
+        .flat_map(Element::sides)
+        .filter(|[_, _, mid]| count[*mid as usize] == 1)
+        .map(|[a, b, mid]| [b, a, mid])
+        .collect()
 }
 
 /// Corners of the surface's sides and their places in it, in order. Two sides between the same corners
@@ -321,7 +323,7 @@ fn by_corners(
     surface: &[Edge],
     owners: &Owners,
     raw: &RawMesh,
-    found: &mut Faults,
+    found: &mut Faults<'_>,
 ) -> Vec<((u32, u32), u32)> {
     let mut sorted: Vec<((u32, u32), u32)> = surface
         .iter()
@@ -338,10 +340,6 @@ fn by_corners(
     sorted
 }
 
-fn key(a: u32, b: u32) -> (u32, u32) {
-    (a.min(b), a.max(b))
-}
-
 impl Mesh {
     /// The sides of the body's surface, directed with the body on the right.
     pub fn surface(&self) -> Vec<Edge> {
@@ -349,46 +347,20 @@ impl Mesh {
         for [_, _, mid] in self.elements.iter().flat_map(Element::sides) {
             count[mid as usize] = count[mid as usize].saturating_add(1);
         }
-        let first = Vec::new();
-        Owners { count, first }.surface(&self.elements)
+        surface(&self.elements, &count)
     }
 }
 
-#[derive(Default)]
-struct Faults {
-    list: Vec<Violation>,
-}
-
-impl Faults {
-    fn say(&mut self, reason: &str, got: String, expected: &str, hint: &str) {
-        let same = self.list.iter().filter(|v| v.reason == reason).count();
-        if same < MOST_LISTED {
-            self.list.push(Violation {
-                pointer: String::new(),
-                reason: reason.to_owned(),
-                got,
-                expected: expected.to_owned(),
-                hint: hint.to_owned(),
-            });
-        }
-    }
-
+impl Faults<'_> {
     fn nonconforming(&mut self, raw: &RawMesh, first: usize, second: usize) {
         let [a, b] = [first, second].map(|e| raw.element_labels[e]);
         self.say(
+            "",
             "nonconforming",
             format!("elements {a} and {b}, which do not share a whole side"),
             "at most two elements on a side, with all three of its nodes in common",
             "Merge coincident nodes (in Gmsh: Coherence), and remove elements that overlap.",
         );
-    }
-
-    fn end(&mut self) -> Result<(), Vec<Violation>> {
-        if self.list.is_empty() {
-            Ok(())
-        } else {
-            Err(std::mem::take(&mut self.list))
-        }
     }
 }
 

@@ -2,20 +2,14 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::faults::Faults;
+use super::{Mesh, key};
 use crate::error::{Violation, escape};
-use crate::mesh::Mesh;
 use crate::problem::InlineMesh;
-
-/// More violations of one kind than this are counted, not listed.
-const MOST_LISTED: usize = 20;
 
 /// The mesh, or everything that is wrong with its numbering; `pointer` is the inline mesh's own.
 pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violation>> {
-    let mut found = Faults {
-        pointer,
-        list: Vec::new(),
-        unlisted: HashMap::new(),
-    };
+    let mut found = Faults::new(pointer);
     let count = input.nodes.len() as u32;
     if input.elements.is_empty() {
         found.say(
@@ -97,8 +91,8 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
         }
     }
     // the rest needs sound numbers
-    if !found.list.is_empty() {
-        return Err(found.into_list());
+    if !found.is_empty() {
+        return Err(found.counted());
     }
     for node in (0..input.nodes.len()).filter(|&n| !used[n]) {
         found.say(
@@ -150,7 +144,7 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
         }
         boundaries.insert(name.clone(), directed);
     }
-    if found.list.is_empty() {
+    if found.is_empty() {
         let boundaries = boundaries.into_iter().collect();
         Ok(Mesh {
             nodes: input.nodes.clone(),
@@ -160,7 +154,7 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
             node_sets: input.node_sets.clone(),
         })
     } else {
-        Err(found.into_list())
+        Err(found.counted())
     }
 }
 
@@ -172,7 +166,7 @@ struct Side {
 }
 
 /// All sides by their corners; says where neighbours do not share a midside.
-fn surface(input: &InlineMesh, found: &mut Faults) -> HashMap<(u32, u32), Side> {
+fn surface(input: &InlineMesh, found: &mut Faults<'_>) -> HashMap<(u32, u32), Side> {
     let mut sides: HashMap<(u32, u32), Side> = HashMap::with_capacity(2 * input.elements.len());
     for (e, element) in input.elements.iter().enumerate() {
         for (k, [a, b, mid]) in element.sides().enumerate() {
@@ -204,53 +198,11 @@ fn surface(input: &InlineMesh, found: &mut Faults) -> HashMap<(u32, u32), Side> 
     sides
 }
 
-fn key(a: u32, b: u32) -> (u32, u32) {
-    (a.min(b), a.max(b))
-}
-
-struct Faults<'a> {
-    pointer: &'a str,
-    list: Vec<Violation>,
-    unlisted: HashMap<&'static str, usize>,
-}
-
-impl Faults<'_> {
-    fn say(
-        &mut self,
-        place: &str,
-        reason: &'static str,
-        got: impl ToString,
-        expected: &str,
-        hint: &str,
-    ) {
-        if self.list.iter().filter(|v| v.reason == reason).count() == MOST_LISTED {
-            *self.unlisted.entry(reason).or_default() += 1;
-            return;
-        }
-        self.list.push(Violation {
-            pointer: format!("{}{place}", self.pointer),
-            reason: reason.to_owned(),
-            got: got.to_string(),
-            expected: expected.to_owned(),
-            hint: hint.to_owned(),
-        });
-    }
-
-    fn into_list(mut self) -> Vec<Violation> {
-        for (reason, count) in self.unlisted {
-            if let Some(last) = self.list.iter_mut().rfind(|v| v.reason == reason) {
-                last.hint
-                    .push_str(&format!(" ({count} more of this kind.)"));
-            }
-        }
-        self.list
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::element::Element;
+    use crate::mesh::faults::MOST_LISTED;
     use std::collections::BTreeMap;
 
     fn square() -> InlineMesh {

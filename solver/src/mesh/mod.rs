@@ -1,11 +1,13 @@
 //! The body as nodes, elements and named boundaries.
 
 mod build;
+mod faults;
 mod grid;
 mod inline;
 mod refine;
 
 pub use build::{NO_NODE, RawMesh, build};
+pub use faults::inverted;
 pub use grid::{grid_mesh, grid_violations, largest_cut};
 pub use inline::inline_mesh;
 pub use refine::refine;
@@ -140,6 +142,11 @@ impl Mesh {
         }
         parts
     }
+}
+
+/// The two corners of a side, whichever way it runs.
+fn key(a: u32, b: u32) -> (u32, u32) {
+    (a.min(b), a.max(b))
 }
 
 fn find(parent: &mut [u32], node: u32) -> u32 {

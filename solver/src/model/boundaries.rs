@@ -43,18 +43,17 @@ impl Findings {
             mesh = None;
         }
         let mut mesh = mesh?;
-        // straight-sided grids need no look at their corners, and stay what they are when refined
-        let free = input.grid.is_none();
-        self.inverted(
-            &mesh,
-            free,
-            if input.inline.is_some() {
-                "/mesh/inline/elements"
-            } else {
-                ""
-            },
-            "",
-        );
+        // what was read from a file was looked at there
+        let faults = if input.grid.is_some() {
+            // straight-sided grids need no look at their corners, and stay what they are when refined
+            mesh::inverted(&mesh, false, |_| "/mesh".to_owned(), "")
+        } else if input.inline.is_some() {
+            let element = |e| format!("/mesh/inline/elements/{e}");
+            mesh::inverted(&mesh, true, element, "")
+        } else {
+            Vec::new()
+        };
+        self.adopt(faults);
         if matches!(analysis, Analysis::Axisymmetric {})
             && let Some(node) = mesh.nodes.iter().position(|[r, _]| *r < 0.0)
         {
@@ -83,8 +82,9 @@ impl Findings {
         for _ in 0..refine {
             mesh = mesh::refine(&mesh);
         }
-        if free && refine > 0 {
-            self.inverted(&mesh, false, "", " of the refined mesh");
+        if input.grid.is_none() && refine > 0 {
+            let whole = |_| "/mesh".to_owned();
+            self.adopt(mesh::inverted(&mesh, false, whole, " of the refined mesh"));
         }
         if self.violations.len() > before {
             return None;
@@ -265,23 +265,6 @@ impl Findings {
                 );
                 None
             }
-        }
-    }
-
-    /// `list`: pointer to the list that an element's number counts in, where there is one.
-    fn inverted(&mut self, mesh: &Mesh, at_nodes: bool, list: &str, of: &str) {
-        for (e, place, det) in mesh.inverted_elements(at_nodes).into_iter().take(20) {
-            let pointer = match list {
-                "" => "/mesh".to_owned(),
-                _ => format!("{list}/{e}"),
-            };
-            self.say(
-                pointer,
-                "inverted_element",
-                format!("element {e}{of} with det J = {det:.3e} at {place}"),
-                "det J > 0 at all nine Gauss points and at the nodes",
-                "List corners counter-clockwise, and keep midsides near the middle of their sides.",
-            );
         }
     }
 

@@ -42,6 +42,20 @@ impl Findings {
         });
     }
 
+    /// Takes over what a mesh has found.
+    pub(super) fn adopt(&mut self, faults: Vec<Violation>) {
+        for fault in faults {
+            let Violation {
+                pointer,
+                reason,
+                got,
+                expected,
+                hint,
+            } = fault;
+            self.say(pointer, &reason, got, expected, hint);
+        }
+    }
+
     /// All violations; those beyond the first hundred are counted in the last one's hint.
     pub(super) fn into_violations(mut self) -> Vec<Violation> {
         if let Some(last) = self.violations.last_mut().filter(|_| self.unlisted > 0) {

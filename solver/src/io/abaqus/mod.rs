@@ -5,7 +5,10 @@
 //! data lines follow their keyword; names are compared without regard to case, as both programs do,
 //! and kept as they were first written.
 
+mod block;
 mod deck;
+mod keyword;
+mod names;
 mod problem;
 
 pub use problem::problem;

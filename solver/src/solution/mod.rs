@@ -4,6 +4,10 @@
 //! normal turned clockwise. Forces are of the modelled part: a half model gives half, plane stress
 //! includes the thickness, axisymmetric totals include 2π.
 
+mod sample;
+
+pub use sample::sample;
+
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
@@ -20,6 +24,10 @@ pub struct Solution {
     pub history: Vec<Iteration>,
     /// Columns along each contact boundary, by its name.
     pub profiles: BTreeMap<String, ContactProfile>,
+    /// The same columns at the points where friction acts, see [`ContactProfile`]. No part of the
+    /// document, and of its digest: it is kept and served by itself.
+    #[serde(default, skip_serializing)]
+    pub friction_profiles: BTreeMap<String, ContactProfile>,
     /// One entry per load step of the problem; summary, profiles and fields above are of the last.
     pub steps: Vec<StepSolution>,
     /// Displacements and stresses.
@@ -37,6 +45,9 @@ pub struct StepSolution {
     pub history: Vec<Iteration>,
     /// Columns along each contact boundary, by its name.
     pub profiles: BTreeMap<String, ContactProfile>,
+    /// As of a whole solution; no part of the document here either.
+    #[serde(default, skip_serializing)]
+    pub friction_profiles: BTreeMap<String, ContactProfile>,
 }
 
 /// How an iteration ended.
@@ -310,7 +321,15 @@ pub struct ForcePair {
     pub tangential: f64,
 }
 
-/// Columns along a contact boundary, one entry per node of Γ_C in order of arc length.
+/// Columns along a contact boundary in order of arc length: one entry per node of Γ_C, or one per
+/// point where friction acts.
+///
+/// Those points are three Gauss points per edge, also without friction; with `"points": "nodal"` the
+/// nodes, but for one on the axis. There `normal_stress`, the gap and the displacements are those of
+/// the edge, quadratic between its nodes; `nonlocal_pressure`, `friction_bound` and `friction_ratio`
+/// are the law's at the very point; `tangential_stress` is the one that acts in the solution, so that
+/// it adds up to the forces of the summary (at a node it is the law's, which differs by
+/// `Residuals::friction` of the largest); and a point is open where one of the nodes beside it is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ContactProfile {
     /// Arc length from the first node of Γ_C.
@@ -335,11 +354,47 @@ pub struct ContactProfile {
     pub friction_bound: Vec<f64>,
     /// φ_ε(|u_t − d|), between 0 and 1.
     pub friction_ratio: Vec<f64>,
-    /// The node's state.
+    /// State there.
     pub state: Vec<NodeState>,
 }
 
-/// State of a contact node.
+impl ContactProfile {
+    /// The columns of numbers.
+    #[rustfmt::skip]
+    fn columns(&self) -> [&Vec<f64>; 11] {
+        let ContactProfile {
+            s, x, y, gap, normal_displacement, tangential_displacement, normal_stress, tangential_stress,
+            nonlocal_pressure, friction_bound, friction_ratio, state: _,
+        } = self;
+        [
+            s, x, y, gap, normal_displacement, tangential_displacement, normal_stress, tangential_stress,
+            nonlocal_pressure, friction_bound, friction_ratio,
+        ]
+    }
+
+    /// The same to write to.
+    #[rustfmt::skip]
+    fn columns_mut(&mut self) -> [&mut Vec<f64>; 11] {
+        let ContactProfile {
+            s, x, y, gap, normal_displacement, tangential_displacement, normal_stress, tangential_stress,
+            nonlocal_pressure, friction_bound, friction_ratio, state: _,
+        } = self;
+        [
+            s, x, y, gap, normal_displacement, tangential_displacement, normal_stress, tangential_stress,
+            nonlocal_pressure, friction_bound, friction_ratio,
+        ]
+    }
+
+    /// Adds a row of another profile.
+    pub(crate) fn push_row(&mut self, other: &ContactProfile, row: usize) {
+        for (to, from) in self.columns_mut().into_iter().zip(other.columns()) {
+            to.push(from[row]);
+        }
+        self.state.push(other.state[row]);
+    }
+}
+
+/// State of a contact node, or of a point between two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NodeState {
@@ -432,6 +487,10 @@ pub enum Progress<'a> {
     Iteration(&'a mut Iteration),
     /// A finding, as soon as it is known; all stand in the summary again.
     Warning(&'a Warning),
+    /// A load step that is not the last has ended: the solution so far, without fields. Only of
+    /// problems with several steps, and not on the meshes of adaptive refinement; who wants to break
+    /// off says so at the next iteration.
+    Step(&'a Solution),
     /// Nothing to tell: the solver is at work and asks whether to go on.
     Pulse,
 }

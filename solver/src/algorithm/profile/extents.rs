@@ -1,0 +1,230 @@
+//! Forces of a contact, where it touches, sticks and slips, and its peaks.
+
+use super::PatchView;
+use crate::contact::edge_nodes;
+use crate::element::edge3;
+use crate::problem::Condition;
+use crate::solution::{ContactSummary, Peak};
+
+/// Samples per edge in the search for a peak, before it is narrowed down.
+const SAMPLES: usize = 16;
+
+/// Intervals of arc length.
+struct Extents {
+    contact: Vec<[f64; 2]>,
+    stick: Vec<[f64; 2]>,
+    slip: Vec<[f64; 2]>,
+}
+
+impl PatchView<'_> {
+    pub(in crate::algorithm) fn summary(&self) -> ContactSummary {
+        let circumference = self.system.circumference;
+        let range = self.system.range(self.patch);
+        let (mut tangential, mut friction) = (0.0, 0.0);
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        for (point, traction) in points.filter(|(point, _)| point.patch == self.p) {
+            tangential += point.weight * traction;
+            friction += point.weight * traction.abs();
+        }
+        for held in &self.forces.tangential_reactions[range.clone()] {
+            tangential += held;
+            friction += held.abs();
+        }
+        let Extents {
+            contact,
+            stick,
+            slip,
+        } = self.extents();
+        ContactSummary {
+            normal: self.patch.contact.normal,
+            normal_force: circumference * self.forces.reactions[range].iter().sum::<f64>(),
+            tangential_force: circumference * tangential,
+            friction_force: circumference * friction,
+            contact,
+            stick,
+            slip,
+            peak_normal_stress: self.peak_normal_stress(),
+            peak_tangential_stress: self.peak_tangential_stress(),
+        }
+    }
+
+    /// Contact between its outermost nodes, and its division by |e| < ε.
+    fn extents(&self) -> Extents {
+        let s = &self.patch.contact.boundary.s;
+        let (mut contact, mut stick, mut slip) =
+            (Vec::new(), Vec::<[f64; 2]>::new(), Vec::<[f64; 2]>::new());
+        let mut i = 0;
+        while i < self.count() {
+            if !self.engaged(i) {
+                i += 1;
+                continue;
+            }
+            let first = i;
+            while i + 1 < self.count() && self.engaged(i + 1) {
+                i += 1;
+            }
+            let (from, to) = (s[first], s[i]);
+            if self.active(first) {
+                contact.push([from, to]);
+            }
+            let mut cuts = vec![from];
+            cuts.extend(
+                self.stick_ends()
+                    .into_iter()
+                    .filter(|c| *c > from && *c < to),
+            );
+            cuts.push(to);
+            for pair in cuts.windows(2) {
+                let list = if self.sticks(0.5 * (pair[0] + pair[1])) {
+                    &mut stick
+                } else {
+                    &mut slip
+                };
+                // pieces that meet were divided for nothing
+                match list.last_mut() {
+                    Some([_, end]) if *end == pair[0] => *end = pair[1],
+                    _ => list.push([pair[0], pair[1]]),
+                }
+            }
+            i += 1;
+        }
+        Extents {
+            contact,
+            stick,
+            slip,
+        }
+    }
+
+    fn sticks(&self, s: f64) -> bool {
+        let Some(law) = &self.patch.law else {
+            return self.patch.contact.condition == Condition::Bonded;
+        };
+        let boundary = &self.patch.contact.boundary;
+        let edge = (0..boundary.edge_count())
+            .find(|k| boundary.edge_arc(*k)[1] >= s)
+            .unwrap_or(0);
+        self.slip_at(edge, edge3::invert(&boundary.edge_arc(edge), s))
+            .abs()
+            < law.elastic_slip
+    }
+
+    /// Arc lengths at which |e| = ε: roots of a quadratic on each edge, in order.
+    fn stick_ends(&self) -> Vec<f64> {
+        let Some(law) = &self.patch.law else {
+            return Vec::new();
+        };
+        let boundary = &self.patch.contact.boundary;
+        let mut ends = Vec::new();
+        for edge in 0..boundary.edge_count() {
+            let [start, end, middle] = [-1.0, 1.0, 0.0].map(|xi| self.slip_at(edge, xi));
+            for target in [-law.elastic_slip, law.elastic_slip] {
+                let (a, b, c) = (
+                    0.5 * (start + end) - middle,
+                    0.5 * (end - start),
+                    middle - target,
+                );
+                for xi in quadratic_roots(a, b, c)
+                    .into_iter()
+                    .filter(|xi| xi.abs() <= 1.0)
+                {
+                    ends.push(edge3::interpolate(
+                        &edge3::shape(xi),
+                        &boundary.edge_arc(edge),
+                    ));
+                }
+            }
+        }
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        ends
+    }
+
+    fn peak(&self, value: f64, edge: usize, xi: f64) -> Peak {
+        let boundary = &self.patch.contact.boundary;
+        let h = edge3::shape(xi);
+        let at = |f: &dyn Fn(usize) -> f64| edge3::interpolate(&h, &edge_nodes(edge).map(f));
+        Peak {
+            value,
+            s: at(&|i| boundary.s[i]),
+            x: at(&|i| boundary.positions[i][0]),
+            y: at(&|i| boundary.positions[i][1]),
+        }
+    }
+
+    fn peak_normal_stress(&self) -> Option<Peak> {
+        let edges = 0..self.patch.contact.boundary.edge_count();
+        let in_contact = edges.filter(|edge| edge_nodes(*edge).iter().any(|&i| self.active(i)));
+        let best = in_contact
+            .flat_map(|edge| {
+                let p = edge_nodes(edge).map(|i| self.pressure(i));
+                // ends, and the vertex of the parabola where it lies inside
+                let (a, b) = (0.5 * (p[0] + p[1]) - p[2], 0.5 * (p[1] - p[0]));
+                let vertex = if a < 0.0 {
+                    (-b / (2.0 * a)).clamp(-1.0, 1.0)
+                } else {
+                    0.0
+                };
+                [-1.0, 1.0, vertex].map(|xi| (edge3::interpolate(&edge3::shape(xi), &p), edge, xi))
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(self.peak(-best.0 + 0.0, best.1, best.2))
+    }
+
+    fn peak_tangential_stress(&self) -> Option<Peak> {
+        if self.patch.law.is_none() && self.tractions.is_none() {
+            return None;
+        }
+        let size = |edge: usize, xi: f64| self.tangential_stress_at(edge, xi).abs();
+        let step = 2.0 / SAMPLES as f64;
+        let samples = (0..self.patch.contact.boundary.edge_count())
+            .flat_map(|edge| (0..=SAMPLES).map(move |k| (edge, -1.0 + step * k as f64)));
+        let (_, edge, centre) = samples
+            .map(|(edge, xi)| (size(edge, xi), edge, xi))
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        // golden section between the neighbouring samples
+        let (mut low, mut high) = ((centre - step).max(-1.0), (centre + step).min(1.0));
+        let ratio = 0.5 * (5f64.sqrt() - 1.0);
+        for _ in 0..40 {
+            let (a, b) = (high - ratio * (high - low), low + ratio * (high - low));
+            if size(edge, a) < size(edge, b) {
+                low = a
+            } else {
+                high = b
+            }
+        }
+        let narrowed = 0.5 * (low + high);
+        let xi = if size(edge, narrowed) > size(edge, centre) {
+            narrowed
+        } else {
+            centre
+        };
+        Some(self.peak(self.tangential_stress_at(edge, xi), edge, xi))
+    }
+}
+
+fn quadratic_roots(a: f64, b: f64, c: f64) -> Vec<f64> {
+    let discriminant = b * b - 4.0 * a * c;
+    if discriminant < 0.0 {
+        return Vec::new();
+    }
+    // q avoids the difference of nearly equal numbers
+    let q = -0.5 * (b + b.signum() * discriminant.sqrt());
+    [q / a, c / q]
+        .into_iter()
+        .filter(|x| x.is_finite())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quadratics_and_lines_give_their_roots() {
+        let mut roots = quadratic_roots(1.0, -3.0, 2.0);
+        roots.sort_by(f64::total_cmp);
+        assert_eq!(roots, [1.0, 2.0]);
+        assert_eq!(quadratic_roots(0.0, 2.0, -1.0), [0.5]);
+        assert!(quadratic_roots(1.0, 0.0, 1.0).is_empty());
+    }
+}

@@ -1,0 +1,286 @@
+//! One contact in the final state: its columns; in files of their own its forces, extents and peaks,
+//! and what to warn of.
+
+mod extents;
+mod warnings;
+
+use super::Finished;
+use super::system::{Patch, System};
+use crate::contact::edge_nodes;
+use crate::element::edge3;
+use crate::element::gauss::GAUSS_3;
+use crate::problem::{Condition, FrictionPoints};
+use crate::solution::{ContactProfile, NodeState};
+
+/// One contact in the final state.
+pub(super) struct PatchView<'a> {
+    system: &'a System<'a>,
+    patch: &'a Patch<'a>,
+    p: usize,
+    v: &'a [f64],
+    finished: &'a Finished,
+    forces: &'a Forces,
+    /// g at start, end and midside of every edge; in the total law nothing.
+    anchors: Vec<[f64; 3]>,
+    /// σ_t likewise, where it is not the law's: of the thesis's own iteration, and of bonded contacts.
+    tractions: Option<Vec<[f64; 3]>>,
+}
+
+/// Nodal forces of a state, all contacts in a row.
+pub(super) struct Forces {
+    pub(super) reactions: Vec<f64>,
+    pub(super) tangential_reactions: Vec<f64>,
+    pub(super) pressures: Vec<f64>,
+}
+
+impl<'a> PatchView<'a> {
+    pub(super) fn new(
+        system: &'a System<'a>,
+        p: usize,
+        finished: &'a Finished,
+        forces: &'a Forces,
+    ) -> Self {
+        let patch = &system.patches[p];
+        let mut view = PatchView {
+            system,
+            patch,
+            p,
+            v: &finished.state.v,
+            finished,
+            forces,
+            anchors: Vec::new(),
+            tractions: None,
+        };
+        view.anchors = view.carried_to_nodes(&|g| system.points[g].anchor);
+        if patch.contact.condition == Condition::Bonded {
+            let shear = |i: usize| {
+                let node = patch.first + i;
+                forces.tangential_reactions[node] / system.nodes[node].weight
+            };
+            // on the axis there is no shear
+            let stress = |i: usize| match system.nodes[patch.first + i].follows {
+                Some(_) => 0.0,
+                None => shear(i),
+            };
+            let edges = 0..patch.contact.boundary.edge_count();
+            view.tractions = Some(edges.map(|edge| edge_nodes(edge).map(stress)).collect());
+        } else if finished.own_tractions {
+            view.tractions = Some(view.carried_to_nodes(&|g| finished.tractions[g]));
+        }
+        view
+    }
+
+    /// Values at friction points, carried to start, end and midside of every edge: the parabola
+    /// through its three Gauss points, or the nodes' own.
+    fn carried_to_nodes(&self, value: &dyn Fn(usize) -> f64) -> Vec<[f64; 3]> {
+        let points = &self.system.points;
+        let own: Vec<usize> = (0..points.len())
+            .filter(|&g| points[g].patch == self.p)
+            .collect();
+        let edges = self.patch.contact.boundary.edge_count();
+        if own.is_empty() {
+            return vec![[0.0; 3]; edges];
+        }
+        if self.at_gauss_points() {
+            let gauss = GAUSS_3[2].0;
+            let parabola = |edge: usize| {
+                let [low, middle, high] = [0, 1, 2].map(|k| value(own[3 * edge + k]));
+                let slope = (high - low) / (2.0 * gauss);
+                let curve = (high + low - 2.0 * middle) / (2.0 * gauss * gauss);
+                [middle - slope + curve, middle + slope + curve, middle]
+            };
+            return (0..edges).map(parabola).collect();
+        }
+        // a node without a point lies on the axis, where nothing slides
+        let mut nodal = vec![0.0; self.count()];
+        for g in own {
+            nodal[points[g].nodes[0] - self.patch.first] = value(g);
+        }
+        (0..edges)
+            .map(|edge| edge_nodes(edge).map(|i| nodal[i]))
+            .collect()
+    }
+
+    /// Friction acts at Gauss points, three an edge.
+    fn at_gauss_points(&self) -> bool {
+        let friction = self.patch.contact.friction.as_ref();
+        friction.is_some_and(|f| f.points == FrictionPoints::Gauss3)
+    }
+
+    fn count(&self) -> usize {
+        self.patch.contact.boundary.nodes.len()
+    }
+
+    /// True where friction may act: in contact, or without any obstacle.
+    fn engaged(&self, i: usize) -> bool {
+        self.active(i) || self.patch.contact.condition == Condition::None
+    }
+
+    fn active(&self, i: usize) -> bool {
+        self.finished.state.active[self.patch.first + i]
+    }
+
+    fn u_t(&self, i: usize) -> f64 {
+        self.system
+            .tangential_displacement(self.v, self.patch.first + i)
+    }
+
+    fn pressure(&self, i: usize) -> f64 {
+        self.forces.pressures[self.patch.first + i]
+    }
+
+    /// e = u_t − d − g along an edge.
+    fn slip_at(&self, edge: usize, xi: f64) -> f64 {
+        let drag = |i: usize| self.system.nodes[self.patch.first + i].drag;
+        let relative = edge_nodes(edge).map(|i| self.u_t(i) - drag(i));
+        let h = edge3::shape(xi);
+        edge3::interpolate(&h, &relative) - edge3::interpolate(&h, &self.anchors[edge])
+    }
+
+    fn own_pressures(&self) -> &[f64] {
+        &self.forces.pressures[self.system.range(self.patch)]
+    }
+
+    /// S_ρ and τ at arc length s.
+    fn averaged_and_bound(&self, s: f64) -> (f64, f64) {
+        let Some(law) = &self.patch.law else {
+            return (0.0, 0.0);
+        };
+        let source = law.bound.source(s);
+        let pressures = self.own_pressures();
+        (
+            source.nonlocal_pressure(pressures),
+            law.bound.bound(&source, pressures),
+        )
+    }
+
+    /// σ_t(s) = −τ(s) φ(e(s)), with W at this very s.
+    fn tangential_stress_at(&self, edge: usize, xi: f64) -> f64 {
+        let h = edge3::shape(xi);
+        if let Some(tractions) = &self.tractions {
+            return edge3::interpolate(&h, &tractions[edge]);
+        }
+        let Some(law) = &self.patch.law else {
+            return 0.0;
+        };
+        let s = edge3::interpolate(&h, &self.patch.contact.boundary.edge_arc(edge));
+        -self.averaged_and_bound(s).1 * law.phi(self.slip_at(edge, xi))
+    }
+
+    /// A value at a node: the mean of those of the edges that meet there.
+    fn at_node(&self, i: usize, value: impl Fn(usize, f64) -> f64) -> f64 {
+        if i % 2 == 1 {
+            return value(i / 2, 0.0);
+        }
+        let before = (i > 0).then(|| value(i / 2 - 1, 1.0));
+        let after = (i + 1 < self.count()).then(|| value(i / 2, -1.0));
+        match (before, after) {
+            (Some(a), Some(b)) => 0.5 * (a + b),
+            (a, b) => a.or(b).unwrap_or(0.0),
+        }
+    }
+
+    pub(super) fn profile(&self) -> ContactProfile {
+        let boundary = &self.patch.contact.boundary;
+        let mut profile = ContactProfile::default();
+        for i in 0..self.count() {
+            let (averaged, bound) = self.averaged_and_bound(boundary.s[i]);
+            let law = self.patch.law.as_ref();
+            let phi = |edge, xi| law.map_or(0.0, |law| law.phi(self.slip_at(edge, xi)));
+            let sticks = match law {
+                None => self.patch.contact.condition == Condition::Bonded,
+                Some(law) => {
+                    self.at_node(i, |edge, xi| self.slip_at(edge, xi)).abs() < law.elastic_slip
+                }
+            };
+            let ratio = self.at_node(i, phi);
+            let stress = match &self.tractions {
+                None => -bound * ratio,
+                Some(_) => self.at_node(i, |edge, xi| self.tangential_stress_at(edge, xi)),
+            };
+            profile.s.push(boundary.s[i]);
+            profile.x.push(boundary.positions[i][0]);
+            profile.y.push(boundary.positions[i][1]);
+            profile
+                .gap
+                .push(self.patch.contact.gap(i, self.system.level.indentation));
+            profile.normal_displacement.push(
+                self.system
+                    .normal_displacement(self.v, self.patch.first + i),
+            );
+            profile.tangential_displacement.push(self.u_t(i));
+            profile.normal_stress.push(-self.pressure(i) + 0.0);
+            profile.tangential_stress.push(stress + 0.0);
+            profile.nonlocal_pressure.push(averaged);
+            profile.friction_bound.push(bound);
+            profile.friction_ratio.push(ratio.abs());
+            profile.state.push(state(self.engaged(i), sticks));
+        }
+        profile
+    }
+
+    /// The columns where friction acts, see [`ContactProfile`]; `nodal` are those at the nodes.
+    pub(super) fn friction_profile(&self, nodal: &ContactProfile) -> ContactProfile {
+        let (points, tractions) = (&self.system.points, &self.finished.tractions);
+        let own: Vec<usize> = (0..points.len())
+            .filter(|&g| points[g].patch == self.p)
+            .collect();
+        let mut profile = ContactProfile::default();
+        if !own.is_empty() && !self.at_gauss_points() {
+            for g in own {
+                profile.push_row(nodal, points[g].nodes[0] - self.patch.first);
+                profile.tangential_stress.pop();
+                profile.tangential_stress.push(tractions[g] + 0.0);
+            }
+            return profile;
+        }
+        let law = self.patch.law.as_ref();
+        let places = self.patch.contact.boundary.friction_points.iter();
+        for (k, place) in places.enumerate() {
+            let (edge, xi) = (k / 3, GAUSS_3[k % 3].0);
+            let along = |column: &[f64]| {
+                edge3::interpolate(&place.shape, &place.nodes.map(|i| column[i])) + 0.0
+            };
+            let (averaged, bound) = self.averaged_and_bound(place.s);
+            let slip = self.slip_at(edge, xi);
+            let stress = match own.get(k) {
+                Some(&g) => tractions[g],
+                None => self.tangential_stress_at(edge, xi),
+            };
+            let sticks = match law {
+                None => self.patch.contact.condition == Condition::Bonded,
+                Some(law) => slip.abs() < law.elastic_slip,
+            };
+            let [start, end, middle] = place.nodes;
+            let beside = [[start, middle], [middle; 2], [middle, end]][k % 3];
+            profile.s.push(place.s);
+            profile.x.push(along(&nodal.x));
+            profile.y.push(along(&nodal.y));
+            profile.gap.push(along(&nodal.gap));
+            profile
+                .normal_displacement
+                .push(along(&nodal.normal_displacement));
+            profile
+                .tangential_displacement
+                .push(along(&nodal.tangential_displacement));
+            profile.normal_stress.push(along(&nodal.normal_stress));
+            profile.tangential_stress.push(stress + 0.0);
+            profile.nonlocal_pressure.push(averaged);
+            profile.friction_bound.push(bound);
+            profile
+                .friction_ratio
+                .push(law.map_or(0.0, |law| law.phi(slip)).abs());
+            let engaged = beside.iter().all(|&i| self.engaged(i));
+            profile.state.push(state(engaged, sticks));
+        }
+        profile
+    }
+}
+
+fn state(engaged: bool, sticks: bool) -> NodeState {
+    match (engaged, sticks) {
+        (false, _) => NodeState::Open,
+        (true, true) => NodeState::Stick,
+        (true, false) => NodeState::Slip,
+    }
+}

@@ -1,0 +1,242 @@
+//! What to know before trusting a contact.
+
+use super::PatchView;
+use crate::contact::edge_nodes;
+use crate::elasticity::Dof;
+use crate::problem::{Condition, Friction};
+use crate::solution::{Outcome, Warning};
+
+/// Error of a smooth peak times the square of the number of elements across.
+const SMOOTH_PEAK: f64 = 0.28;
+
+/// Part of the friction force that cancels inside edges, from which on stick tractions oscillate.
+const OSCILLATING: f64 = 3e-3;
+
+/// One edge may hold this part of it for the sake of a motion that turns there.
+const TURN: f64 = 0.02;
+
+/// Fewer edges than this across a contact say little about its pressure.
+const FEWEST_EDGES: usize = 6;
+
+impl PatchView<'_> {
+    pub(in crate::algorithm) fn warn(&self, warnings: &mut Vec<Warning>) {
+        self.warn_of_oscillation(warnings);
+        self.warn_of_contact(warnings);
+    }
+
+    fn warn_of_contact(&self, warnings: &mut Vec<Warning>) {
+        let contact = self.patch.contact;
+        let mut warn = |code: &str, message: String| {
+            warnings.push(Warning {
+                code: code.to_owned(),
+                pointer: contact.pointer.clone(),
+                message,
+            });
+        };
+        let jumps = |f: &Friction| f.cohesion > 0.0 && f.nonlocal_radius == Some(0.0);
+        let settled = matches!(
+            self.finished.outcome,
+            Outcome::Converged | Outcome::Canceled
+        );
+        if !settled && contact.friction.as_ref().is_some_and(jumps) {
+            warn(
+                "cohesion_jumps",
+                "The friction bound jumps by the cohesion where the pressure ends; without a nonlocal radius the nodes there may come and go for ever. Give a radius of an element or more.".to_owned(),
+            );
+        }
+        let touching = (0..self.count()).filter(|&i| self.active(i)).count();
+        if contact.condition != Condition::Unilateral {
+            return;
+        }
+        if touching == 0 {
+            let opening = |i: usize| {
+                contact.gap(i, self.system.level.indentation)
+                    - self
+                        .system
+                        .normal_displacement(self.v, self.patch.first + i)
+            };
+            let nearest = (0..self.count()).min_by(|&a, &b| opening(a).total_cmp(&opening(b)));
+            let smallest = nearest.map_or(f64::INFINITY, opening);
+            // untouched, the body does not feel the obstacle: what the gap lacks is what to indent by
+            let engages = |i: usize| {
+                let moved = self
+                    .system
+                    .normal_displacement(self.v, self.patch.first + i);
+                (contact.profile[i] - moved) / contact.push[i][0]
+            };
+            let needed = (0..self.count()).map(engages).fold(f64::INFINITY, f64::min);
+            warn(
+                "no_contact",
+                format!(
+                    "The body never touches the obstacle: the smallest gap is {smallest:.6e}. An indentation above {needed:.6e} engages it."
+                ),
+            );
+            return;
+        }
+        if let Some(tau) = self.bound_beyond_contact() {
+            warn(
+                "bound_beyond_contact",
+                format!(
+                    "The prescribed friction bound acts on all of the boundary, as Tresca's law has it: up to {tau:.3e} also where the body does not touch. Give it as a table over s that ends with the contact."
+                ),
+            );
+        }
+        if let Some((length, radius)) = self.unresolved_radius() {
+            warn(
+                "mesh_too_coarse_for_radius",
+                format!(
+                    "The edge under the peak of σ_t ({length:.3e}) is longer than the nonlocal radius ({radius}): the averaging is not resolved there. Refine the mesh."
+                ),
+            );
+        }
+        let edges = (0..contact.boundary.edge_count())
+            .filter(|k| edge_nodes(*k).iter().all(|&i| self.active(i)))
+            .count();
+        if edges < FEWEST_EDGES {
+            warn(
+                "mesh_too_coarse_for_contact",
+                format!(
+                    "Only {edges} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a pressure to rely on. {} Refine the mesh there.",
+                    self.peak_uncertainty(edges)
+                ),
+            );
+        }
+        let s = &contact.boundary.s;
+        let ends = [0, self.count() - 1].map(|i| (s[i], self.active(i) && !self.symmetric(i)));
+        for (s, _) in ends.into_iter().filter(|(_, pressed)| *pressed) {
+            warn(
+                "contact_reaches_obstacle_end",
+                format!(
+                    "The body presses against the very end of the obstacle, s = {s:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the obstacle goes on there, extend it."
+                ),
+            );
+        }
+        let radius = contact
+            .friction
+            .as_ref()
+            .and_then(|f| f.nonlocal_radius)
+            .unwrap_or(0.0);
+        let first = (0..self.count()).find(|&i| self.active(i));
+        let last = (0..self.count()).rfind(|&i| self.active(i));
+        if let (Some(first), Some(last)) = (first, last) {
+            let mirrored = [first, last]
+                .into_iter()
+                .filter(|&i| self.symmetric(i))
+                .count();
+            let width = (s[last] - s[first]) * (1 + mirrored) as f64;
+            if radius > width && width > 0.0 {
+                warn(
+                    "radius_exceeds_contact",
+                    format!(
+                        "The nonlocal radius {radius} is larger than the whole contact, {width:.4}: the averaged pressure, and friction with it, is smeared out beyond the contact."
+                    ),
+                );
+            }
+        }
+    }
+
+    /// How far the peak pressure may be off with so few elements in contact. The worst of many meshes
+    /// of Hertz's cylinder is .28/n², n elements across the whole contact (`tests/verification`).
+    fn peak_uncertainty(&self, edges: usize) -> String {
+        let count = self.count();
+        let pressed = [0, count - 1].into_iter().filter(|&i| self.active(i));
+        let (mirrored, sharp): (Vec<usize>, Vec<usize>) = pressed.partition(|&i| self.symmetric(i));
+        let across = edges * (1 + mirrored.len());
+        if across == 0 {
+            "Nothing is known of its peak.".to_owned()
+        } else if !sharp.is_empty() {
+            "At the obstacle's end its peak has no limit.".to_owned()
+        } else {
+            let off = 100.0 * SMOOTH_PEAK / (across * across) as f64;
+            format!("A smooth pressure's peak is then off by up to {off:.1} %.")
+        }
+    }
+
+    /// Inside an edge the tangential stress changes its sign where the motion turns, mostly once. What
+    /// else cancels inside edges is an oscillation of stick tractions, and `friction_force` is too
+    /// large by about that much.
+    fn warn_of_oscillation(&self, warnings: &mut Vec<Warning>) {
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        let own: Vec<f64> = points
+            .filter(|(point, _)| point.patch == self.p)
+            .map(|(point, traction)| point.weight * traction)
+            .collect();
+        if !self.at_gauss_points() {
+            return; // friction at nodes does not oscillate
+        }
+        let cancels = |edge: &[f64]| {
+            let size: f64 = edge.iter().map(|force| force.abs()).sum();
+            size - edge.iter().sum::<f64>().abs()
+        };
+        let total: f64 = own.iter().map(|force| force.abs()).sum();
+        let mut canceling: f64 = own.chunks(3).map(cancels).sum();
+        // the motion may turn once, within a coarse edge; but not from the full bound one way to the
+        // full bound the other way
+        let reached: Vec<bool> = self
+            .system
+            .points
+            .iter()
+            .zip(self.finished.tractions.iter().zip(&self.finished.bound))
+            .filter(|(point, _)| point.patch == self.p)
+            .map(|(_, (traction, tau))| traction.abs() >= *tau)
+            .collect();
+        let turns = own.chunks(3).zip(reached.chunks(3));
+        let turn = turns
+            .filter(|(_, reached)| reached.iter().filter(|r| **r).count() < 2)
+            .map(|(edge, _)| cancels(edge))
+            .fold(0.0, f64::max);
+        if turn < TURN * total {
+            canceling -= turn;
+        }
+        if canceling > OSCILLATING * total {
+            warnings.push(Warning {
+                code: "oscillating_stick".to_owned(),
+                pointer: self.patch.contact.pointer.clone(),
+                message: format!(
+                    "The tangential stress oscillates between the friction points of single edges: the mesh does not resolve elastic_slip, and friction_force is too large by about {:.1} %. Refine the contact, raise elastic_slip, or choose \"points\": \"nodal\".",
+                    100.0 * canceling / total
+                ),
+            });
+        }
+    }
+
+    /// A node on a line of symmetry: on the axis, or held along the tangent.
+    fn symmetric(&self, i: usize) -> bool {
+        let node = &self.system.nodes[self.patch.first + i];
+        node.follows.is_some() || matches!(node.tangent, Dof::Fixed(value) if value == 0.0)
+    }
+
+    /// The largest |σ_t| that a prescribed bound exerts on edges of which no node touches.
+    fn bound_beyond_contact(&self) -> Option<f64> {
+        let friction = self.patch.contact.friction.as_ref()?;
+        friction.bound.as_ref()?;
+        let open = |node: usize| !self.active(node - self.patch.first);
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        let largest = points
+            .filter(|(point, _)| point.patch == self.p && point.nodes.iter().all(|n| open(*n)))
+            .fold(0.0f64, |most, (_, traction)| most.max(traction.abs()));
+        (largest > 0.0).then_some(largest)
+    }
+
+    /// The edge under the peak of σ_t, where it is longer than ρ; unless all edges are, which was said
+    /// before the solution.
+    fn unresolved_radius(&self) -> Option<(f64, f64)> {
+        let contact = &self.patch.contact;
+        let friction = contact.friction.as_ref()?;
+        friction.coefficient.filter(|mu| *mu > 0.0)?;
+        let radius = friction.nonlocal_radius.filter(|radius| *radius > 0.0)?;
+        let boundary = &contact.boundary;
+        let length = |edge: usize| boundary.edge_arc(edge)[1] - boundary.edge_arc(edge)[0];
+        let edges = || 0..boundary.edge_count();
+        if edges().all(|edge| length(edge) > radius) {
+            return None;
+        }
+        let size = |edge: usize| {
+            let at = |xi: f64| self.tangential_stress_at(edge, xi).abs();
+            at(-0.7).max(at(0.0)).max(at(0.7))
+        };
+        let under = edges().max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+        // rounding of a grid whose lines are ρ apart
+        (length(under) > radius * (1.0 + 1e-9)).then_some((length(under), radius))
+    }
+}

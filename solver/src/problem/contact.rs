@@ -1,0 +1,316 @@
+//! A boundary that faces a rigid obstacle: the obstacle, and the friction law.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A boundary that may touch a rigid obstacle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Contact {
+    /// Name of the boundary.
+    pub boundary: String,
+    /// The obstacle that faces it.
+    pub obstacle: Obstacle,
+    /// How far the obstacle is pushed against the body (length, either sign):
+    /// gap = profile − indentation.
+    #[serde(default)]
+    pub indentation: f64,
+    /// Displacement of the obstacle along t, the outward normal turned clockwise (length).
+    #[serde(default)]
+    pub tangential_displacement: f64,
+    /// The direction that gap and normal displacement are measured along.
+    #[serde(default)]
+    pub normal: NormalOf,
+    /// What the obstacle does to the body.
+    #[serde(default)]
+    pub condition: Condition,
+    /// Absent: frictionless.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<Friction>,
+}
+
+/// Whose normal a contact uses. On a sloping obstacle they differ, and forces with them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NormalOf {
+    /// The body's outward normal, as in the thesis.
+    #[default]
+    Body,
+    /// The normal of the obstacle where it faces the node; the gap is measured to the tangent there.
+    Obstacle,
+}
+
+/// What the obstacle does to the body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Condition {
+    /// u_n ≤ gap, and only pressure: thesis (1.14).
+    #[default]
+    Unilateral,
+    /// u_n = gap and u_t = d on all of Γ_C; stresses of either sign.
+    Bonded,
+    /// No obstacle: friction with a prescribed bound only.
+    None,
+}
+
+/// Declares the kinds of obstacle, each with the three fields that all of them have.
+macro_rules! obstacles {
+    ($($(#[$doc:meta])* $kind:ident { $($(#[$attribute:meta])* $field:ident: $type:ty,)* })*) => {
+        /// Shape of a rigid obstacle: its distance from the boundary before it is pushed, as a
+        /// function of a coordinate c along the boundary; or a curve in space.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+        pub enum Obstacle {
+            $($(#[$doc])* $kind {
+                $($(#[$attribute])* $field: $type,)*
+                /// Where the obstacle begins; absent: with the boundary.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                from: Option<f64>,
+                /// Where it ends; absent: with the boundary.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                to: Option<f64>,
+                /// What c is.
+                #[serde(default)]
+                along: Along,
+            },)*
+        }
+
+        impl Obstacle {
+            /// `from`, `to` and `along`, which every kind has.
+            pub fn span(&self) -> (Option<f64>, Option<f64>, Along) {
+                match *self {
+                    $(Obstacle::$kind { from, to, along, .. } => (from, to, along),)*
+                }
+            }
+        }
+    };
+}
+
+obstacles! {
+    /// Profile 0.
+    Flat {}
+    /// Profile R − √(R² − (c − center)²); there is no obstacle beyond R.
+    Circle {
+        /// R > 0 (length).
+        radius: f64,
+        /// Where the profile is zero.
+        #[serde(default)]
+        center: f64,
+    }
+    /// Profile (c − center)² / (2 radius).
+    Parabola {
+        /// Radius of curvature at the apex, > 0 (length).
+        radius: f64,
+        /// Where the profile is zero.
+        #[serde(default)]
+        center: f64,
+    }
+    /// Profile |c − center| tan(angle).
+    Wedge {
+        /// Between face and surface, 0 < angle < 90 (degrees).
+        angle: f64,
+        /// Where the profile is zero.
+        #[serde(default)]
+        center: f64,
+    }
+    /// Profile |c − center| tan(angle): a wedge of revolution.
+    Cone {
+        /// Between face and surface, 0 < angle < 90 (degrees).
+        angle: f64,
+        /// Where the profile is zero.
+        #[serde(default)]
+        center: f64,
+    }
+    /// Profile slope · (c − center).
+    Tilted {
+        /// Rise per length of c.
+        slope: f64,
+        /// Where the profile is zero.
+        #[serde(default)]
+        center: f64,
+    }
+    /// Profile coefficient · |c − center|^exponent.
+    Power {
+        /// > 0 (length^(1 − exponent)).
+        coefficient: f64,
+        /// ≥ 1.
+        exponent: f64,
+        /// Where the profile is zero.
+        #[serde(default)]
+        center: f64,
+    }
+    /// Profile 0 up to `half_width` from the center, then a circle that leaves it tangentially; there
+    /// is no obstacle beyond half_width + radius.
+    RoundedFlat {
+        /// Half the width of the flat part, ≥ 0 (length).
+        half_width: f64,
+        /// Radius of the rounding, > 0 (length).
+        radius: f64,
+        /// Middle of the flat part.
+        #[serde(default)]
+        center: f64,
+    }
+    /// Profile by a table, linear between its points; there is no obstacle outside of it.
+    Table {
+        /// Coordinates c, strictly increasing.
+        x: Vec<f64>,
+        /// Profile there (length, any sign).
+        gap: Vec<f64>,
+    }
+    /// A broken line in space; the profile is the distance along the body's normal.
+    Polyline {
+        /// Its points `[x, y]`.
+        points: Vec<[f64; 2]>,
+    }
+    /// A straight line in space, without end; the profile is the distance along the body's normal.
+    Line {
+        /// A point `[x, y]` of it.
+        point: [f64; 2],
+        /// Angle from x to the line, counter-clockwise (degrees).
+        angle: f64,
+    }
+}
+
+/// The coordinate c along a contact boundary.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Along {
+    /// The position x.
+    #[default]
+    X,
+    /// Arc length from the start of the named boundary, along t.
+    ArcLength,
+}
+
+/// The nonlocal, nonlinear friction law of Oden and Pires, thesis (1.8):
+/// σ_t = −τ φ_ε(|u_t − d|) sign(u_t − d), τ = min(shear_cap, cohesion + coefficient · S_ρ(p)) where
+/// S_ρ(p) > 0; or with a prescribed `bound` τ.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Friction {
+    /// μ ≥ 0 (the thesis's ν). Needed, but with a `bound`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coefficient: Option<f64>,
+    /// ρ ≥ 0 (length): the pressure is averaged over this distance. 0: Coulomb's local law. Needed,
+    /// but with a `bound`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nonlocal_radius: Option<f64>,
+    /// ε > 0 (length): tangential displacement at which the friction bound is reached.
+    pub elastic_slip: f64,
+    /// Shape of the averaging kernel.
+    #[serde(default)]
+    pub kernel: Kernel,
+    /// Scale of the averaging kernel.
+    #[serde(default)]
+    pub normalization: Normalization,
+    /// φ_ε, from stick to slip.
+    #[serde(default)]
+    pub transition: Transition,
+    /// What friction remembers.
+    #[serde(default)]
+    pub history: History,
+    /// Where friction is evaluated.
+    #[serde(default)]
+    pub points: FrictionPoints,
+    /// What the kernel is integrated over in axisymmetry.
+    #[serde(default)]
+    pub measure: Measure,
+    /// Added to μ S wherever S > 0, ≥ 0 (stress).
+    #[serde(default)]
+    pub cohesion: f64,
+    /// Largest τ, > 0 (stress); absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shear_cap: Option<f64>,
+    /// A prescribed τ ≥ 0 (Tresca's law) instead of coefficient, radius, cohesion and cap. It acts on all
+    /// of Γ_C, touched or not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bound: Option<PrescribedBound>,
+}
+
+/// A prescribed friction bound τ (stress).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum PrescribedBound {
+    /// The same everywhere.
+    Constant(f64),
+    /// Linear between points of arc length; nothing outside of them.
+    Table(BoundTable),
+}
+
+/// A friction bound by arc length.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoundTable {
+    /// Arc length from the first node of Γ_C, strictly increasing.
+    pub s: Vec<f64>,
+    /// τ there, ≥ 0 (stress).
+    pub bound: Vec<f64>,
+}
+
+/// Where friction is evaluated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FrictionPoints {
+    /// At three Gauss points per edge. On a coarse mesh and with a small elastic slip the
+    /// tangential stress may oscillate inside stick.
+    #[default]
+    Gauss3,
+    /// At the nodes; it does not oscillate.
+    Nodal,
+}
+
+/// What the averaging kernel is integrated over in axisymmetry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Measure {
+    /// Arc length along the meridian, as in the thesis.
+    #[default]
+    Line,
+    /// The contact surface itself: rings of it.
+    Surface,
+}
+
+/// Shape of the averaging kernel ω_ρ, thesis 1.2.1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Kernel {
+    /// C exp(ρ²/(x² − ρ²)), thesis (1.2).
+    #[default]
+    Bump,
+    /// C (1 − x²/ρ²).
+    Parabola,
+}
+
+/// Scale of the averaging kernel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Normalization {
+    /// ∫ω = 1 on a line: tends to Coulomb's law as ρ → 0.
+    #[default]
+    UnitIntegral,
+    /// ω(0) = 1, the thesis's words taken literally; friction then vanishes with ρ.
+    PeakOne,
+}
+
+/// φ_ε, thesis (1.7).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Transition {
+    /// min(|u|/ε, 1), thesis (1.7b).
+    #[default]
+    Linear,
+    /// tanh(|u|/ε), thesis (1.7a).
+    Tanh,
+}
+
+/// What friction remembers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum History {
+    /// Friction depends on the total displacement, as in the thesis.
+    #[default]
+    Total,
+    /// Friction depends on the displacement since the point last slipped: each point keeps an anchor,
+    /// FORMULATION 1. For the linear transition only.
+    Incremental,
+}

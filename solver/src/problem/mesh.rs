@@ -1,0 +1,138 @@
+//! The mesh of a body: where its elements come from, and names for parts of it.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::element::Element;
+
+/// Where the elements come from: exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshInput {
+    /// A grid of lines, with the boundaries `left`, `right`, `bottom`, `top`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grid: Option<Grid>,
+    /// Nodes and elements, written out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inline: Option<InlineMesh>,
+    /// The text of a Gmsh mesh (MSH 2.2 or 4.1, ASCII): physical curves become boundaries, physical
+    /// surfaces groups, physical points node sets.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gmsh: Option<String>,
+    /// The text of an Abaqus or CalculiX deck: surfaces and, where their nodes span edges, node sets
+    /// become boundaries, element sets groups, node sets node sets. What it says of the analysis is
+    /// not used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub abaqus: Option<String>,
+    /// The hash of a mesh that was uploaded to the service, `sha256:…`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stored: Option<String>,
+    /// How often every element is split, or the tolerance that a grid is refined to.
+    #[serde(default)]
+    pub refine: Refine,
+    /// Further names for parts of boundaries, e.g. `{"taper": {"side": "top", "x": [1, 3]}}`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub boundaries: BTreeMap<String, BoundaryPart>,
+    /// Names for groups of elements, e.g. `{"inclusion": {"x": [1, 2], "y": [-1, 0]}}`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub groups: BTreeMap<String, ElementRange>,
+}
+
+/// Refinement of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Refine {
+    /// Every element is split in two in each direction, this many times.
+    Times(u32),
+    /// A grid is refined towards the ends of its contacts until the results settle.
+    Adaptive(AdaptiveRefine),
+}
+
+impl Default for Refine {
+    fn default() -> Self {
+        Refine::Times(0)
+    }
+}
+
+/// Goal of adaptive refinement.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AdaptiveRefine {
+    /// Largest relative change, from one mesh to the next finer one, of the total forces and of
+    /// the peak stresses that have a limit (0 < tolerance < 1).
+    pub tolerance: f64,
+}
+
+/// The elements whose nodes all lie within a range of x and of y, ends included.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ElementRange {
+    /// Range of x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x: Option<[f64; 2]>,
+    /// Range of y.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub y: Option<[f64; 2]>,
+}
+
+/// Grid lines; with `top` or `bottom` a strip between two polylines.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// Positions of the lines x = const, strictly increasing (length).
+    pub x: Vec<f64>,
+    /// Positions of the lines y = const, strictly increasing (length); for a strip the fractions
+    /// of its height, from 0 to 1.
+    pub y: Vec<f64>,
+    /// Upper edge of a strip: points `[x, y]` with increasing x that span all of `x`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub top: Option<Vec<[f64; 2]>>,
+    /// Lower edge of a strip; absent: y = 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bottom: Option<Vec<[f64; 2]>>,
+}
+
+/// A mesh written out in the problem.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InlineMesh {
+    /// Node positions `[x, y]` (length).
+    pub nodes: Vec<[f64; 2]>,
+    /// Quadrilaterals and triangles.
+    pub elements: Vec<Element>,
+    /// Named boundaries: element sides as `[corner, corner, midside]`.
+    #[serde(default)]
+    pub boundaries: BTreeMap<String, Vec<[u32; 3]>>,
+    /// Named groups of elements, by their numbers from 0.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub groups: BTreeMap<String, Vec<u32>>,
+    /// Named sets of nodes, by their numbers from 0.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub node_sets: BTreeMap<String, Vec<u32>>,
+}
+
+/// The sides of the body's surface that fit every condition given, ends included.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoundaryPart {
+    /// The boundary to take a part of; absent: the whole surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub side: Option<String>,
+    /// All three nodes of a side lie within this range of x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x: Option<[f64; 2]>,
+    /// All three nodes of a side lie within this range of y.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub y: Option<[f64; 2]>,
+    /// All three nodes of a side lie within this box, `[[x, y], [x, y]]`: two opposite corners.
+    #[serde(default, skip_serializing_if = "Option::is_none", rename = "box")]
+    pub corners: Option<[[f64; 2]; 2]>,
+    /// The outward normal of a side points this way `[x, y]` at all three nodes, to `angle`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f64; 2]>,
+    /// Largest angle between a side's normal and `normal`; 1 when absent (degrees).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle: Option<f64>,
+}

@@ -1,0 +1,182 @@
+//! Load steps, and how to solve them.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// One load step: factors on the values given elsewhere, reached in equal or growing increments
+/// from those of the step before (from nothing at first).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Step {
+    /// A name for people.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Factor on the indentation of every contact at the end of the step.
+    #[serde(default = "one")]
+    pub indentation: f64,
+    /// Factor on the tangential displacement of every obstacle.
+    #[serde(default)]
+    pub tangential_displacement: f64,
+    /// Factor on all loads.
+    #[serde(default = "one")]
+    pub loads: f64,
+    /// Factor on all prescribed displacements.
+    #[serde(default = "one")]
+    pub supports: f64,
+    /// Increments of the step (≥ 1).
+    #[serde(default = "one_increment")]
+    pub increments: u32,
+    /// How the indentation grows from increment to increment.
+    #[serde(default)]
+    pub spacing: Spacing,
+}
+
+/// How the indentation grows inside a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Spacing {
+    /// By equal amounts.
+    #[default]
+    Uniform,
+    /// So that the contact grows by equal widths: δ_k = δ (k/n)^m for a profile of power m.
+    ContactWidth,
+}
+
+impl Step {
+    /// Everything as it is given, at once.
+    pub fn whole() -> Self {
+        Step {
+            name: None,
+            indentation: 1.0,
+            tangential_displacement: 1.0,
+            loads: 1.0,
+            supports: 1.0,
+            increments: 1,
+            spacing: Spacing::Uniform,
+        }
+    }
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn one_increment() -> u32 {
+    1
+}
+
+/// How to solve, and how far.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SolverControls {
+    /// The strategy.
+    #[serde(default)]
+    pub algorithm: Algorithm,
+    /// All residuals are dimensionless; each must fall below this (0 < tolerance < 1).
+    #[serde(default = "default_tolerance")]
+    pub tolerance: f64,
+    /// Most outer sweeps over the friction bound, per increment (≥ 1).
+    #[serde(default = "default_max_iterations")]
+    pub max_iterations: u32,
+    /// Solve once more from the bonded state, and say whether the two solutions agree.
+    #[serde(default)]
+    pub check_uniqueness: bool,
+    /// Solve once more with twice the increments, and say how much the result changes.
+    #[serde(default)]
+    pub check_increments: bool,
+    /// Choices that the thesis leaves to its user; for `algorithm: thesis` only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thesis: Option<ThesisOptions>,
+}
+
+/// The strategy of solution, FORMULATION 4.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Algorithm {
+    /// Sweeps; where they contract badly, accelerated; where that fails, Newton.
+    #[default]
+    Auto,
+    /// Sweeps over the friction bound, each a convex problem, with Anderson acceleration.
+    FixedPoint,
+    /// One semi-smooth Newton iteration for everything, the averaging included.
+    Newton,
+    /// The thesis's own iteration (3.1), to the letter. At the thesis's parameters it does not
+    /// solve the problem; the result says so.
+    Thesis,
+}
+
+/// Choices of the thesis's own iteration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ThesisOptions {
+    /// First guess of the contact Γ_C*: `[s0, s1]` of arc length by boundary; absent: all of Γ_C.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub contact_guess: BTreeMap<String, [f64; 2]>,
+    /// Way of evaluating the friction force, thesis 3.2: 1 at the boundary's own Gauss points, 2 along
+    /// the two nearest rows of internal Gauss points, carried to the boundary linearly.
+    #[serde(default = "first_way")]
+    pub friction_force: u32,
+    /// Where the normal stress comes from.
+    #[serde(default)]
+    pub pressure: ThesisPressure,
+    /// Local Gauss points that the kernel is integrated with in each element, thesis 3.4.2, no further
+    /// than the next element; for extrapolated pressure only. 0: the mesh-free average of nodal values.
+    #[serde(default)]
+    pub local_points: u32,
+    /// Part of the new friction force that is taken over (0 < relaxation ≤ 1).
+    #[serde(default = "one")]
+    pub relaxation: f64,
+    /// Let friction oppose the motion, as (1.8) means it, instead of acting along t throughout.
+    #[serde(default)]
+    pub signed: bool,
+}
+
+impl Default for ThesisOptions {
+    fn default() -> Self {
+        ThesisOptions {
+            contact_guess: BTreeMap::new(),
+            friction_force: first_way(),
+            pressure: ThesisPressure::default(),
+            local_points: 0,
+            relaxation: one(),
+            signed: false,
+        }
+    }
+}
+
+/// Where the thesis's iteration takes the normal stress from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ThesisPressure {
+    /// Nodal reactions / ∫h.
+    #[default]
+    Lumped,
+    /// Stresses at internal Gauss points carried to the boundary, thesis 3.3.
+    Extrapolated,
+}
+
+fn first_way() -> u32 {
+    1
+}
+fn default_tolerance() -> f64 {
+    1e-10
+}
+
+fn default_max_iterations() -> u32 {
+    200
+}
+
+impl Default for SolverControls {
+    fn default() -> Self {
+        Self {
+            algorithm: Algorithm::Auto,
+            tolerance: default_tolerance(),
+            max_iterations: default_max_iterations(),
+            check_uniqueness: false,
+            check_increments: false,
+            thesis: None,
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! A stored profile at other points: as many as are asked for, without solving anything again.
+
+use super::{ContactProfile, NodeState};
+use crate::element::edge3;
+
+/// A place this near to a node, as part of the whole length, is the node: the rounding of `s`.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// The columns of a profile at `count` places, equally spaced in arc length from the first node of
+/// Γ_C to the last; units and signs are those of [`ContactProfile`].
+///
+/// `profile` is at the nodes, `friction` at the friction points of the same Γ_C and the same step (it
+/// may be empty: results stored by older versions have none). Nothing is solved or averaged again:
+///
+/// - positions, gap, displacements and normal stress are the quadratic of their edge between its three
+///   nodes, which is what the solution means by them: exact. (The gap is the one that contact is
+///   asked for, at nodes; between them the obstacle itself may be elsewhere.)
+/// - tangential stress, nonlocal pressure, friction bound and ratio are the law's at nodes and friction
+///   points, five a Gauss edge, and curves between: of the two parabolas in s through a third
+///   neighbour the flatter one, and the straight line where they bend to opposite sides. So a
+///   quadratic is exact, a smooth column is good to third order, and the corners that the law has,
+///   at the end of contact or of stick, do not make their surroundings wave. Bound ≥ 0 and
+///   0 ≤ ratio ≤ 1 are kept.
+/// - the state is that of the nearest node or friction point.
+///
+/// At a node all columns are those of the node.
+pub fn sample(profile: &ContactProfile, friction: &ContactProfile, count: usize) -> ContactProfile {
+    let mut sampled = ContactProfile::default();
+    // Γ_C is a chain of edges: start, midside, end, and the end is the next one's start
+    let edges = profile.s.len().saturating_sub(1) / 2;
+    if edges == 0 {
+        return sampled;
+    }
+    let known = Known::new(profile, friction);
+    let (first, last) = (profile.s[0], profile.s[2 * edges]);
+    let (mut edge, mut interval) = (0, 0);
+    for k in 0..count {
+        let s = match k {
+            0 => first,
+            _ if k == count - 1 => last,
+            _ => first + (last - first) * (k as f64 / (count - 1) as f64),
+        };
+        while edge + 1 < edges && profile.s[2 * edge + 2] < s {
+            edge += 1;
+        }
+        while interval + 2 < known.s.len() && known.s[interval + 1] < s {
+            interval += 1;
+        }
+        let nodes = [2 * edge, 2 * edge + 2, 2 * edge + 1];
+        let same = |i: &usize| (profile.s[*i] - s).abs() <= ROUNDING * (last - first);
+        if let Some(node) = nodes.into_iter().find(same) {
+            sampled.push_row(profile, node);
+            continue;
+        }
+        let h = edge3::shape(edge3::invert(&nodes.map(|i| profile.s[i]), s));
+        // + 0.0 turns −0 into 0
+        let along = |column: &[f64]| edge3::interpolate(&h, &nodes.map(|i| column[i])) + 0.0;
+        let between = |column: &[f64]| curve(&known.s, column, interval, s) + 0.0;
+        sampled.s.push(s);
+        for (to, from) in [
+            (&mut sampled.x, &profile.x),
+            (&mut sampled.y, &profile.y),
+            (&mut sampled.gap, &profile.gap),
+            (
+                &mut sampled.normal_displacement,
+                &profile.normal_displacement,
+            ),
+            (
+                &mut sampled.tangential_displacement,
+                &profile.tangential_displacement,
+            ),
+            (&mut sampled.normal_stress, &profile.normal_stress),
+        ] {
+            to.push(along(from));
+        }
+        let values = &known.values;
+        sampled
+            .tangential_stress
+            .push(between(&values.tangential_stress));
+        sampled
+            .nonlocal_pressure
+            .push(between(&values.nonlocal_pressure));
+        let bound = between(&values.friction_bound);
+        sampled.friction_bound.push(bound.max(0.0));
+        let ratio = between(&values.friction_ratio);
+        sampled.friction_ratio.push(ratio.clamp(0.0, 1.0));
+        sampled.state.push(known.nearest(interval, s));
+    }
+    sampled
+}
+
+/// Nodes and friction points, in order of arc length.
+struct Known {
+    s: Vec<f64>,
+    values: ContactProfile,
+}
+
+impl Known {
+    fn new(profile: &ContactProfile, friction: &ContactProfile) -> Self {
+        let mut values = ContactProfile::default();
+        let mut next = 0;
+        for (node, s) in profile.s.iter().enumerate() {
+            while next < friction.s.len() && friction.s[next] <= *s {
+                // the middle Gauss point of an edge is its midside: the node's values count
+                if friction.s[next] < *s {
+                    values.push_row(friction, next);
+                }
+                next += 1;
+            }
+            values.push_row(profile, node);
+        }
+        Known {
+            s: values.s.clone(),
+            values,
+        }
+    }
+
+    fn nearest(&self, interval: usize, s: f64) -> NodeState {
+        let later = self.s[interval + 1] - s < s - self.s[interval];
+        self.values.state[interval + usize::from(later)]
+    }
+}
+
+/// v at a place between s_j and s_{j+1}:
+///
+///   v_j + (s − s_j) v[j, j+1] + (s − s_j)(s − s_{j+1}) b
+///
+/// b the smaller of the second divided differences v[j−1, j, j+1] and v[j, j+1, j+2], 0 where their
+/// signs differ, and the only one at the ends.
+fn curve(s: &[f64], v: &[f64], j: usize, at: f64) -> f64 {
+    let slope = |i: usize| (v[i + 1] - v[i]) / (s[i + 1] - s[i]);
+    let bend = |i: usize| (slope(i + 1) - slope(i)) / (s[i + 2] - s[i]);
+    let before = (j > 0).then(|| bend(j - 1));
+    let after = (j + 2 < s.len()).then(|| bend(j));
+    let flatter = match (before, after) {
+        (Some(a), Some(b)) if a * b <= 0.0 => 0.0,
+        (Some(a), Some(b)) if a.abs() < b.abs() => a,
+        (Some(_), Some(b)) => b,
+        (a, b) => a.or(b).unwrap_or(0.0),
+    };
+    v[j] + (at - s[j]) * slope(j) + (at - s[j]) * (at - s[j + 1]) * flatter
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::gauss::GAUSS_3;
+
+    /// Columns that are quadratics of s, on edges that end at `corners`.
+    fn profiles(corners: &[f64]) -> (ContactProfile, ContactProfile) {
+        let (mut nodes, mut points) = (vec![corners[0]], Vec::new());
+        for ends in corners.windows(2) {
+            let (middle, half) = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]));
+            nodes.extend([middle, ends[1]]);
+            points.extend(GAUSS_3.map(|(xi, _)| middle + half * xi));
+        }
+        (quadratics(&nodes), quadratics(&points))
+    }
+
+    /// Column number c is c + s/2 − s²/10 times a factor that keeps bound and ratio in their limits.
+    fn quadratics(s: &[f64]) -> ContactProfile {
+        let column = |c: f64| {
+            s.iter()
+                .map(|s| 0.05 * (c + 0.5 * s - 0.1 * s * s))
+                .collect()
+        };
+        ContactProfile {
+            s: s.to_vec(),
+            x: column(1.0),
+            y: column(2.0),
+            gap: column(3.0),
+            normal_displacement: column(4.0),
+            tangential_displacement: column(5.0),
+            normal_stress: column(6.0),
+            tangential_stress: column(7.0),
+            nonlocal_pressure: column(8.0),
+            friction_bound: column(9.0),
+            friction_ratio: column(10.0),
+            state: s
+                .iter()
+                .map(|s| match *s {
+                    s if s < 1.0 => NodeState::Stick,
+                    s if s < 2.5 => NodeState::Slip,
+                    _ => NodeState::Open,
+                })
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn at_the_nodes_a_sample_is_the_profile() {
+        let (nodal, friction) = profiles(&[0.0, 0.3, 0.6, 0.9]);
+        assert_eq!(sample(&nodal, &friction, 7), nodal);
+        assert_eq!(sample(&nodal, &ContactProfile::default(), 7), nodal);
+        let ends = sample(&nodal, &friction, 2);
+        assert_eq!(
+            ends.friction_ratio,
+            [nodal.friction_ratio[0], nodal.friction_ratio[6]]
+        );
+    }
+
+    #[test]
+    fn quadratics_are_exact_with_and_without_friction_points() {
+        let (nodal, friction) = profiles(&[0.0, 0.1, 0.7, 1.9, 3.0]);
+        for friction in [friction, ContactProfile::default()] {
+            let sampled = sample(&nodal, &friction, 1000);
+            assert_eq!((sampled.s[0], sampled.s[999]), (0.0, 3.0));
+            let exact = quadratics(&sampled.s);
+            for (got, exact) in sampled.columns().into_iter().zip(exact.columns()) {
+                assert_eq!(got.len(), 1000);
+                for (got, exact) in got.iter().zip(exact) {
+                    assert!((got - exact).abs() < 1e-14, "{got} for {exact}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_state_reaches_half_way_to_the_next_point() {
+        let (nodal, friction) = profiles(&[0.0, 2.0, 4.0]);
+        let sampled = sample(&nodal, &friction, 4001);
+        let turns = |state| sampled.state.iter().filter(|s| **s == state).count();
+        // the last point that sticks is the Gauss point at 1 − √.6, the first that slips the node at 1
+        let stick = 1000.0 * (1.0 - 0.5 * 0.6f64.sqrt());
+        assert_eq!(turns(NodeState::Stick), stick as usize + 1);
+        assert_eq!(sampled.state[4000], NodeState::Open);
+    }
+
+    /// Where stick ends φ has a corner, where contact ends τ has one: neither may wave.
+    #[test]
+    fn corners_of_the_law_stay_within_their_limits() {
+        let (mut nodal, mut friction) = profiles(&[0.0, 1.0, 2.0, 3.0]);
+        for profile in [&mut nodal, &mut friction] {
+            for (i, s) in profile.s.clone().into_iter().enumerate() {
+                profile.friction_ratio[i] = (s / 0.9).min(1.0);
+                profile.friction_bound[i] = (2.2 - s).max(0.0);
+                profile.tangential_stress[i] = -profile.friction_bound[i];
+            }
+        }
+        let sampled = sample(&nodal, &friction, 777);
+        for i in 0..777 {
+            let (s, tau) = (sampled.s[i], sampled.friction_bound[i]);
+            assert!((0.0..=1.0).contains(&sampled.friction_ratio[i]));
+            assert!((0.0..=2.2).contains(&tau));
+            assert!((tau - (2.2 - s).max(0.0)).abs() < 0.1, "{s}: {tau}");
+            assert_eq!(sampled.tangential_stress[i] + tau, 0.0, "{s}");
+        }
+    }
+}
