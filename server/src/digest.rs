@@ -152,6 +152,7 @@ mod tests {
             summary: solution.summary.clone(),
             history: solution.history.clone(),
             profiles: solution.profiles.clone(),
+            friction_profiles: solution.friction_profiles.clone(),
         });
         let mut document = serde_json::to_value(&solution).unwrap();
         document["summary"]["input_hash"] = json!("h");

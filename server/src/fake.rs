@@ -75,6 +75,7 @@ pub(crate) fn solution() -> Solution {
             },
         )]
         .into(),
+        friction_profiles: Default::default(),
         steps: vec![],
         fields: Fields {
             x: vec![0.0, 1.0],

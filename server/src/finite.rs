@@ -15,12 +15,14 @@ pub fn solution(solution: &Solution) -> bool {
         summary: scalars,
         history,
         profiles,
+        friction_profiles,
         steps,
         fields: nodes,
     } = solution;
     summary(scalars)
         && history.iter().all(iteration)
         && profiles.values().all(profile)
+        && friction_profiles.values().all(profile)
         && steps.iter().all(step)
         && fields(nodes)
 }
@@ -73,9 +75,11 @@ fn step(step: &StepSolution) -> bool {
         summary: scalars,
         history,
         profiles,
+        friction_profiles,
         name: _,
     } = step;
-    summary(scalars) && history.iter().all(iteration) && profiles.values().all(profile)
+    let mut columns = profiles.values().chain(friction_profiles.values());
+    summary(scalars) && history.iter().all(iteration) && columns.all(profile)
 }
 
 #[rustfmt::skip]

@@ -21,7 +21,8 @@ use crate::{
     verbs::{
         Service,
         jobs::{self, MAX_PAGE_SIZE, Many, PAGE_SIZE},
-        meshes, problems, queue, results,
+        meshes, problems, queue,
+        results::{self, Points},
         submit::{self, Draft, Handed},
         watch::{self, Until},
     },
@@ -244,9 +245,16 @@ impl JobService for Grpc {
             id: name,
             boundary,
             step,
+            points,
         } = request.into_inner();
         let step = step.as_deref();
-        let profile = results::profile(&self.service, id(&name)?, &boundary, step).await?;
+        let points = match points.as_deref() {
+            None => Points::Nodes,
+            Some(text) => {
+                Points::parse(text).ok_or_else(|| bad("points", text, Points::EXPECTED))?
+            }
+        };
+        let profile = results::profile(&self.service, id(&name)?, &boundary, step, points).await?;
         Ok(Response::new(profile.into()))
     }
 

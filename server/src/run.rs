@@ -25,6 +25,9 @@ pub struct Document {
     pub history: Vec<Iteration>,
     /// Columns along each contact boundary.
     pub profiles: BTreeMap<String, ContactProfile>,
+    /// The same at the points where friction acts; served by itself, and no part of a written document.
+    #[serde(skip)]
+    pub friction_profiles: BTreeMap<String, ContactProfile>,
     /// One entry per load step of the problem.
     pub steps: Vec<StepSolution>,
     /// Displacements and stresses at all nodes.
@@ -53,14 +56,24 @@ pub type Timings = BTreeMap<String, f64>;
 /// The solver, or what stands in for it in a test.
 pub type Solve = fn(&Problem, Option<&Mesh>, &mut Observer<'_>) -> Result<Solution, SolveError>;
 
+/// What a run says on its way.
+#[derive(Debug)]
+pub enum Said<'a> {
+    /// What the solver says.
+    Progress(Progress<'a>),
+    /// What finished load steps have found, while others are to come: a document without fields.
+    Partial(Box<Document>),
+}
+
 /// Solves `problem`, stamps each iteration with the seconds since the start and measures the
-/// phases. `stored`: the mesh that it names by its hash. `parse_s`: seconds that reading the problem took, the caller's own phase.
+/// phases. `stored`: the mesh that it names by its hash. `parse_s`: seconds that reading the problem took,
+/// the caller's own phase.
 pub fn run(
     problem: &Problem,
     stored: Option<&Mesh>,
     parse_s: f64,
     solve: Solve,
-    on_progress: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
+    say: &mut dyn FnMut(Said<'_>) -> ControlFlow<()>,
 ) -> Result<Document, SolveError> {
     let mut watch = Stopwatch::new(parse_s);
     let mut broken = false;
@@ -75,10 +88,16 @@ pub fn run(
             Progress::Warning(_) | Progress::Step(_) | Progress::Pulse => {}
         }
         if broken {
-            ControlFlow::Break(())
-        } else {
-            on_progress(progress)
+            return ControlFlow::Break(());
         }
+        if let Progress::Step(solution) = progress {
+            // what is not finite is told at the end, when nothing follows that might mend it
+            return match document(problem, solution.clone(), watch.so_far()) {
+                Ok(document) => say(Said::Partial(Box::new(document))),
+                Err(_) => ControlFlow::Continue(()),
+            };
+        }
+        say(Said::Progress(progress))
     });
     if broken {
         return Err(SolveError::NonFinite { phase: "iterate" });
@@ -89,7 +108,15 @@ pub fn run(
         // within half a second, and writing the fields of a large one takes longer.
         solution.fields = Fields::default();
     }
-    let timings = watch.stop();
+    document(problem, solution, watch.so_far())
+}
+
+/// A solution with what only its caller knows.
+fn document(
+    problem: &Problem,
+    solution: Solution,
+    timings: Timings,
+) -> Result<Document, SolveError> {
     let non_finite = SolveError::NonFinite { phase: "recover" };
     if !finite::solution(&solution) {
         return Err(non_finite);
@@ -101,6 +128,7 @@ pub fn run(
         summary,
         history,
         profiles,
+        friction_profiles,
         steps,
         fields,
     } = solution;
@@ -116,6 +144,7 @@ pub fn run(
         summary,
         history,
         profiles,
+        friction_profiles,
         steps,
         fields,
     })
@@ -171,9 +200,11 @@ impl Stopwatch {
         }
     }
 
-    fn stop(mut self) -> Timings {
-        self.leave();
-        self.timings
+    fn so_far(&mut self) -> Timings {
+        if let Some((phase, _)) = self.current {
+            self.enter(phase);
+        }
+        self.timings.clone()
     }
 }
 
@@ -201,7 +232,7 @@ mod tests {
     fn every_iteration_is_stamped_and_every_phase_has_a_time() {
         let mut stamps = vec![];
         let document = run(&fake::problem(), None, 0.5, fake::solve, &mut |progress| {
-            if let Progress::Iteration(row) = progress {
+            if let Said::Progress(Progress::Iteration(row)) = progress {
                 stamps.push(row.wall_s);
             }
             ControlFlow::Continue(())

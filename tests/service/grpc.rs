@@ -82,6 +82,7 @@ async fn a_job_goes_all_the_way_over_grpc() {
             id: job.id.clone(),
             boundary: "top".into(),
             step: None,
+            points: None,
         })
         .await;
     let profile = profile.unwrap().into_inner();

@@ -165,6 +165,7 @@ async fn both_protocols_tell_the_same_story_of_one_job() {
             id,
             boundary: "top".into(),
             step: None,
+            points: None,
         })
         .await
         .unwrap()
@@ -230,6 +231,7 @@ async fn both_protocols_serve_every_load_step() {
         id: id.clone(),
         boundary: "top".into(),
         step: Some("0".into()),
+        points: None,
     });
     let profile = profile.await.unwrap().into_inner();
     assert_eq!(first["tangential_stress"], json!(profile.tangential_stress));
@@ -237,6 +239,7 @@ async fn both_protocols_serve_every_load_step() {
         id,
         boundary: "top".into(),
         step: Some("unload".into()),
+        points: None,
     });
     assert_eq!(none.await.unwrap_err().code(), tonic::Code::NotFound);
 }

@@ -2,7 +2,11 @@
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};
-use suite::{example_json, harness::large};
+use service::pb;
+use suite::{
+    example_json,
+    harness::{Server, block, large},
+};
 
 use crate::{SIGNORINI, server};
 
@@ -242,4 +246,96 @@ async fn a_result_is_not_there_before_the_end_nor_after_an_end_without_one() {
         .unwrap();
     assert_eq!(never.status(), StatusCode::NOT_FOUND);
     assert_eq!(never.json::<Value>().await.unwrap()["code"], "no-result");
+}
+
+/// Load steps: while the second runs, what the first has found is there.
+#[tokio::test]
+async fn finished_load_steps_of_a_running_job_are_served() {
+    let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
+    let mut problem = block(100, 100);
+    problem["contacts"][0]["friction"]["history"] = json!("incremental");
+    problem["contacts"][0]["tangential_displacement"] = json!(0.01);
+    problem["steps"] = json!([
+        { "name": "indent" },
+        { "name": "drag", "tangential_displacement": 1, "increments": 400 },
+    ]);
+    let id = server.submit(&problem).await;
+    // an iteration of the second step comes after the first step was stored
+    server
+        .until(&id, |event| {
+            event["type"] == "iteration" && event["step"] == 1
+        })
+        .await;
+    let job = server.job(&id).await;
+    assert_eq!(
+        (&job["status"], &job["result_available"]),
+        (&json!("running"), &json!("partial"))
+    );
+    let at = |what: &str| format!("/v1/jobs/{id}/{what}");
+    let result = server.json(&at("result")).await;
+    let steps = result["steps"].as_array().unwrap();
+    assert_eq!((steps.len(), &steps[0]["name"]), (1, &json!("indent")));
+    let first = result["summary"]["normal_force"].as_f64().unwrap();
+    assert!(first > 0.0);
+    let profile = server.json(&at("profiles/top?step=indent")).await;
+    assert_eq!(profile, server.json(&at("profiles/top")).await);
+    let rows = server.json(&at("history")).await;
+    assert!(rows.as_array().unwrap().len() > 1);
+    let fields = server.get(&at("fields")).send().await.unwrap();
+    assert_eq!(fields.status(), StatusCode::CONFLICT);
+    let plot = server.get(&at("plots/profile.svg")).send().await.unwrap();
+    assert_eq!(plot.status(), StatusCode::OK);
+    let plot = server.get(&at("plots/deformed.svg")).send().await.unwrap();
+    assert_eq!(plot.status(), StatusCode::CONFLICT);
+    // and stays when the job does not come to its end
+    server.cancel(&id).await;
+    let done = server.until_done(&id).await;
+    assert_eq!(
+        (&done["status"], &done["result_available"]),
+        (&json!("canceled"), &json!("partial"))
+    );
+    let result = server.json(&at("result")).await;
+    assert_eq!(result["steps"][0]["summary"]["normal_force"], first);
+}
+
+#[tokio::test]
+async fn a_profile_is_given_at_nodes_at_friction_points_or_at_any_number_of_places() {
+    let server = server().await;
+    let mut grpc = crate::grpc::connect(&server).await;
+    let id = server.submit(&example_json("rectangular_punch")).await;
+    server.until_done(&id).await;
+    let at = |points: &str| format!("/v1/jobs/{id}/profiles/top?points={points}");
+    let count = |profile: &Value| profile["s"].as_array().unwrap().len();
+    let nodes = server.json(&at("nodes")).await;
+    assert_eq!(
+        nodes,
+        server.json(&format!("/v1/jobs/{id}/profiles/top")).await
+    );
+    let friction = server.json(&at("friction")).await;
+    assert_eq!(
+        count(&friction),
+        (count(&nodes) - 1) / 2 * 3,
+        "three an edge"
+    );
+    let spaced = server.json(&at("101")).await;
+    assert_eq!(count(&spaced), 101);
+    for name in ["s", "normal_stress", "tangential_stress"] {
+        let (first, last) = (count(&nodes) - 1, 100);
+        assert_eq!(nodes[name][0], spaced[name][0], "{name}");
+        assert_eq!(nodes[name][first], spaced[name][last], "{name}");
+    }
+    for (points, same) in [("nodes", &nodes), ("friction", &friction), ("101", &spaced)] {
+        let request = pb::GetProfileRequest {
+            id: id.clone(),
+            boundary: "top".into(),
+            points: Some(points.into()),
+            ..Default::default()
+        };
+        let twin = grpc.get_profile(request).await.unwrap().into_inner();
+        assert_eq!(same["tangential_stress"], json!(twin.tangential_stress));
+    }
+    for bad in ["1", "100001", "corners", "-3"] {
+        let response = server.get(&at(bad)).send().await.unwrap();
+        assert_eq!(response.status(), StatusCode::BAD_REQUEST, "{bad}");
+    }
 }

@@ -20,7 +20,11 @@ use super::{
     output::{self, Output},
     report,
 };
-use crate::{config::MemoryBudget, error::ApiError, run};
+use crate::{
+    config::MemoryBudget,
+    error::ApiError,
+    run::{self, Said},
+};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -81,14 +85,15 @@ pub(super) fn run(
         eprintln!("{}: {too_large}", file.display());
         return Ok(Exit::Invalid);
     }
-    let solved = run::run(&problem, None, parse_s, solver::solve_on, &mut |progress| {
-        match progress {
-            Progress::Phase(phase) => eprintln!("{} …", run::phase_name(phase)),
-            Progress::Iteration(row) => eprintln!("{}", report::iteration(row)),
-            Progress::Warning(warning) => {
+    let solved = run::run(&problem, None, parse_s, solver::solve_on, &mut |said| {
+        match said {
+            Said::Progress(Progress::Phase(phase)) => eprintln!("{} …", run::phase_name(phase)),
+            Said::Progress(Progress::Iteration(row)) => eprintln!("{}", report::iteration(row)),
+            Said::Progress(Progress::Warning(warning)) => {
                 eprintln!("warning: {}: {}", warning.pointer, warning.message)
             }
-            Progress::Step(_) | Progress::Pulse => {} // Ctrl-C ends the process anyway
+            // Ctrl-C ends the process anyway
+            Said::Progress(Progress::Step(_) | Progress::Pulse) | Said::Partial(_) => {}
         }
         ControlFlow::Continue(())
     });

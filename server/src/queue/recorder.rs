@@ -13,7 +13,7 @@ use crate::{
     event::Payload,
     job::{Job, Progress},
     run::phase_name,
-    store::{LastWords, Result},
+    store::{LastWords, Parts, Result},
     time::Time,
 };
 
@@ -22,8 +22,24 @@ const ROWS: usize = 50;
 /// … or so long after its first.
 const LATENCY: Duration = Duration::from_millis(50);
 
-/// What a solver says, with the moment it said it.
-pub(super) type Line = (Time, Payload);
+/// What a solver says.
+#[derive(Debug)]
+pub(super) enum Line {
+    /// An event, with the moment it happened.
+    Event(Time, Payload),
+    /// What it has found so far, ready to be stored.
+    Partial(Box<Parts>),
+}
+
+/// Lines that are written together.
+#[derive(Debug, Default)]
+struct Batch {
+    events: Vec<(Time, Payload)>,
+    /// What comes after them.
+    partial: Option<Box<Parts>>,
+    /// Nothing comes after them: the solver hung up.
+    last: bool,
+}
 
 /// Writes until the solver hangs up, and gives what it said last: that is written with the job's end, in
 /// one commit. When the start is no longer current, or the store fails, the solver is told to stop and the
@@ -36,21 +52,16 @@ pub(super) async fn record(
 ) -> Result<LastWords> {
     let mut progress = Progress::default();
     let written = loop {
-        let (batch, last) = next_batch(&mut lines).await;
-        batch
-            .iter()
-            .for_each(|(_, payload)| follow(&mut progress, payload));
-        if last {
-            let lines = batch;
+        let batch = next_batch(&mut lines).await;
+        let payloads = batch.events.iter().map(|(_, payload)| payload);
+        payloads.for_each(|payload| follow(&mut progress, payload));
+        if batch.last {
+            let lines = batch.events;
             return Ok(LastWords { lines, progress });
         }
-        match queue
-            .store
-            .append_events(job.key, running.attempt, &batch, &progress)
-            .await
-        {
-            Ok(Some(seq)) => queue.live.announce(job.key, seq),
-            Ok(None) => break Ok(LastWords::default()),
+        match write(queue, job, running, &batch, &progress).await {
+            Ok(true) => {}
+            Ok(false) => break Ok(LastWords::default()),
             Err(error) => break Err(error),
         }
     };
@@ -59,25 +70,61 @@ pub(super) async fn record(
     written
 }
 
-/// The next lines, and whether they are the last.
-async fn next_batch(lines: &mut mpsc::Receiver<Line>) -> (Vec<Line>, bool) {
-    let Some(first) = lines.recv().await else {
-        return (vec![], true);
-    };
-    let mut batch = vec![first];
+/// Writes a batch; false when the start is no longer current.
+async fn write(
+    queue: &Queue,
+    job: &Job,
+    running: &Running,
+    batch: &Batch,
+    progress: &Progress,
+) -> Result<bool> {
+    let (store, key, attempt) = (&queue.store, job.key, running.attempt);
+    if !batch.events.is_empty() {
+        let written = store.append_events(key, attempt, &batch.events, progress);
+        match written.await? {
+            Some(seq) => queue.live.announce(key, seq),
+            None => return Ok(false),
+        }
+    }
+    match &batch.partial {
+        Some(parts) => store.write_partial(key, attempt, parts).await,
+        None => Ok(true),
+    }
+}
+
+/// The next lines.
+async fn next_batch(lines: &mut mpsc::Receiver<Line>) -> Batch {
+    let mut batch = Batch::default();
+    match lines.recv().await {
+        Some(line) => batch.take(line),
+        None => batch.last = true,
+    }
     let end = sleep_until(Instant::now() + LATENCY);
     tokio::pin!(end);
-    while batch.len() < ROWS {
+    while batch.is_open() {
         tokio::select! {
             biased;
             line = lines.recv() => match line {
-                Some(line) => batch.push(line),
-                None => return (batch, true),
+                Some(line) => batch.take(line),
+                None => batch.last = true,
             },
             () = &mut end => break,
         }
     }
-    (batch, false)
+    batch
+}
+
+impl Batch {
+    fn take(&mut self, line: Line) {
+        match line {
+            Line::Event(time, payload) => self.events.push((time, payload)),
+            Line::Partial(parts) => self.partial = Some(parts),
+        }
+    }
+
+    fn is_open(&self) -> bool {
+        self.events.len() < ROWS && self.partial.is_none() && !self.last
+    }
 }
 
 /// Keeps up with what the solver says.
@@ -123,15 +170,18 @@ mod tests {
         let (sender, mut lines) = mpsc::channel(64);
         for k in 1..=51 {
             sender
-                .send((Time::now(), Payload::Iteration(fake::iteration(k))))
+                .send(Line::Event(
+                    Time::now(),
+                    Payload::Iteration(fake::iteration(k)),
+                ))
                 .await
                 .unwrap();
         }
         drop(sender);
-        let (batch, last) = next_batch(&mut lines).await;
-        assert_eq!((batch.len(), last), (50, false));
-        let (batch, last) = next_batch(&mut lines).await;
-        assert_eq!((batch.len(), last), (1, true));
+        let batch = next_batch(&mut lines).await;
+        assert_eq!((batch.events.len(), batch.last), (50, false));
+        let batch = next_batch(&mut lines).await;
+        assert_eq!((batch.events.len(), batch.last), (1, true));
     }
 
     #[test]

@@ -13,13 +13,14 @@ use tracing::{error, info, warn};
 use uuid::Uuid;
 
 use super::{
-    Queue, Running, recorder,
+    Queue, Running,
+    recorder::{self, Line},
     stop::{Stop, Why},
 };
 use crate::{
     event::Payload,
     job::{Failure, Job, Reason, ResultAvailable, Status},
-    run::{self, Document, Solve},
+    run::{self, Document, Said, Solve},
     store::{Claim, Ending, LastWords, Parts, Store},
     time::Time,
 };
@@ -42,9 +43,9 @@ pub(super) async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) 
     let store = queue.store.clone();
     let solving = tokio::task::spawn_blocking(move || {
         let mesh = mesh.map(|hash| stored_mesh(&store, &hash)).transpose()?;
-        solve_aloud(&problem, mesh.as_ref(), solve, |payload| {
+        solve_aloud(&problem, mesh.as_ref(), solve, |line| {
             // An error means that the recorder is gone, and with it everybody who would listen.
-            let heard = payload.is_none_or(|said| say.blocking_send((Time::now(), said)).is_ok());
+            let heard = line.is_none_or(|line| say.blocking_send(line).is_ok());
             if heard && stop.why().is_none() {
                 ControlFlow::Continue(())
             } else {
@@ -106,17 +107,24 @@ fn solve_aloud(
     problem: &str,
     mesh: Option<&Mesh>,
     solve: Solve,
-    mut say: impl FnMut(Option<Payload>) -> ControlFlow<()>,
+    mut say: impl FnMut(Option<Line>) -> ControlFlow<()>,
 ) -> Result<Solved, SolveError> {
     let start = Instant::now();
     let problem: Problem = solver::parse(problem).map_err(SolveError::Invalid)?;
     let parse_s = start.elapsed().as_secs_f64();
-    let document = run::run(&problem, mesh, parse_s, solve, &mut |progress| {
-        say(match progress {
-            Progress::Phase(stage) => Some(Payload::Stage { stage }),
-            Progress::Iteration(row) => Some(Payload::Iteration(row.clone())),
-            Progress::Warning(warning) => Some(Payload::Warning(warning.clone())),
-            Progress::Step(_) | Progress::Pulse => None,
+    let event = |payload| Some(Line::Event(Time::now(), payload));
+    let document = run::run(&problem, mesh, parse_s, solve, &mut |said| {
+        say(match said {
+            Said::Partial(document) => match Parts::of(&document) {
+                Ok(parts) => Some(Line::Partial(Box::new(parts))),
+                Err(_) => None, // nothing follows from what has no JSON
+            },
+            Said::Progress(progress) => match progress {
+                Progress::Phase(stage) => event(Payload::Stage { stage }),
+                Progress::Iteration(row) => event(Payload::Iteration(row.clone())),
+                Progress::Warning(warning) => event(Payload::Warning(warning.clone())),
+                Progress::Step(_) | Progress::Pulse => None,
+            },
         })
     })?;
     let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite { phase: "recover" })?;

@@ -17,7 +17,7 @@ use crate::{
     error::ApiError,
     formats::{self, Format},
     run::Summary,
-    verbs::results,
+    verbs::results::{self, Points},
 };
 
 /// The scalars of a result, whole and by load step.
@@ -61,10 +61,12 @@ pub(super) async fn profile(
     headers: HeaderMap,
     path: JobPath,
 ) -> Result<Response, ApiError> {
-    let params = Params::parse(query.as_deref(), &["format", "step"])?;
+    let params = Params::parse(query.as_deref(), &["format", "step", "points"])?;
     let format = choose(Format::OF_TABLES, params.one("format"), &headers)?;
     let step = params.one("step");
-    let profile = results::profile(&rest.service, path.id, &path.boundary, step).await?;
+    let points = params.word("points", Points::parse, Points::EXPECTED)?;
+    let points = points.unwrap_or(Points::Nodes);
+    let profile = results::profile(&rest.service, path.id, &path.boundary, step, points).await?;
     let bytes = rest
         .service
         .work(move || formats::profile(&profile, format));

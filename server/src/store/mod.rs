@@ -35,7 +35,7 @@ pub use jobs::{CancelOutcome, Claim, Edit, Ending, LastWords};
 use line::{Line, Move};
 pub use list::{Cursor, Filter, GroupBy, Order, OrderBy};
 pub use meshes::{Removal, StoredMesh};
-pub use results::{PIECE_BYTES, PartInfo, Parts};
+pub use results::{PIECE_BYTES, PartInfo, Parts, ProfilePoints};
 pub use submit::{Accepted, NewJob, OWNER, RequestKey, Submission};
 
 use crate::job::JobId;

@@ -4,8 +4,11 @@
 //! still runs has found so far (its finished load steps) stands under the negative of its number: the
 //! final result can then be written beside it, and takes its place with the job's end.
 
+use std::collections::BTreeMap;
+
 use serde_json::json;
 use sha2::{Digest, Sha256};
+use solver::solution::ContactProfile;
 use sqlx::SqliteConnection;
 
 use super::{Result, Store, jobs::is_current};
@@ -62,15 +65,23 @@ impl Parts {
             .map(|step| json!({"name": step.name, "summary": step.summary}))
             .collect();
         parts.push(("steps".to_string(), serde_json::to_vec(&steps)?));
-        for (number, step) in document.steps.iter().enumerate() {
-            for (boundary, profile) in &step.profiles {
-                let name = profile_part(boundary, Some(number));
+        let mut add = |points, step, profiles: &BTreeMap<String, ContactProfile>| {
+            for (boundary, profile) in profiles {
+                let name = profile_part(boundary, points, step);
                 parts.push((name, serde_json::to_vec(profile)?));
             }
+            Ok::<_, serde_json::Error>(())
+        };
+        for (number, step) in document.steps.iter().enumerate() {
+            add(ProfilePoints::Nodes, Some(number), &step.profiles)?;
+            add(
+                ProfilePoints::Friction,
+                Some(number),
+                &step.friction_profiles,
+            )?;
         }
-        for (boundary, profile) in &document.profiles {
-            parts.push((profile_part(boundary, None), serde_json::to_vec(profile)?));
-        }
+        add(ProfilePoints::Nodes, None, &document.profiles)?;
+        add(ProfilePoints::Friction, None, &document.friction_profiles)?;
         if !document.fields.x.is_empty() {
             parts.push(("fields".to_string(), serde_json::to_vec(&document.fields)?));
         }
@@ -112,11 +123,24 @@ struct Piece<'a> {
     body: &'a [u8],
 }
 
+/// Where a stored profile has its values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProfilePoints {
+    /// At the nodes of the boundary.
+    Nodes,
+    /// Where friction acts.
+    Friction,
+}
+
 /// The part that holds the profile of a boundary, at the end or at the end of a load step.
-fn profile_part(boundary: &str, step: Option<usize>) -> String {
+fn profile_part(boundary: &str, points: ProfilePoints, step: Option<usize>) -> String {
+    let kind = match points {
+        ProfilePoints::Nodes => "profile",
+        ProfilePoints::Friction => "friction",
+    };
     match step {
-        None => format!("profile/{boundary}"),
-        Some(number) => format!("step/{number}/profile/{boundary}"),
+        None => format!("{kind}/{boundary}"),
+        Some(number) => format!("step/{number}/{kind}/{boundary}"),
     }
 }
 
@@ -212,14 +236,15 @@ impl Store {
         &self,
         key: i64,
         boundary: &str,
+        points: ProfilePoints,
         step: Option<usize>,
     ) -> Result<Option<Vec<u8>>> {
-        self.part(key, &profile_part(boundary, step)).await
+        self.part(key, &profile_part(boundary, points, step)).await
     }
 
     /// The boundaries that have a profile.
     pub async fn profiled_boundaries(&self, key: i64) -> Result<Vec<String>> {
-        let prefix = profile_part("", None);
+        let prefix = profile_part("", ProfilePoints::Nodes, None);
         let names: Vec<String> = sqlx::query_scalar(
             "select name from result_part where job_id = ? and piece = 0 and substr(name, 1, ?) = ? order by name",
         )

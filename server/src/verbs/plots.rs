@@ -11,7 +11,7 @@ use solver::{
 };
 
 use super::{Service, results};
-use crate::{error::ApiError, job::JobId};
+use crate::{error::ApiError, job::JobId, store::ProfilePoints};
 
 /// One figure as SVG, drawn from what the store keeps. Only the parts that it needs are read.
 pub async fn plot(
@@ -29,7 +29,10 @@ pub async fn plot(
         let mut columns: Vec<(String, Vec<u8>)> = vec![];
         if matches!(plot, Plot::Profile | Plot::Deformed) {
             for boundary in store.profiled_boundaries(key).await? {
-                if let Some(bytes) = store.profile(key, &boundary, None).await? {
+                if let Some(bytes) = store
+                    .profile(key, &boundary, ProfilePoints::Nodes, None)
+                    .await?
+                {
                     columns.push((boundary, bytes));
                 }
             }
@@ -43,8 +46,7 @@ pub async fn plot(
             _ => None,
         };
         if plot == Plot::Deformed && fields.is_none() {
-            // A canceled job keeps its history and profiles, but no fields.
-            return Err(ApiError::NoResult(job.status.as_str()));
+            return Err(results::no_fields(&job));
         }
         let problem: Problem = Problem {
             title,

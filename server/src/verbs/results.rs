@@ -14,7 +14,7 @@ use crate::{
     formats::{self, Format},
     job::{Job, JobId, ResultAvailable},
     run::Summary,
-    store::{PIECE_BYTES, PartInfo},
+    store::{PIECE_BYTES, PartInfo, ProfilePoints},
     violations,
 };
 
@@ -104,6 +104,34 @@ fn thin(rows: &mut Vec<Iteration>, most: usize) {
     });
 }
 
+/// Where a profile has its values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Points {
+    /// At the nodes of the boundary.
+    Nodes,
+    /// Where friction acts, which is what forces and peaks are made of.
+    Friction,
+    /// At so many places, equally spaced in arc length, the ends among them.
+    Spaced(usize),
+}
+
+impl Points {
+    /// What can be said.
+    pub const EXPECTED: &str = "nodes, friction, or a whole number from 2 to 100000";
+
+    /// Reads `nodes`, `friction` or a number.
+    pub fn parse(text: &str) -> Option<Points> {
+        match text {
+            "nodes" => Some(Points::Nodes),
+            "friction" => Some(Points::Friction),
+            _ => {
+                let count = text.parse().ok().filter(|n| (2..=100_000).contains(n));
+                count.map(Points::Spaced)
+            }
+        }
+    }
+}
+
 /// The profile of one contact boundary: at the end, or at the end of a load step, by its name or its
 /// number from 0.
 pub async fn profile(
@@ -111,28 +139,46 @@ pub async fn profile(
     id: JobId,
     boundary: &str,
     step: Option<&str>,
+    points: Points,
 ) -> Result<ContactProfile, ApiError> {
     let job = with_result(service, id).await?;
+    let key = job.result_key;
     let step = match step {
         None => None,
         Some(wanted) => Some(step_number(&steps(service, &job).await?, wanted, id)?),
     };
-    let Some(bytes) = service
-        .store
-        .profile(job.result_key, boundary, step)
-        .await?
-    else {
-        let known = service
-            .store
-            .profiled_boundaries(job.result_key)
-            .await?
-            .join(", ");
+    let stored = async |points| service.store.profile(key, boundary, points, step).await;
+    let (nodes, friction) = match points {
+        Points::Nodes => (stored(ProfilePoints::Nodes).await?, None),
+        Points::Friction => (stored(ProfilePoints::Friction).await?, None),
+        Points::Spaced(_) => (
+            stored(ProfilePoints::Nodes).await?,
+            stored(ProfilePoints::Friction).await?,
+        ),
+    };
+    let Some(bytes) = nodes else {
+        let known = service.store.profiled_boundaries(key).await?;
+        if known.iter().any(|name| name == boundary) {
+            return Err(ApiError::NotFound(format!(
+                "{id} was solved before profiles at friction points were kept; try points=nodes"
+            )));
+        }
         return Err(ApiError::NotFound(format!(
-            "{id} has no contact boundary {:?}; it has: {known}",
-            violations::name(boundary)
+            "{id} has no contact boundary {:?}; it has: {}",
+            violations::name(boundary),
+            known.join(", ")
         )));
     };
-    serde_json::from_slice(&bytes).map_err(ApiError::internal)
+    let read = |bytes: &[u8]| serde_json::from_slice(bytes).map_err(ApiError::internal);
+    let Points::Spaced(count) = points else {
+        return read(&bytes);
+    };
+    let sampling = service.work(move || {
+        let nodes = read(&bytes)?;
+        let friction = friction.map_or(Ok(ContactProfile::default()), |bytes| read(&bytes))?;
+        Ok(solver::solution::sample(&nodes, &friction, count))
+    });
+    sampling.await?
 }
 
 fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, ApiError> {
@@ -172,7 +218,7 @@ pub async fn fields(service: &Service, id: JobId) -> Result<StoredFields, ApiErr
 }
 
 /// A job that was canceled, or still runs, has history and profiles, but no fields.
-fn no_fields(job: &Job) -> ApiError {
+pub(super) fn no_fields(job: &Job) -> ApiError {
     match job.status.is_terminal() {
         true => ApiError::NoResult(job.status.as_str()),
         false => ApiError::ResultNotReady(job.status.as_str()),
