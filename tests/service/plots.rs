@@ -4,7 +4,7 @@ use reqwest::StatusCode;
 use serde_json::{Value, json};
 use suite::{
     example_json,
-    harness::{Server, large},
+    harness::{Server, block, large},
 };
 
 use crate::{SIGNORINI, server};
@@ -86,11 +86,14 @@ async fn what_a_result_does_not_have_is_not_drawn() {
 }
 
 #[tokio::test]
-async fn there_is_no_plot_before_the_end_nor_after_an_end_without_a_result() {
+async fn a_plot_is_there_as_soon_as_what_it_shows() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
     let front = server.submit(&large()).await;
     let waiting = server.submit(&example_json("sheet")).await;
-    for plot in PLOTS {
+    let mesh = format!("/v1/jobs/{waiting}/plots/mesh.svg");
+    let mesh = server.get(&mesh).send().await.unwrap();
+    assert_eq!(mesh.status(), StatusCode::OK, "of the problem alone");
+    for plot in ["deformed", "profile", "convergence"] {
         let early = format!("/v1/jobs/{waiting}/plots/{plot}.svg");
         let early = server.get(&early).send().await.unwrap();
         assert_eq!(early.status(), StatusCode::CONFLICT);
@@ -98,11 +101,21 @@ async fn there_is_no_plot_before_the_end_nor_after_an_end_without_a_result() {
         assert_eq!(error["code"], "result-not-ready");
     }
     server.cancel(&waiting).await;
-    let never = format!("/v1/jobs/{waiting}/plots/mesh.svg");
+    let never = format!("/v1/jobs/{waiting}/plots/profile.svg");
     let never = server.get(&never).send().await.unwrap();
     assert_eq!(never.status(), StatusCode::NOT_FOUND);
     assert_eq!(never.json::<Value>().await.unwrap()["code"], "no-result");
     server.cancel(&front).await;
+
+    let mut long = block(80, 80);
+    long["contacts"][0]["friction"]["history"] = json!("incremental");
+    long["steps"] = json!([{ "increments": 300 }]);
+    let running = server.submit(&long).await;
+    server.until(&running, |event| event["k"] == 3).await;
+    let so_far = format!("/v1/jobs/{running}/plots/convergence.svg");
+    let so_far = server.get(&so_far).send().await.unwrap();
+    assert_eq!(so_far.status(), StatusCode::OK, "of a job that runs");
+    server.cancel(&running).await;
 }
 
 #[tokio::test]

@@ -10,8 +10,15 @@ use solver::{
     solution::{ContactProfile, Fields, Iteration},
 };
 
-use super::{Service, results};
-use crate::{error::ApiError, job::JobId, store::ProfilePoints};
+use super::{
+    Service, jobs,
+    results::{self, StoredHistory},
+};
+use crate::{
+    error::ApiError,
+    job::{Job, JobId},
+    store::ProfilePoints,
+};
 
 /// One figure as SVG, drawn from what the store keeps. Only the parts that it needs are read.
 pub async fn plot(
@@ -22,7 +29,11 @@ pub async fn plot(
 ) -> Result<String, ApiError> {
     // who has no place yet holds nothing
     let load = async {
-        let job = results::with_result(service, id).await?;
+        let job = match plot {
+            // of the problem and of the iteration alone: there while the job waits or runs
+            Plot::Mesh | Plot::Convergence => jobs::get(service, id).await?,
+            Plot::Profile | Plot::Deformed => results::with_result(service, id).await?,
+        };
         let store = &service.store;
         let key = job.result_key;
         let (title, problem) = store.problem(job.key).await?;
@@ -38,7 +49,7 @@ pub async fn plot(
             }
         }
         let history = match plot {
-            Plot::Convergence => store.part(key, "history").await?,
+            Plot::Convergence => Some(StoredHistory::load(service, &job).await?),
             _ => None,
         };
         let fields = match plot {
@@ -46,7 +57,7 @@ pub async fn plot(
             _ => None,
         };
         if plot == Plot::Deformed && fields.is_none() {
-            return Err(results::no_fields(&job));
+            return Err(results::nothing_of(&job));
         }
         let problem: Problem = Problem {
             title,
@@ -56,14 +67,17 @@ pub async fn plot(
             Some(hash) if plot == Plot::Mesh => store.mesh_body(hash).await?,
             _ => None,
         };
-        Ok((problem, columns, history, fields, stored))
+        Ok((job, problem, columns, history, fields, stored))
     };
-    let draw = move |(problem, columns, history, fields, stored): Loaded| {
+    let draw = move |(job, problem, columns, history, fields, stored): Loaded| {
         let mut profiles: BTreeMap<String, ContactProfile> = BTreeMap::new();
         for (boundary, bytes) in columns {
             profiles.insert(boundary, read(&bytes)?);
         }
-        let history: Vec<Iteration> = history.map_or(Ok(vec![]), |bytes| read(&bytes))?;
+        let history: Vec<Iteration> = history.map_or(Ok(vec![]), StoredHistory::read)?;
+        if plot == Plot::Convergence && history.is_empty() {
+            return Err(results::nothing_of(&job));
+        }
         let fields = fields.map_or(Ok(Fields::default()), |bytes| read(&bytes))?;
         let stored: Option<Mesh> = stored
             .map(|bytes| postcard::from_bytes(&bytes).map_err(ApiError::internal))
@@ -81,12 +95,13 @@ pub async fn plot(
     service.work_on(load, draw).await?
 }
 
-/// Problem, profiles, history, fields and stored mesh, as the store keeps them; what a figure does not need
+/// Job, problem, profiles, history, fields and stored mesh, as the store keeps them; what a figure does not need
 /// is absent.
 type Loaded = (
+    Job,
     Problem,
     Vec<(String, Vec<u8>)>,
-    Option<Vec<u8>>,
+    Option<StoredHistory>,
     Option<Vec<u8>>,
     Option<Vec<u8>>,
 );

@@ -51,30 +51,43 @@ pub async fn history(
     max_points: Option<usize>,
 ) -> Result<Vec<Iteration>, ApiError> {
     let job = jobs::get(service, id).await?;
-    let store = &service.store;
-    let load = async {
-        let stored = match (job.status.is_terminal(), job.result_available) {
-            (true, ResultAvailable::Partial | ResultAvailable::Final) => {
-                store.part(job.result_key, "history").await?
-            }
-            // of one that runs, its watchers were told more than its finished load steps hold
-            (false, _) | (true, ResultAvailable::None) => None,
-        };
-        let told = match stored {
-            Some(_) => vec![],
-            None => store.iterations(job.key, job.attempt).await?,
-        };
-        Ok((stored, told))
-    };
-    let rows = service.work_on(load, |(stored, told)| match stored {
-        Some(bytes) => serde_json::from_slice(&bytes),
-        None => told.iter().map(|line| row(line)).collect(),
-    });
-    let mut rows: Vec<Iteration> = rows.await?.map_err(ApiError::internal)?;
+    let load = StoredHistory::load(service, &job);
+    let mut rows = service.work_on(load, StoredHistory::read).await??;
     if let Some(most) = max_points {
         thin(&mut rows, most);
     }
     Ok(rows)
+}
+
+/// A history as it is stored.
+pub(super) enum StoredHistory {
+    /// With the result.
+    Whole(Vec<u8>),
+    /// Row by row, as it was told.
+    Told(Vec<String>),
+}
+
+impl StoredHistory {
+    pub(super) async fn load(service: &Service, job: &Job) -> Result<StoredHistory, ApiError> {
+        let store = &service.store;
+        // of a job that runs, its watchers were told more than its finished load steps hold
+        if job.status.is_terminal() && job.result_available != ResultAvailable::None {
+            let whole = store.part(job.result_key, "history").await?;
+            if let Some(whole) = whole {
+                return Ok(StoredHistory::Whole(whole));
+            }
+        }
+        let told = store.iterations(job.key, job.attempt).await?;
+        Ok(StoredHistory::Told(told))
+    }
+
+    pub(super) fn read(self) -> Result<Vec<Iteration>, ApiError> {
+        let rows = match self {
+            StoredHistory::Whole(bytes) => serde_json::from_slice(&bytes),
+            StoredHistory::Told(lines) => lines.iter().map(|line| row(line)).collect(),
+        };
+        rows.map_err(ApiError::internal)
+    }
 }
 
 fn row(line: &str) -> serde_json::Result<Iteration> {
@@ -213,12 +226,13 @@ pub async fn fields(service: &Service, id: JobId) -> Result<StoredFields, ApiErr
     let result_key = job.result_key;
     match service.store.part_info(result_key, "fields").await? {
         Some(info) => Ok(StoredFields { info, result_key }),
-        None => Err(no_fields(&job)),
+        None => Err(nothing_of(&job)),
     }
 }
 
-/// A job that was canceled, or still runs, has history and profiles, but no fields.
-pub(super) fn no_fields(job: &Job) -> ApiError {
+/// There is nothing to show: not yet, or not any more. A job that was canceled, or still runs, has history and
+/// profiles, but no fields.
+pub(super) fn nothing_of(job: &Job) -> ApiError {
     match job.status.is_terminal() {
         true => ApiError::NoResult(job.status.as_str()),
         false => ApiError::ResultNotReady(job.status.as_str()),
@@ -257,7 +271,7 @@ pub async fn converted_fields(
     let load = async {
         let job = with_result(service, id).await?;
         let fields = service.store.part(job.result_key, "fields").await?;
-        fields.ok_or_else(|| no_fields(&job))
+        fields.ok_or_else(|| nothing_of(&job))
     };
     let written = service.work_on(load, move |stored| {
         let fields: Fields = serde_json::from_slice(&stored).map_err(|error| error.to_string())?;
@@ -270,10 +284,9 @@ pub async fn converted_fields(
 /// The job, if it has something to show: at its end, or of finished load steps while it runs.
 pub(super) async fn with_result(service: &Service, id: JobId) -> Result<Job, ApiError> {
     let job = jobs::get(service, id).await?;
-    match (job.status.is_terminal(), job.result_available) {
-        (_, ResultAvailable::Partial | ResultAvailable::Final) => Ok(job),
-        (false, ResultAvailable::None) => Err(ApiError::ResultNotReady(job.status.as_str())),
-        (true, ResultAvailable::None) => Err(ApiError::NoResult(job.status.as_str())),
+    match job.result_available {
+        ResultAvailable::Partial | ResultAvailable::Final => Ok(job),
+        ResultAvailable::None => Err(nothing_of(&job)),
     }
 }
 
