@@ -26,6 +26,12 @@ drop index job_queue;
 create index job_queue on job (priority desc, id) where status = 'queued' and twin_of is null;
 create index job_expiry on job (expires_at) where status = 'queued';
 create index job_twin on job (twin_of) where twin_of is not null;
+-- Looked at by every submit, however many jobs have had the same input: its newest result that may answer
+-- others, and a job at work on it.
+create index job_answer on job (input_hash, id)
+    where status = 'succeeded' and result_available = 'final' and cache <> 'off';
+create index job_under_way on job (input_hash, id)
+    where status in ('queued', 'running') and twin_of is null and cache <> 'off';
 create index job_by_result on job (result_job) where result_job is not null;
 
 -- Lists: one index for each filter, each in the order of the list, so that a page costs as many rows as it

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     event::Payload,
-    job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status},
+    job::{Cache, Job, JobId, Limits, Reason, Status},
     time::Time,
 };
 
@@ -409,12 +409,12 @@ pub(super) async fn write_labels(
 /// The newest job of this input with a final result of this very program that may answer others.
 async fn earlier(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job>> {
     let row = sqlx::query(
-        "select * from job where input_hash = ? and +status = 'succeeded' and result_available = ?
-                and cache <> 'off' and solver_version = ?
-         order by created_at desc, id desc limit 1",
+        "select * from job indexed by job_answer
+         where input_hash = ? and status = 'succeeded' and result_available = 'final' and cache <> 'off'
+               and solver_version = ?
+         order by id desc limit 1",
     )
     .bind(input_hash)
-    .bind(ResultAvailable::Final.as_str())
     .bind(env!("CARGO_PKG_VERSION"))
     .fetch_optional(change.sql())
     .await?;
@@ -425,9 +425,10 @@ async fn earlier(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job
 /// priority, or that is about to be canceled, would make it late.
 async fn under_way(change: &mut Change<'_>, new: &NewJob) -> Result<Option<i64>> {
     Ok(sqlx::query_scalar(
-        "select id from job where input_hash = ?1 and +status in ('queued', 'running') and cache <> 'off'
-                and twin_of is null and cancel_requested = 0 and (status = 'running' or priority >= ?2)
-         order by created_at, id limit 1",
+        "select id from job indexed by job_under_way
+         where input_hash = ? and status in ('queued', 'running') and twin_of is null and cache <> 'off'
+               and cancel_requested = 0 and (status = 'running' or priority >= ?)
+         order by id limit 1",
     )
     .bind(&new.input_hash)
     .bind(new.priority)
