@@ -220,20 +220,17 @@ impl Store {
     /// running, will answer does not wait for a start.
     pub async fn expire_queued(&self, now: Time) -> Result<Vec<Told>> {
         const AT_ONCE: i64 = 100;
-        let late = "from job where status = 'queued' and expires_at <= ?
-                    and (twin_of is null or twin_of in (select id from job where status = 'queued'))";
         // nearly always there is none: readers do not hold up the writer to find that out
-        let some: bool = sqlx::query_scalar(sqlx::AssertSqlSafe(format!(
-            "select exists (select 1 {late})"
-        )))
-        .bind(now.micros())
-        .fetch_one(&self.reader)
-        .await?;
-        if !some {
+        let some = sqlx::query(LATE)
+            .bind(now.micros())
+            .bind(1)
+            .fetch_optional(&self.reader)
+            .await?;
+        if some.is_none() {
             return Ok(vec![]);
         }
         let mut change = self.change().await?;
-        let rows = sqlx::query(sqlx::AssertSqlSafe(format!("select * {late} limit ?")))
+        let rows = sqlx::query(LATE)
             .bind(now.micros())
             .bind(AT_ONCE)
             .fetch_all(change.sql())
@@ -318,6 +315,13 @@ impl Store {
     }
 }
 
+/// Jobs that have waited too long, at most so many.
+pub(super) const LATE: &str = "select * from job indexed by job_expiry
+     where status = 'queued' and expires_at <= ?
+           and (twin_of is null or exists
+                (select 1 from job source where source.id = job.twin_of and source.status = 'queued'))
+     order by expires_at limit ?";
+
 pub(super) async fn find(connection: &mut SqliteConnection, key: i64) -> Result<Option<Job>> {
     let row = sqlx::query("select * from job where id = ?")
         .bind(key)
@@ -337,12 +341,15 @@ pub(super) async fn is_current(tx: &mut SqliteConnection, key: i64, attempt: i32
     .await?)
 }
 
+/// The next job of the queue. The index is named because the planner, which knows nothing of how many jobs
+/// there are, would rather sort all that wait.
+pub(super) const NEXT: &str = "select id from job indexed by job_queue
+     where status = 'queued' and twin_of is null order by priority desc, id limit 1";
+
 pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
-    let key: Option<i64> = sqlx::query_scalar(
-        "select id from job where status = 'queued' and twin_of is null order by priority desc, id limit 1",
-    )
-    .fetch_optional(change.sql())
-    .await?;
+    let key: Option<i64> = sqlx::query_scalar(NEXT)
+        .fetch_optional(change.sql())
+        .await?;
     let Some(key) = key else { return Ok(None) };
     let waiting = read(change.sql(), key).await?;
     let (job, seq) = start(change, &waiting).await?;

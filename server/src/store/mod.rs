@@ -15,6 +15,8 @@ mod results;
 mod rows;
 mod settings;
 mod submit;
+#[cfg(test)]
+mod tests;
 
 use std::{
     fs::{File, OpenOptions, TryLockError},

@@ -406,34 +406,34 @@ pub(super) async fn write_labels(
     Ok(())
 }
 
+pub(super) const EARLIER: &str = "select * from job indexed by job_answer
+     where input_hash = ? and status = 'succeeded' and result_available = 'final' and cache <> 'off'
+           and solver_version = ?
+     order by id desc limit 1";
+
+pub(super) const UNDER_WAY: &str = "select id from job indexed by job_under_way
+     where input_hash = ? and status in ('queued', 'running') and twin_of is null and cache <> 'off'
+           and cancel_requested = 0 and (status = 'running' or priority >= ?)
+     order by id limit 1";
+
 /// The newest job of this input with a final result of this very program that may answer others.
 async fn earlier(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job>> {
-    let row = sqlx::query(
-        "select * from job indexed by job_answer
-         where input_hash = ? and status = 'succeeded' and result_available = 'final' and cache <> 'off'
-               and solver_version = ?
-         order by id desc limit 1",
-    )
-    .bind(input_hash)
-    .bind(env!("CARGO_PKG_VERSION"))
-    .fetch_optional(change.sql())
-    .await?;
+    let row = sqlx::query(EARLIER)
+        .bind(input_hash)
+        .bind(env!("CARGO_PKG_VERSION"))
+        .fetch_optional(change.sql())
+        .await?;
     row.as_ref().map(from_row).transpose()
 }
 
 /// A job at work on this input that will answer the new one too. One that waits behind the new one's
 /// priority, or that is about to be canceled, would make it late.
 async fn under_way(change: &mut Change<'_>, new: &NewJob) -> Result<Option<i64>> {
-    Ok(sqlx::query_scalar(
-        "select id from job indexed by job_under_way
-         where input_hash = ? and status in ('queued', 'running') and twin_of is null and cache <> 'off'
-               and cancel_requested = 0 and (status = 'running' or priority >= ?)
-         order by id limit 1",
-    )
-    .bind(&new.input_hash)
-    .bind(new.priority)
-    .fetch_optional(change.sql())
-    .await?)
+    Ok(sqlx::query_scalar(UNDER_WAY)
+        .bind(&new.input_hash)
+        .bind(new.priority)
+        .fetch_optional(change.sql())
+        .await?)
 }
 
 /// Whether the end of a job is that of its twins too.

@@ -1,0 +1,86 @@
+//! The store by itself.
+#![allow(clippy::unwrap_used)]
+
+use sqlx::migrate::Migrator;
+
+use super::*;
+use crate::job::{Limits, Status};
+
+/// A store as it was before the job API, with a job that had ended and one that was waiting.
+async fn older_store(folder: &Path) {
+    let migrations = folder.join("migrations");
+    std::fs::create_dir(&migrations).unwrap();
+    let now = Path::new(env!("CARGO_MANIFEST_DIR")).join("../migrations");
+    for name in ["0001_jobs.sql", "0002_meshes.sql"] {
+        std::fs::copy(now.join(name), migrations.join(name)).unwrap();
+    }
+    let options = SqliteConnectOptions::new()
+        .filename(folder.join("signorini.db"))
+        .create_if_missing(true);
+    let db = SqlitePool::connect_with(options).await.unwrap();
+    let migrator = Migrator::new(migrations.as_path()).await.unwrap();
+    migrator.run(&db).await.unwrap();
+    for statement in [
+        "insert into problem (input_hash, body) values ('sha256:1', '{}')",
+        "insert into job (uuid, status, input_hash, labels, created_at, started_at, finished_at, attempt, result_available)
+         values ('01890a5d-ac96-774b-bcce-b302099a8057', 'succeeded', 'sha256:1', '{\"a\": \"b\"}', 1, 2, 3, 1, 'final')",
+        "insert into job (uuid, status, input_hash, created_at)
+         values ('01890a5d-ac96-774b-bcce-b302099a8058', 'queued', 'sha256:1', 4)",
+        "insert into result_part (job_id, name, piece, body) values (1, 'fields', 0, x'7b'), (1, 'fields', 1, x'7d')",
+    ] {
+        sqlx::query(statement).execute(&db).await.unwrap();
+    }
+    db.close().await;
+}
+
+#[tokio::test]
+async fn an_older_store_is_brought_up_to_date_with_all_that_is_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    older_store(folder.path()).await;
+    let store = Store::open(folder.path()).await.unwrap();
+    let labeled = Filter {
+        labels: vec![("a".into(), "b".into())],
+        ..Filter::default()
+    };
+    let jobs = store.jobs(&labeled, Order::NEWEST_FIRST, None, 10);
+    let jobs = jobs.await.unwrap();
+    assert_eq!(jobs.len(), 1, "found by its label");
+    assert_eq!(
+        (jobs[0].status, jobs[0].limits),
+        (Status::Succeeded, Limits::default())
+    );
+    let key = jobs[0].result_key;
+    assert_eq!(store.part(key, "fields").await.unwrap().unwrap(), b"{}");
+    let info = store.part_info(key, "fields").await.unwrap().unwrap();
+    assert_eq!((info.bytes, info.digest.len()), (2, 32));
+    // the one that waited is in line, and is not taken for one that has waited too long
+    assert_eq!(store.waiting(), 1);
+    assert!(
+        store
+            .expire_queued(crate::time::Time::now())
+            .await
+            .unwrap()
+            .is_empty()
+    );
+    assert!(store.claim_next().await.unwrap().is_some());
+    // what an older program has found answers nobody
+    assert_eq!(store.delete(key).await.unwrap(), Deletion::Deleted);
+    assert_eq!(store.part(key, "fields").await.unwrap(), None);
+}
+
+/// What every submit, start and tick of the clock asks looks at as many rows as it gives, however many jobs
+/// there are.
+#[tokio::test]
+async fn the_questions_of_the_queue_are_answered_by_indexes() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for question in [jobs::NEXT, jobs::LATE, submit::EARLIER, submit::UNDER_WAY] {
+        let plan = sqlx::AssertSqlSafe(format!("explain query plan {question}"));
+        let plan: Vec<(i64, i64, i64, String)> =
+            sqlx::query_as(plan).fetch_all(&store.reader).await.unwrap();
+        let steps: Vec<&str> = plan.iter().map(|(.., step)| step.as_str()).collect();
+        assert!(steps[0].contains("INDEX job_"), "{question}: {steps:?}");
+        let sorts = |step: &&str| step.contains("TEMP B-TREE");
+        assert!(!steps.iter().any(sorts), "{question}: {steps:?}");
+    }
+}
