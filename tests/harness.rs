@@ -137,6 +137,17 @@ impl Server {
         response.json().await.unwrap()
     }
 
+    /// Hands in a body; gives the job.
+    pub async fn hand_in(&self, body: &Value) -> Value {
+        answer(self.post("/v1/jobs").json(body)).await.1
+    }
+
+    /// The same, and waits for the job's end.
+    pub async fn solve(&self, body: &Value) -> Value {
+        let request = self.post("/v1/jobs").header("Prefer", "wait=60");
+        answer(request.json(body)).await.1
+    }
+
     /// Hands in a job that is solved on its own; gives its id.
     pub async fn submit(&self, problem: &Value) -> String {
         let response = self
@@ -310,6 +321,12 @@ impl std::fmt::Debug for Events {
 /// A client that asks the server itself, whatever proxy the environment names.
 pub fn client() -> Client {
     Client::builder().no_proxy().build().unwrap()
+}
+
+/// The status of an answer, and its JSON.
+pub async fn answer(request: RequestBuilder) -> (StatusCode, Value) {
+    let response = request.send().await.unwrap();
+    (response.status(), response.json().await.unwrap())
 }
 
 /// What comes in time; a test that waits in vain says for what.

@@ -13,29 +13,19 @@ use crate::{
     server,
 };
 
-async fn submit(server: &Server, body: Value) -> Value {
-    let request = server.post("/v1/jobs").header("Prefer", "wait=60");
-    request
-        .json(&body)
-        .send()
-        .await
-        .unwrap()
-        .json()
-        .await
-        .unwrap()
-}
-
 #[tokio::test]
 async fn the_same_input_is_answered_from_the_first_result() {
     let server = server().await;
     let mut problem = example_json("cylinder");
-    let first = submit(&server, json!({ "problem": problem })).await;
+    let first = server.solve(&json!({ "problem": problem })).await;
     assert_eq!(
         (&first["status"], &first["cached_from"]),
         (&json!("succeeded"), &Value::Null)
     );
     problem["title"] = json!("the title is for people");
-    let second = submit(&server, json!({ "problem": problem, "name": "mine" })).await;
+    let second = server
+        .solve(&json!({ "problem": problem, "name": "mine" }))
+        .await;
     assert_eq!(second["cached_from"], first["id"]);
     assert_eq!(second["name"], "mine");
     let id = second["id"].as_str().unwrap();
@@ -99,10 +89,7 @@ async fn the_same_input_is_answered_from_the_first_result() {
 async fn two_of_the_same_input_are_solved_once_and_canceled_apart() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "2"]).await;
     let post = async || {
-        let request = server
-            .post("/v1/jobs")
-            .json(&json!({ "problem": block(120, 110) }));
-        let job: Value = request.send().await.unwrap().json().await.unwrap();
+        let job = server.hand_in(&json!({ "problem": block(120, 110) })).await;
         job["id"].as_str().unwrap().to_owned()
     };
     let (source, twin, canceled) = (post().await, post().await, post().await);
@@ -128,8 +115,7 @@ async fn two_of_the_same_input_are_solved_once_and_canceled_apart() {
     let mut problem = block(60, 60);
     problem["solver"] = json!({ "max_iterations": 2 });
     let post = async || {
-        let request = server.post("/v1/jobs").json(&json!({ "problem": problem }));
-        let job: Value = request.send().await.unwrap().json().await.unwrap();
+        let job = server.hand_in(&json!({ "problem": problem })).await;
         job["id"].as_str().unwrap().to_owned()
     };
     for id in [post().await, post().await] {

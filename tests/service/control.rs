@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use service::pb;
 use suite::{
     example_json,
-    harness::{Server, large},
+    harness::{Server, answer, large},
 };
 use tonic::Code;
 
@@ -17,15 +17,7 @@ async fn a_job_that_has_ended_is_tried_again_as_a_new_one() {
     let mut problem = example_json("rectangular_punch");
     problem["solver"] = json!({ "max_iterations": 3 });
     let body = json!({ "problem": problem, "name": "n", "labels": { "a": "b" }, "limits": { "timeout_s": 7 } });
-    let request = server.post("/v1/jobs").header("Prefer", "wait=60");
-    let first: Value = request
-        .json(&body)
-        .send()
-        .await
-        .unwrap()
-        .json()
-        .await
-        .unwrap();
+    let first = server.solve(&body).await;
     assert_eq!(first["reason"], "not_converged");
     let path = format!("/v1/jobs/{}/retry", first["id"].as_str().unwrap());
     let response = server
@@ -151,8 +143,7 @@ async fn name_labels_priority_and_pin_are_changed_if_the_version_is_the_one_that
         if let Some(version) = version {
             request = request.header("If-Match", version);
         }
-        let response = request.send().await.unwrap();
-        (response.status(), response.json::<Value>().await.unwrap())
+        answer(request).await
     };
     let seen = format!("\"{}\"", done["version"]);
     let edit = json!({ "name": "n", "labels": { "a": "b" }, "priority": 4, "pinned": true });
@@ -224,21 +215,10 @@ async fn many_jobs_are_canceled_and_deleted_by_a_filter_and_not_without_one() {
     let mut labeled = vec![];
     for n in 0..6 {
         let body = json!({ "problem": example_json("sheet"), "cache": "off", "labels": { "odd": (n % 2).to_string() } });
-        let job: Value = server
-            .post("/v1/jobs")
-            .json(&body)
-            .send()
-            .await
-            .unwrap()
-            .json()
-            .await
-            .unwrap();
+        let job = server.hand_in(&body).await;
         labeled.push(job["id"].as_str().unwrap().to_owned());
     }
-    let act = async |method: Method, path: &str| {
-        let response = server.request(method, path).send().await.unwrap();
-        (response.status(), response.json::<Value>().await.unwrap())
-    };
+    let act = async |method: Method, path: &str| answer(server.request(method, path)).await;
     for (method, path) in [
         (Method::POST, "/v1/jobs/cancel"),
         (Method::DELETE, "/v1/jobs"),
@@ -340,15 +320,7 @@ async fn time_limits_end_a_job_with_reasons_of_their_own() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
     let post = async |problem: Value, limits: Value| {
         let body = json!({ "problem": problem, "limits": limits, "cache": "off" });
-        let job: Value = server
-            .post("/v1/jobs")
-            .json(&body)
-            .send()
-            .await
-            .unwrap()
-            .json()
-            .await
-            .unwrap();
+        let job = server.hand_in(&body).await;
         job["id"].as_str().unwrap().to_owned()
     };
     let long = post(large(), json!({ "timeout_s": 1.0 })).await;

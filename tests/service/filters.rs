@@ -9,15 +9,26 @@ use crate::{SIGNORINI, server};
 async fn submit(server: &Server, name: &str, labels: Value) -> Value {
     let body =
         json!({ "problem": example_json("sheet"), "name": name, "labels": labels, "cache": "off" });
-    let request = server.post("/v1/jobs").header("Prefer", "wait=60");
-    request
-        .json(&body)
-        .send()
-        .await
-        .unwrap()
-        .json()
-        .await
-        .unwrap()
+    server.solve(&body).await
+}
+
+/// The ids of a list, two a page: the pages are one list.
+async fn listed(server: &Server, query: &str) -> Vec<String> {
+    let (mut ids, mut token) = (vec![], String::new());
+    loop {
+        let page = server
+            .json(&format!("/v1/jobs?page_size=2&page_token={token}&{query}"))
+            .await;
+        let jobs = page["jobs"].as_array().unwrap();
+        ids.extend(
+            jobs.iter()
+                .map(|job| job["id"].as_str().unwrap().to_owned()),
+        );
+        match page["next_page_token"].as_str() {
+            Some(next) => token = next.to_owned(),
+            None => return ids,
+        }
+    }
 }
 
 #[tokio::test]
@@ -35,21 +46,12 @@ async fn every_filter_finds_its_jobs_alone_and_with_others() {
     };
     server.until_done(&failing).await;
     let found = async |query: &str| -> Vec<usize> {
-        // page by page: the pages are one list
-        let (mut found, mut token) = (vec![], String::new());
-        loop {
-            let page = server
-                .json(&format!("/v1/jobs?page_size=2&page_token={token}&{query}"))
-                .await;
-            for job in page["jobs"].as_array().unwrap() {
-                let place = jobs.iter().position(|known| known["id"] == job["id"]);
-                found.push(place.unwrap_or(jobs.len()));
-            }
-            match page["next_page_token"].as_str() {
-                Some(next) => token = next.to_owned(),
-                None => break,
-            }
-        }
+        let known = |id: &String| jobs.iter().position(|job| job["id"] == id.as_str());
+        let ids = listed(&server, query).await;
+        let found: Vec<usize> = ids
+            .iter()
+            .map(|id| known(id).unwrap_or(jobs.len()))
+            .collect();
         let count = server.json(&format!("/v1/jobs/count?{query}")).await;
         assert_eq!(count["total"], found.len(), "{query}");
         found
@@ -100,15 +102,7 @@ async fn lists_go_by_the_time_that_is_asked_for_in_both_directions() {
     let mut ids = vec![];
     for priority in [0, 5, -5, 9] {
         let body = json!({ "problem": example_json("sheet"), "priority": priority, "cache": "off", "labels": { "l": "x" } });
-        let job: Value = server
-            .post("/v1/jobs")
-            .json(&body)
-            .send()
-            .await
-            .unwrap()
-            .json()
-            .await
-            .unwrap();
+        let job = server.hand_in(&body).await;
         ids.push(job["id"].as_str().unwrap().to_owned());
     }
     server.post("/v1/queue/resume").send().await.unwrap();
@@ -121,23 +115,9 @@ async fn lists_go_by_the_time_that_is_asked_for_in_both_directions() {
     };
     ids.push(waiting);
     let order = async |query: &str| -> Vec<usize> {
-        let (mut found, mut token) = (vec![], String::new());
-        loop {
-            let page = server
-                .json(&format!("/v1/jobs?page_size=2&page_token={token}&{query}"))
-                .await;
-            found.extend(
-                page["jobs"]
-                    .as_array()
-                    .unwrap()
-                    .iter()
-                    .map(|job| ids.iter().position(|id| job["id"] == id.as_str()).unwrap()),
-            );
-            match page["next_page_token"].as_str() {
-                Some(next) => token = next.to_owned(),
-                None => return found,
-            }
-        }
+        let listed = listed(&server, query).await;
+        let place = |id: &String| ids.iter().position(|known| known == id).unwrap();
+        listed.iter().map(place).collect()
     };
     assert_eq!(order("").await, [4, 3, 2, 1, 0]);
     assert_eq!(order("order_by=created_at").await, [4, 3, 2, 1, 0]);

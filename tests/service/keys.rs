@@ -3,7 +3,7 @@
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use service::pb;
-use suite::{example, example_json};
+use suite::{example, example_json, harness::answer};
 use tonic::Code;
 
 use crate::{
@@ -104,9 +104,7 @@ async fn a_job_may_have_a_name_of_the_clients_own() {
     let server = server().await;
     let id = "job_01890a5d-ac96-774b-bcce-b302099a8057";
     let put = async |id: &str, body: Value| {
-        let response = server.put(&format!("/v1/jobs/{id}")).json(&body);
-        let response = response.send().await.unwrap();
-        (response.status(), response.json::<Value>().await.unwrap())
+        answer(server.put(&format!("/v1/jobs/{id}")).json(&body)).await
     };
     let (status, job) = put(id, body("a")).await;
     assert_eq!((status, &job["id"]), (StatusCode::ACCEPTED, &json!(id)));
@@ -150,8 +148,7 @@ async fn a_batch_is_accepted_whole_or_not_at_all() {
     let server = server().await;
     let post = async |body: Value| {
         let request = server.post("/v1/jobs/batch").header("Idempotency-Key", "b");
-        let response = request.json(&body).send().await.unwrap();
-        (response.status(), response.json::<Value>().await.unwrap())
+        answer(request.json(&body)).await
     };
     let mut broken = example_json("sheet");
     broken["materials"][0]["poissons_ratio"] = json!(0.7);

@@ -3,7 +3,10 @@
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use service::pb;
-use suite::harness::Server;
+use suite::{
+    harness::{Server, answer},
+    pressed,
+};
 use tonic::Code;
 
 use crate::{SIGNORINI, grpc::connect, server};
@@ -14,21 +17,7 @@ fn file(name: &str) -> Vec<u8> {
 }
 
 async fn upload(server: &Server, bytes: Vec<u8>) -> (StatusCode, Value) {
-    let response = server.post("/v1/meshes").body(bytes).send().await.unwrap();
-    (response.status(), response.json().await.unwrap())
-}
-
-/// A cylinder pressed on the top of the plate with the fillet, and dragged.
-fn pressed(mesh: Value) -> Value {
-    json!({
-        "analysis": {"kind": "plane_strain"},
-        "mesh": mesh,
-        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
-        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
-        "contacts": [{"boundary": "top", "obstacle": {"kind": "parabola", "radius": 5, "center": 1},
-            "indentation": 0.05, "tangential_displacement": 0.01,
-            "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}}],
-    })
+    answer(server.post("/v1/meshes").body(bytes)).await
 }
 
 fn pulled(mesh: Value) -> Value {
@@ -38,26 +27,10 @@ fn pulled(mesh: Value) -> Value {
 }
 
 async fn solved(server: &Server, problem: &Value) -> Value {
-    let response = server
-        .post("/v1/jobs")
-        .header("Prefer", "wait=60")
-        .json(&json!({"problem": problem}))
-        .send()
-        .await
-        .unwrap();
-    let (status, job): (_, Value) = (response.status(), response.json().await.unwrap());
-    assert_eq!(status, StatusCode::CREATED, "{job:#}");
+    let job = server.solve(&json!({"problem": problem})).await;
     assert_eq!(job["status"], "succeeded", "{job:#}");
     let path = format!("/v1/jobs/{}/result", job["id"].as_str().unwrap());
-    let result: Value = server
-        .get(&path)
-        .send()
-        .await
-        .unwrap()
-        .json()
-        .await
-        .unwrap();
-    result["summary"].clone()
+    server.json(&path).await["summary"].take()
 }
 
 /// Every family that Gmsh wrote, in each form of its format, solves through REST; the four forms of a

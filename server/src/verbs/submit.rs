@@ -73,19 +73,12 @@ pub async fn create(
         let prepared = prepare(&service, draft, id).await?;
         let payload = prepared.payload.clone();
         let key = key.map(|key| RequestKey { key, payload });
-        if let Some(mut old) = replayed(&service, key.as_ref()).await?
-            && let Some(accepted) = old.pop()
-        {
-            let replayed = true;
-            return Ok(Handed { accepted, replayed });
+        if let Some(old) = replayed(&service, key.as_ref()).await? {
+            return only(old, true);
         }
         let new = admit(&service, prepared).await?;
-        let accepted = hand_in(&service, vec![new], key).await?;
-        let job = accepted.jobs.into_iter().next();
-        Ok(Handed {
-            accepted: job.ok_or_else(|| ApiError::internal("a job was accepted, but not given"))?,
-            replayed: accepted.replayed,
-        })
+        let Accepted { jobs, replayed, .. } = hand_in(&service, vec![new], key).await?;
+        only(jobs, replayed)
     })
     .await
 }
@@ -149,11 +142,8 @@ pub async fn retry(
                 Some(RequestKey { key, payload })
             }
         };
-        if let Some(mut old) = replayed(&service, key.as_ref()).await?
-            && let Some(accepted) = old.pop()
-        {
-            let replayed = true;
-            return Ok(Handed { accepted, replayed });
+        if let Some(old) = replayed(&service, key.as_ref()).await? {
+            return only(old, true);
         }
         let job = jobs::get(&service, id).await?;
         if !job.status.is_terminal() {
@@ -181,14 +171,18 @@ pub async fn retry(
             parent: Some(id),
             ..admit(&service, prepared).await?
         };
-        let accepted = hand_in(&service, vec![new], key).await?;
-        let job = accepted.jobs.into_iter().next();
-        Ok(Handed {
-            accepted: job.ok_or_else(|| ApiError::internal("a job was accepted, but not given"))?,
-            replayed: accepted.replayed,
-        })
+        let Accepted { jobs, replayed, .. } = hand_in(&service, vec![new], key).await?;
+        only(jobs, replayed)
     })
     .await
+}
+
+/// The one job of a submission of one.
+fn only(jobs: Vec<Job>, replayed: bool) -> Result<Handed<Job>, ApiError> {
+    let accepted = jobs.into_iter().next();
+    let accepted =
+        accepted.ok_or_else(|| ApiError::internal("a job was accepted, but not given"))?;
+    Ok(Handed { accepted, replayed })
 }
 
 /// Does the same with each of many, a few at a time, in order; of those that are invalid all are told.
