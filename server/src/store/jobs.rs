@@ -440,7 +440,8 @@ pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> 
 /// The end itself. The last word on a job.
 async fn close(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
     debug_assert!(ending.status.is_terminal());
-    let now = Time::now();
+    // Lists count on it that nobody ends before it was accepted, also where the clock was set back.
+    let now = Time::now().max(job.created_at);
     let failure = ending
         .failure
         .as_ref()

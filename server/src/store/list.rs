@@ -1,10 +1,11 @@
 //! Jobs by name, and lists of them: filters, pages, counts.
 //!
-//! A page costs as many rows as it shows, not as many as there are: each filter has an index in the order of
-//! the list, and of the filters given the one that usually leaves the fewest jobs leads. A second filter is
-//! checked on the rows that the first one finds.
+//! A page costs as many rows as it shows, not as many as there are. Each filter has an index in the order of
+//! the list. One filter leads, and the others are checked on the rows that it finds: one that leaves few jobs,
+//! which are sorted where they have to be, or else one whose index has the order of the list, since then a
+//! page is soon full.
 
-use sqlx::{QueryBuilder, Row, Sqlite};
+use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
 use super::{Result, Store, rows::from_row};
 use crate::{
@@ -88,8 +89,14 @@ enum Lead<'a> {
     Name(&'a str),
     Status(Status),
     Owner(&'a str),
+    /// The time of the end, in a list by the time of arrival.
+    Ended,
     All,
 }
+
+/// A filter that leaves no more jobs than this leads whatever the order: to look at all of them, and to sort
+/// them, takes less than a page may.
+const FEW: i64 = 1000;
 
 impl Store {
     /// The job of that name.
@@ -134,8 +141,12 @@ impl Store {
         cursor: Option<Cursor>,
         limit: i64,
     ) -> Result<Vec<Job>> {
+        let mut connection = self.reader.acquire().await?;
+        let leads = match few(&mut connection, filter, order).await? {
+            Some(lead) => vec![lead],
+            None => leads(filter, order),
+        };
         let mut query = QueryBuilder::<Sqlite>::new("");
-        let leads = leads(filter);
         for (n, lead) in leads.iter().enumerate() {
             query.push(if n == 0 {
                 "select * from ("
@@ -150,7 +161,6 @@ impl Store {
             query.push(format!(" order by {by} {direction}, id {direction} limit "));
             query.push_bind(limit);
         }
-        let mut connection = self.reader.acquire().await?;
         let rows = query.build().fetch_all(&mut *connection).await?;
         let mut jobs = rows.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
         self.place(&mut connection, &mut jobs).await?;
@@ -173,6 +183,7 @@ impl Store {
             "select {group} as kind, count(*) as jobs from job where true"
         ));
         conditions(&mut query, filter, None);
+        times(&mut query, filter, "job.created_at", None);
         query.push(" group by kind order by kind");
         let rows = query.build().fetch_all(&self.reader).await?;
         rows.iter()
@@ -191,6 +202,7 @@ impl Store {
         let mut query = QueryBuilder::<Sqlite>::new("select id from job where id > ");
         query.push_bind(after).push(" and id <= ").push_bind(up_to);
         conditions(&mut query, filter, None);
+        times(&mut query, filter, "job.created_at", None);
         query.push(" order by id limit ").push_bind(limit);
         Ok(query.build_query_scalar().fetch_all(&self.reader).await?)
     }
@@ -257,8 +269,74 @@ impl GroupBy {
     }
 }
 
-/// What leads: one lead, or where only statuses can one for each of them, since their lists are merged.
-fn leads(filter: &Filter) -> Vec<Lead<'_>> {
+/// A filter that leaves few jobs, if there is one and there is a choice.
+async fn few<'a>(
+    connection: &mut SqliteConnection,
+    filter: &'a Filter,
+    order: Order,
+) -> Result<Option<Lead<'a>>> {
+    let mut candidates: Vec<Lead<'a>> = filter.labels.iter().map(Lead::Label).collect();
+    candidates.extend(filter.input_hash.as_deref().map(Lead::InputHash));
+    candidates.extend(filter.name.as_deref().map(Lead::Name));
+    if let [status] = filter.statuses[..] {
+        candidates.push(Lead::Status(status));
+    }
+    let by_creation = order.by == OrderBy::CreatedAt;
+    if by_creation && (filter.finished_after.is_some() || filter.finished_before.is_some()) {
+        candidates.push(Lead::Ended);
+    }
+    if by_creation && candidates.len() == 1 && !matches!(candidates[0], Lead::Ended) {
+        return Ok(None);
+    }
+    for lead in candidates {
+        let mut query = QueryBuilder::<Sqlite>::new("select count(*) from (select 1 from ");
+        match lead {
+            Lead::Label((key, value)) => {
+                query.push("job_label where key = ").push_bind(key);
+                query.push(" and value = ").push_bind(value);
+            }
+            Lead::InputHash(hash) => {
+                query.push("job where input_hash = ").push_bind(hash);
+            }
+            Lead::Name(name) => {
+                query.push("job where name = ").push_bind(name);
+            }
+            Lead::Status(status) => {
+                query.push("job where status = ").push_bind(status.as_str());
+            }
+            Lead::Ended => {
+                query.push("job indexed by job_by_finished where finished_at is not null");
+                times(&mut query, filter, "finished_at", None);
+            }
+            Lead::Owner(_) | Lead::All => continue,
+        }
+        query.push(" limit ").push_bind(FEW + 1).push(")");
+        let jobs: i64 = query
+            .build_query_scalar()
+            .fetch_one(&mut *connection)
+            .await?;
+        if jobs <= FEW {
+            return Ok(Some(lead));
+        }
+    }
+    Ok(None)
+}
+
+/// What leads where every filter leaves many jobs: an index in the order of the list. One lead, or where only
+/// statuses can one for each of them, since their lists are merged.
+fn leads(filter: &Filter, order: Order) -> Vec<Lead<'_>> {
+    let mut statuses = filter.statuses.clone();
+    statuses.sort_by_key(|status| status.as_str());
+    statuses.dedup();
+    let by_status: Vec<Lead<'_>> = statuses.iter().copied().map(Lead::Status).collect();
+    // most jobs succeed: of the others there are fewer than most filters leave
+    let of_the_others = !by_status.is_empty() && !statuses.contains(&Status::Succeeded);
+    if order.by == OrderBy::FinishedAt || of_the_others {
+        return match by_status.is_empty() {
+            true => vec![Lead::All],
+            false => by_status,
+        };
+    }
     if let Some(label) = filter.labels.first() {
         return vec![Lead::Label(label)];
     }
@@ -268,11 +346,8 @@ fn leads(filter: &Filter) -> Vec<Lead<'_>> {
     if let Some(name) = &filter.name {
         return vec![Lead::Name(name)];
     }
-    if !filter.statuses.is_empty() {
-        let mut statuses = filter.statuses.clone();
-        statuses.sort_by_key(|status| status.as_str());
-        statuses.dedup();
-        return statuses.into_iter().map(Lead::Status).collect();
+    if !by_status.is_empty() {
+        return by_status;
     }
     vec![filter.owner.as_deref().map_or(Lead::All, Lead::Owner)]
 }
@@ -317,6 +392,10 @@ fn page(
             query.push("select * from job indexed by job_by_owner where owner = ");
             query.push_bind(owner.to_owned());
         }
+        Lead::Ended => {
+            query
+                .push("select * from job indexed by job_by_finished where finished_at is not null");
+        }
         Lead::Owner(_) | Lead::All => {
             let index = if by_creation {
                 "job_by_created"
@@ -335,6 +414,7 @@ fn page(
         _ if by_creation => ("job.created_at", "job.id"),
         _ => ("job.finished_at", "job.id"),
     };
+    times(query, filter, by, cursor.map(|_| order));
     if let Some(Cursor { micros, key }) = cursor {
         let beyond = if order.descending { "<" } else { ">" };
         query.push(format!(" and ({by}, {id}) {beyond} ("));
@@ -344,8 +424,8 @@ fn page(
     query.push(format!(" order by {by} {direction}, {id} {direction}"));
 }
 
-/// All conditions of a filter; the one that leads is said twice, which costs nothing, but for statuses, of
-/// which each leads a list of its own, and labels, which are rows elsewhere.
+/// All conditions of a filter but for times. The one that leads is said twice, which costs nothing, but for
+/// statuses, of which each leads a list of its own, and labels, which are rows elsewhere.
 fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, lead: Option<Lead<'_>>) {
     let Filter {
         statuses,
@@ -353,10 +433,7 @@ fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, lead: Option<Le
         labels,
         name,
         input_hash,
-        created_after,
-        created_before,
-        finished_after,
-        finished_before,
+        ..
     } = filter;
     if !statuses.is_empty() && !matches!(lead, Some(Lead::Status(_))) {
         query.push(" and job.status in (");
@@ -366,9 +443,16 @@ fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, lead: Option<Le
         });
         query.push(")");
     }
-    let by_label = matches!(lead, Some(Lead::Label(_)));
-    for (key, value) in labels.iter().skip(usize::from(by_label)) {
-        query.push(" and job.id in (select job_id from job_label where key = ");
+    for label in labels {
+        let (key, value) = label;
+        match lead {
+            Some(Lead::Label(leading)) if leading == label => continue,
+            // one look for each row that the lead finds
+            Some(_) => query.push(
+                " and exists (select 1 from job_label where created_at = job.created_at and job_id = job.id and key = ",
+            ),
+            None => query.push(" and job.id in (select job_id from job_label where key = "),
+        };
         query.push_bind(key.clone()).push(" and value = ");
         query.push_bind(value.clone()).push(")");
     }
@@ -379,20 +463,31 @@ fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, lead: Option<Le
             query.push_bind(text.clone());
         }
     }
-    // a list by label has the times of the label's rows, in its own order
-    let created = if by_label {
-        "job_label.created_at"
+}
+
+/// The bounds of both times. `by` is the column that orders the list; what a cursor in this order says of it
+/// is not said again, since the index would start from either.
+fn times(query: &mut QueryBuilder<Sqlite>, filter: &Filter, by: &str, cursor: Option<Order>) {
+    let (mut created_before, mut finished_after) = (filter.created_before, filter.finished_after);
+    let by_creation = by.ends_with("created_at");
+    // Nobody ends before it was accepted: a bound on one time is one on the other, by which the list is read.
+    if by_creation {
+        let bounds = [created_before, filter.finished_before];
+        created_before = bounds.into_iter().flatten().min();
     } else {
-        "job.created_at"
-    };
-    let times = [
-        (created, ">=", created_after),
+        finished_after = finished_after.max(filter.created_after);
+    }
+    let created = if by_creation { by } else { "job.created_at" };
+    for (column, comparison, time) in [
+        (created, ">=", filter.created_after),
         (created, "<", created_before),
         ("job.finished_at", ">=", finished_after),
-        ("job.finished_at", "<", finished_before),
-    ];
-    for (column, comparison, time) in times {
-        if let Some(time) = time {
+        ("job.finished_at", "<", filter.finished_before),
+    ] {
+        let said = cursor.is_some_and(|order| order.descending == (comparison == "<"));
+        if let Some(time) = time
+            && !(said && column == by)
+        {
             query.push(format!(" and {column} {comparison} "));
             query.push_bind(time.micros());
         }

@@ -1,0 +1,232 @@
+"""What every test from outside needs: a server of its own, a little HTTP, the examples. Nothing here
+knows more of the service than its clients do.
+"""
+
+import asyncio
+import http.client
+import json
+import math
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.parse
+
+TOP = pathlib.Path(__file__).resolve().parent.parent
+BINARY = pathlib.Path(os.environ.get("SIGNORINI_BINARY", TOP / "target/release/signorini"))
+TERMINAL = ("succeeded", "failed", "canceled")
+# a proxy of this machine has no business between two of its own processes
+os.environ.update(NO_PROXY="127.0.0.1", no_proxy="127.0.0.1", no_grpc_proxy="127.0.0.1")
+
+checks = 0
+
+
+def check(holds, what):
+    global checks
+    checks += 1
+    if not holds:
+        raise AssertionError(what)
+
+
+def equal(found, expected, what):
+    check(found == expected, "%s: found %r, expected %r" % (what, found, expected))
+
+
+def example(name="rectangular_punch", **mesh):
+    """An example of the thesis; `mesh` is laid over its mesh, as in `refine=3`."""
+    problem = json.loads((TOP / "examples" / (name + ".json")).read_text(encoding="utf-8"))
+    problem["mesh"].update(mesh)
+    return problem
+
+
+def talkative(increments, **mesh):
+    """A problem with about seven events for each increment of its load."""
+    return dict(example(**mesh), steps=[{"name": "press", "increments": increments}])
+
+
+def submission(problem, **envelope):
+    """The body of a submit. Nothing is answered from the cache, so that what is counted has run."""
+    return json.dumps({"cache": "off", **envelope, "problem": problem}).encode()
+
+
+def percentile(values, share):
+    """The smallest value that `share` of all do not exceed."""
+    return sorted(values)[max(0, math.ceil(len(values) * share) - 1)]
+
+
+class Answer:
+    """Status, headers (names in lower case) and body of a response."""
+
+    def __init__(self, status, headers, body):
+        self.status, self.headers, self.body = status, headers, body
+
+    def json(self):
+        return json.loads(self.body)
+
+    def __repr__(self):
+        return "%d %r %r" % (self.status, self.headers, self.body[:600])
+
+
+class Server:
+    """The real binary on a free port with a store of its own, which outlives a kill."""
+
+    def __init__(self, *options, wrapper=()):
+        self.options, self.wrapper = options, wrapper
+        self.folder = tempfile.TemporaryDirectory()
+        self.data = pathlib.Path(self.folder.name) / "data"
+        self.log = pathlib.Path(self.folder.name) / "log"
+        self.process = None
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, kind, *_):
+        if kind is not None:
+            print("".join(self.log.read_text(errors="replace").splitlines(True)[-20:]), file=sys.stderr)
+        if self.process.poll() is None:
+            self.kill()
+        self.folder.cleanup()
+
+    def start(self):
+        """Starts it, and gives the seconds until it said that it is ready."""
+        began = time.monotonic()
+        command = [*self.wrapper, BINARY, "serve", "--listen", "127.0.0.1:0", "--data", self.data, *self.options]
+        with self.log.open("a") as log:
+            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log)
+        self.url = self.process.stdout.readline().decode().strip()
+        check(self.url.startswith("http://127.0.0.1:"), "serve began with %r, not with its URL" % self.url)
+        self.address = self.url[len("http://"):]
+        while self.call("GET", "/readyz").status != 200:
+            check(time.monotonic() < began + 60, "the server was not ready within a minute")
+        return time.monotonic() - began
+
+    def kill(self):
+        """As a crash would."""
+        self.process.kill()
+        self.process.wait()
+
+    def stop(self):
+        """As an operator would."""
+        self.process.send_signal(signal.SIGTERM)
+        equal(self.process.wait(timeout=30), 0, "exit code after SIGTERM")
+
+    def call(self, method, path, body=None, **headers):
+        """One request on a connection of its own. `if_match` becomes the header If-Match."""
+        headers = {name.replace("_", "-"): value for name, value in headers.items()}
+        if body is not None:
+            body = body if isinstance(body, bytes) else json.dumps(body).encode()
+            headers.setdefault("content-type", "application/json")
+        connection = http.client.HTTPConnection(self.address, timeout=120)
+        try:
+            connection.request(method, path, body, headers)
+            response = connection.getresponse()
+            names = {name.lower(): value for name, value in response.getheaders()}
+            return Answer(response.status, names, response.read())
+        finally:
+            connection.close()
+
+    def json(self, path):
+        answer = self.call("GET", path)
+        equal(answer.status, 200, "GET %s, %r" % (path, answer))
+        return answer.json()
+
+    def submit(self, problem, **envelope):
+        """Hands in a job; gives its id."""
+        answer = self.call("POST", "/v1/jobs", submission(problem, **envelope))
+        equal(answer.status, 202, "submit, %r" % answer)
+        return answer.json()["id"]
+
+    def finished(self, job):
+        """Waits for the job's end; gives the terminal job."""
+        while True:
+            self.call("GET", "/v1/jobs/%s/events" % job)  # closes after `done`
+            found = self.json("/v1/jobs/" + job)
+            if found["status"] in TERMINAL:
+                return found
+
+    def events(self, job):
+        """All events of a finished job."""
+        answer = self.call("GET", "/v1/jobs/%s/events" % job)
+        equal(answer.status, 200, "events, %r" % answer)
+        return [json.loads(line[6:]) for line in answer.body.splitlines() if line.startswith(b"data: ")]
+
+    def every_job(self, **filters):
+        """All pages of the list."""
+        jobs, filters = [], {"page_size": 1000, **filters}
+        while True:
+            page = self.json("/v1/jobs?" + urllib.parse.urlencode(filters))
+            jobs += page["jobs"]
+            filters["page_token"] = page["next_page_token"]
+            if not filters["page_token"]:
+                return jobs
+
+
+class Lost(Exception):
+    """The connection broke before the answer was there."""
+
+
+class Connection:
+    """A connection that stays open from request to request, for many clients in one thread."""
+
+    def __init__(self, server):
+        self.server, self.writer = server, None
+
+    async def call(self, method, path, body=None, **headers):
+        try:
+            if self.writer is None:
+                host, port = self.server.address.split(":")
+                self.reader, self.writer = await asyncio.open_connection(host, int(port), limit=1 << 24)
+            lines = ["%s %s HTTP/1.1" % (method, path), "host: " + self.server.address]
+            lines += ["%s: %s" % (name.replace("_", "-"), value) for name, value in headers.items()]
+            if body is not None:
+                lines += ["content-type: application/json", "content-length: %d" % len(body)]
+            self.writer.write("\r\n".join([*lines, "", ""]).encode() + (body or b""))
+            head = (await self.reader.readuntil(b"\r\n\r\n")).decode("latin-1").split("\r\n")
+            pairs = [line.split(":", 1) for line in head[1:] if line]
+            names = {name.lower(): value.strip() for name, value in pairs}
+            status = int(head[0].split()[1])
+            return Answer(status, names, await self._body(status, names))
+        except (OSError, EOFError) as error:
+            self.close()
+            raise Lost(str(error)) from error
+
+    async def _body(self, status, headers):
+        if "content-length" in headers:
+            return await self.reader.readexactly(int(headers["content-length"]))
+        if headers.get("transfer-encoding") != "chunked":
+            check(status in (204, 304), "a body without length")
+            return b""
+        pieces = []
+        while True:
+            size = int(await self.reader.readuntil(b"\r\n"), 16)
+            piece = (await self.reader.readexactly(size + 2))[:-2]
+            if size == 0:
+                return b"".join(pieces)
+            pieces.append(piece)
+
+    async def call_until_answered(self, *request, **headers):
+        """Sends the same again while the connection breaks: for clients of a server that is killed."""
+        while True:
+            try:
+                return await self.call(*request, **headers)
+            except Lost:
+                await asyncio.sleep(0.02)
+
+    def close(self):
+        if self.writer is not None:
+            self.writer.close()
+            self.writer = None
+
+
+async def each(clients, work):
+    """Runs `work(client)` for all clients at once; the first failure ends them all."""
+    tasks = [asyncio.ensure_future(work(client)) for client in clients]
+    try:
+        await asyncio.gather(*tasks)
+    finally:
+        for task in tasks:
+            task.cancel()
