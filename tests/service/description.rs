@@ -53,6 +53,7 @@ fn filled(path: &str) -> String {
         .replace("{hash}", &format!("sha256:{}", "0".repeat(64)))
         .replace("{boundary}", "top")
         .replace("{code}", "internal")
+        .replace("{file}", "start.js")
         .replace("{plot}", "deformed.svg")
 }
 
@@ -84,6 +85,27 @@ async fn every_route_is_there_and_knows_the_parameters_that_are_described() {
             described.sort_unstable();
             assert_eq!(described, known, "{what}");
         }
+    }
+}
+
+#[tokio::test]
+async fn the_page_of_the_api_loads_from_here_and_from_nowhere_else() {
+    let server = server().await;
+    let page = server.get("/docs").send().await.unwrap();
+    let policy = page.headers()["content-security-policy"].to_str().unwrap();
+    assert!(policy.starts_with("default-src 'none'") && !policy.contains("http"));
+    let html = page.text().await.unwrap();
+    let addresses: Vec<&str> = ["src=\"", "href=\""]
+        .iter()
+        .flat_map(|start| html.split(start).skip(1))
+        .map(|rest| rest.split('"').next().unwrap())
+        .filter(|address| !address.starts_with("data:"))
+        .collect();
+    assert!(addresses.len() > 3);
+    for address in addresses {
+        assert!(address.starts_with('/'), "{address}");
+        let answer = server.get(address).send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{address}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! REST. The whole API is one list, `operations`. Handlers only translate; see `verbs`.
 
 mod data;
+mod docs;
 mod events;
 mod filters;
 mod jobs;

@@ -308,6 +308,8 @@ mod tests {
         // API.md: plots, docs, openapi, proto, schema, error pages, probes
         let rest_only = [
             "/v1/jobs/{id}/plots/{plot}",
+            "/docs",
+            "/docs/{file}",
             "/openapi.json",
             "/proto/signorini.proto",
             "/v1/schema/problem.json",

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     catalog::{Code, Kind},
-    rest::{openapi, service, submission::BareProblem, submit},
+    rest::{docs, openapi, service, submission::BareProblem, submit},
     verbs::{
         problems::Judgement,
         queue::{Caller, Info, QueueState},
@@ -70,6 +70,16 @@ pub(super) fn operations() -> Vec<Operation> {
             .says("The description of the API over gRPC")
             .answers(200, "The protocol buffers", bytes("text/plain"))
             .tested(&["service::description::the_contract_of_grpc_is_served_as_it_was_written"]),
+        get("/docs", docs::page)
+            .rest_only("GetDocs")
+            .says("A page that shows this description, and can try it out; it works offline")
+            .answers(200, "The page", bytes("text/html"))
+            .tested(PAGE),
+        get("/docs/{file}", docs::file)
+            .rest_only("GetDocsFile")
+            .says("What that page loads")
+            .answers(200, "The file", PARTS.map(bytes).concat())
+            .tested(PAGE),
         get("/livez", service::livez)
             .rest_only("Live")
             .says("The process is alive")
@@ -86,4 +96,7 @@ pub(super) fn operations() -> Vec<Operation> {
     ]
 }
 
+const PAGE: &[&str] =
+    &["service::description::the_page_of_the_api_loads_from_here_and_from_nowhere_else"];
+const PARTS: [&str; 3] = ["text/css", "text/javascript", "text/plain"];
 const PROBES: &[&str] = &["service::errors::the_probes_and_the_schema_answer"];

@@ -6,7 +6,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
 
 use super::{Content, Parameter, SchemaOf};
-use crate::{catalog::Code, formats::Format};
+use crate::{catalog::Code, formats::Format, rest::docs};
 
 /// Schema and meaning of a variable in a path.
 pub(in crate::rest) fn variable(path: &str, name: &str) -> (Value, &'static str) {
@@ -25,6 +25,7 @@ pub(in crate::rest) fn variable(path: &str, name: &str) -> (Value, &'static str)
             word(&Code::ALL.map(|code| code.kind().code)),
             "The kind of error",
         ),
+        "file" => (word(&docs::NAMES), "What the page loads"),
         _ => unreachable!("{name} in {path} has no schema"),
     }
 }
