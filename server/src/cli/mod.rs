@@ -48,7 +48,11 @@ enum Command {
     /// Say what an error code means, and what to do
     Explain(explain::Arguments),
     /// Print the description of the API over REST (OpenAPI 3.1)
-    Openapi,
+    Openapi {
+        /// As a page for people, with the rpcs and the tests: docs/api.md
+        #[arg(long)]
+        reference: bool,
+    },
     /// Start a service for the occasion, submit five examples over REST and gRPC, watch them converge
     Demo,
 }
@@ -67,8 +71,12 @@ pub fn main() -> ExitCode {
         }
         Command::Schema => solve::schema(),
         Command::Explain(arguments) => explain::run(&arguments),
-        Command::Openapi => {
-            println!("{:#}", rest::openapi());
+        Command::Openapi { reference } => {
+            if reference {
+                print!("{}", rest::reference());
+            } else {
+                println!("{:#}", rest::openapi());
+            }
             Ok(Exit::Ok)
         }
         Command::Demo => {

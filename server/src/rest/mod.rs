@@ -9,6 +9,7 @@ mod meshes;
 mod openapi;
 mod operations;
 mod plots;
+mod reference;
 mod reply;
 mod request;
 mod results;
@@ -24,6 +25,7 @@ use tower_http::catch_panic::CatchPanicLayer;
 use crate::{error::ApiError, verbs::Service};
 
 pub use openapi::openapi;
+pub use reference::reference;
 
 /// What handlers see.
 #[derive(Clone, Debug)]

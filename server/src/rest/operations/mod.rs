@@ -1,11 +1,11 @@
 //! The REST API as one list: every operation with its route and handler, the rpc that does the same,
-//! what it takes, what it answers, and the tests that hold it to that. The router, `/openapi.json`
-//! and the test of parity with gRPC are all made from this list, so none of them can
+//! what it takes, what it answers, and the tests that hold it to that. The router, `/openapi.json`,
+//! `docs/api.md` and the test of parity with gRPC are all made from this list, so none of them can
 //! know an operation that another does not.
 //!
 //! Why no crate writes the document from the handlers (utoipa, aide): they describe what extractors
 //! read, and ours read by hand, since all that is wrong with a request is told at once. And the table
-//! must feed the parity test as well.
+//! must feed the parity test and the reference as well.
 
 mod jobs;
 mod meshes;
