@@ -64,7 +64,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .rest_only("GetOpenApi")
             .says("This description of the API over REST")
             .answers(200, "An OpenAPI document", bytes("application/json"))
-            .tested(&["service::description::the_description_is_whole_and_says_what_each_error_is",]),
+            .tested(&["service::description::the_description_is_whole_and_says_what_each_error_is", "tests/contract.py"]),
         get("/proto/signorini.proto", service::proto)
             .rest_only("GetProto")
             .says("The description of the API over gRPC")
