@@ -1,7 +1,12 @@
 //! Generates the gRPC types, and the descriptor that reflection serves. protox compiles the
-//! contract in Rust, so that nobody has to install protoc.
+//! contract in Rust, so that nobody has to install protoc. And unpacks the page of `/docs`.
 
-use std::{env, error::Error, fs, path::PathBuf};
+use std::{
+    env,
+    error::Error,
+    fs, io,
+    path::{Path, PathBuf},
+};
 
 use prost::Message;
 
@@ -17,5 +22,26 @@ fn main() -> Result<(), Box<dyn Error>> {
     tonic_prost_build::configure()
         .btree_map(".")
         .compile_fds(descriptors)?;
+    swagger_ui(&out)
+}
+
+/// Takes what `/docs` serves out of the archive of Swagger UI: 1.7 of its 6 MB.
+fn swagger_ui(out: &Path) -> Result<(), Box<dyn Error>> {
+    let archive = io::Cursor::new(utoipa_swagger_ui_vendored::SWAGGER_UI_VENDORED);
+    let mut archive = zip::ZipArchive::new(archive)?;
+    let names = archive.file_names().map(|name| name.map(String::from));
+    let names = names.collect::<Result<Vec<_>, _>>()?;
+    for (end, to) in [
+        ("/dist/swagger-ui.css", "swagger-ui.css"),
+        ("/dist/swagger-ui-bundle.js", "swagger-ui-bundle.js"),
+        ("/LICENSE", "swagger-ui-license.txt"),
+    ] {
+        let name = names.iter().find(|name| name.ends_with(end));
+        let name = name.ok_or_else(|| format!("Swagger UI has no {end}"))?;
+        io::copy(
+            &mut archive.by_name(name)?,
+            &mut fs::File::create(out.join(to))?,
+        )?;
+    }
     Ok(())
 }

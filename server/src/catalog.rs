@@ -1,6 +1,7 @@
 //! Every kind of error there is: of requests, and of jobs. The one source of HTTP status and gRPC code, of the
 //! pages at `/v1/errors/{code}` and of `signorini explain`.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use tonic::Code as Grpc;
 
@@ -45,7 +46,7 @@ pub enum Code {
 }
 
 /// What clients may rely on about a kind of error.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Kind {
     /// Its stable name.
     pub code: &'static str,
@@ -55,6 +56,7 @@ pub struct Kind {
     pub status: Option<u16>,
     /// The gRPC code; likewise.
     #[serde(serialize_with = "grpc_name")]
+    #[schemars(with = "Option<String>")]
     pub grpc: Option<Grpc>,
     /// Seconds after which the same request may succeed.
     pub retry_after_s: Option<u64>,

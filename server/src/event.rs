@@ -1,5 +1,6 @@
 //! What happens to a job, as its watchers are told.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use solver::solution::{Iteration, Phase, Warning};
 
@@ -9,7 +10,7 @@ use crate::{
 };
 
 /// One line of a job's story; `seq` is dense from 1, across attempts and restarts.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Event {
     /// Number of the event.
     pub seq: i64,
@@ -23,7 +24,7 @@ pub struct Event {
 }
 
 /// What happened.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Payload {
     /// The job changed its status, but is not at its end.

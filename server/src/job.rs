@@ -1,14 +1,15 @@
 //! A job: its identity, its status and the moves it may make. No I/O.
 
-use std::{collections::BTreeMap, fmt};
+use std::{borrow::Cow, collections::BTreeMap, fmt};
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use uuid::Uuid;
 
 use crate::{catalog::Code, time::Time};
 
 /// A problem on its way through the service, as clients see it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Job {
     /// The store's own number, in order of arrival; never shown.
     #[serde(skip)]
@@ -126,8 +127,22 @@ impl<'de> Deserialize<'de> for JobId {
     }
 }
 
+impl JsonSchema for JobId {
+    fn schema_name() -> Cow<'static, str> {
+        "JobId".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "The public name of a job, job_<uuidv7>.",
+            "type": "string",
+            "pattern": "^job_[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}$",
+        })
+    }
+}
+
 /// Where a job stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// Accepted and waiting.
@@ -193,7 +208,7 @@ impl Status {
 }
 
 /// Why a job failed or was canceled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
     /// `max_iterations` reached.
@@ -279,7 +294,9 @@ impl Reason {
 }
 
 /// Whether a job has something to fetch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum ResultAvailable {
     /// Nothing.
@@ -309,7 +326,7 @@ impl ResultAvailable {
 }
 
 /// What a job may take.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
     /// Seconds from a start to the end; then it fails with `timed_out`.
@@ -328,7 +345,7 @@ impl Default for Limits {
 }
 
 /// Whether earlier results may answer a job.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Cache {
     /// The result of the same input answers it at once; a job at work on that input is joined.
@@ -359,7 +376,7 @@ impl Cache {
 }
 
 /// The place of a queued job.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct QueuePosition {
     /// From 1; 0 for a job that another one, already running, will answer.
     pub position: i64,
@@ -370,7 +387,7 @@ pub struct QueuePosition {
 }
 
 /// What a queued job waits for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Waiting {
     /// All workers have something to do.
@@ -393,7 +410,7 @@ impl Waiting {
 }
 
 /// How far a job has come.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Progress {
     /// The phase that began last: mesh, assemble, …, recover.
     pub stage: String,
@@ -412,7 +429,7 @@ pub struct Progress {
 }
 
 /// Why a job failed, in the form of a problem document.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Failure {
     /// Address of the explanation.
     pub r#type: String,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use solver::{
     MeshSize,
@@ -14,7 +15,7 @@ use solver::{
 use crate::time::Time;
 
 /// A stored mesh, without its nodes and elements.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeshInfo {
     /// `sha256:…` of the file; what a problem's `mesh.stored` names.
     pub hash: String,
@@ -47,7 +48,7 @@ pub struct MeshInfo {
 }
 
 /// A named boundary of a stored mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BoundaryInfo {
     /// Sides.
     pub edges: u64,
@@ -56,7 +57,7 @@ pub struct BoundaryInfo {
 }
 
 /// How far the elements are from being folded.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Quality {
     /// Least ratio of the smallest to the largest det J within an element: 1 is best, 0 is folded.
     pub least_jacobian_ratio: f64,

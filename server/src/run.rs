@@ -3,6 +3,7 @@
 
 use std::{collections::BTreeMap, ops::ControlFlow, time::Instant};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use solver::{
     error::SolveError,
@@ -35,7 +36,7 @@ pub struct Document {
 }
 
 /// The solver's summary, and what only its caller knows.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
     /// What the solver says.
     #[serde(flatten)]

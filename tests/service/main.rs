@@ -6,6 +6,7 @@ mod cache;
 mod cancel;
 mod control;
 mod demo;
+mod description;
 mod errors;
 mod files;
 mod filters;

@@ -14,7 +14,7 @@ use clap::{Parser, Subcommand};
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::EnvFilter;
 
-use crate::config::Config;
+use crate::{config::Config, rest};
 
 /// What the process tells its caller. The names are the API's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +47,12 @@ enum Command {
     Schema,
     /// Say what an error code means, and what to do
     Explain(explain::Arguments),
+    /// Print the description of the API over REST (OpenAPI 3.1)
+    Openapi {
+        /// As a page for people, with the rpcs and the tests: docs/api.md
+        #[arg(long)]
+        reference: bool,
+    },
     /// Start a service for the occasion, submit five examples over REST and gRPC, watch them converge
     Demo,
 }
@@ -65,6 +71,14 @@ pub fn main() -> ExitCode {
         }
         Command::Schema => solve::schema(),
         Command::Explain(arguments) => explain::run(&arguments),
+        Command::Openapi { reference } => {
+            if reference {
+                print!("{}", rest::reference());
+            } else {
+                println!("{:#}", rest::openapi());
+            }
+            Ok(Exit::Ok)
+        }
         Command::Demo => {
             log(LevelFilter::WARN);
             with_runtime(demo::run())

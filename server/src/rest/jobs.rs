@@ -7,6 +7,7 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 use solver::problem::Problem;
 
@@ -49,7 +50,8 @@ pub(super) async fn get(
 }
 
 /// A page of jobs.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "JobList")]
 pub(super) struct List {
     jobs: Vec<Job>,
     next_page_token: Option<String>,
@@ -122,7 +124,8 @@ pub(super) async fn cancel(
 ) -> Result<Response, ApiError> {
     Params::parse(query.as_deref(), &[])?;
     let (outcome, job) = verbs::cancel(&rest.service, path.id).await?;
-    Ok(tagged(&job, Canceled { outcome, job: &job }))
+    let tag = [(header::ETAG, tag(&job))];
+    Ok((tag, Json(Canceled { outcome, job })).into_response())
 }
 
 pub(super) async fn delete(
@@ -153,11 +156,7 @@ pub(super) async fn delete_many(
 
 /// One job with its version as entity tag.
 pub(super) fn one(job: &Job) -> Response {
-    tagged(job, job)
-}
-
-fn tagged(job: &Job, body: impl Serialize) -> Response {
-    ([(header::ETAG, tag(job))], Json(body)).into_response()
+    ([(header::ETAG, tag(job))], Json(job)).into_response()
 }
 
 fn tag(job: &Job) -> String {
@@ -165,8 +164,8 @@ fn tag(job: &Job) -> String {
 }
 
 /// What asking a job to stop did, and the job.
-#[derive(Serialize)]
-struct Canceled<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Canceled {
     outcome: Cancellation,
-    job: &'a Job,
+    job: Job,
 }

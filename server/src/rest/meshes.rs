@@ -8,6 +8,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use futures_util::StreamExt;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
@@ -63,7 +64,8 @@ pub(super) async fn get(
 }
 
 /// A page of meshes.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "MeshList")]
 pub(super) struct List {
     meshes: Vec<MeshInfo>,
     next_page_token: Option<String>,

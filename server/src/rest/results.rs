@@ -7,6 +7,7 @@ use axum::{
     http::{HeaderMap, header},
     response::Response,
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
@@ -21,7 +22,8 @@ use crate::{
 };
 
 /// The scalars of a result, whole and by load step.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Result")]
 pub(super) struct Found {
     summary: Summary,
     steps: Vec<results::StepResult>,

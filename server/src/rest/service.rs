@@ -121,6 +121,13 @@ pub(super) async fn schema(RawQuery(query): RawQuery) -> Result<Json<Value>, Api
     Ok(Json(solver::schema()))
 }
 
+/// The API over gRPC.
+pub(super) async fn proto(RawQuery(query): RawQuery) -> Result<impl IntoResponse, ApiError> {
+    const TEXT: &str = include_str!("../../../proto/signorini/v1/signorini.proto");
+    Params::parse(query.as_deref(), &[])?;
+    Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], TEXT))
+}
+
 /// The process is alive.
 pub(super) async fn livez() -> &'static str {
     "ok\n"

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde_json::value::RawValue;
 use solver::{
     error::{Violation, escape},
@@ -10,6 +11,7 @@ use solver::{
 
 use crate::{
     error::ApiError,
+    job::{Cache, Limits},
     store::Edit,
     verbs::{
         problems::{AT, prefixed},
@@ -17,6 +19,75 @@ use crate::{
     },
     violations::{self, Violations},
 };
+
+/// A body that hands in a job; for its schema only, since it is read by hand: what is wrong with the
+/// problem comes together with what is wrong around it.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[allow(dead_code)]
+pub(super) struct Submission {
+    /// What to solve.
+    problem: Problem,
+    /// A name for people, at most 256 characters.
+    #[schemars(default, length(max = 256))]
+    name: Option<String>,
+    /// Labels for programs, at most 64.
+    #[schemars(default, extend("maxProperties" = 64))]
+    labels: Option<BTreeMap<Label, Label>>,
+    /// Higher first; absent: 0.
+    #[schemars(default, range(min = -10, max = 10))]
+    priority: Option<i32>,
+    /// What it may take.
+    #[schemars(default)]
+    limits: Option<Limits>,
+    /// Whether an earlier result may answer it; absent: use.
+    #[schemars(default)]
+    cache: Option<Cache>,
+}
+
+/// A body with many of them; for its schema only.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[allow(dead_code)]
+pub(super) struct Submissions {
+    /// All or none of them are accepted.
+    #[schemars(length(min = 1, max = 1000))]
+    jobs: Vec<Submission>,
+}
+
+/// A body that changes a job: what is absent stays; for its schema only.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[allow(dead_code)]
+pub(super) struct Edits {
+    /// A name for people, at most 256 characters; null takes it away.
+    #[schemars(default, length(max = 256))]
+    name: Option<String>,
+    /// All labels that it shall have, at most 64.
+    #[schemars(default, extend("maxProperties" = 64))]
+    labels: Option<BTreeMap<Label, Label>>,
+    /// Higher first.
+    #[schemars(default, range(min = -10, max = 10))]
+    priority: Option<i32>,
+    /// Never removed by age.
+    #[schemars(default)]
+    pinned: Option<bool>,
+}
+
+/// Key or value of a label.
+#[derive(JsonSchema, PartialEq, Eq, PartialOrd, Ord)]
+#[schemars(inline)]
+#[allow(dead_code)]
+struct Label(#[schemars(length(max = 256))] String);
+
+/// A body with a problem and nothing else; for its schema only.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[allow(dead_code)]
+pub(super) struct BareProblem {
+    /// What to check.
+    problem: Problem,
+}
 
 /// What is wrong with a body whose JSON is well formed, or what it holds.
 type Read<T> = Result<T, Vec<Violation>>;
@@ -280,6 +351,47 @@ mod tests {
             .into_iter()
             .map(|v| v.pointer)
             .collect()
+    }
+
+    /// What a body may have, by what it is told that has something else.
+    fn known(told: Vec<Violation>) -> Vec<String> {
+        let unknown = told.iter().find(|v| v.reason == "unknown_name").unwrap();
+        let names = unknown.expected.strip_prefix("one of ").unwrap();
+        names.split(", ").map(str::to_owned).collect()
+    }
+
+    fn described<T: JsonSchema>() -> Vec<String> {
+        let schema = schemars::schema_for!(T);
+        let fields = schema.get("properties").unwrap().as_object().unwrap();
+        fields.keys().cloned().collect()
+    }
+
+    #[test]
+    fn what_is_described_of_a_body_is_what_is_read() {
+        const OTHER: &str = r#"{"other": 1}"#;
+        let ApiError::InvalidProblem(edits) = edit(OTHER).unwrap_err() else {
+            unreachable!("it is well-formed");
+        };
+        for (told, mut described) in [
+            (
+                submission(OTHER).unwrap().1.unwrap_err(),
+                described::<Submission>(),
+            ),
+            (
+                batch(OTHER).unwrap().unwrap_err(),
+                described::<Submissions>(),
+            ),
+            (
+                bare_problem(OTHER).unwrap().unwrap_err(),
+                described::<BareProblem>(),
+            ),
+            (edits, described::<Edits>()),
+        ] {
+            let mut known = known(told);
+            known.sort();
+            described.sort();
+            assert_eq!(known, described);
+        }
     }
 
     #[test]

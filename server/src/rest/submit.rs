@@ -7,6 +7,7 @@ use axum::{
     http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
@@ -137,7 +138,7 @@ fn set(response: &mut Response, name: HeaderName, value: String) {
 }
 
 /// Jobs that were accepted together.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub(super) struct Batch {
     jobs: Vec<Job>,
 }

@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
+use schemars::JsonSchema;
 use solver::problem::Problem;
 
 use super::{Service, detached, page, submit};
@@ -78,7 +79,7 @@ pub async fn list(
 }
 
 /// How many jobs there are, and in groups how many of each.
-#[derive(Clone, Debug, serde::Serialize)]
+#[derive(Clone, Debug, serde::Serialize, JsonSchema)]
 pub struct Count {
     /// All that the filters leave.
     pub total: i64,
@@ -146,7 +147,7 @@ pub async fn cancel(service: &Arc<Service>, id: JobId) -> Result<(Cancellation, 
 }
 
 /// What asking a job to stop did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Cancellation {
     /// Nobody ran it, and nobody will.
@@ -175,7 +176,7 @@ pub async fn delete(service: &Arc<Service>, id: JobId) -> Result<(), ApiError> {
 }
 
 /// What was done to many jobs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, JsonSchema)]
 pub struct Many {
     /// Jobs that the filters leave.
     pub matched: u64,

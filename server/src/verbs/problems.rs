@@ -1,5 +1,6 @@
 //! Judging a problem before it becomes a job.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use solver::{Estimate, error::Violation, mesh::Mesh, problem::Problem, solution::Warning};
 
@@ -7,7 +8,7 @@ use super::{Service, meshes};
 use crate::{digest, error::ApiError, mesh::MeshInfo};
 
 /// What there is to say about a problem.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Judgement {
     /// It would be accepted.
     pub valid: bool,

@@ -1,12 +1,13 @@
 //! The queue as a whole, the service itself, and who asks.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Service;
 use crate::{error::ApiError, formats::Format, store::OWNER};
 
 /// How the queue stands.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct QueueState {
     /// No new job is started.
     pub paused: bool,
@@ -49,7 +50,7 @@ pub async fn resume(service: &Service) -> Result<QueueState, ApiError> {
 }
 
 /// What this service is.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Info {
     /// Its name.
     pub name: String,
@@ -68,7 +69,7 @@ pub struct Info {
 }
 
 /// What the service takes at most.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ServiceLimits {
     /// Bytes of a request over REST.
     pub max_body_bytes: u64,
@@ -109,7 +110,7 @@ pub fn info(service: &Service) -> Info {
 }
 
 /// Who asks.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Caller {
     /// The owner of the jobs that this caller hands in.
     pub owner: String,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use async_stream::try_stream;
 use futures_util::Stream;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use solver::solution::{ContactProfile, Fields, Iteration};
 
@@ -19,7 +20,7 @@ use crate::{
 };
 
 /// What is said of one load step.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct StepResult {
     /// Its name in the problem, or its number from 1.
     pub name: String,

@@ -2,6 +2,7 @@
 
 use std::io::BufRead;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{ReadError, abaqus, gmsh};
@@ -11,7 +12,7 @@ use crate::problem::InlineMesh;
 use crate::solution::Warning;
 
 /// Formats of mesh files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeshFormat {
     /// MSH 2.2 or 4.1 of Gmsh.

@@ -10,6 +10,7 @@ pub use sample::sample;
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::element::Element;
@@ -51,7 +52,7 @@ pub struct StepSolution {
 }
 
 /// How an iteration ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// Contact set unchanged, every residual below the tolerance.
@@ -68,7 +69,8 @@ pub enum Outcome {
 }
 
 /// The scalars of a solution.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "SolutionSummary")]
 pub struct Summary {
     /// How it ended.
     pub outcome: Outcome,
@@ -117,7 +119,7 @@ pub struct Summary {
 
 /// Error estimate of Zienkiewicz and Zhu: stresses recovered at nodes against those of the elements,
 /// in the energy norm (∫ σ : C⁻¹ σ)^½.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ErrorEstimate {
     /// Estimated norm of the error ((force × length)^½).
     pub error: f64,
@@ -128,7 +130,7 @@ pub struct ErrorEstimate {
 }
 
 /// A second solution of the same problem beside the first.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Comparison {
     /// True where the two agree: forces and friction bounds to 1e-6 (uniqueness only; for doubled
     /// increments to `tolerance`).
@@ -146,7 +148,7 @@ pub struct Comparison {
 }
 
 /// One mesh of adaptive refinement and what it gave.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Refinement {
     /// Elements of the mesh.
     pub elements: u64,
@@ -167,7 +169,7 @@ pub struct Refinement {
 }
 
 /// Scalars of one contact boundary.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactSummary {
     /// Whose normal was used.
     pub normal: NormalOf,
@@ -190,7 +192,7 @@ pub struct ContactSummary {
 }
 
 /// A value and where it occurs.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Peak {
     /// The stress, with its sign.
     pub value: f64,
@@ -203,7 +205,7 @@ pub struct Peak {
 }
 
 /// Dimensionless residuals.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residuals {
     /// Largest force or complementarity defect for the friction bound in use / largest nodal reaction.
     pub kkt: f64,
@@ -216,7 +218,7 @@ pub struct Residuals {
 }
 
 /// Something the user should know.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {
     /// A short name, stable for programs.
     pub code: String,
@@ -227,7 +229,7 @@ pub struct Warning {
 }
 
 /// Where in the method an iteration belongs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
     /// The first solution, without friction.
@@ -260,7 +262,7 @@ impl Stage {
 }
 
 /// One line of history.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Iteration {
     /// Number of the row, from 1.
     pub k: u32,
@@ -293,7 +295,7 @@ pub struct Iteration {
 }
 
 /// Nodes in contact and their changes since the row before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactCount {
     /// Nodes in contact.
     pub active: u32,
@@ -304,7 +306,7 @@ pub struct ContactCount {
 }
 
 /// Friction points with a positive bound.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct FrictionCount {
     /// |u_t − d| ≥ ε.
     pub slip: u32,
@@ -313,7 +315,7 @@ pub struct FrictionCount {
 }
 
 /// Total forces over all contacts.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ForcePair {
     /// ∫p.
     pub normal: f64,
@@ -330,7 +332,7 @@ pub struct ForcePair {
 /// are the law's at the very point; `tangential_stress` is the one that acts in the solution, so that
 /// it adds up to the forces of the summary (at a node it is the law's, which differs by
 /// `Residuals::friction` of the largest); and a point is open where one of the nodes beside it is.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactProfile {
     /// Arc length from the first node of Γ_C.
     pub s: Vec<f64>,
@@ -395,7 +397,7 @@ impl ContactProfile {
 }
 
 /// State of a contact node, or of a point between two.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NodeState {
     /// Not in contact.
@@ -407,7 +409,7 @@ pub enum NodeState {
 }
 
 /// Values at all nodes of the mesh, in its order.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fields {
     /// Position before deformation.
     pub x: Vec<f64>,
@@ -438,7 +440,7 @@ pub struct Fields {
 
 /// Values at the integration points, element by element. A quadrilateral has order × order of them, the
 /// first local coordinate running fastest; a triangle 7 for order 3 and 3 for order 2.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GaussFields {
     /// Points of an element in each direction.
     pub order: u32,
@@ -457,7 +459,9 @@ pub struct GaussFields {
 }
 
 /// Phases of a solution, in their order; the caller times them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
     /// Reading the JSON (the caller's own).

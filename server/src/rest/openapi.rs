@@ -1,0 +1,264 @@
+//! `/openapi.json`: the list of operations as an OpenAPI document. The shapes of bodies are those of
+//! the types that are read and written, so a renamed field shows here without further ado.
+
+use std::{collections::BTreeMap, sync::LazyLock};
+
+use axum::{Json, extract::RawQuery};
+use schemars::{
+    SchemaGenerator,
+    generate::{Contract, SchemaSettings},
+};
+use serde_json::{Map, Value, json};
+use solver::error::Violation;
+
+use super::{
+    operations::{self, Answer, Content, Operation, Parameter},
+    request::Params,
+};
+use crate::{
+    catalog::{Code, Kind},
+    error::ApiError,
+};
+
+/// The document; it does not change while the service runs.
+pub fn openapi() -> &'static Value {
+    static DOCUMENT: LazyLock<Value> = LazyLock::new(document);
+    &DOCUMENT
+}
+
+/// The API over REST.
+pub(super) async fn serve(RawQuery(query): RawQuery) -> Result<Json<&'static Value>, ApiError> {
+    Params::parse(query.as_deref(), &[])?;
+    Ok(Json(openapi()))
+}
+
+/// Media type of errors, RFC 9457.
+const PROBLEM: &str = "application/problem+json";
+
+fn document() -> Value {
+    let mut schemas = Schemas::new();
+    let mut paths: BTreeMap<&str, Map<String, Value>> = BTreeMap::new();
+    let operations = operations::all();
+    for operation in &operations {
+        let described = schemas.operation(operation);
+        let path = paths.entry(operation.path).or_default();
+        path.insert(operation.method.to_ascii_lowercase(), described);
+    }
+    json!({
+        "openapi": "3.1.0",
+        "info": {
+            "title": "Signorini",
+            "version": env!("CARGO_PKG_VERSION"),
+            "summary": "Frictional contact problems as jobs",
+            "description": INTRODUCTION,
+            "license": { "name": "MIT OR Apache-2.0", "identifier": "MIT OR Apache-2.0" },
+        },
+        "servers": [{ "url": "/" }],
+        "tags": operations::GROUPS.map(|(name, meaning, _)| json!({ "name": name, "description": meaning })),
+        "paths": paths,
+        "components": { "schemas": schemas.into_components() },
+    })
+}
+
+const INTRODUCTION: &str = "The same verbs, names and numbers as over gRPC \
+([/proto/signorini.proto](/proto/signorini.proto)), on one port. A problem by itself: \
+[/v1/schema/problem.json](/v1/schema/problem.json). \
+Units are the client's own, used consistently; stresses are negative in compression; times are RFC 3339 in UTC. \
+A name that is not known is refused, in bodies and in queries. Every error is a document of RFC 9457, whose `code` \
+is stable and explained at its `type`.";
+
+/// Collects the schemas that operations refer to.
+struct Schemas {
+    /// How bodies are read: what has a default may be left out.
+    requests: SchemaGenerator,
+    /// How they are written: what is always written is always there.
+    answers: SchemaGenerator,
+}
+
+impl Schemas {
+    fn new() -> Schemas {
+        let generator = |contract| {
+            let mut settings = SchemaSettings::draft2020_12();
+            settings.definitions_path = "/components/schemas".into();
+            settings.contract = contract;
+            settings.into_generator()
+        };
+        Schemas {
+            requests: generator(Contract::Deserialize),
+            answers: generator(Contract::Serialize),
+        }
+    }
+
+    fn operation(&mut self, operation: &Operation) -> Value {
+        let mut described = json!({
+            "operationId": operation.id,
+            "summary": operation.summary,
+            "tags": [operation.group],
+            "responses": {},
+        });
+        let in_path = operation.variables().map(|name| {
+            let (schema, meaning) = operations::variable(operation.path, name);
+            json!({ "name": name, "in": "path", "required": true, "schema": schema, "description": meaning })
+        });
+        let others = operation.parameters.iter().map(parameter);
+        let parameters: Vec<Value> = in_path.chain(others).collect();
+        if !parameters.is_empty() {
+            described["parameters"] = json!(parameters);
+        }
+        if !operation.rpcs.is_empty() {
+            described["x-grpc"] = json!(operation.rpcs);
+        }
+        if let Some(body) = &operation.body {
+            let content = content(&mut self.requests, body, operation.example.as_ref());
+            described["requestBody"] = json!({ "required": true, "content": content });
+        }
+        for answer in &operation.answers {
+            described["responses"][answer.status.to_string()] = self.answer(answer);
+        }
+        for (status, codes) in by_status(&operation.errors()) {
+            described["responses"][status.to_string()] = self.failure(&codes);
+        }
+        described
+    }
+
+    fn answer(&mut self, answer: &Answer) -> Value {
+        let mut described = json!({ "description": answer.meaning });
+        if !answer.content.is_empty() {
+            described["content"] = content(&mut self.answers, &answer.content, None);
+        }
+        for (header, always) in &answer.headers {
+            let Parameter {
+                schema, meaning, ..
+            } = header;
+            described["headers"][header.name] =
+                json!({ "description": meaning, "required": always, "schema": schema });
+        }
+        described
+    }
+
+    /// All errors of one status; their codes say which of them.
+    fn failure(&mut self, codes: &[Kind]) -> Value {
+        let said: Vec<String> = codes
+            .iter()
+            .map(|kind| format!("`{}`: {}", kind.code, kind.title))
+            .collect();
+        let names: Vec<&str> = codes.iter().map(|kind| kind.code).collect();
+        json!({
+            "description": said.join("; "),
+            "content": { PROBLEM: { "schema": {
+                "allOf": [{ "$ref": "#/components/schemas/Error" }],
+                "properties": { "code": { "enum": names } },
+            } } },
+        })
+    }
+
+    fn into_components(mut self) -> Map<String, Value> {
+        let violation = self.answers.subschema_for::<Violation>();
+        let mut all = self.requests.take_definitions(true);
+        // What is both read and written is described as it is read.
+        for (name, schema) in self.answers.take_definitions(true) {
+            all.entry(name).or_insert(schema);
+        }
+        all.insert("Error".into(), error_schema(&violation.to_value()));
+        all
+    }
+}
+
+fn parameter(parameter: &Parameter) -> Value {
+    json!({
+        "name": parameter.name,
+        "in": parameter.place,
+        "schema": parameter.schema,
+        "description": parameter.meaning,
+    })
+}
+
+fn content(generator: &mut SchemaGenerator, body: &Content, example: Option<&Value>) -> Value {
+    let by_media = body.iter().map(|(media, schema)| {
+        let schema = schema(generator).to_value();
+        let mut described = json!({});
+        if schema != json!({}) {
+            described["schema"] = schema;
+        }
+        if let Some(example) = example {
+            described["example"] = example.clone();
+        }
+        ((*media).to_string(), described)
+    });
+    Value::Object(by_media.collect())
+}
+
+fn by_status(codes: &[Code]) -> BTreeMap<u16, Vec<Kind>> {
+    let mut found: BTreeMap<u16, Vec<Kind>> = BTreeMap::new();
+    for kind in codes.iter().map(|code| code.kind()) {
+        if let Some(status) = kind.status {
+            found.entry(status).or_default().push(kind);
+        }
+    }
+    found
+}
+
+/// `ApiError::document`, which a test holds to this.
+fn error_schema(violation: &Value) -> Value {
+    json!({
+        "title": "Error",
+        "description": "What went wrong (RFC 9457).",
+        "type": "object",
+        "properties": {
+            "type": { "type": "string", "description": "Where this kind of error is explained." },
+            "title": { "type": "string", "description": "One line, the same for every error of its kind." },
+            "status": { "type": "integer", "minimum": 400, "maximum": 599 },
+            "code": { "type": "string", "description": "The kind, stable for programs." },
+            "detail": { "type": "string", "description": "What happened this time." },
+            "instance": { "type": "string", "description": "The path that was asked for." },
+            "retryable": { "type": "boolean", "description": "The same request may succeed later." },
+            "errors": {
+                "type": "array",
+                "items": violation,
+                "description": "All that is wrong with the request, if that can be said piece by piece.",
+            },
+        },
+        "required": ["type", "title", "status", "code", "detail", "instance", "retryable", "errors"],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn names(schema: &Value, of: &str) -> Vec<String> {
+        let fields = schema[of].as_object().into_iter().flatten();
+        fields.map(|(name, _)| name.clone()).collect()
+    }
+
+    /// One list of schemas is made of two, which do not know each other's names.
+    #[test]
+    fn two_types_do_not_share_a_name() {
+        let mut schemas = Schemas::new();
+        for operation in operations::all() {
+            schemas.operation(&operation);
+        }
+        let read = schemas.requests.take_definitions(true);
+        let written = schemas.answers.take_definitions(true);
+        let mut shared = 0;
+        for (name, read) in &read {
+            if let Some(written) = written.get(name) {
+                assert_eq!(read["description"], written["description"], "{name}");
+                assert_eq!(names(read, "properties"), names(written, "properties"));
+                shared += 1;
+            }
+        }
+        assert!(shared > 0, "limits of a job are both read and written");
+    }
+
+    #[test]
+    fn an_error_is_described_as_it_is_written() {
+        let written = ApiError::Draining.document("/v1/jobs");
+        let described = error_schema(&json!({}));
+        let mut names = names(&described, "properties");
+        names.sort();
+        let fields: Vec<&String> = written.as_object().unwrap().keys().collect();
+        assert_eq!(names.iter().collect::<Vec<_>>(), fields);
+    }
+}

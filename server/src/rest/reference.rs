@@ -1,0 +1,136 @@
+//! `docs/api.md`: the list of operations for people, with the tests that hold each to its word.
+
+use std::fmt::Write;
+
+use super::operations::{self, Operation, Parameter};
+use crate::catalog::{Code, grpc_code_name};
+
+/// The whole page.
+pub fn reference() -> String {
+    let mut out = String::from(INTRODUCTION);
+    let all = operations::all();
+    out += "| operation | over gRPC | answers |\n|---|---|---|\n";
+    for operation in &all {
+        let _ = writeln!(
+            out,
+            "| [`{} {}`](#{}) | {} | {} |",
+            operation.method,
+            operation.path,
+            anchor(operation),
+            rpcs(operation),
+            statuses(operation),
+        );
+    }
+    for (group, meaning, _) in operations::GROUPS {
+        let _ = write!(out, "\n## {}\n\n{meaning}.\n", capital(group));
+        for operation in all.iter().filter(|operation| operation.group == group) {
+            section(&mut out, operation);
+        }
+    }
+    errors(&mut out);
+    out
+}
+
+const INTRODUCTION: &str = "# The API
+
+Generated from the list of operations (`server/src/rest/operations`) by `signorini openapi --reference`; the same
+list makes the routes, `/openapi.json` and the test that every rpc has its route. Bodies are described there, a
+problem by `signorini schema`; `/docs` shows it all and can try it out. A name that is not known is refused,
+in bodies and in queries. Every error is a document of RFC 9457 with one of the codes below.
+
+";
+
+fn section(out: &mut String, operation: &Operation) {
+    let _ = write!(
+        out,
+        "\n### `{} {}`\n\n{}.\n\n",
+        operation.method, operation.path, operation.summary
+    );
+    if !operation.rpcs.is_empty() {
+        let _ = writeln!(out, "- gRPC: {}", rpcs(operation));
+    }
+    for Parameter {
+        place,
+        name,
+        meaning,
+        ..
+    } in &operation.parameters
+    {
+        let _ = writeln!(out, "- {place} `{name}`: {meaning}");
+    }
+    for answer in &operation.answers {
+        let media: Vec<String> = answer
+            .content
+            .iter()
+            .map(|(media, _)| format!("`{media}`"))
+            .collect();
+        let _ = write!(out, "- {}: {}", answer.status, answer.meaning);
+        if !media.is_empty() {
+            let _ = write!(out, " ({})", media.join(", "));
+        }
+        out.push('\n');
+    }
+    let codes: Vec<String> = operation
+        .errors()
+        .iter()
+        .map(|code| code.kind())
+        .map(|kind| format!("{} `{}`", kind.status.unwrap_or_default(), kind.code))
+        .collect();
+    let _ = writeln!(out, "- errors: {}", codes.join(", "));
+    let tests: Vec<String> = operation
+        .tests
+        .iter()
+        .map(|test| format!("`{test}`"))
+        .collect();
+    let _ = writeln!(out, "- tests: {}", tests.join(", "));
+}
+
+fn errors(out: &mut String) {
+    *out += "\n## Errors\n\n`signorini explain CODE` and `GET /v1/errors/{code}` say what each means. Those without a status \
+             are what jobs fail of.\n\n| code | HTTP | gRPC | title |\n|---|---|---|---|\n";
+    for kind in Code::ALL.map(Code::kind) {
+        let status = kind
+            .status
+            .map_or(String::new(), |status| status.to_string());
+        let grpc = kind.grpc.map_or("", grpc_code_name);
+        let _ = writeln!(
+            out,
+            "| `{}` | {status} | {grpc} | {} |",
+            kind.code, kind.title
+        );
+    }
+}
+
+fn rpcs(operation: &Operation) -> String {
+    match operation.rpcs {
+        [] => "–".into(),
+        rpcs => rpcs.join(", "),
+    }
+}
+
+fn statuses(operation: &Operation) -> String {
+    let good = operation.answers.iter().map(|answer| answer.status);
+    let errors = operation.errors();
+    let bad = errors.iter().filter_map(|code| code.kind().status);
+    let mut all: Vec<u16> = good.chain(bad).collect();
+    all.sort_unstable();
+    all.dedup();
+    let words: Vec<String> = all.iter().map(u16::to_string).collect();
+    words.join(" ")
+}
+
+/// As GitHub makes it from the heading: lower case, spaces to hyphens, punctuation dropped.
+fn anchor(operation: &Operation) -> String {
+    let heading = format!("{} {}", operation.method, operation.path);
+    heading
+        .to_lowercase()
+        .chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c))
+        .map(|c| if c == ' ' { '-' } else { c })
+        .collect()
+}
+
+fn capital(word: &str) -> String {
+    let (first, rest) = word.split_at(1);
+    first.to_uppercase() + rest
+}

@@ -1,0 +1,171 @@
+"""Generated calls against the API as /openapi.json describes it: schemathesis makes them, from good data and
+bad, and checks that every answer is one that is described (status, type, headers, schema, code), none a 5xx.
+
+    tests/contract.py [CALLS]        at least so many, 2000 when nothing is said
+
+Two servers: the first keeps its jobs, so that names resolve; what deletes or cancels many at once, or holds
+up the queue, runs against the second. The jobs whose events are asked for have ended: a stream that does not
+end would be waited for (tests/service reads those).
+"""
+
+import concurrent.futures
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+
+import openapi_spec_validator
+import schemathesis
+
+TOP = pathlib.Path(__file__).resolve().parents[1]
+SIGNORINI = TOP / "target/release/signorini"
+# of the environment that runs this
+SCHEMATHESIS = pathlib.Path(sys.executable).with_name("schemathesis")
+# seconds after which a run that hangs is ended
+PATIENCE = 240
+# what deletes or cancels many, or holds up the queue
+DRASTIC = "^(DELETE |POST /v1/jobs/cancel|POST /v1/queue/)"
+# A fresh seed each time: over the weeks that finds more than the same calls every day.
+SETTINGS = """
+hooks = "contract"
+continue-on-failure = true
+request-timeout = 30
+suppress-health-check = ["all"]
+# more threads trip over a fault of CPython 3.11: "AST constructor recursion depth mismatch"
+workers = 1
+warnings = false
+
+[generation]
+max-examples = {examples}
+
+[phases]
+stateful.enabled = false
+
+[checks]
+# Good data by the schema may still mean nothing: a boundary that does not exist, a body free to move.
+positive_data_acceptance.enabled = false
+# Nobody has to prove who he is.
+ignored_auth.enabled = false
+
+[[operations]]
+# What is wrong with a problem is what it answers.
+include-operation-id = "ValidateProblem"
+checks.negative_data_rejection.enabled = false
+
+[dictionaries]
+{dictionaries}
+
+[parameters]
+{parameters}
+"""
+
+
+class Server:
+    """A server of its own, with jobs at every end of a job's life."""
+
+    def __init__(self, folder):
+        self.process = subprocess.Popen(
+            [SIGNORINI, "serve", "--listen", "127.0.0.1:0", "--data", folder / "data"],
+            stdout=subprocess.PIPE,
+            stderr=open(folder / "log", "w"),
+            text=True,
+        )
+        self.url = self.process.stdout.readline().strip()
+        self.log = folder / "log"
+        self.known = {"id": self.jobs(), "hash": [self.mesh()], "boundary": ["top"]}
+
+    def ask(self, method, path, body=None, **headers):
+        data = body if isinstance(body, (bytes, type(None))) else json.dumps(body).encode()
+        headers.setdefault("Content-Type", "application/json")
+        request = urllib.request.Request(self.url + path, data, headers, method=method)
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return json.load(answer)
+
+    def jobs(self):
+        """Succeeded, not converged, canceled."""
+        problem = json.loads((TOP / "examples/rectangular_punch.json").read_text(encoding="utf-8"))
+        hasty = dict(problem, solver={"max_iterations": 1})
+        names = [
+            self.ask("POST", "/v1/jobs", {"problem": problem, "name": "seed"}, Prefer="wait=60")["id"]
+            for problem in (problem, hasty)
+        ]
+        self.ask("POST", "/v1/queue/pause")
+        names.append(self.ask("POST", "/v1/jobs", {"problem": problem, "cache": "off"})["id"])
+        self.ask("POST", f"/v1/jobs/{names[-1]}/cancel")
+        self.ask("POST", "/v1/queue/resume")
+        return names
+
+    def mesh(self):
+        mesh = (TOP / "tests/data/gmsh/sheet-tri6-msh41-binary.msh").read_bytes()
+        return self.ask("POST", "/v1/meshes", mesh)["hash"]
+
+    def end(self):
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(timeout=30)
+
+
+@schemathesis.hook
+def before_call(context, case, kwargs):
+    """A job that has ended does not change: who waits for that, waits in vain, for a minute."""
+    try:
+        if case.operation.path == "/v1/jobs/{id}" and 0.05 < float(case.query["wait"]) <= 60:
+            case.query["wait"] = 0.05
+    except (KeyError, TypeError, ValueError):
+        pass  # nothing that would be waited for
+
+
+def settings(known, examples):
+    """Three names of four exist: with made-up ones alone, nearly every answer would be 404."""
+    dictionaries = "".join(f"{name} = {{ values = {json.dumps(values)} }}\n" for name, values in known.items())
+    bound = '"path.{0}" = {{ dictionary = "{0}", probability = 0.75 }}\n'
+    return SETTINGS.format(
+        examples=examples, dictionaries=dictionaries, parameters="".join(bound.format(name) for name in known)
+    )
+
+
+def run(folder, examples, *which):
+    """Schemathesis against a server of its own: how many calls it made, and what is wrong if anything is."""
+    folder.mkdir()
+    server = Server(folder)
+    try:
+        openapi_spec_validator.validate(server.ask("GET", "/openapi.json"))
+        config = folder / "schemathesis.toml"
+        config.write_text(settings(server.known, examples), encoding="utf-8")
+        command = [SCHEMATHESIS, "--config-file", config, "run", server.url + "/openapi.json", *which]
+        environment = dict(os.environ, PYTHONPATH=TOP / "tests", NO_PROXY="127.0.0.1", no_proxy="127.0.0.1")
+        done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
+    finally:
+        code = server.end()
+    found = re.search(r"(\d+) generated", done.stdout)
+    wrong = "" if done.returncode == 0 and code == 0 else f"{done.stdout}{done.stderr}\nthe server ended with {code}"
+    return int(found[1]) if found else 0, wrong
+
+
+def main():
+    least = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor() as both:
+        folder = pathlib.Path(folder)
+        # beside these, drawn at random for each operation, there are those that schemathesis always makes
+        keep = both.submit(run, folder / "keep", least // 40, "--exclude-name-regex", DRASTIC)
+        drop = both.submit(run, folder / "drop", least // 40, "--include-name-regex", DRASTIC)
+        results = [keep.result(), drop.result()]
+    calls = sum(calls for calls, _ in results)
+    wrong = [text for _, text in results if text]
+    print(*wrong, sep="\n")
+    print(f"schemathesis: {calls} calls in {time.monotonic() - began:.0f} s")
+    if wrong:
+        sys.exit("an answer is not as described")
+    if calls < least:
+        sys.exit(f"fewer than {least} calls")
+
+
+# schemathesis imports this file for its hook
+if __name__ == "__main__":
+    main()
