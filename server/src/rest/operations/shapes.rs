@@ -89,9 +89,9 @@ pub(super) fn several(one: Value) -> Value {
 }
 
 /// Parameters `label.{key}`, as many as are wanted. OpenAPI has them as the members of an object, which are
-/// parameters each (style form, exploded: the default).
+/// parameters each (style form, exploded: the default). Their values have no type: in a query all are text.
 pub(super) fn labels() -> Parameter {
-    let keys = json!({ "^label\\.": text() });
+    let keys = json!({ "^label\\.": {} });
     let labels =
         json!({ "type": "object", "patternProperties": keys, "additionalProperties": false });
     query(
