@@ -19,6 +19,7 @@ alter table job add column timeout_s real not null default 600;
 alter table job add column queue_ttl_s real not null default 86400;
 -- When its waiting has been too long.
 alter table job add column expires_at integer;
+update job set expires_at = created_at + 86400000000 where status = 'queued';
 -- The program that solved it: another one's results answer nobody.
 alter table job add column solver_version text;
 

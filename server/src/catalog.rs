@@ -29,6 +29,7 @@ pub enum Code {
     RangeNotSatisfiable,
     InvalidProblem,
     IdempotencyKeyReuse,
+    RateLimited,
     Internal,
     QueueFull,
     Draining,
@@ -100,7 +101,7 @@ fn grpc_name<S: serde::Serializer>(code: &Option<Grpc>, serializer: S) -> Result
 
 impl Code {
     /// All of them.
-    pub const ALL: [Code; 34] = [
+    pub const ALL: [Code; 35] = [
         Code::MalformedJson,
         Code::UnknownParameter,
         Code::BadParameter,
@@ -121,6 +122,7 @@ impl Code {
         Code::RangeNotSatisfiable,
         Code::InvalidProblem,
         Code::IdempotencyKeyReuse,
+        Code::RateLimited,
         Code::Internal,
         Code::QueueFull,
         Code::Draining,
@@ -192,6 +194,8 @@ impl Code {
                 "The problem, or the envelope around it, has violations. `errors` lists all of them: where (a JSON Pointer), what was found, what is expected, what to do. The schema is at /v1/schema/problem.json."),
             Code::IdempotencyKeyReuse => of_request("idempotency-key-reuse", "The key was used for something else", 422, Grpc::AlreadyExists, None,
                 "This Idempotency-Key (request_id) was used before, with another payload. One key stands for one request; use a new one."),
+            Code::RateLimited => of_request("rate-limited", "Too much at once", 429, Grpc::ResourceExhausted, Some(1),
+                "More is asked at the same time than can be answered soon, mostly lists and counts. Ask less often, or follow jobs by their events."),
             Code::Internal => of_request("internal", "Internal error", 500, Grpc::Internal, Some(1),
                 "Something unexpected happened, and it is our fault. The cause is in the service's log under the incident's number; please report it."),
             Code::QueueFull => of_request("queue-full", "The queue is full", 503, Grpc::Unavailable, Some(10),

@@ -103,6 +103,9 @@ pub enum ApiError {
     /// The problem, or the envelope it came in, is wrong.
     #[error("{}", summed_up(.0))]
     InvalidProblem(Vec<Violation>),
+    /// Too much is asked at once.
+    #[error("more is asked at once than can be answered soon")]
+    RateLimited,
     /// Our fault; the cause is in the log under this number.
     #[error("an unexpected error, logged as incident {incident}")]
     Internal {
@@ -154,6 +157,7 @@ impl ApiError {
             ApiError::PayloadTooLarge { .. } => Code::PayloadTooLarge,
             ApiError::ProblemTooLarge { .. } => Code::ProblemTooLarge,
             ApiError::InvalidProblem(_) => Code::InvalidProblem,
+            ApiError::RateLimited => Code::RateLimited,
             ApiError::Internal { .. } => Code::Internal,
             ApiError::QueueFull { .. } => Code::QueueFull,
             ApiError::Draining => Code::Draining,

@@ -31,6 +31,10 @@ use crate::{
 
 /// Largest message taken in; the contract's promise. (tonic answers a larger one with OUT_OF_RANGE.)
 const MAX_MESSAGE_BYTES: usize = 1 << 20;
+/// Rows of a history in one answer, some 200 bytes each: it shall not be larger either.
+const MAX_ROWS: usize = 4000;
+/// Places of a profile in one answer, some 90 bytes each.
+const MAX_PLACES: usize = 10_000;
 
 /// The gRPC routes, to share a port with REST, and the handle on what health reports.
 pub async fn router(
@@ -250,9 +254,14 @@ impl JobService for Grpc {
         let step = step.as_deref();
         let points = match points.as_deref() {
             None => Points::Nodes,
-            Some(text) => {
-                Points::parse(text).ok_or_else(|| bad("points", text, Points::EXPECTED))?
-            }
+            Some(text) => match Points::parse(text) {
+                // more would not fit into a message
+                Some(Points::Spaced(count)) if count > MAX_PLACES => {
+                    return Err(bad("points", text, "at most 10000 places over gRPC").into());
+                }
+                Some(points) => points,
+                None => return Err(bad("points", text, Points::EXPECTED).into()),
+            },
         };
         let profile = results::profile(&self.service, id(&name)?, &boundary, step, points).await?;
         Ok(Response::new(profile.into()))
@@ -265,14 +274,19 @@ impl JobService for Grpc {
         let pb::ListIterationsRequest {
             id: name,
             max_points,
+            after,
         } = request.into_inner();
         if let Some(few @ 0..2) = max_points {
             return Err(bad("max_points", few, "a whole number, 2 or more").into());
         }
         let most = max_points.map(|most| most as usize);
-        let rows = results::history(&self.service, id(&name)?, most).await?;
+        let mut rows = results::history(&self.service, id(&name)?, most).await?;
+        rows.retain(|row| row.k > after);
+        let more = rows.len() > MAX_ROWS;
+        rows.truncate(MAX_ROWS);
         Ok(Response::new(pb::ListIterationsResponse {
             iterations: rows.into_iter().map(Into::into).collect(),
+            more,
         }))
     }
 

@@ -20,6 +20,9 @@ pub struct Job {
     /// The key of the job whose end will be its own.
     #[serde(skip)]
     pub twin_of: Option<i64>,
+    /// Whether an earlier result may answer it.
+    #[serde(skip)]
+    pub cache: Cache,
     /// The public name.
     pub id: JobId,
     /// Where it stands.

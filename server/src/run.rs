@@ -62,8 +62,23 @@ pub type Solve = fn(&Problem, Option<&Mesh>, &mut Observer<'_>) -> Result<Soluti
 pub enum Said<'a> {
     /// What the solver says.
     Progress(Progress<'a>),
-    /// What finished load steps have found, while others are to come: a document without fields.
-    Partial(Box<Document>),
+    /// A load step has ended, while others are to come.
+    Step(SoFar<'a>),
+}
+
+/// What finished load steps have found.
+#[derive(Debug)]
+pub struct SoFar<'a> {
+    problem: &'a Problem,
+    solution: &'a Solution,
+    timings: Timings,
+}
+
+impl SoFar<'_> {
+    /// As a document without fields. It costs as much as all that it holds: not for every one of many steps.
+    pub fn document(&self) -> Result<Document, SolveError> {
+        document(self.problem, self.solution.clone(), self.timings.clone())
+    }
 }
 
 /// Solves `problem`, stamps each iteration with the seconds since the start and measures the
@@ -92,11 +107,12 @@ pub fn run(
             return ControlFlow::Break(());
         }
         if let Progress::Step(solution) = progress {
-            // what is not finite is told at the end, when nothing follows that might mend it
-            return match document(problem, solution.clone(), watch.so_far()) {
-                Ok(document) => say(Said::Partial(Box::new(document))),
-                Err(_) => ControlFlow::Continue(()),
-            };
+            let timings = watch.so_far();
+            return say(Said::Step(SoFar {
+                problem,
+                solution,
+                timings,
+            }));
         }
         say(Said::Progress(progress))
     });

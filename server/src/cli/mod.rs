@@ -110,6 +110,8 @@ fn log(default: LevelFilter) {
     tracing_subscriber::fmt()
         .with_env_filter(filter.from_env_lossy())
         .with_writer(std::io::stderr)
+        // a log that cannot be written shall not end what it tells of
+        .log_internal_errors(false)
         .with_ansi(std::io::stderr().is_terminal())
         .init();
 }

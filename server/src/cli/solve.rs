@@ -93,7 +93,7 @@ pub(super) fn run(
                 eprintln!("warning: {}: {}", warning.pointer, warning.message)
             }
             // Ctrl-C ends the process anyway
-            Said::Progress(Progress::Step(_) | Progress::Pulse) | Said::Partial(_) => {}
+            Said::Progress(Progress::Step(_) | Progress::Pulse) | Said::Step(_) => {}
         }
         ControlFlow::Continue(())
     });

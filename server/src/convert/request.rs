@@ -11,7 +11,7 @@ use crate::{
     store::{Edit, Filter},
     time::Time,
     verbs::{
-        problems,
+        jobs, problems,
         submit::{Draft, Envelope},
     },
 };
@@ -81,7 +81,7 @@ pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
     let read = |number| {
         status(number).ok_or_else(|| bad("status", number, "a value of the enum other than 0"))
     };
-    Ok(Filter {
+    jobs::checked(Filter {
         statuses: numbers.into_iter().map(read).collect::<Result<_, _>>()?,
         owner,
         labels: labels.into_iter().collect(),

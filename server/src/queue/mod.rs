@@ -114,8 +114,9 @@ impl Queue {
         let slot = self.free_slot();
         submission.claim = false;
         let Some(slot) = slot else {
-            let accepted = self.store.submit(submission).await?;
+            let mut accepted = self.store.submit(submission).await?;
             self.wake.notify_one();
+            self.store.try_to_place(&mut accepted.jobs).await;
             return Ok(accepted);
         };
         let _gate = self.gate.read().await;
@@ -128,6 +129,7 @@ impl Queue {
                     None => drop(slot),
                 }
                 self.wake.notify_one(); // several may have come, or the slot is free again
+                self.store.try_to_place(&mut accepted.jobs).await;
                 Ok(accepted)
             }
             Err(cause) => {
@@ -179,6 +181,7 @@ impl Queue {
 
     /// Lets jobs start again.
     pub async fn resume(&self) -> Result<()> {
+        let _gate = self.gate.write().await; // no pause at the same time
         self.store.set_paused(false).await?;
         self.wake.notify_one();
         Ok(())
@@ -193,6 +196,7 @@ impl Queue {
             let running = self.running().get(&key).cloned();
             match running {
                 Some(running) => {
+                    self.stir(key); // the wish is a new version
                     running.stop.ask(Why::Canceled);
                     tokio::spawn(self.clone().cancel_over_its_head(key, running.attempt));
                 }
@@ -293,13 +297,14 @@ impl Queue {
         if self.stopping.is_cancelled() || self.store.is_paused() {
             return Ok(false);
         }
-        match self.store.claim_next().await? {
-            Some(claim) => {
-                self.begin(claim, slot);
-                Ok(true)
-            }
-            None => Ok(false),
+        let (claim, told) = self.store.claim_next().await?;
+        self.announce(&told);
+        match claim {
+            Some(claim) => self.begin(claim, slot),
+            None if told.is_empty() => return Ok(false),
+            None => {} // some were answered; there may be more
         }
+        Ok(true)
     }
 
     /// Hands a claimed job to a worker. Under the gate.

@@ -106,6 +106,7 @@ impl Rig {
             Payload::Done { job: done } => Job {
                 key: job.key,
                 result_key: job.key,
+                cache: job.cache,
                 ..*done
             },
             other => unreachable!("{other:?} after done"),
@@ -123,11 +124,15 @@ async fn a_job_runs_to_its_end_and_its_result_is_stored() {
         (done.status, done.result_available, done.attempt),
         (Status::Succeeded, ResultAvailable::Final, 1)
     );
-    assert!(rig.store.part(job.key, "fields").await.unwrap().is_some());
-    assert_eq!(
-        rig.store.profiled_boundaries(job.key).await.unwrap(),
-        ["top"]
+    assert!(
+        rig.store
+            .piece(job.key, "fields", 0)
+            .await
+            .unwrap()
+            .is_some()
     );
+    let mut snapshot = rig.store.snapshot(job.id).await.unwrap().unwrap();
+    assert_eq!(snapshot.profiled_boundaries().await.unwrap(), ["top"]);
 }
 
 #[tokio::test]
@@ -166,7 +171,11 @@ async fn a_canceled_running_job_keeps_its_last_state() {
         (Status::Canceled, ResultAvailable::Partial)
     );
     assert!(
-        rig.store.part(job.key, "fields").await.unwrap().is_none(),
+        rig.store
+            .piece(job.key, "fields", 0)
+            .await
+            .unwrap()
+            .is_none(),
         "a canceled job has no fields"
     );
 }
@@ -201,7 +210,13 @@ async fn a_job_that_converged_to_no_balance_fails_and_keeps_its_result() {
     let failure = done.failure.unwrap();
     assert_eq!(failure.code, "false-convergence");
     assert!(failure.detail.contains("5.000e-1"), "{}", failure.detail);
-    assert!(rig.store.part(job.key, "fields").await.unwrap().is_some());
+    assert!(
+        rig.store
+            .piece(job.key, "fields", 0)
+            .await
+            .unwrap()
+            .is_some()
+    );
 }
 
 /// At work in one long phase, with nothing to tell.
@@ -279,7 +294,7 @@ async fn a_deaf_solver_delays_only_its_slot_and_not_the_cancel() {
 async fn a_running_job_that_no_worker_holds_is_canceled_at_once() {
     let rig = rig(fake::solve).await; // its workers never start: nobody holds what we claim
     let job = rig.submit().await;
-    rig.store.claim_next().await.unwrap().unwrap();
+    rig.store.claim_next().await.unwrap().0.unwrap();
     let outcome = rig.queue.cancel(job.key).await.unwrap();
     assert!(matches!(outcome, CancelOutcome::Canceled(_)), "{outcome:?}");
     assert_eq!(rig.until_done(&job).await.status, Status::Canceled);
@@ -309,7 +324,7 @@ async fn a_job_that_loses_three_workers_fails() {
     let rig = rig(fake::solve).await; // its workers never start: we claim, and die, in their place
     let job = rig.submit().await;
     for attempt in 1..=3 {
-        let claim = rig.store.claim_next().await.unwrap().unwrap();
+        let claim = rig.store.claim_next().await.unwrap().0.unwrap();
         assert_eq!((claim.job.id, claim.job.attempt), (job.id, attempt));
         assert_eq!(rig.store.requeue_interrupted().await.unwrap(), 1);
     }
@@ -324,7 +339,7 @@ async fn a_job_that_loses_three_workers_fails() {
 async fn a_running_job_with_a_cancel_request_is_canceled_at_the_next_start() {
     let rig = rig(fake::solve).await;
     let job = rig.submit().await;
-    rig.store.claim_next().await.unwrap().unwrap();
+    rig.store.claim_next().await.unwrap().0.unwrap();
     rig.store.request_cancel(job.key).await.unwrap();
     rig.store.requeue_interrupted().await.unwrap();
     assert_eq!(rig.until_done(&job).await.status, Status::Canceled);
@@ -335,7 +350,7 @@ async fn a_drain_says_what_became_of_each_job() {
     let rig = rig(fake::solve).await;
     let (one, two) = (rig.submit().await, rig.submit().await);
     for _ in 0..2 {
-        rig.store.claim_next().await.unwrap().unwrap();
+        rig.store.claim_next().await.unwrap().0.unwrap();
     }
     rig.store.request_cancel(one.key).await.unwrap();
     let drain = async |job: &Job| rig.store.requeue_drained(job.key, 1).await.unwrap();
@@ -348,9 +363,9 @@ async fn a_drain_says_what_became_of_each_job() {
 async fn what_an_overtaken_start_says_is_not_recorded() {
     let rig = rig(fake::solve).await;
     let job = rig.submit().await;
-    rig.store.claim_next().await.unwrap().unwrap();
+    rig.store.claim_next().await.unwrap().0.unwrap();
     rig.store.requeue_interrupted().await.unwrap();
-    let again = rig.store.claim_next().await.unwrap().unwrap();
+    let again = rig.store.claim_next().await.unwrap().0.unwrap();
     let line = [(
         crate::time::Time::now(),
         Payload::Iteration(fake::iteration(1)),
@@ -385,7 +400,7 @@ async fn the_queue_is_ordered_by_priority_then_by_arrival() {
         .collect();
     assert_eq!(places, [1, 1, 3, 4], "as they were when each arrived");
     let mut claimed = vec![];
-    while let Some(claim) = rig.store.claim_next().await.unwrap() {
+    while let Some(claim) = rig.store.claim_next().await.unwrap().0 {
         claimed.push(claim.job.id);
     }
     assert_eq!(claimed, [jobs[1].id, jobs[0].id, jobs[2].id, jobs[3].id]);
@@ -420,7 +435,7 @@ async fn an_earlier_result_answers_at_once_and_survives_its_source() {
     let events = rig.store.events_after(cached.key, 0, 100).await.unwrap();
     let kinds: Vec<_> = events.iter().map(|event| event.payload.kind()).collect();
     assert_eq!(kinds, ["status", "status", "done"]);
-    let part = |key| rig.store.part(key, "fields");
+    let part = |key| rig.store.piece(key, "fields", 0);
     let bytes = part(source.key).await.unwrap().unwrap();
     assert_eq!(cached.result_key, source.key);
     rig.store.delete(source.key).await.unwrap();
@@ -459,7 +474,7 @@ async fn a_twin_ends_as_its_source_ends() {
     let twin = rig.submit_as(same()).await;
     let place = twin.queue.clone().unwrap();
     assert_eq!((place.position, place.reason), (1, Waiting::Joined));
-    assert_eq!(rig.store.waiting(), 1, "only one of them is solved");
+    assert_eq!(rig.store.waiting(), 2, "one in line, one for its end");
     rig.queue.start();
     let done = rig.until_done(&twin).await;
     assert_eq!(
@@ -692,10 +707,116 @@ async fn the_line_in_memory_is_the_queue_on_the_disk() {
         .collect();
     places.sort_by_key(|(position, _)| *position);
     let mut claimed = vec![];
-    while let Some(claim) = rig.store.claim_next().await.unwrap() {
+    while let Some(claim) = rig.store.claim_next().await.unwrap().0 {
         claimed.push((claimed.len() as i64 + 1, claim.job.id));
     }
     assert_eq!(places, claimed);
     assert_eq!(claimed[0].1, moved[1].id);
     assert_eq!(rig.store.waiting(), 0);
+}
+
+#[tokio::test]
+async fn twins_count_as_waiting_and_one_that_is_to_go_first_goes_alone() {
+    let rig = rig(fake::solve).await; // its workers start later
+    let source = rig.submit_as(same()).await;
+    let twin = rig.submit_as(same()).await;
+    let other = rig.submit_as(same()).await;
+    assert_eq!(rig.store.waiting(), 3);
+    let full = Submission {
+        max_queued: 3,
+        ..submission(vec![same()], None)
+    };
+    let refused = rig.queue.submit(full).await.unwrap_err();
+    assert!(matches!(refused, StoreError::QueueFull), "{refused}");
+    let first = Edit {
+        priority: Some(5),
+        ..Edit::default()
+    };
+    let twin = rig.store.edit(twin.id, &first, None).await.unwrap();
+    let place = twin.unwrap().unwrap().queue.unwrap();
+    assert_eq!(
+        (place.position, place.reason),
+        (1, Waiting::WorkersBusy),
+        "before its source"
+    );
+    assert_eq!(rig.store.waiting(), 3);
+    rig.queue.start();
+    // the source is answered by it when its turn comes, and the other twin by the source
+    for job in [&source, &other] {
+        assert_eq!(rig.until_done(job).await.status, Status::Succeeded);
+    }
+    let source = rig.store.job(source.id).await.unwrap().unwrap();
+    assert!(source.cached_from.is_some());
+    assert_eq!(rig.store.waiting(), 0);
+}
+
+#[tokio::test]
+async fn a_key_stands_for_what_is_left_of_its_jobs() {
+    let rig = rig(fake::solve).await;
+    rig.queue.start();
+    let two = submission(vec![new(0), new(0)], Some("k"));
+    let accepted = rig.queue.submit(two.clone()).await.unwrap();
+    for job in &accepted.jobs {
+        rig.until_done(job).await;
+    }
+    rig.store.delete(accepted.jobs[0].key).await.unwrap();
+    let again = rig.queue.submit(two.clone()).await.unwrap();
+    assert!(again.replayed);
+    assert_eq!(again.jobs.len(), 1);
+    assert_eq!(again.jobs[0].id, accepted.jobs[1].id);
+    rig.store.delete(accepted.jobs[1].key).await.unwrap();
+    let gone = rig.queue.submit(two.clone()).await;
+    assert!(matches!(gone, Err(StoreError::Deleted(_))));
+    // forgotten with the names of its jobs
+    let later = crate::time::Time::now().after_s(8.0 * 86_400.0);
+    rig.store.forget_deleted(later).await.unwrap();
+    assert!(!rig.queue.submit(two).await.unwrap().replayed);
+}
+
+/// Eight steps that take no time: what they found is written once, and not eight times.
+#[tokio::test]
+async fn what_many_quick_steps_have_found_is_not_written_after_each() {
+    fn quick_steps(
+        _: &Problem,
+        _: Option<&Mesh>,
+        observe: &mut Observer<'_>,
+    ) -> std::result::Result<Solution, SolveError> {
+        let mut solution = fake::solution();
+        for _ in 0..8 {
+            if observe(Progress::Step(&solution)).is_break() {
+                return Err(SolveError::Stopped);
+            }
+        }
+        while observe(Progress::Pulse).is_continue() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        solution.summary.outcome = Outcome::Canceled;
+        Err(SolveError::Stopped)
+    }
+    let rig = rig(quick_steps).await;
+    rig.queue.start();
+    let job = rig.submit().await;
+    let found = loop {
+        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        if job.result_available == ResultAvailable::Partial {
+            break job;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    };
+    assert_eq!(
+        (found.status, found.result_key),
+        (Status::Running, -job.key)
+    );
+    rig.queue.cancel(job.key).await.unwrap();
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.result_available),
+        (Status::Canceled, ResultAvailable::Partial)
+    );
+    let mut kept = rig.store.snapshot(job.id).await.unwrap().unwrap();
+    assert!(kept.part("summary").await.unwrap().is_some());
+    assert!(
+        kept.part("history").await.unwrap().is_none(),
+        "what was told went on after it"
+    );
 }

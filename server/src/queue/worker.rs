@@ -20,7 +20,7 @@ use super::{
 use crate::{
     event::Payload,
     job::{Failure, Job, Reason, ResultAvailable, Status},
-    run::{self, Document, Said, Solve},
+    run::{self, Document, Said, SoFar, Solve},
     store::{Claim, Ending, LastWords, Parts, Store},
     time::Time,
 };
@@ -71,10 +71,13 @@ async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
     tokio::time::sleep(Duration::from_secs_f64(job.limits.timeout_s)).await;
     running.stop.ask(Why::TimedOut);
     tokio::time::sleep(LAST_STATE).await;
-    let ending = timed_out(&job);
-    if let Err(cause) = queue.end(job.key, running.attempt, &ending).await {
-        error!(job.id = %job.id, %cause, "job {} could not be ended: {cause}", job.id);
-    }
+    // in a task of its own: a solver that returns now stops this clock, but not a commit under way
+    tokio::spawn(async move {
+        let ending = timed_out(&job);
+        if let Err(cause) = queue.end(job.key, running.attempt, &ending).await {
+            error!(job.id = %job.id, %cause, "job {} could not be ended: {cause}", job.id);
+        }
+    });
 }
 
 fn timed_out(job: &Job) -> Ending {
@@ -113,12 +116,10 @@ fn solve_aloud(
     let problem: Problem = solver::parse(problem).map_err(SolveError::Invalid)?;
     let parse_s = start.elapsed().as_secs_f64();
     let event = |payload| Some(Line::Event(Time::now(), payload));
+    let mut partials = Partials::default();
     let document = run::run(&problem, mesh, parse_s, solve, &mut |said| {
         say(match said {
-            Said::Partial(document) => match Parts::of(&document) {
-                Ok(parts) => Some(Line::Partial(Box::new(parts))),
-                Err(_) => None, // nothing follows from what has no JSON
-            },
+            Said::Step(so_far) => partials.next(&so_far),
             Said::Progress(progress) => match progress {
                 Progress::Phase(stage) => event(Payload::Stage { stage }),
                 Progress::Iteration(row) => event(Payload::Iteration(row.clone())),
@@ -133,6 +134,31 @@ fn solve_aloud(
         iterations: document.history.len(),
         parts,
     })
+}
+
+/// What finished load steps have found, from time to time: each time all of it is written, and a problem may
+/// have thousands of steps.
+#[derive(Default)]
+struct Partials {
+    /// Not before this moment.
+    next: Option<Instant>,
+}
+
+impl Partials {
+    /// What there is, if it is time for it.
+    fn next(&mut self, so_far: &SoFar<'_>) -> Option<Line> {
+        /// A tenth of the time, and at most once a second.
+        const SHARE: u32 = 10;
+        const PAUSE: Duration = Duration::from_secs(1);
+        let start = Instant::now();
+        if self.next.is_some_and(|next| start < next) {
+            return None;
+        }
+        // what is not finite, or has no JSON, is told at the end
+        let parts = Parts::of(&so_far.document().ok()?).ok();
+        self.next = Some(start + (start.elapsed() * SHARE).max(PAUSE));
+        Some(Line::Partial(Box::new(parts?)))
+    }
 }
 
 /// A solution ready to be stored.

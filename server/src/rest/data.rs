@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use axum::{
-    body::Body,
+    body::{Body, Bytes},
     http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
@@ -36,9 +36,9 @@ pub(super) fn whole(
         bytes: bytes.len() as u64,
         digest: Sha256::digest(&bytes).to_vec(),
     };
+    let bytes = Bytes::from(bytes);
     answer(headers, &file, |range| {
-        let range = range.start as usize..range.end as usize;
-        Body::from(bytes.get(range).unwrap_or_default().to_vec())
+        Body::from(bytes.slice(range.start as usize..range.end as usize))
     })
 }
 

@@ -5,6 +5,7 @@ use crate::{
     error::ApiError,
     job::Status,
     store::{Filter, GroupBy, Order},
+    verbs::jobs as verbs,
 };
 
 /// The parameters that filter.
@@ -47,7 +48,7 @@ pub(super) fn parse(query: Option<&str>, more: &[&str]) -> Result<(Filter, Param
         finished_after: params.time("finished_after")?,
         finished_before: params.time("finished_before")?,
     };
-    Ok((filter, params))
+    Ok((verbs::checked(filter)?, params))
 }
 
 /// The `order_by` of a list.

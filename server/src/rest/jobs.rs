@@ -35,6 +35,13 @@ pub(super) async fn get(
     let wait_s = params.wait_s("wait")?;
     let terminal = |word: &str| (word == "terminal").then_some(Until::Terminal);
     let until = params.word("until", terminal, "terminal")?;
+    if let (Some(_), None) = (until, wait_s) {
+        return Err(ApiError::BadParameter {
+            name: "until",
+            got: "no wait beside it".into(),
+            expected: "wait=0…60 with it",
+        });
+    }
     let seen = versions(&headers, header::IF_NONE_MATCH);
     let mut job = verbs::get(&rest.service, path.id).await?;
     if let Some(wait_s) = wait_s {
@@ -109,8 +116,12 @@ pub(super) async fn update(
     let version = match versions(&headers, header::IF_MATCH) {
         None => None,
         Some(tags) if tags.any() => None,
-        // a tag that is not ours matches no version
-        Some(tags) => Some(tags.version().unwrap_or(-1)),
+        Some(tags) => {
+            let job = verbs::get(&rest.service, path.id).await?;
+            // no job is of version −1
+            let same = tags.contain_strongly(&tag(&job));
+            Some(if same { job.version } else { -1 })
+        }
     };
     Ok(one(
         &verbs::update(&rest.service, path.id, edit, version).await?
@@ -159,7 +170,7 @@ pub(super) fn one(job: &Job) -> Response {
     ([(header::ETAG, tag(job))], Json(job)).into_response()
 }
 
-fn tag(job: &Job) -> String {
+pub(super) fn tag(job: &Job) -> String {
     format!("\"{}\"", job.version)
 }
 

@@ -3,7 +3,7 @@
 use axum::{
     Json,
     body::Body,
-    extract::{Path, RawQuery, State},
+    extract::{RawQuery, State},
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::{
     Rest,
-    request::{Params, declared_length, discard},
+    request::{Params, TextPath, declared_length, discard},
 };
 use crate::{
     error::ApiError,
@@ -57,7 +57,7 @@ pub(super) async fn upload(
 pub(super) async fn get(
     State(rest): State<Rest>,
     RawQuery(query): RawQuery,
-    Path(hash): Path<String>,
+    TextPath(hash): TextPath,
 ) -> Result<Json<MeshInfo>, ApiError> {
     Params::parse(query.as_deref(), &[])?;
     Ok(Json(verbs::get(&rest.service, &hash).await?))
@@ -92,7 +92,7 @@ pub(super) async fn list(
 pub(super) async fn delete(
     State(rest): State<Rest>,
     RawQuery(query): RawQuery,
-    Path(hash): Path<String>,
+    TextPath(hash): TextPath,
 ) -> Result<StatusCode, ApiError> {
     Params::parse(query.as_deref(), &[])?;
     verbs::delete(&rest.service, &hash).await?;

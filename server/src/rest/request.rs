@@ -39,6 +39,20 @@ impl<S: Send + Sync> FromRequestParts<S> for JobPath {
     }
 }
 
+/// A text in a path; one that is not text names nothing.
+pub(super) struct TextPath(pub(super) String);
+
+impl<S: Send + Sync> FromRequestParts<S> for TextPath {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        match Path::<String>::from_request_parts(parts, state).await {
+            Ok(Path(text)) => Ok(TextPath(text)),
+            Err(_) => Err(ApiError::NotFound("the path is not well formed".into())),
+        }
+    }
+}
+
 /// Parameters `label.{key}` stand for any key.
 pub(super) const ANY_LABEL: &str = "label.{key}";
 const LABEL: &str = "label.";
@@ -186,6 +200,11 @@ impl Tags {
         self.0.iter().any(same)
     }
 
+    /// The same as `If-Match` compares: strongly.
+    pub(super) fn contain_strongly(&self, tag: &str) -> bool {
+        self.0.iter().any(|own| own == tag)
+    }
+
     /// Whether anything matches.
     pub(super) fn any(&self) -> bool {
         self.0.iter().any(|own| own == "*")
@@ -248,6 +267,14 @@ pub(super) async fn json_text(
         && !(essence.starts_with("application/") && essence.ends_with("+json"))
     {
         return Err(ApiError::UnsupportedMedia(content_type.into()));
+    }
+    if let Some(coding) = headers.get(header::CONTENT_ENCODING)
+        && coding.as_bytes() != b"identity"
+    {
+        let coding = String::from_utf8_lossy(coding.as_bytes());
+        return Err(ApiError::UnsupportedMedia(format!(
+            "a body coded as {coding}"
+        )));
     }
     let mut pieces = body.into_data_stream();
     let length = declared_length(headers);

@@ -2,7 +2,7 @@
 
 use axum::{
     Json,
-    extract::{Path, RawQuery, State},
+    extract::{RawQuery, State},
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::{
     Rest,
-    request::{Params, wants},
+    request::{Params, TextPath, wants},
 };
 use crate::{
     catalog::{Code, Kind, grpc_code_name},
@@ -60,7 +60,7 @@ pub(super) async fn me(RawQuery(query): RawQuery) -> Result<Json<Caller>, ApiErr
 pub(super) async fn error(
     RawQuery(query): RawQuery,
     headers: HeaderMap,
-    Path(code): Path<String>,
+    TextPath(code): TextPath,
 ) -> Result<Response, ApiError> {
     Params::parse(query.as_deref(), &[])?;
     let Some(found) = Code::parse(&code) else {

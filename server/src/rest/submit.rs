@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::{
     Rest, events,
-    jobs::one,
+    jobs::{one, tag},
     request::{JobPath, Params, idempotency_key, json_text, preferred_wait_s, wants},
     submission::{bare_problem, batch, submission},
 };
@@ -91,6 +91,7 @@ async fn answer(
         let mut response = events::stream(&rest.service, &job, 0);
         *response.status_mut() = StatusCode::ACCEPTED;
         set(&mut response, header::LOCATION, location(&job));
+        set(&mut response, header::ETAG, tag(&job));
         note_replay(&mut response, replayed);
         return Ok(response);
     }

@@ -61,8 +61,8 @@ impl Change<'_> {
     /// Jobs that wait, those of this transaction among them.
     pub(super) fn waiting(&self) -> usize {
         let entered = |step: &Move| match step {
-            Move::Enter { .. } => 1,
-            Move::Leave { .. } => -1,
+            Move::Enter { .. } | Move::Join => 1,
+            Move::Leave { .. } | Move::Part => -1,
         };
         let change: isize = self.moves.iter().map(entered).sum();
         self.store

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     event::{Payload, Requeue},
-    job::{Failure, Job, JobId, Progress, Reason, ResultAvailable, Status},
+    job::{Cache, Failure, Job, JobId, Progress, Reason, ResultAvailable, Status},
     time::Time,
 };
 
@@ -105,11 +105,12 @@ pub struct Edit {
 
 impl Store {
     /// The next job of the queue, now running; highest priority first, then in order of arrival.
-    pub async fn claim_next(&self) -> Result<Option<Claim>> {
+    /// Jobs before it that a result has come for are answered; the events of all of them come with it.
+    pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<Told>)> {
         let mut change = self.change().await?;
         let claim = claim(&mut change).await?;
-        change.commit().await?;
-        Ok(claim)
+        let told = change.commit().await?;
+        Ok((claim, told))
     }
 
     /// Notes that somebody wants the job to stop; a queued one is canceled at once.
@@ -304,15 +305,38 @@ impl Store {
                 });
                 change.moves(Move::Enter { priority, key });
             }
+            if let Some(source) = job.twin_of {
+                leave_source(&mut change, &job, source, priority).await?;
+            }
         }
         let edited = read(change.sql(), key).await?;
         change.commit().await?;
         let mut edited = [edited];
-        let mut connection = self.reader.acquire().await?;
-        self.place(&mut connection, &mut edited).await?;
+        self.try_to_place(&mut edited).await;
         let [edited] = edited;
         Ok(Some(Ok(edited)))
     }
+}
+
+/// A twin that is to run before its source waits for it no longer.
+async fn leave_source(
+    change: &mut Change<'_>,
+    job: &Job,
+    source: i64,
+    priority: i32,
+) -> Result<()> {
+    let source = read(change.sql(), source).await?;
+    if source.status != Status::Queued || source.priority >= priority {
+        return Ok(());
+    }
+    let key = job.key;
+    sqlx::query("update job set twin_of = null where id = ?")
+        .bind(key)
+        .execute(change.sql())
+        .await?;
+    change.moves(Move::Part);
+    change.moves(Move::Enter { priority, key });
+    Ok(())
 }
 
 /// Jobs that have waited too long, at most so many.
@@ -347,22 +371,35 @@ pub(super) const NEXT: &str = "select id from job indexed by job_queue
      where status = 'queued' and twin_of is null order by priority desc, id limit 1";
 
 pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
-    let key: Option<i64> = sqlx::query_scalar(NEXT)
-        .fetch_optional(change.sql())
-        .await?;
-    let Some(key) = key else { return Ok(None) };
-    let waiting = read(change.sql(), key).await?;
-    let (job, seq) = start(change, &waiting).await?;
-    let (problem, mesh) = sqlx::query_as("select body, mesh from problem where input_hash = ?")
-        .bind(&job.input_hash)
-        .fetch_one(change.sql())
-        .await?;
-    Ok(Some(Claim {
-        job,
-        problem,
-        mesh,
-        seq,
-    }))
+    /// A transaction that answers more than these is too long.
+    const ANSWERED: usize = 100;
+    for _ in 0..ANSWERED {
+        let key: Option<i64> = sqlx::query_scalar(NEXT)
+            .fetch_optional(change.sql())
+            .await?;
+        let Some(key) = key else { return Ok(None) };
+        let waiting = read(change.sql(), key).await?;
+        // a result may have come since it was accepted
+        if waiting.cache == Cache::Use
+            && let Some(source) = submit::earlier(change, &waiting.input_hash).await?
+        {
+            answer(change, &waiting, &source).await?;
+            settle_twins(change, &waiting).await?;
+            continue;
+        }
+        let (job, seq) = start(change, &waiting).await?;
+        let (problem, mesh) = sqlx::query_as("select body, mesh from problem where input_hash = ?")
+            .bind(&job.input_hash)
+            .fetch_one(change.sql())
+            .await?;
+        return Ok(Some(Claim {
+            job,
+            problem,
+            mesh,
+            seq,
+        }));
+    }
+    Ok(None)
 }
 
 /// A start of a queued job.
@@ -384,16 +421,25 @@ async fn start(change: &mut Change<'_>, job: &Job) -> Result<(Job, i64)> {
     Ok((job, seq))
 }
 
-/// Ends a job with its one `done` event, and decides what becomes of its twins.
+/// Ends a job with its one `done` event, and its twins with it.
 async fn end(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
     close(change, job, ending).await?;
-    let twins = sqlx::query("select * from job where twin_of = ? order by id")
+    settle_twins(change, job).await
+}
+
+/// What becomes of the jobs that waited for the end of this one: they end as it has ended, or the first of
+/// them takes its place.
+async fn settle_twins(change: &mut Change<'_>, job: &Job) -> Result<()> {
+    let twins = sqlx::query("select * from job where twin_of = ? order by priority desc, id")
         .bind(job.key)
         .fetch_all(change.sql())
         .await?;
     let twins = twins.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
-    if submit::is_shared(ending.status, ending.reason) {
-        let source = read(change.sql(), job.key).await?;
+    if twins.is_empty() {
+        return Ok(());
+    }
+    let source = read(change.sql(), job.key).await?;
+    if submit::is_shared(source.status, source.reason) {
         for twin in &twins {
             answer(change, twin, &source).await?;
         }
@@ -404,11 +450,12 @@ async fn end(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> 
             .bind(key)
             .execute(change.sql())
             .await?;
+        change.moves(Move::Part);
         change.moves(Move::Enter { priority, key });
-        for other in others {
-            sqlx::query("update job set twin_of = ? where id = ?")
+        if !others.is_empty() {
+            sqlx::query("update job set twin_of = ? where twin_of = ?")
                 .bind(key)
-                .bind(other.key)
+                .bind(job.key)
                 .execute(change.sql())
                 .await?;
         }
@@ -483,9 +530,15 @@ async fn requeue(change: &mut Change<'_>, job: &Job, why: Requeue) -> Result<()>
     self::change(change, job, Status::Queued).await?;
     // The start keeps its number, so that events tell starts apart, but a drain gives it back.
     let given_back = i32::from(why == Requeue::Drain);
-    sqlx::query("update job set max_attempts = max_attempts + ?, expires_at = ? where id = ?")
+    sqlx::query("update job set max_attempts = max_attempts + ? where id = ?")
         .bind(given_back)
-        .bind(Time::now().after_s(job.limits.queue_ttl_s).micros())
+        .bind(job.key)
+        .execute(change.sql())
+        .await?;
+    // its waiting begins anew, and that of the jobs that wait for it
+    sqlx::query("update job set expires_at = ? + cast(queue_ttl_s * 1e6 as integer) where id = ? or twin_of = ?")
+        .bind(Time::now().micros())
+        .bind(job.key)
         .bind(job.key)
         .execute(change.sql())
         .await?;
@@ -511,6 +564,8 @@ async fn change(change: &mut Change<'_>, job: &Job, next: Status) -> Result<()> 
     let (priority, key) = (job.priority, job.key);
     if job.waits_in_line() {
         change.moves(Move::Leave { priority, key });
+    } else if job.status == Status::Queued {
+        change.moves(Move::Part);
     }
     if next == Status::Queued {
         change.moves(Move::Enter { priority, key });

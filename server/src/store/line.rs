@@ -6,13 +6,27 @@ const PRIORITIES: usize = 21;
 
 /// Waiting jobs by their keys, for each priority in order of arrival, the highest priority first.
 #[derive(Debug, Default)]
-pub(super) struct Line([Vec<i64>; PRIORITIES]);
+pub(super) struct Line {
+    rows: [Vec<i64>; PRIORITIES],
+    /// Jobs that wait for another one's end.
+    joined: usize,
+}
 
 /// A job that enters or leaves the line when its transaction is committed.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Move {
-    Enter { priority: i32, key: i64 },
-    Leave { priority: i32, key: i64 },
+    Enter {
+        priority: i32,
+        key: i64,
+    },
+    Leave {
+        priority: i32,
+        key: i64,
+    },
+    /// A job waits for the end of another.
+    Join,
+    /// It does so no longer.
+    Part,
 }
 
 impl Line {
@@ -20,30 +34,32 @@ impl Line {
     pub(super) fn make(&mut self, step: Move) {
         match step {
             Move::Enter { priority, key } => {
-                let row = &mut self.0[rank(priority)];
+                let row = &mut self.rows[rank(priority)];
                 if let Err(place) = row.binary_search(&key) {
                     row.insert(place, key);
                 }
             }
             Move::Leave { priority, key } => {
-                let row = &mut self.0[rank(priority)];
+                let row = &mut self.rows[rank(priority)];
                 if let Ok(place) = row.binary_search(&key) {
                     row.remove(place);
                 }
             }
+            Move::Join => self.joined += 1,
+            Move::Part => self.joined = self.joined.saturating_sub(1),
         }
     }
 
     /// Jobs ahead of this one; none if it does not wait.
     pub(super) fn ahead(&self, priority: i32, key: i64) -> Option<usize> {
         let rank = rank(priority);
-        let here = self.0[rank].binary_search(&key).ok()?;
-        Some(here + self.0[..rank].iter().map(Vec::len).sum::<usize>())
+        let here = self.rows[rank].binary_search(&key).ok()?;
+        Some(here + self.rows[..rank].iter().map(Vec::len).sum::<usize>())
     }
 
-    /// How many wait.
+    /// How many wait, in line or for another job.
     pub(super) fn len(&self) -> usize {
-        self.0.iter().map(Vec::len).sum()
+        self.joined + self.rows.iter().map(Vec::len).sum::<usize>()
     }
 }
 

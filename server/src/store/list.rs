@@ -37,6 +37,18 @@ pub struct Filter {
 }
 
 impl Filter {
+    /// Labels that a filter may name.
+    pub const MOST_LABELS: usize = 64;
+
+    /// The same filter with each status and label once.
+    pub fn tidied(mut self) -> Self {
+        self.statuses.sort_unstable_by_key(|status| status.as_str());
+        self.statuses.dedup();
+        self.labels.sort_unstable();
+        self.labels.dedup();
+        self
+    }
+
     /// Leaves no job out.
     pub fn is_empty(&self) -> bool {
         *self == Filter::default()
@@ -77,8 +89,6 @@ pub enum GroupBy {
     Status,
     /// Their owner.
     Owner,
-    /// Their name; jobs without one stand under the empty name.
-    Name,
 }
 
 /// What finds the rows of a list.
@@ -114,13 +124,13 @@ impl Store {
     }
 
     /// The title of a job, and its problem as JSON without it.
-    pub async fn problem(&self, key: i64) -> Result<(Option<String>, String)> {
+    pub async fn problem(&self, key: i64) -> Result<Option<(Option<String>, String)>> {
         Ok(sqlx::query_as(
             "select job.title, problem.body from job join problem on problem.input_hash = job.input_hash
              where job.id = ?",
         )
         .bind(key)
-        .fetch_one(&self.reader)
+        .fetch_optional(&self.reader)
         .await?)
     }
 
@@ -141,7 +151,7 @@ impl Store {
         cursor: Option<Cursor>,
         limit: i64,
     ) -> Result<Vec<Job>> {
-        let mut connection = self.reader.acquire().await?;
+        let mut connection = self.lists.acquire().await?;
         let leads = match few(&mut connection, filter, order).await? {
             Some(lead) => vec![lead],
             None => leads(filter, order),
@@ -176,7 +186,6 @@ impl Store {
         let group = match group_by {
             Some(GroupBy::Status) => "status",
             Some(GroupBy::Owner) => "owner",
-            Some(GroupBy::Name) => "coalesce(name, '')",
             None => "''",
         };
         let mut query = QueryBuilder::<Sqlite>::new(format!(
@@ -185,7 +194,7 @@ impl Store {
         conditions(&mut query, filter, None);
         times(&mut query, filter, "job.created_at", None);
         query.push(" group by kind order by kind");
-        let rows = query.build().fetch_all(&self.reader).await?;
+        let rows = query.build().fetch_all(&self.lists).await?;
         rows.iter()
             .map(|row| Ok((row.try_get("kind")?, row.try_get("jobs")?)))
             .collect()
@@ -204,7 +213,7 @@ impl Store {
         conditions(&mut query, filter, None);
         times(&mut query, filter, "job.created_at", None);
         query.push(" order by id limit ").push_bind(limit);
-        Ok(query.build_query_scalar().fetch_all(&self.reader).await?)
+        Ok(query.build_query_scalar().fetch_all(&self.lists).await?)
     }
 
     /// The number of the job that came last; 0 when there is none.
@@ -256,14 +265,13 @@ impl Order {
 
 impl GroupBy {
     /// What can be said.
-    pub const EXPECTED: &str = "status, owner or name";
+    pub const EXPECTED: &str = "status or owner";
 
     /// Reads the word.
     pub fn parse(word: &str) -> Option<GroupBy> {
         match word {
             "status" => Some(GroupBy::Status),
             "owner" => Some(GroupBy::Owner),
-            "name" => Some(GroupBy::Name),
             _ => None,
         }
     }

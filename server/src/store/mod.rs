@@ -26,7 +26,7 @@ use std::{
 };
 
 use sqlx::{
-    Sqlite, SqlitePool, Transaction,
+    Connection, Sqlite, SqlitePool, Transaction,
     migrate::MigrateError,
     sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
 };
@@ -37,16 +37,21 @@ pub use jobs::{CancelOutcome, Claim, Edit, Ending, LastWords};
 use line::{Line, Move};
 pub use list::{Cursor, Filter, GroupBy, Order, OrderBy};
 pub use meshes::{Removal, StoredMesh};
-pub use results::{PIECE_BYTES, PartInfo, Parts, ProfilePoints};
+pub use results::{PIECE_BYTES, PartInfo, Parts, ProfilePoints, Snapshot};
 pub use submit::{Accepted, NewJob, OWNER, RequestKey, Submission};
 
 use crate::job::JobId;
+
+/// So long a list waits for its turn.
+const LIST_PATIENCE: Duration = Duration::from_secs(5);
 
 /// The database of one server.
 #[derive(Debug)]
 pub struct Store {
     writer: SqlitePool,
     reader: SqlitePool,
+    /// Lists and counts, which may be slow, keep nobody else from reading.
+    lists: SqlitePool,
     /// Jobs that wait, in order; true to the disk after every commit.
     line: Mutex<Line>,
     /// True to the disk too.
@@ -80,6 +85,9 @@ pub enum StoreError {
     /// The job's mesh is not there.
     #[error("the mesh is not stored")]
     UnknownMesh,
+    /// Too many lists are asked for at once.
+    #[error("too many lists at once")]
+    Busy,
     /// The disk is full.
     #[error("the disk is full")]
     Full,
@@ -101,6 +109,7 @@ impl From<sqlx::Error> for StoreError {
             sqlx::Error::Database(cause) if cause.code().as_deref() == Some(SQLITE_FULL) => {
                 StoreError::Full
             }
+            sqlx::Error::PoolTimedOut => StoreError::Busy,
             _ => StoreError::Database(error),
         }
     }
@@ -111,6 +120,7 @@ impl StoreError {
     fn again(&self) -> StoreError {
         match self {
             StoreError::Full => StoreError::Full,
+            StoreError::Busy => StoreError::Busy,
             other => StoreError::Corrupt(other.to_string()),
         }
     }
@@ -138,9 +148,22 @@ impl Store {
             .create_if_missing(true)
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full);
-        let writer = pool(1).connect_with(writing).await?;
+        // A full disk makes SQLite end a transaction by itself, which leaves the driver's count of open ones
+        // wrong for ever: such a connection is given up for a new one.
+        let writer = pool(1)
+            .before_acquire(|connection, _| {
+                let whole = !connection.is_in_transaction();
+                Box::pin(async move { Ok(whole) })
+            })
+            .connect_with(writing)
+            .await?;
         sqlx::migrate!("../migrations").run(&writer).await?;
-        let reader = pool(4).connect_with(options.read_only(true)).await?;
+        let reading = options.read_only(true);
+        let reader = pool(4).connect_with(reading.clone()).await?;
+        let lists = pool(2)
+            .acquire_timeout(LIST_PATIENCE)
+            .connect_with(reading)
+            .await?;
         let mut line = Line::default();
         let waiting: Vec<(i32, i64)> = sqlx::query_as(
             "select priority, id from job where status = 'queued' and twin_of is null order by priority desc, id",
@@ -150,11 +173,16 @@ impl Store {
         for (priority, key) in waiting {
             line.make(Move::Enter { priority, key });
         }
+        let joined: i64 = sqlx::query_scalar("select count(*) from job where twin_of is not null")
+            .fetch_one(&reader)
+            .await?;
+        (0..joined).for_each(|_| line.make(Move::Join));
         let paused = AtomicBool::new(settings::was_paused(&reader).await?);
         let (door, submissions) = submit::Door::new();
         let store = Arc::new(Store {
             writer,
             reader,
+            lists,
             line: Mutex::new(line),
             paused,
             turn: tokio::sync::Mutex::default(),
@@ -168,7 +196,7 @@ impl Store {
         Ok(store)
     }
 
-    /// How many jobs wait for a worker.
+    /// How many jobs wait for a worker, or for another job.
     pub fn waiting(&self) -> usize {
         self.line().len()
     }
@@ -180,6 +208,7 @@ impl Store {
 
     /// Ends every connection, and with the last one the write-ahead log.
     pub async fn close(&self) {
+        self.lists.close().await;
         self.reader.close().await;
         self.writer.close().await;
     }

@@ -9,10 +9,13 @@ use std::collections::BTreeMap;
 use serde_json::json;
 use sha2::{Digest, Sha256};
 use solver::solution::ContactProfile;
-use sqlx::SqliteConnection;
+use sqlx::{Sqlite, SqliteConnection, Transaction};
 
-use super::{Result, Store, jobs::is_current};
-use crate::run::Document;
+use super::{Result, Store, jobs::is_current, rows::from_row};
+use crate::{
+    job::{Job, JobId},
+    run::Document,
+};
 
 /// Bytes of one piece; larger rows make SQLite chain pages and readers hold more.
 pub const PIECE_BYTES: usize = 256 << 10;
@@ -187,24 +190,17 @@ impl Store {
         Ok(true)
     }
 
-    /// What a part is, as bytes.
-    pub async fn part_info(&self, key: i64, part: &str) -> Result<Option<PartInfo>> {
-        let found: Option<(i64, Vec<u8>)> =
-            sqlx::query_as("select bytes, digest from result_info where job_id = ? and name = ?")
-                .bind(key)
-                .bind(part)
-                .fetch_optional(&self.reader)
-                .await?;
-        if let Some((bytes, digest)) = found {
-            let bytes = bytes as u64;
-            return Ok(Some(PartInfo { bytes, digest }));
-        }
-        // stored before lengths and fingerprints were
-        let body = self.part(key, part).await?;
-        Ok(body.map(|body| PartInfo {
-            bytes: body.len() as u64,
-            digest: Sha256::digest(&body).to_vec(),
-        }))
+    /// A job with what there is of its result, as of one moment: while it runs, or is being deleted, the
+    /// parts are replaced and removed.
+    pub async fn snapshot(&self, id: JobId) -> Result<Option<Snapshot>> {
+        let mut tx = self.reader.begin().await?;
+        let row = sqlx::query("select * from job where uuid = ?")
+            .bind(id.0.to_string())
+            .fetch_optional(&mut *tx)
+            .await?;
+        let Some(row) = row else { return Ok(None) };
+        let job = from_row(&row)?;
+        Ok(Some(Snapshot { job, tx }))
     }
 
     /// One piece of a part, from 0; `None` after the last.
@@ -218,40 +214,68 @@ impl Store {
         .fetch_optional(&self.reader)
         .await?)
     }
+}
+
+/// A job and its result as of one moment. It holds a reader: not for long.
+pub struct Snapshot {
+    /// The job; without its place in the queue.
+    pub job: Job,
+    tx: Transaction<'static, Sqlite>,
+}
+
+impl Snapshot {
+    /// What a part is, as bytes.
+    pub async fn part_info(&mut self, part: &str) -> Result<Option<PartInfo>> {
+        let found: Option<(i64, Vec<u8>)> =
+            sqlx::query_as("select bytes, digest from result_info where job_id = ? and name = ?")
+                .bind(self.job.result_key)
+                .bind(part)
+                .fetch_optional(&mut *self.tx)
+                .await?;
+        if let Some((bytes, digest)) = found {
+            let bytes = bytes as u64;
+            return Ok(Some(PartInfo { bytes, digest }));
+        }
+        // stored before lengths and fingerprints were
+        let body = self.part(part).await?;
+        Ok(body.map(|body| PartInfo {
+            bytes: body.len() as u64,
+            digest: Sha256::digest(&body).to_vec(),
+        }))
+    }
 
     /// A whole part.
-    pub async fn part(&self, key: i64, part: &str) -> Result<Option<Vec<u8>>> {
+    pub async fn part(&mut self, part: &str) -> Result<Option<Vec<u8>>> {
         let pieces: Vec<Vec<u8>> = sqlx::query_scalar(
             "select body from result_part where job_id = ? and name = ? order by piece",
         )
-        .bind(key)
+        .bind(self.job.result_key)
         .bind(part)
-        .fetch_all(&self.reader)
+        .fetch_all(&mut *self.tx)
         .await?;
         Ok((!pieces.is_empty()).then(|| pieces.concat()))
     }
 
     /// The profile of a boundary, at the end or at the end of a load step (from 0).
     pub async fn profile(
-        &self,
-        key: i64,
+        &mut self,
         boundary: &str,
         points: ProfilePoints,
         step: Option<usize>,
     ) -> Result<Option<Vec<u8>>> {
-        self.part(key, &profile_part(boundary, points, step)).await
+        self.part(&profile_part(boundary, points, step)).await
     }
 
     /// The boundaries that have a profile.
-    pub async fn profiled_boundaries(&self, key: i64) -> Result<Vec<String>> {
+    pub async fn profiled_boundaries(&mut self) -> Result<Vec<String>> {
         let prefix = profile_part("", ProfilePoints::Nodes, None);
         let names: Vec<String> = sqlx::query_scalar(
             "select name from result_part where job_id = ? and piece = 0 and substr(name, 1, ?) = ? order by name",
         )
-        .bind(key)
+        .bind(self.job.result_key)
         .bind(prefix.len() as i64)
         .bind(&prefix)
-        .fetch_all(&self.reader)
+        .fetch_all(&mut *self.tx)
         .await?;
         Ok(names
             .iter()
@@ -272,9 +296,14 @@ pub(super) async fn write_last(tx: &mut SqliteConnection, key: i64, parts: &Part
     describe(tx, key, parts).await
 }
 
-/// What a job has found while it ran becomes its result.
+/// What a job has found while it ran becomes its result; but its history is the one that was told, which
+/// went on after the last finished load step.
 pub(super) async fn promote(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     remove(tx, key).await?;
+    sqlx::query("delete from result_part where job_id = ? and name = 'history'")
+        .bind(running(key))
+        .execute(&mut *tx)
+        .await?;
     for table in ["result_part", "result_info"] {
         let statement = format!("update {table} set job_id = ? where job_id = ?");
         sqlx::query(sqlx::AssertSqlSafe(statement))

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use super::{Result, Store, StoreError, results::running};
 use crate::{
-    job::{Job, JobId, Limits, QueuePosition, Reason, ResultAvailable, Status, Waiting},
+    job::{Cache, Job, JobId, Limits, QueuePosition, Reason, ResultAvailable, Status, Waiting},
     time::Time,
 };
 
@@ -21,6 +21,20 @@ pub(super) async fn read(tx: &mut SqliteConnection, key: i64) -> Result<Job> {
 }
 
 impl Store {
+    /// The same where the work is done already, and an answer without places is better than none.
+    pub async fn try_to_place(&self, jobs: &mut [Job]) {
+        if jobs.iter().all(|job| job.status != Status::Queued) {
+            return;
+        }
+        let placed = async {
+            let mut connection = self.reader.acquire().await?;
+            self.place(&mut connection, jobs).await
+        };
+        if let Err(cause) = placed.await {
+            tracing::warn!(%cause, "places could not be told: {cause}");
+        }
+    }
+
     /// Fills in the places of those that are queued. A job that another one will answer is where that one
     /// is, and has come as far.
     pub(super) async fn place(
@@ -92,6 +106,7 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
         key,
         result_key,
         twin_of: row.try_get("twin_of")?,
+        cache: Cache::parse(row.try_get("cache")?).ok_or_else(|| corrupt("cache"))?,
         id,
         status,
         reason: reason

@@ -26,6 +26,9 @@ use crate::{
 /// Submissions that share a commit at most.
 const TOGETHER: usize = 64;
 
+/// Jobs that wait for the end of one other at most.
+const MOST_TWINS: i64 = 100;
+
 /// A job that is about to be accepted.
 #[derive(Clone, Debug)]
 pub struct NewJob {
@@ -109,14 +112,7 @@ impl Store {
         let gone = || StoreError::Folder("the store is closed".into());
         let sent = self.door.0.send((submission, reply)).await;
         sent.map_err(|_| gone())?;
-        let mut accepted = answer.await.map_err(|_| gone())??;
-        // only now, since only now they stand in line
-        let queued = |job: &Job| job.status == Status::Queued;
-        if accepted.jobs.iter().any(queued) {
-            let mut connection = self.reader.acquire().await?;
-            self.place(&mut connection, &mut accepted.jobs).await?;
-        }
-        Ok(accepted)
+        answer.await.map_err(|_| gone())?
     }
 
     /// The jobs of a key that was used before.
@@ -125,26 +121,40 @@ impl Store {
         let Some(keys) = keyed(&mut connection, OWNER, key).await? else {
             return Ok(None);
         };
-        let mut jobs = vec![];
-        for number in keys {
-            jobs.push(still_there(&mut connection, number).await?);
-        }
+        let Some(mut jobs) = remaining(&mut connection, keys).await? else {
+            return Ok(None);
+        };
         self.place(&mut connection, &mut jobs).await?;
         Ok(Some(jobs))
     }
 
-    async fn commit_together(&self, waiting: Vec<Asking>) {
-        let mut replies = vec![];
+    /// The job of a client's own name, if it was handed in with that payload.
+    pub async fn replay_named(&self, id: JobId, payload: &str) -> Result<Option<Job>> {
+        let same: Option<i64> =
+            sqlx::query_scalar("select id from job where uuid = ? and payload = ?")
+                .bind(id.0.to_string())
+                .bind(payload)
+                .fetch_optional(&self.reader)
+                .await?;
+        match same {
+            Some(_) => self.job(id).await,
+            None => Ok(None),
+        }
+    }
+
+    async fn commit_together(&self, asking: Vec<Asking>) {
+        let (submissions, replies): (Vec<Submission>, Vec<_>) = asking.into_iter().unzip();
+        let mut answers = vec![];
         let committed = async {
             let mut change = self.change().await?;
-            for (submission, reply) in waiting {
+            for submission in submissions {
                 let mark = change.mark().await?;
                 let accepted = accept(&mut change, submission).await;
                 match &accepted {
                     Ok(_) => change.keep().await?,
                     Err(_) => change.undo(mark).await?,
                 }
-                replies.push((reply, accepted));
+                answers.push(accepted);
             }
             change.commit().await
         }
@@ -152,13 +162,12 @@ impl Store {
         match committed {
             // nobody watches a job before its name is known; of claims the queue tells
             Ok(_) => {
-                for (reply, accepted) in replies {
+                for (reply, accepted) in replies.into_iter().zip(answers) {
                     let _ = reply.send(accepted); // who asked may have gone
                 }
             }
             Err(cause) => {
-                // those not reached yet hear that the store is closed, by their dropped senders
-                for (reply, _) in replies {
+                for reply in replies {
                     let _ = reply.send(Err(cause.again()));
                 }
             }
@@ -186,7 +195,7 @@ async fn accept(change: &mut Change<'_>, submission: Submission) -> Result<Accep
     }
     if let (Some(key), Some(first)) = (&key, keys.first()) {
         sqlx::query(
-            "insert into request_key (owner, key, payload, first_job, jobs, created_at) values (?, ?, ?, ?, ?, ?)",
+            "insert or replace into request_key (owner, key, payload, first_job, jobs, created_at) values (?, ?, ?, ?, ?, ?)",
         )
         .bind(OWNER)
         .bind(&key.key)
@@ -220,11 +229,8 @@ async fn known(
 ) -> Result<Option<Vec<Job>>> {
     if let Some(key) = key
         && let Some(keys) = keyed(change.sql(), OWNER, key).await?
+        && let Some(old) = remaining(change.sql(), keys).await?
     {
-        let mut old = vec![];
-        for key in keys {
-            old.push(still_there(change.sql(), key).await?);
-        }
         return Ok(Some(old));
     }
     let mut old = vec![];
@@ -237,7 +243,7 @@ async fn known(
                 .await?;
         match found {
             Some((key, Some(payload))) if payload == new.payload && jobs.len() == 1 => {
-                old.push(still_there(change.sql(), key).await?);
+                old.push(read(change.sql(), key).await?);
             }
             Some(_) => return Err(StoreError::IdConflict(id)),
             None if was_deleted(change.sql(), id).await? => {
@@ -294,6 +300,26 @@ async fn keyed(
     }
 }
 
+/// The jobs of a key that are still there. A key whose jobs were all deleted says so as long as that is
+/// remembered; then it stands for nothing any more.
+async fn remaining(
+    connection: &mut sqlx::SqliteConnection,
+    keys: std::ops::Range<i64>,
+) -> Result<Option<Vec<Job>>> {
+    let (mut jobs, mut deleted) = (vec![], None);
+    for key in keys {
+        match jobs::find(connection, key).await? {
+            Some(job) => jobs.push(job),
+            None => deleted = deleted_name(connection, key).await?.or(deleted),
+        }
+    }
+    match (jobs.is_empty(), deleted) {
+        (false, _) => Ok(Some(jobs)),
+        (true, Some(id)) => Err(StoreError::Deleted(id)),
+        (true, None) => Ok(None),
+    }
+}
+
 pub(super) async fn was_deleted(
     connection: &mut sqlx::SqliteConnection,
     id: JobId,
@@ -306,21 +332,12 @@ pub(super) async fn was_deleted(
     )
 }
 
-async fn still_there(connection: &mut sqlx::SqliteConnection, key: i64) -> Result<Job> {
-    match jobs::find(connection, key).await? {
-        Some(job) => Ok(job),
-        None => Err(StoreError::Deleted(deleted_name(connection, key).await?)),
-    }
-}
-
-async fn deleted_name(connection: &mut sqlx::SqliteConnection, key: i64) -> Result<JobId> {
+async fn deleted_name(connection: &mut sqlx::SqliteConnection, key: i64) -> Result<Option<JobId>> {
     let uuid: Option<String> = sqlx::query_scalar("select uuid from deleted_job where id = ?")
         .bind(key)
         .fetch_optional(connection)
         .await?;
-    // forgotten by now: any name that is not a job's says the same
-    let uuid = uuid.and_then(|text| text.parse().ok());
-    Ok(JobId(uuid.unwrap_or_default()))
+    Ok(uuid.and_then(|text| text.parse().ok()).map(JobId))
 }
 
 /// Inserts a job: waiting, or answered at once by an earlier result, or joined to a twin.
@@ -335,7 +352,7 @@ async fn insert(change: &mut Change<'_>, new: &NewJob, max_queued: u32) -> Resul
         (None, _) => None,
     };
     let waits = twin_of.is_none();
-    if waits && change.waiting() >= max_queued as usize {
+    if answer.is_none() && change.waiting() >= max_queued as usize {
         return Err(StoreError::QueueFull);
     }
     if answer.is_none() {
@@ -376,10 +393,11 @@ async fn insert(change: &mut Change<'_>, new: &NewJob, max_queued: u32) -> Resul
     write_labels(change, key, now, &new.labels).await?;
     let queued = [(now, Payload::status(Status::Queued))];
     events::append(change.sql(), key, 0, &queued).await?;
-    if waits {
-        let priority = new.priority;
-        change.moves(Move::Enter { priority, key });
-    }
+    let priority = new.priority;
+    change.moves(match waits {
+        true => Move::Enter { priority, key },
+        false => Move::Join,
+    });
     if let Some(source) = answer {
         let job = read(change.sql(), key).await?;
         jobs::answer(change, &job, &source).await?;
@@ -417,7 +435,7 @@ pub(super) const UNDER_WAY: &str = "select id from job indexed by job_under_way
      order by id limit 1";
 
 /// The newest job of this input with a final result of this very program that may answer others.
-async fn earlier(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job>> {
+pub(super) async fn earlier(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job>> {
     let row = sqlx::query(EARLIER)
         .bind(input_hash)
         .bind(env!("CARGO_PKG_VERSION"))
@@ -429,11 +447,20 @@ async fn earlier(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job
 /// A job at work on this input that will answer the new one too. One that waits behind the new one's
 /// priority, or that is about to be canceled, would make it late.
 async fn under_way(change: &mut Change<'_>, new: &NewJob) -> Result<Option<i64>> {
-    Ok(sqlx::query_scalar(UNDER_WAY)
+    let source: Option<i64> = sqlx::query_scalar(UNDER_WAY)
         .bind(&new.input_hash)
         .bind(new.priority)
         .fetch_optional(change.sql())
-        .await?)
+        .await?;
+    let Some(source) = source else {
+        return Ok(None);
+    };
+    // They end in one transaction with it. Those beyond wait in line, and are answered when it is their turn.
+    let twins: i64 = sqlx::query_scalar("select count(*) from job where twin_of = ?")
+        .bind(source)
+        .fetch_one(change.sql())
+        .await?;
+    Ok((twins < MOST_TWINS).then_some(source))
 }
 
 /// Whether the end of a job is that of its twins too.

@@ -25,7 +25,7 @@ async fn older_store(folder: &Path) {
         "insert into job (uuid, status, input_hash, labels, created_at, started_at, finished_at, attempt, result_available)
          values ('01890a5d-ac96-774b-bcce-b302099a8057', 'succeeded', 'sha256:1', '{\"a\": \"b\"}', 1, 2, 3, 1, 'final')",
         "insert into job (uuid, status, input_hash, created_at)
-         values ('01890a5d-ac96-774b-bcce-b302099a8058', 'queued', 'sha256:1', 4)",
+         values ('01890a5d-ac96-774b-bcce-b302099a8058', 'queued', 'sha256:1', unixepoch() * 1000000)",
         "insert into result_part (job_id, name, piece, body) values (1, 'fields', 0, x'7b'), (1, 'fields', 1, x'7d')",
     ] {
         sqlx::query(statement).execute(&db).await.unwrap();
@@ -50,8 +50,10 @@ async fn an_older_store_is_brought_up_to_date_with_all_that_is_in_it() {
         (Status::Succeeded, Limits::default())
     );
     let key = jobs[0].result_key;
-    assert_eq!(store.part(key, "fields").await.unwrap().unwrap(), b"{}");
-    let info = store.part_info(key, "fields").await.unwrap().unwrap();
+    let mut found = store.snapshot(jobs[0].id).await.unwrap().unwrap();
+    assert_eq!(found.part("fields").await.unwrap().unwrap(), b"{}");
+    let info = found.part_info("fields").await.unwrap().unwrap();
+    drop(found);
     assert_eq!((info.bytes, info.digest.len()), (2, 32));
     // the one that waited is in line, and is not taken for one that has waited too long
     assert_eq!(store.waiting(), 1);
@@ -62,10 +64,10 @@ async fn an_older_store_is_brought_up_to_date_with_all_that_is_in_it() {
             .unwrap()
             .is_empty()
     );
-    assert!(store.claim_next().await.unwrap().is_some());
+    assert!(store.claim_next().await.unwrap().0.is_some());
     // what an older program has found answers nobody
     assert_eq!(store.delete(key).await.unwrap(), Deletion::Deleted);
-    assert_eq!(store.part(key, "fields").await.unwrap(), None);
+    assert_eq!(store.piece(key, "fields", 0).await.unwrap(), None);
 }
 
 /// What every submit, start and tick of the clock asks looks at as many rows as it gives, however many jobs
@@ -83,4 +85,51 @@ async fn the_questions_of_the_queue_are_answered_by_indexes() {
         let sorts = |step: &&str| step.contains("TEMP B-TREE");
         assert!(!steps.iter().any(sorts), "{question}: {steps:?}");
     }
+}
+
+/// SQLite ends a transaction by itself when the disk is full, and the driver does not notice.
+#[tokio::test]
+async fn a_full_disk_refuses_and_does_not_end_the_writing_for_ever() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let limit = async |pages: i64| {
+        let limit = sqlx::AssertSqlSafe(format!("pragma max_page_count = {pages}"));
+        sqlx::query(limit).execute(&store.writer).await.unwrap();
+    };
+    let (pages,): (i64,) = sqlx::query_as("pragma page_count")
+        .fetch_one(&store.writer)
+        .await
+        .unwrap();
+    limit(pages + 4).await;
+    let submission = || Submission {
+        jobs: vec![NewJob {
+            id: None,
+            name: Some("x".repeat(1000)),
+            labels: Default::default(),
+            priority: 0,
+            limits: Limits::default(),
+            cache: crate::job::Cache::Off,
+            parent: None,
+            title: None,
+            input_hash: "sha256:0".into(),
+            problem: "{}".into(),
+            mesh: None,
+            payload: String::new(),
+        }],
+        key: None,
+        max_queued: 1_000_000,
+        claim: false,
+    };
+    let mut accepted = 0;
+    let refused = loop {
+        match store.submit(submission()).await {
+            Ok(_) => accepted += 1,
+            Err(refused) => break refused,
+        }
+    };
+    assert!(matches!(refused, StoreError::Full), "{refused}");
+    assert_eq!(store.waiting(), accepted, "the line is what is on the disk");
+    limit(1_000_000).await; // there is room again
+    store.submit(submission()).await.unwrap();
+    assert_eq!(store.waiting(), accepted + 1);
 }

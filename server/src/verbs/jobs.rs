@@ -9,7 +9,7 @@ use super::{Service, detached, page, submit};
 use crate::{
     error::ApiError,
     job::{Job, JobId},
-    store::{CancelOutcome, Deletion, Edit, Filter, GroupBy, Order},
+    store::{CancelOutcome, Deletion, Edit, Filter, GroupBy, Order, Snapshot},
     violations::Violations,
 };
 
@@ -28,6 +28,14 @@ pub async fn get(service: &Service, id: JobId) -> Result<Job, ApiError> {
     }
 }
 
+/// The job with what there is of its result, as of one moment.
+pub(super) async fn snapshot(service: &Service, id: JobId) -> Result<Snapshot, ApiError> {
+    match service.store.snapshot(id).await? {
+        Some(found) => Ok(found),
+        None => Err(absent(service, id).await?),
+    }
+}
+
 async fn absent(service: &Service, id: JobId) -> Result<ApiError, ApiError> {
     Ok(match service.store.was_deleted(id).await? {
         true => ApiError::Deleted(id),
@@ -38,10 +46,24 @@ async fn absent(service: &Service, id: JobId) -> Result<ApiError, ApiError> {
 /// The problem that was handed in, with its defaults filled in.
 pub async fn problem(service: &Service, id: JobId) -> Result<Problem, ApiError> {
     let job = get(service, id).await?;
-    let (title, body) = service.store.problem(job.key).await?;
+    let stored = service.store.problem(job.key).await?;
+    let (title, body) = stored.ok_or(ApiError::Deleted(id))?;
     let read = service.work(move || serde_json::from_str(&body)).await?;
     let problem: Problem = read.map_err(ApiError::internal)?;
     Ok(Problem { title, ..problem })
+}
+
+/// A filter that can be asked for, each status and label once.
+pub fn checked(filter: Filter) -> Result<Filter, ApiError> {
+    let filter = filter.tidied();
+    if filter.labels.len() > Filter::MOST_LABELS {
+        return Err(ApiError::BadParameter {
+            name: "labels",
+            got: format!("{} labels", filter.labels.len()),
+            expected: "at most 64 labels",
+        });
+    }
+    Ok(filter)
 }
 
 /// A page of jobs.

@@ -106,6 +106,7 @@ impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
         match error {
             StoreError::Full => ApiError::StorageFull,
+            StoreError::Busy => ApiError::RateLimited,
             StoreError::KeyReuse => ApiError::KeyReuse,
             StoreError::IdConflict(id) => ApiError::IdConflict(id),
             StoreError::Deleted(id) => ApiError::Deleted(id),

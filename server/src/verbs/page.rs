@@ -9,13 +9,7 @@ use crate::{
 
 /// What tells a list of jobs from others: its filters and its order, whatever the order of statuses and labels.
 pub fn list_of_jobs(filter: &Filter, order: Order) -> String {
-    let mut filter = filter.clone();
-    filter
-        .statuses
-        .sort_unstable_by_key(|status| status.as_str());
-    filter.statuses.dedup();
-    filter.labels.sort_unstable();
-    filter.labels.dedup();
+    let filter = filter.clone().tidied();
     format!("jobs {filter:?} {order:?}")
 }
 

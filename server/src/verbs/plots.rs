@@ -29,36 +29,34 @@ pub async fn plot(
 ) -> Result<String, ApiError> {
     // who has no place yet holds nothing
     let load = async {
-        let job = match plot {
+        let mut found = match plot {
             // of the problem and of the iteration alone: there while the job waits or runs
-            Plot::Mesh | Plot::Convergence => jobs::get(service, id).await?,
+            Plot::Mesh | Plot::Convergence => jobs::snapshot(service, id).await?,
             Plot::Profile | Plot::Deformed => results::with_result(service, id).await?,
         };
-        let store = &service.store;
-        let key = job.result_key;
-        let (title, problem) = store.problem(job.key).await?;
         let mut columns: Vec<(String, Vec<u8>)> = vec![];
         if matches!(plot, Plot::Profile | Plot::Deformed) {
-            for boundary in store.profiled_boundaries(key).await? {
-                if let Some(bytes) = store
-                    .profile(key, &boundary, ProfilePoints::Nodes, None)
-                    .await?
-                {
-                    columns.push((boundary, bytes));
-                }
+            for boundary in found.profiled_boundaries().await? {
+                let bytes = found.profile(&boundary, ProfilePoints::Nodes, None).await?;
+                columns.extend(bytes.map(|bytes| (boundary, bytes)));
             }
         }
         let history = match plot {
-            Plot::Convergence => Some(StoredHistory::load(service, &job).await?),
+            Plot::Convergence => Some(StoredHistory::load(service, &mut found).await?),
             _ => None,
         };
         let fields = match plot {
-            Plot::Mesh | Plot::Deformed => store.part(key, "fields").await?,
+            Plot::Mesh | Plot::Deformed => found.part("fields").await?,
             _ => None,
         };
+        let job = found.job.clone();
+        drop(found);
         if plot == Plot::Deformed && fields.is_none() {
             return Err(results::nothing_of(&job));
         }
+        let store = &service.store;
+        let stored = store.problem(job.key).await?;
+        let (title, problem) = stored.ok_or(ApiError::Deleted(id))?;
         let problem: Problem = Problem {
             title,
             ..read(problem.as_bytes())?

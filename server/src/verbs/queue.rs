@@ -1,9 +1,11 @@
 //! The queue as a whole, the service itself, and who asks.
 
 use schemars::JsonSchema;
+use std::sync::Arc;
+
 use serde::Serialize;
 
-use super::Service;
+use super::{Service, detached};
 use crate::{error::ApiError, formats::Format, store::OWNER};
 
 /// How the queue stands.
@@ -11,7 +13,7 @@ use crate::{error::ApiError, formats::Format, store::OWNER};
 pub struct QueueState {
     /// No new job is started.
     pub paused: bool,
-    /// Jobs that wait for a worker.
+    /// Jobs that wait for a worker, or for another job with the same input.
     pub queued: u64,
     /// Jobs in the hands of workers.
     pub running: u64,
@@ -38,15 +40,23 @@ pub fn state(service: &Service) -> QueueState {
 
 /// Lets no job start until the queue is resumed, also after a restart. Jobs that run go on, and new ones are
 /// accepted.
-pub async fn pause(service: &Service) -> Result<QueueState, ApiError> {
-    service.queue.pause().await?;
-    Ok(state(service))
+pub async fn pause(service: &Arc<Service>) -> Result<QueueState, ApiError> {
+    let service = service.clone();
+    detached(async move {
+        service.queue.pause().await?;
+        Ok(state(&service))
+    })
+    .await
 }
 
 /// Lets jobs start again.
-pub async fn resume(service: &Service) -> Result<QueueState, ApiError> {
-    service.queue.resume().await?;
-    Ok(state(service))
+pub async fn resume(service: &Arc<Service>) -> Result<QueueState, ApiError> {
+    let service = service.clone();
+    detached(async move {
+        service.queue.resume().await?;
+        Ok(state(&service))
+    })
+    .await
 }
 
 /// What this service is.

@@ -15,7 +15,7 @@ use crate::{
     formats::{self, Format},
     job::{Job, JobId, ResultAvailable},
     run::Summary,
-    store::{PIECE_BYTES, PartInfo, ProfilePoints},
+    store::{PIECE_BYTES, PartInfo, ProfilePoints, Snapshot},
     violations,
 };
 
@@ -30,15 +30,15 @@ pub struct StepResult {
 
 /// The summary of a job that has one, and those of its load steps: of one that runs, those that are done.
 pub async fn summary(service: &Service, id: JobId) -> Result<(Summary, Vec<StepResult>), ApiError> {
-    let job = with_result(service, id).await?;
-    let bytes = service.store.part(job.result_key, "summary").await?;
+    let mut found = with_result(service, id).await?;
+    let bytes = found.part("summary").await?;
     let bytes = bytes.ok_or_else(|| ApiError::internal(format!("{id} has no summary")))?;
     let summary = serde_json::from_slice(&bytes).map_err(ApiError::internal)?;
-    Ok((summary, steps(service, &job).await?))
+    Ok((summary, steps(&mut found).await?))
 }
 
-async fn steps(service: &Service, job: &Job) -> Result<Vec<StepResult>, ApiError> {
-    let bytes = service.store.part(job.result_key, "steps").await?;
+async fn steps(found: &mut Snapshot) -> Result<Vec<StepResult>, ApiError> {
+    let bytes = found.part("steps").await?;
     bytes.map_or(Ok(vec![]), |bytes| {
         serde_json::from_slice(&bytes).map_err(ApiError::internal)
     })
@@ -51,8 +51,10 @@ pub async fn history(
     id: JobId,
     max_points: Option<usize>,
 ) -> Result<Vec<Iteration>, ApiError> {
-    let job = jobs::get(service, id).await?;
-    let load = StoredHistory::load(service, &job);
+    let load = async {
+        let mut found = jobs::snapshot(service, id).await?;
+        StoredHistory::load(service, &mut found).await
+    };
     let mut rows = service.work_on(load, StoredHistory::read).await??;
     if let Some(most) = max_points {
         thin(&mut rows, most);
@@ -69,16 +71,20 @@ pub(super) enum StoredHistory {
 }
 
 impl StoredHistory {
-    pub(super) async fn load(service: &Service, job: &Job) -> Result<StoredHistory, ApiError> {
-        let store = &service.store;
+    pub(super) async fn load(
+        service: &Service,
+        found: &mut Snapshot,
+    ) -> Result<StoredHistory, ApiError> {
+        let job = &found.job;
         // of a job that runs, its watchers were told more than its finished load steps hold
         if job.status.is_terminal() && job.result_available != ResultAvailable::None {
-            let whole = store.part(job.result_key, "history").await?;
+            let whole = found.part("history").await?;
             if let Some(whole) = whole {
                 return Ok(StoredHistory::Whole(whole));
             }
         }
-        let told = store.iterations(job.key, job.attempt).await?;
+        let job = &found.job;
+        let told = service.store.iterations(job.key, job.attempt).await?;
         Ok(StoredHistory::Told(told))
     }
 
@@ -155,23 +161,27 @@ pub async fn profile(
     step: Option<&str>,
     points: Points,
 ) -> Result<ContactProfile, ApiError> {
-    let job = with_result(service, id).await?;
-    let key = job.result_key;
+    let mut found = with_result(service, id).await?;
     let step = match step {
         None => None,
-        Some(wanted) => Some(step_number(&steps(service, &job).await?, wanted, id)?),
+        Some(wanted) => Some(step_number(&steps(&mut found).await?, wanted, id)?),
     };
-    let stored = async |points| service.store.profile(key, boundary, points, step).await;
-    let (nodes, friction) = match points {
-        Points::Nodes => (stored(ProfilePoints::Nodes).await?, None),
-        Points::Friction => (stored(ProfilePoints::Friction).await?, None),
-        Points::Spaced(_) => (
-            stored(ProfilePoints::Nodes).await?,
-            stored(ProfilePoints::Friction).await?,
-        ),
+    let (here, friction) = match points {
+        Points::Nodes => (ProfilePoints::Nodes, false),
+        Points::Friction => (ProfilePoints::Friction, false),
+        Points::Spaced(_) => (ProfilePoints::Nodes, true),
+    };
+    let nodes = found.profile(boundary, here, step).await?;
+    let friction = match friction {
+        true => {
+            found
+                .profile(boundary, ProfilePoints::Friction, step)
+                .await?
+        }
+        false => None,
     };
     let Some(bytes) = nodes else {
-        let known = service.store.profiled_boundaries(key).await?;
+        let known = found.profiled_boundaries().await?;
         if known.iter().any(|name| name == boundary) {
             return Err(ApiError::NotFound(format!(
                 "{id} was solved before profiles at friction points were kept; try points=nodes"
@@ -183,6 +193,7 @@ pub async fn profile(
             known.join(", ")
         )));
     };
+    drop(found);
     let read = |bytes: &[u8]| serde_json::from_slice(bytes).map_err(ApiError::internal);
     let Points::Spaced(count) = points else {
         return read(&bytes);
@@ -223,11 +234,11 @@ pub struct StoredFields {
 
 /// The fields at all nodes as they are stored.
 pub async fn fields(service: &Service, id: JobId) -> Result<StoredFields, ApiError> {
-    let job = with_result(service, id).await?;
-    let result_key = job.result_key;
-    match service.store.part_info(result_key, "fields").await? {
+    let mut found = with_result(service, id).await?;
+    let result_key = found.job.result_key;
+    match found.part_info("fields").await? {
         Some(info) => Ok(StoredFields { info, result_key }),
-        None => Err(nothing_of(&job)),
+        None => Err(nothing_of(&found.job)),
     }
 }
 
@@ -270,9 +281,9 @@ pub async fn converted_fields(
     format: Format,
 ) -> Result<Vec<u8>, ApiError> {
     let load = async {
-        let job = with_result(service, id).await?;
-        let fields = service.store.part(job.result_key, "fields").await?;
-        fields.ok_or_else(|| nothing_of(&job))
+        let mut found = with_result(service, id).await?;
+        let fields = found.part("fields").await?;
+        fields.ok_or_else(|| nothing_of(&found.job))
     };
     let written = service.work_on(load, move |stored| {
         let fields: Fields = serde_json::from_slice(&stored).map_err(|error| error.to_string())?;
@@ -283,11 +294,11 @@ pub async fn converted_fields(
 }
 
 /// The job, if it has something to show: at its end, or of finished load steps while it runs.
-pub(super) async fn with_result(service: &Service, id: JobId) -> Result<Job, ApiError> {
-    let job = jobs::get(service, id).await?;
-    match job.result_available {
-        ResultAvailable::Partial | ResultAvailable::Final => Ok(job),
-        ResultAvailable::None => Err(nothing_of(&job)),
+pub(super) async fn with_result(service: &Service, id: JobId) -> Result<Snapshot, ApiError> {
+    let found = jobs::snapshot(service, id).await?;
+    match found.job.result_available {
+        ResultAvailable::Partial | ResultAvailable::Final => Ok(found),
+        ResultAvailable::None => Err(nothing_of(&found.job)),
     }
 }
 

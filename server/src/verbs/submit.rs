@@ -76,6 +76,13 @@ pub async fn create(
         if let Some(old) = replayed(&service, key.as_ref()).await? {
             return only(old, true);
         }
+        // before it is looked at in depth: what was accepted once need not be acceptable now
+        if let Some(id) = prepared.id
+            && !prepared.payload.is_empty()
+            && let Some(old) = service.store.replay_named(id, &prepared.payload).await?
+        {
+            return only(vec![old], true);
+        }
         let new = admit(&service, prepared).await?;
         let Accepted { jobs, replayed, .. } = hand_in(&service, vec![new], key).await?;
         only(jobs, replayed)
@@ -149,12 +156,14 @@ pub async fn retry(
         if !job.status.is_terminal() {
             return Err(ApiError::JobActive(job.status.as_str()));
         }
-        let (title, problem) = service.store.problem(job.key).await?;
+        let stored = service.store.problem(job.key).await?;
+        let (title, problem) = stored.ok_or(ApiError::Deleted(id))?;
         let Job {
             name,
             labels,
             priority,
             limits,
+            cache,
             ..
         } = job;
         let envelope = Envelope {
@@ -162,7 +171,11 @@ pub async fn retry(
             labels,
             priority,
             limits,
-            cache: Cache::Refresh,
+            // who kept its result to itself means that still
+            cache: match cache {
+                Cache::Off => Cache::Off,
+                Cache::Use | Cache::Refresh => Cache::Refresh,
+            },
         };
         let problem = service.work(move || solver::parse(&problem)).await?;
         let problem = problem.map(|problem| Problem { title, ..problem });

@@ -244,7 +244,7 @@ impl Operation {
 
     /// The codes of the errors that it can answer, each once.
     pub(super) fn errors(&self) -> Vec<Code> {
-        let mut codes = vec![Code::Internal];
+        let mut codes = vec![Code::Internal, Code::RateLimited];
         if self.strict {
             codes.push(Code::UnknownParameter);
         }
