@@ -1,4 +1,4 @@
-//! How watchers learn that there is something new to read: one number per watched job.
+//! How watchers learn that there is something new to read. They are not told what: they read the store.
 
 use std::{
     collections::HashMap,
@@ -7,17 +7,17 @@ use std::{
 
 use tokio::sync::watch;
 
-/// The last announced event number of each job that somebody watches.
+/// The jobs that somebody watches.
 #[derive(Debug, Default)]
 pub(super) struct Live {
-    watched: Mutex<HashMap<i64, watch::Sender<i64>>>,
+    watched: Mutex<HashMap<i64, watch::Sender<()>>>,
 }
 
 impl Live {
-    /// Says that events up to `seq` are on the disk.
-    pub(super) fn announce(&self, key: i64, seq: i64) {
+    /// Says that something new about a job is on the disk.
+    pub(super) fn announce(&self, key: i64) {
         if let Some(sender) = self.watched().get(&key) {
-            sender.send_replace(seq);
+            sender.send_replace(());
         }
     }
 
@@ -25,7 +25,7 @@ impl Live {
         let receiver = self
             .watched()
             .entry(key)
-            .or_insert_with(|| watch::channel(0).0)
+            .or_insert_with(|| watch::channel(()).0)
             .subscribe();
         Subscription {
             live: self,
@@ -34,7 +34,7 @@ impl Live {
         }
     }
 
-    fn watched(&self) -> MutexGuard<'_, HashMap<i64, watch::Sender<i64>>> {
+    fn watched(&self) -> MutexGuard<'_, HashMap<i64, watch::Sender<()>>> {
         self.watched.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -44,7 +44,7 @@ impl Live {
 pub struct Subscription<'a> {
     live: &'a Live,
     key: i64,
-    receiver: watch::Receiver<i64>,
+    receiver: watch::Receiver<()>,
 }
 
 impl Subscription<'_> {
@@ -76,7 +76,7 @@ mod tests {
     async fn an_announcement_between_subscribing_and_listening_is_heard() {
         let live = Live::default();
         let mut subscription = live.subscribe(7);
-        live.announce(7, 1);
+        live.announce(7);
         subscription.news().await;
     }
 

@@ -3,8 +3,7 @@
 //! `workers` slots each hold one job at a time. The dispatcher claims the next job of the store whenever a
 //! slot is free; a submit that finds one free has that done in its own transaction, and hands the claim to
 //! the slot. Each claim is solved on a blocking thread. Beside each running solver a recorder task commits
-//! its events in batches and then announces the number of the last one; watchers read rows from the store
-//! up to that number. No event travels through a channel to a watcher, so none is seen twice, missed, or
+//! its events in batches and then announces that there are some; watchers read them from the store. No event travels through a channel to a watcher, so none is seen twice, missed, or
 //! taken back by a crash.
 //!
 //! Who may end a job? Any of worker, canceler, clock and drain may try; the store lets one of them, by
@@ -32,7 +31,7 @@ use stop::{Stop, Why};
 use crate::{
     job::{Job, Status},
     run::Solve,
-    store::{Accepted, CancelOutcome, Claim, Ending, LastWords, Result, Store, Submission, Told},
+    store::{Accepted, CancelOutcome, Claim, Ending, LastWords, Result, Store, Submission},
     time::Time,
 };
 
@@ -115,6 +114,7 @@ impl Queue {
         submission.claim = false;
         let Some(slot) = slot else {
             let mut accepted = self.store.submit(submission).await?;
+            self.announce(&accepted.changed);
             self.wake.notify_one();
             self.store.try_to_place(&mut accepted.jobs).await;
             return Ok(accepted);
@@ -124,6 +124,7 @@ impl Queue {
         let submitted = self.store.submit(submission).await;
         match submitted {
             Ok(mut accepted) => {
+                self.announce(&accepted.changed);
                 match accepted.claim.take() {
                     Some(claim) => self.begin(claim, slot),
                     None => drop(slot),
@@ -145,16 +146,9 @@ impl Queue {
         self.live.subscribe(key)
     }
 
-    /// Says that events are on the disk.
-    fn announce(&self, told: &[Told]) {
-        for Told { key, seq } in told {
-            self.live.announce(*key, *seq);
-        }
-    }
-
-    /// Says that something was edited about a job.
-    pub fn stir(&self, key: i64) {
-        self.live.announce(key, 0);
+    /// Says that something new about these jobs is on the disk.
+    pub fn announce(&self, jobs: &[i64]) {
+        jobs.iter().for_each(|key| self.live.announce(*key));
     }
 
     /// Ends when the service is about to stop; streams end with it.
@@ -196,7 +190,7 @@ impl Queue {
             let running = self.running().get(&key).cloned();
             match running {
                 Some(running) => {
-                    self.stir(key); // the wish is a new version
+                    self.announce(&[key]); // the wish is a new version
                     running.stop.ask(Why::Canceled);
                     tokio::spawn(self.clone().cancel_over_its_head(key, running.attempt));
                 }
@@ -210,8 +204,8 @@ impl Queue {
                 }
             }
         }
-        if let CancelOutcome::Canceled(told) = &outcome {
-            self.announce(told);
+        if let CancelOutcome::Canceled(changed) = &outcome {
+            self.announce(changed);
             self.wake.notify_one(); // a twin may have taken its place
         }
         Ok(outcome)
@@ -227,12 +221,12 @@ impl Queue {
     /// Ends a start of a job without its solver; false if it was no longer current.
     async fn end(&self, key: i64, attempt: i32, ending: &Ending) -> Result<bool> {
         let last = LastWords::default();
-        let told = self.store.finish(key, attempt, ending, last, None).await?;
-        if let Some(told) = &told {
-            self.announce(told);
+        let changed = self.store.finish(key, attempt, ending, last, None).await?;
+        if let Some(changed) = &changed {
+            self.announce(changed);
             self.wake.notify_one();
         }
-        Ok(told.is_some())
+        Ok(changed.is_some())
     }
 
     /// Takes no more jobs and puts those that are running back for the next start of the service,
@@ -297,11 +291,11 @@ impl Queue {
         if self.stopping.is_cancelled() || self.store.is_paused() {
             return Ok(false);
         }
-        let (claim, told) = self.store.claim_next().await?;
-        self.announce(&told);
+        let (claim, changed) = self.store.claim_next().await?;
+        self.announce(&changed);
         match claim {
             Some(claim) => self.begin(claim, slot),
-            None if told.is_empty() => return Ok(false),
+            None if changed.is_empty() => return Ok(false),
             None => {} // some were answered; there may be more
         }
         Ok(true)
@@ -314,7 +308,6 @@ impl Queue {
             stop: Arc::default(),
         };
         self.running().insert(claim.job.key, running.clone());
-        self.live.announce(claim.job.key, claim.seq);
         let queue = self.clone();
         tokio::spawn(async move {
             worker::attempt(&queue, claim, running).await;
@@ -327,9 +320,9 @@ impl Queue {
     async fn watch_the_clock(self: Arc<Self>) {
         loop {
             match self.store.expire_queued(Time::now()).await {
-                Ok(told) if told.is_empty() => {}
-                Ok(told) => {
-                    self.announce(&told);
+                Ok(changed) if changed.is_empty() => {}
+                Ok(changed) => {
+                    self.announce(&changed);
                     self.wake.notify_one();
                     continue; // there may be more
                 }

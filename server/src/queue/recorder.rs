@@ -82,8 +82,8 @@ async fn write(
     if !batch.events.is_empty() {
         let written = store.append_events(key, attempt, &batch.events, progress);
         match written.await? {
-            Some(seq) => queue.live.announce(key, seq),
-            None => return Ok(false),
+            true => queue.announce(&[key]),
+            false => return Ok(false),
         }
     }
     match &batch.partial {

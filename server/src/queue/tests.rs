@@ -72,7 +72,7 @@ impl Rig {
     }
 
     /// Ends a start by hand.
-    async fn finish(&self, job: &Job, attempt: i32) -> Option<Vec<Told>> {
+    async fn finish(&self, job: &Job, attempt: i32) -> Option<Vec<i64>> {
         let last = LastWords::default();
         let ending = Ending::canceled();
         let finished = self.store.finish(job.key, attempt, &ending, last, None);
@@ -375,7 +375,7 @@ async fn what_an_overtaken_start_says_is_not_recorded() {
             .append_events(job.key, 1, &line, &Default::default())
             .await
             .unwrap(),
-        None
+        false
     );
     assert_eq!(rig.finish(&job, 1).await, None);
     assert!(
@@ -383,7 +383,6 @@ async fn what_an_overtaken_start_says_is_not_recorded() {
             .append_events(job.key, again.job.attempt, &line, &Default::default())
             .await
             .unwrap()
-            .is_some()
     );
 }
 
@@ -819,4 +818,41 @@ async fn what_many_quick_steps_have_found_is_not_written_after_each() {
         kept.part("history").await.unwrap().is_none(),
         "what was told went on after it"
     );
+}
+
+/// A job that waits, with somebody who watches it, is answered in the commit of another one's submit.
+#[tokio::test]
+async fn who_is_answered_beside_a_submit_is_told_of_it() {
+    let rig = rig(fake::solve).await; // its workers never start: we claim in their place
+    let waiting = rig.submit_as(same()).await;
+    let anew = NewJob {
+        cache: Cache::Refresh,
+        ..new(5)
+    };
+    let source = rig.submit_as(anew).await;
+    let claim = rig.store.claim_next().await.unwrap().0.unwrap();
+    assert_eq!(claim.job.id, source.id);
+    let solved = Ending {
+        status: Status::Succeeded,
+        reason: None,
+        failure: None,
+        result: ResultAvailable::Final,
+    };
+    let finished = rig
+        .store
+        .finish(source.key, 1, &solved, LastWords::default(), None);
+    finished.await.unwrap().unwrap();
+    let submission = Submission {
+        claim: true,
+        ..submission(vec![new(0)], None)
+    };
+    let accepted = rig.store.submit(submission).await.unwrap();
+    assert!(accepted.changed.contains(&waiting.key), "{accepted:?}");
+    let answered = rig.store.job(waiting.id).await.unwrap().unwrap();
+    assert_eq!(
+        (answered.status, answered.cached_from),
+        (Status::Succeeded, Some(source.id))
+    );
+    let claimed = accepted.claim.unwrap().job;
+    assert_eq!(claimed.id, accepted.jobs[0].id);
 }

@@ -313,11 +313,11 @@ async fn try_to_end(
     if !current {
         return Ok(());
     }
-    let told = queue
+    let changed = queue
         .store
         .finish(key, attempt, ending, last.clone(), parts);
-    if let Some(told) = told.await? {
-        queue.announce(&told);
+    if let Some(changed) = changed.await? {
+        queue.announce(&changed);
     }
     Ok(())
 }

@@ -6,21 +6,13 @@ use tokio::sync::MutexGuard;
 
 use super::{Result, Store, line::Move};
 
-/// The last event of a job that a transaction has written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Told {
-    /// The job.
-    pub key: i64,
-    /// The number of the event.
-    pub seq: i64,
-}
-
 /// An open transaction.
 pub(super) struct Change<'a> {
     store: &'a Store,
     tx: Transaction<'static, Sqlite>,
     moves: Vec<Move>,
-    told: Vec<Told>,
+    /// Jobs that watchers may look at again.
+    changed: Vec<i64>,
     /// Until the line has moved nobody else begins: moves are made in the order of their commits.
     _turn: MutexGuard<'a, ()>,
 }
@@ -29,7 +21,7 @@ pub(super) struct Change<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct Mark {
     moves: usize,
-    told: usize,
+    changed: usize,
 }
 
 impl Store {
@@ -40,7 +32,7 @@ impl Store {
             store: self,
             tx: self.begin().await?,
             moves: vec![],
-            told: vec![],
+            changed: vec![],
         })
     }
 }
@@ -54,8 +46,16 @@ impl Change<'_> {
         self.moves.push(step);
     }
 
-    pub(super) fn told(&mut self, key: i64, seq: i64) {
-        self.told.push(Told { key, seq });
+    pub(super) fn changed(&mut self, key: i64) {
+        self.changed.push(key);
+    }
+
+    /// Jobs that this part has changed.
+    pub(super) fn changed_since(&self, mark: Mark) -> Vec<i64> {
+        self.changed
+            .get(mark.changed..)
+            .unwrap_or_default()
+            .to_vec()
     }
 
     /// Jobs that wait, those of this transaction among them.
@@ -77,7 +77,7 @@ impl Change<'_> {
         sqlx::query("savepoint part").execute(self.sql()).await?;
         Ok(Mark {
             moves: self.moves.len(),
-            told: self.told.len(),
+            changed: self.changed.len(),
         })
     }
 
@@ -92,15 +92,15 @@ impl Change<'_> {
         sqlx::query("rollback to part").execute(self.sql()).await?;
         self.keep().await?;
         self.moves.truncate(mark.moves);
-        self.told.truncate(mark.told);
+        self.changed.truncate(mark.changed);
         Ok(())
     }
 
-    /// On the disk when this returns. Only then the line moves.
-    pub(super) async fn commit(self) -> Result<Vec<Told>> {
+    /// On the disk when this returns. Only then the line moves. Gives the jobs that have changed.
+    pub(super) async fn commit(self) -> Result<Vec<i64>> {
         self.tx.commit().await?;
         let mut line = self.store.line();
         self.moves.into_iter().for_each(|step| line.make(step));
-        Ok(self.told)
+        Ok(self.changed)
     }
 }

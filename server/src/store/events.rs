@@ -10,22 +10,22 @@ use crate::{
 };
 
 impl Store {
-    /// Appends to the story of this start of a job, with the progress that it amounts to, and
-    /// gives the number of the last event; `None` when the start is no longer current.
+    /// Appends to the story of this start of a job, with the progress that it amounts to; false when the
+    /// start is no longer current.
     pub async fn append_events(
         &self,
         key: i64,
         attempt: i32,
         payloads: &[(Time, Payload)],
         progress: &Progress,
-    ) -> Result<Option<i64>> {
+    ) -> Result<bool> {
         let mut tx = self.begin().await?;
         if !is_current(&mut tx, key, attempt).await? {
-            return Ok(None);
+            return Ok(false);
         }
-        let seq = tell(&mut tx, key, attempt, payloads, progress).await?;
+        tell(&mut tx, key, attempt, payloads, progress).await?;
         tx.commit().await?;
-        Ok(Some(seq))
+        Ok(true)
     }
 
     /// At most `limit` events after number `after`, in order.
@@ -72,23 +72,23 @@ pub(super) async fn tell(
     attempt: i32,
     payloads: &[(Time, Payload)],
     progress: &Progress,
-) -> Result<i64> {
-    let seq = append(tx, key, attempt, payloads).await?;
+) -> Result<()> {
+    append(tx, key, attempt, payloads).await?;
     sqlx::query("update job set progress = ? where id = ?")
         .bind(serde_json::to_string(progress)?)
         .bind(key)
         .execute(tx)
         .await?;
-    Ok(seq)
+    Ok(())
 }
 
-/// Numbers and appends within a transaction; gives the last number.
+/// Numbers and appends within a transaction.
 pub(super) async fn append(
     tx: &mut SqliteConnection,
     key: i64,
     attempt: i32,
     payloads: &[(Time, Payload)],
-) -> Result<i64> {
+) -> Result<()> {
     let last: i64 = sqlx::query_scalar(
         "update job set last_seq = last_seq + ? where id = ? returning last_seq",
     )
@@ -110,5 +110,5 @@ pub(super) async fn append(
         .execute(&mut *tx)
         .await?;
     }
-    Ok(last)
+    Ok(())
 }

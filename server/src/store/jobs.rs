@@ -4,7 +4,7 @@ use sqlx::SqliteConnection;
 
 use super::{
     Result, Store, StoreError,
-    change::{Change, Told},
+    change::Change,
     events,
     line::Move,
     results::{self, Parts, running},
@@ -26,8 +26,6 @@ pub struct Claim {
     pub problem: String,
     /// The stored mesh that it names.
     pub mesh: Option<String>,
-    /// The event that says so.
-    pub seq: i64,
 }
 
 /// How a running job ends.
@@ -80,7 +78,7 @@ pub struct LastWords {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CancelOutcome {
     /// Nobody ran it and it is canceled.
-    Canceled(Vec<Told>),
+    Canceled(Vec<i64>),
     /// This start of it is running and should stop.
     Requested {
         /// The number of the start.
@@ -105,12 +103,12 @@ pub struct Edit {
 
 impl Store {
     /// The next job of the queue, now running; highest priority first, then in order of arrival.
-    /// Jobs before it that a result has come for are answered; the events of all of them come with it.
-    pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<Told>)> {
+    /// Jobs before it that a result has come for are answered; all that have changed come with it.
+    pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
         let mut change = self.change().await?;
         let claim = claim(&mut change).await?;
-        let told = change.commit().await?;
-        Ok((claim, told))
+        let changed = change.commit().await?;
+        Ok((claim, changed))
     }
 
     /// Notes that somebody wants the job to stop; a queued one is canceled at once.
@@ -151,7 +149,7 @@ impl Store {
         ending: &Ending,
         last: LastWords,
         result: Option<&Parts>,
-    ) -> Result<Option<Vec<Told>>> {
+    ) -> Result<Option<Vec<i64>>> {
         let mut change = self.change().await?;
         if !is_current(change.sql(), key, attempt).await? {
             return Ok(None);
@@ -219,7 +217,7 @@ impl Store {
 
     /// Ends jobs that have waited longer than they may, some at a time. A job that another one, already
     /// running, will answer does not wait for a start.
-    pub async fn expire_queued(&self, now: Time) -> Result<Vec<Told>> {
+    pub async fn expire_queued(&self, now: Time) -> Result<Vec<i64>> {
         const AT_ONCE: i64 = 100;
         // nearly always there is none: readers do not hold up the writer to find that out
         let some = sqlx::query(LATE)
@@ -387,23 +385,18 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
             settle_twins(change, &waiting).await?;
             continue;
         }
-        let (job, seq) = start(change, &waiting).await?;
+        let job = start(change, &waiting).await?;
         let (problem, mesh) = sqlx::query_as("select body, mesh from problem where input_hash = ?")
             .bind(&job.input_hash)
             .fetch_one(change.sql())
             .await?;
-        return Ok(Some(Claim {
-            job,
-            problem,
-            mesh,
-            seq,
-        }));
+        return Ok(Some(Claim { job, problem, mesh }));
     }
     Ok(None)
 }
 
 /// A start of a queued job.
-async fn start(change: &mut Change<'_>, job: &Job) -> Result<(Job, i64)> {
+async fn start(change: &mut Change<'_>, job: &Job) -> Result<Job> {
     let now = Time::now();
     self::change(change, job, Status::Running).await?;
     sqlx::query(
@@ -416,9 +409,9 @@ async fn start(change: &mut Change<'_>, job: &Job) -> Result<(Job, i64)> {
     .await?;
     let job = read(change.sql(), job.key).await?;
     let started = [(now, Payload::status(Status::Running))];
-    let seq = events::append(change.sql(), job.key, job.attempt, &started).await?;
-    change.told(job.key, seq);
-    Ok((job, seq))
+    events::append(change.sql(), job.key, job.attempt, &started).await?;
+    change.changed(job.key);
+    Ok(job)
 }
 
 /// Ends a job with its one `done` event, and its twins with it.
@@ -465,7 +458,7 @@ async fn settle_twins(change: &mut Change<'_>, job: &Job) -> Result<()> {
 
 /// Answers a queued job with the end of another one of the same input: it runs, and has ended.
 pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> Result<()> {
-    let (job, _) = start(change, job).await?;
+    let job = start(change, job).await?;
     sqlx::query(
         "update job set cached_from = ?, twin_of = null,
                         result_job = (select coalesce(result_job, id) from job where id = ?) where id = ?",
@@ -521,8 +514,8 @@ async fn close(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()
     let done = Payload::Done {
         job: Box::new(read(change.sql(), job.key).await?),
     };
-    let seq = events::append(change.sql(), job.key, job.attempt, &[(now, done)]).await?;
-    change.told(job.key, seq);
+    events::append(change.sql(), job.key, job.attempt, &[(now, done)]).await?;
+    change.changed(job.key);
     Ok(())
 }
 
@@ -543,8 +536,8 @@ async fn requeue(change: &mut Change<'_>, job: &Job, why: Requeue) -> Result<()>
         .execute(change.sql())
         .await?;
     let back = [(Time::now(), Payload::requeued(why))];
-    let seq = events::append(change.sql(), job.key, job.attempt, &back).await?;
-    change.told(job.key, seq);
+    events::append(change.sql(), job.key, job.attempt, &back).await?;
+    change.changed(job.key);
     Ok(())
 }
 

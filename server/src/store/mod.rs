@@ -31,7 +31,6 @@ use sqlx::{
     sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
 };
 
-pub use change::Told;
 pub use delete::Deletion;
 pub use jobs::{CancelOutcome, Claim, Edit, Ending, LastWords};
 use line::{Line, Move};

@@ -89,6 +89,8 @@ pub struct Accepted {
     pub replayed: bool,
     /// The next job of the queue, if that was asked for and there is one.
     pub claim: Option<Claim>,
+    /// Jobs that have changed with it, those among them that a result was there for when their turn came.
+    pub changed: Vec<i64>,
 }
 
 type Asking = (Submission, oneshot::Sender<Result<Accepted>>);
@@ -150,6 +152,10 @@ impl Store {
             for submission in submissions {
                 let mark = change.mark().await?;
                 let accepted = accept(&mut change, submission).await;
+                let accepted = accepted.map(|accepted| Accepted {
+                    changed: change.changed_since(mark),
+                    ..accepted
+                });
                 match &accepted {
                     Ok(_) => change.keep().await?,
                     Err(_) => change.undo(mark).await?,
@@ -160,7 +166,6 @@ impl Store {
         }
         .await;
         match committed {
-            // nobody watches a job before its name is known; of claims the queue tells
             Ok(_) => {
                 for (reply, accepted) in replies.into_iter().zip(answers) {
                     let _ = reply.send(accepted); // who asked may have gone
@@ -187,6 +192,7 @@ async fn accept(change: &mut Change<'_>, submission: Submission) -> Result<Accep
             jobs: old,
             replayed: true,
             claim: None,
+            changed: vec![],
         });
     }
     let mut keys = vec![];
@@ -218,6 +224,7 @@ async fn accept(change: &mut Change<'_>, submission: Submission) -> Result<Accep
         jobs: accepted,
         replayed: false,
         claim,
+        changed: vec![],
     })
 }
 

@@ -143,7 +143,7 @@ pub async fn update(
     detached(async move {
         match service.store.edit(id, &edit, version).await? {
             Some(Ok(job)) => {
-                service.queue.stir(job.key);
+                service.queue.announce(&[job.key]);
                 Ok(job)
             }
             Some(Err(version)) => Err(ApiError::StaleVersion(version)),
@@ -187,7 +187,7 @@ pub async fn delete(service: &Arc<Service>, id: JobId) -> Result<(), ApiError> {
     detached(async move {
         match service.store.delete(job.key).await? {
             Deletion::Deleted => {
-                service.queue.stir(job.key);
+                service.queue.announce(&[job.key]);
                 Ok(())
             }
             Deletion::Active => Err(ApiError::JobActive(job.status.as_str())),
@@ -220,7 +220,7 @@ pub async fn delete_many(service: &Arc<Service>, filter: Filter) -> Result<Many,
     for_each(service, filter, |service: Arc<Service>, key| async move {
         let deleted = service.store.delete(key).await? == Deletion::Deleted;
         if deleted {
-            service.queue.stir(key);
+            service.queue.announce(&[key]);
         }
         Ok(deleted)
     })
