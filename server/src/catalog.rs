@@ -70,6 +70,18 @@ impl Kind {
     pub fn retryable(&self) -> bool {
         self.retry_after_s.is_some()
     }
+
+    /// How it is told over either protocol, and whether it may pass: sentences for people.
+    pub fn facts(&self) -> Vec<String> {
+        let told = self
+            .status
+            .zip(self.grpc)
+            .map(|(status, grpc)| format!("HTTP {status}, gRPC {}.", grpc_code_name(grpc)));
+        let passes = self.retry_after_s.map(|seconds| {
+            format!("It may pass by itself: the same request may succeed after {seconds} s.")
+        });
+        told.into_iter().chain(passes).collect()
+    }
 }
 
 /// The name of a gRPC code as its specification spells it.

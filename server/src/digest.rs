@@ -49,12 +49,12 @@ pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<Strin
 
 /// A finished hash as it is written everywhere.
 pub fn sha256_text(hash: Sha256) -> String {
-    let hex: String = hash
-        .finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
-    format!("sha256:{hex}")
+    format!("sha256:{}", hex(&hash.finalize()))
+}
+
+/// Two lower-case hexadecimal digits for each byte.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A history without its times.

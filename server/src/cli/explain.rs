@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::Exit;
-use crate::catalog::{Code, Kind, grpc_code_name};
+use crate::catalog::{Code, Kind};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -26,21 +26,11 @@ pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
         );
         return Ok(Exit::Invalid);
     };
-    let Kind {
-        code,
-        title,
-        status,
-        grpc,
-        retry_after_s,
-        explanation,
-    } = found.kind();
-    println!("{title} ({code})");
-    if let (Some(status), Some(grpc)) = (status, grpc) {
-        println!("HTTP {status}, gRPC {}", grpc_code_name(grpc));
+    let kind = found.kind();
+    println!("{} ({})", kind.title, kind.code);
+    for fact in kind.facts() {
+        println!("{fact}");
     }
-    if let Some(seconds) = retry_after_s {
-        println!("It may pass by itself: the same request may succeed after {seconds} s.");
-    }
-    println!("\n{explanation}");
+    println!("\n{}", kind.explanation);
     Ok(Exit::Ok)
 }

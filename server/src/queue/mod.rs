@@ -3,20 +3,19 @@
 //! `workers` slots each hold one job at a time. The dispatcher claims the next job of the store whenever a
 //! slot is free; a submit that finds one free has that done in its own transaction, and hands the claim to
 //! the slot. Each claim is solved on a blocking thread. Beside each running solver a recorder task commits
-//! its events in batches and then announces that there are some; watchers read them from the store. No event travels through a channel to a watcher, so none is seen twice, missed, or
-//! taken back by a crash.
+//! its events in batches and then announces that there are some; watchers read them from the store. No event
+//! travels through a channel to a watcher, so none is seen twice, missed, or taken back by a crash.
 //!
 //! Who may end a job? Any of worker, canceler, clock and drain may try; the store lets one of them, by
 //! checking in one transaction that the start is still current. The others are too late.
 
 mod live;
 mod recorder;
-mod stop;
 mod worker;
 
 use std::{
     collections::HashMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
     time::Duration,
 };
 
@@ -26,7 +25,6 @@ use tracing::{error, info};
 
 use live::Live;
 pub use live::Subscription;
-use stop::{Stop, Why};
 
 use crate::{
     job::{Job, Status},
@@ -65,7 +63,24 @@ pub struct Queue {
 #[derive(Clone, Debug)]
 struct Running {
     attempt: i32,
-    stop: Arc<Stop>,
+    /// Looked at by the solver in every iteration.
+    stop: Arc<OnceLock<Why>>,
+}
+
+impl Running {
+    /// Asks the solver to stop. The first reason given is the one that counts.
+    fn stop(&self, why: Why) {
+        let _ = self.stop.set(why); // an earlier one stays: that is the error of it, and no harm
+    }
+}
+
+/// Why a solver should stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Why {
+    /// The job has run longer than it may.
+    OutOfTime,
+    /// Nobody waits for what it finds: the job was canceled or put back, or its events cannot be stored.
+    Unwanted,
 }
 
 /// How the queue stands.
@@ -191,7 +206,7 @@ impl Queue {
             match running {
                 Some(running) => {
                     self.announce(&[key]); // the wish is a new version
-                    running.stop.ask(Why::Canceled);
+                    running.stop(Why::Unwanted);
                     tokio::spawn(self.clone().cancel_over_its_head(key, running.attempt));
                 }
                 // Its worker could not end it and has given it up: nobody else would.
@@ -239,8 +254,9 @@ impl Queue {
             .iter()
             .map(|(key, running)| (*key, running.clone()))
             .collect();
-        for (key, Running { attempt, stop }) in running {
-            stop.ask(Why::Drained);
+        for (key, running) in running {
+            running.stop(Why::Unwanted);
+            let attempt = running.attempt;
             match self.store.requeue_drained(key, attempt).await {
                 Ok(Some(Status::Canceled)) => {
                     info!(

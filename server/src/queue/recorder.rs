@@ -8,7 +8,7 @@ use tokio::{
     time::{Instant, sleep_until},
 };
 
-use super::{Queue, Running, stop::Why};
+use super::{Queue, Running, Why};
 use crate::{
     event::Payload,
     job::{Job, Progress},
@@ -65,7 +65,7 @@ pub(super) async fn record(
             Err(error) => break Err(error),
         }
     };
-    running.stop.ask(Why::Lost);
+    running.stop(Why::Unwanted);
     while lines.recv().await.is_some() {} // the solver must not block on a full channel
     written
 }

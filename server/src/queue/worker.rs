@@ -13,9 +13,8 @@ use tracing::{error, info, warn};
 use uuid::Uuid;
 
 use super::{
-    Queue, Running,
+    Queue, Running, Why,
     recorder::{self, Line},
-    stop::{Stop, Why},
 };
 use crate::{
     event::Payload,
@@ -46,7 +45,7 @@ pub(super) async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) 
         solve_aloud(&problem, mesh.as_ref(), solve, |line| {
             // An error means that the recorder is gone, and with it everybody who would listen.
             let heard = line.is_none_or(|line| say.blocking_send(line).is_ok());
-            if heard && stop.why().is_none() {
+            if heard && stop.get().is_none() {
                 ControlFlow::Continue(())
             } else {
                 ControlFlow::Break(())
@@ -59,7 +58,10 @@ pub(super) async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) 
     let solved = solving.await;
     clock.abort();
     let (last, (ending, parts)) = match recorded {
-        Ok(last) => (last, judge(&job, solved, &running.stop)),
+        Ok(last) => (
+            last,
+            judge(&job, solved, running.stop.get() == Some(&Why::OutOfTime)),
+        ),
         Err(cause) => (LastWords::default(), (internal(&job, &cause), None)),
     };
     end(queue, &job, ending, last, parts).await;
@@ -69,7 +71,7 @@ pub(super) async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) 
 /// Stops a job that runs longer than it may, if need be over its solver's head.
 async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
     tokio::time::sleep(Duration::from_secs_f64(job.limits.timeout_s)).await;
-    running.stop.ask(Why::TimedOut);
+    running.stop(Why::OutOfTime);
     tokio::time::sleep(LAST_STATE).await;
     // in a task of its own: a solver that returns now stops this clock, but not a commit under way
     tokio::spawn(async move {
@@ -215,9 +217,8 @@ fn ending_of(document: &Document) -> Ending {
 fn judge(
     job: &Job,
     solved: Result<Result<Solved, Unsolved>, JoinError>,
-    stop: &Stop,
+    out_of_time: bool,
 ) -> (Ending, Option<Parts>) {
-    let out_of_time = stop.why() == Some(Why::TimedOut);
     let solved = match solved {
         Ok(Err(Unsolved::Mesh(cause))) => return (internal(job, &cause), None),
         Ok(Err(Unsolved::Solve(error))) => Ok(Err(error)),

@@ -11,7 +11,7 @@ use base64::{Engine, engine::general_purpose::STANDARD};
 use sha2::{Digest, Sha256};
 
 use super::request::versions;
-use crate::{error::ApiError, formats::Format};
+use crate::{digest::hex, error::ApiError, formats::Format};
 
 /// What a file is, before its bytes are looked at.
 pub(super) struct File {
@@ -49,12 +49,7 @@ pub(super) fn answer(
     file: &File,
     body: impl FnOnce(Range<u64>) -> Body,
 ) -> Result<Response, ApiError> {
-    let hex: String = file
-        .digest
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
-    let tag = format!("\"{hex}\"");
+    let tag = format!("\"{}\"", hex(&file.digest));
     let digest = format!("sha-256=:{}:", STANDARD.encode(&file.digest));
     let vary = "Accept".to_owned();
     let known = [

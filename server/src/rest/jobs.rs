@@ -12,9 +12,10 @@ use serde::Serialize;
 use solver::problem::Problem;
 
 use super::{
-    Rest, filters,
+    Rest,
+    bodies::edit,
+    filters,
     request::{JobPath, Params, Tags, json_text, versions},
-    submission::edit,
 };
 use crate::{
     error::ApiError,

@@ -1,5 +1,6 @@
 //! REST. The whole API is one list, `operations`. Handlers only translate; see `verbs`.
 
+mod bodies;
 mod data;
 mod docs;
 mod events;
@@ -14,7 +15,7 @@ mod reply;
 mod request;
 mod results;
 mod service;
-mod submission;
+
 mod submit;
 
 use std::sync::Arc;

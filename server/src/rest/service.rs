@@ -13,7 +13,7 @@ use super::{
     request::{Params, TextPath, wants},
 };
 use crate::{
-    catalog::{Code, Kind, grpc_code_name},
+    catalog::{Code, Kind},
     error::ApiError,
     verbs::queue::{self as verbs, Caller, Info, QueueState},
     violations,
@@ -91,21 +91,14 @@ fn page(kind: &Kind) -> String {
     let Kind {
         code,
         title,
-        status,
-        grpc,
-        retry_after_s,
         explanation,
+        ..
     } = kind;
-    let mut facts = String::new();
-    if let (Some(status), Some(grpc)) = (status, grpc) {
-        let grpc = grpc_code_name(*grpc);
-        facts += &format!("<p>HTTP {status}, gRPC {grpc}.</p>");
-    }
-    if let Some(seconds) = retry_after_s {
-        facts += &format!(
-            "<p>It may pass by itself: the same request may succeed after {seconds} s.</p>"
-        );
-    }
+    let facts: String = kind
+        .facts()
+        .iter()
+        .map(|fact| format!("<p>{fact}</p>"))
+        .collect();
     format!(
         "<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content=\"width=device-width\">\
          <title>{code} – Signorini</title>\

@@ -11,10 +11,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    Rest, events,
+    Rest,
+    bodies::{bare_problem, batch, submission},
+    events,
     jobs::{one, tag},
     request::{JobPath, Params, idempotency_key, json_text, preferred_wait_s, wants},
-    submission::{bare_problem, batch, submission},
 };
 use crate::{
     error::ApiError,

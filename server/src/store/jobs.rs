@@ -1,4 +1,4 @@
-//! The life of a job: claimed, ended, put back, edited. Every change of status goes through `change`.
+//! The life of a job: claimed, ended, put back. Every change of status goes through `change`.
 
 use sqlx::SqliteConnection;
 
@@ -9,11 +9,11 @@ use super::{
     line::Move,
     results::{self, Parts, running},
     rows::{from_row, read},
-    submit,
+    twins,
 };
 use crate::{
     event::{Payload, Requeue},
-    job::{Cache, Failure, Job, JobId, Progress, Reason, ResultAvailable, Status},
+    job::{Cache, Failure, Job, Progress, Reason, ResultAvailable, Status},
     time::Time,
 };
 
@@ -86,19 +86,6 @@ pub enum CancelOutcome {
     },
     /// It had ended.
     AlreadyTerminal,
-}
-
-/// What is changed of a job; what is absent stays.
-#[derive(Clone, Debug, Default)]
-pub struct Edit {
-    /// A name, or none.
-    pub name: Option<Option<String>>,
-    /// All labels.
-    pub labels: Option<std::collections::BTreeMap<String, String>>,
-    /// −10 … 10.
-    pub priority: Option<i32>,
-    /// Never removed by age.
-    pub pinned: Option<bool>,
 }
 
 impl Store {
@@ -249,92 +236,6 @@ impl Store {
         }
         change.commit().await
     }
-
-    /// Changes what may be changed of a job, if it still is of that version. `Err` holds the version
-    /// that it is of instead; `None`: there is no such job.
-    pub async fn edit(
-        &self,
-        id: JobId,
-        edit: &Edit,
-        version: Option<i64>,
-    ) -> Result<Option<std::result::Result<Job, i64>>> {
-        let mut change = self.change().await?;
-        let row = sqlx::query("select * from job where uuid = ?")
-            .bind(id.0.to_string())
-            .fetch_optional(change.sql())
-            .await?;
-        let Some(row) = row else { return Ok(None) };
-        let job = from_row(&row)?;
-        if version.is_some_and(|version| version != job.version) {
-            return Ok(Some(Err(job.version)));
-        }
-        let key = job.key;
-        let name = edit.name.as_ref().unwrap_or(&job.name);
-        let labels = edit.labels.as_ref().unwrap_or(&job.labels);
-        let priority = edit.priority.unwrap_or(job.priority);
-        let pinned = edit.pinned.unwrap_or(job.pinned);
-        let same = *name == job.name
-            && *labels == job.labels
-            && priority == job.priority
-            && pinned == job.pinned;
-        if !same {
-            sqlx::query(
-                "update job set name = ?, labels = ?, priority = ?, pinned = ?, version = version + 1 where id = ?",
-            )
-            .bind(name)
-            .bind(serde_json::to_string(labels)?)
-            .bind(priority)
-            .bind(pinned)
-            .bind(key)
-            .execute(change.sql())
-            .await?;
-            if *labels != job.labels {
-                sqlx::query("delete from job_label where job_id = ?")
-                    .bind(key)
-                    .execute(change.sql())
-                    .await?;
-                submit::write_labels(&mut change, key, job.created_at, labels).await?;
-            }
-            if job.waits_in_line() && priority != job.priority {
-                let left = job.priority;
-                change.moves(Move::Leave {
-                    priority: left,
-                    key,
-                });
-                change.moves(Move::Enter { priority, key });
-            }
-            if let Some(source) = job.twin_of {
-                leave_source(&mut change, &job, source, priority).await?;
-            }
-        }
-        let edited = read(change.sql(), key).await?;
-        change.commit().await?;
-        let mut edited = [edited];
-        self.try_to_place(&mut edited).await;
-        let [edited] = edited;
-        Ok(Some(Ok(edited)))
-    }
-}
-
-/// A twin that is to run before its source waits for it no longer.
-async fn leave_source(
-    change: &mut Change<'_>,
-    job: &Job,
-    source: i64,
-    priority: i32,
-) -> Result<()> {
-    let source = read(change.sql(), source).await?;
-    if source.status != Status::Queued || source.priority >= priority {
-        return Ok(());
-    }
-    let key = job.key;
-    sqlx::query("update job set twin_of = null where id = ?")
-        .bind(key)
-        .execute(change.sql())
-        .await?;
-    change.moves(Move::Part);
-    change.moves(Move::Enter { priority, key });
-    Ok(())
 }
 
 /// Jobs that have waited too long, at most so many.
@@ -379,10 +280,10 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         let waiting = read(change.sql(), key).await?;
         // a result may have come since it was accepted
         if waiting.cache == Cache::Use
-            && let Some(source) = submit::earlier(change, &waiting.input_hash).await?
+            && let Some(source) = twins::earlier(change, &waiting.input_hash).await?
         {
-            answer(change, &waiting, &source).await?;
-            settle_twins(change, &waiting).await?;
+            twins::answer(change, &waiting, &source).await?;
+            twins::settle(change, &waiting).await?;
             continue;
         }
         let job = start(change, &waiting).await?;
@@ -396,7 +297,7 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
 }
 
 /// A start of a queued job.
-async fn start(change: &mut Change<'_>, job: &Job) -> Result<Job> {
+pub(super) async fn start(change: &mut Change<'_>, job: &Job) -> Result<Job> {
     let now = Time::now();
     self::change(change, job, Status::Running).await?;
     sqlx::query(
@@ -417,68 +318,11 @@ async fn start(change: &mut Change<'_>, job: &Job) -> Result<Job> {
 /// Ends a job with its one `done` event, and its twins with it.
 async fn end(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
     close(change, job, ending).await?;
-    settle_twins(change, job).await
-}
-
-/// What becomes of the jobs that waited for the end of this one: they end as it has ended, or the first of
-/// them takes its place.
-async fn settle_twins(change: &mut Change<'_>, job: &Job) -> Result<()> {
-    let twins = sqlx::query("select * from job where twin_of = ? order by priority desc, id")
-        .bind(job.key)
-        .fetch_all(change.sql())
-        .await?;
-    let twins = twins.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
-    if twins.is_empty() {
-        return Ok(());
-    }
-    let source = read(change.sql(), job.key).await?;
-    if submit::is_shared(source.status, source.reason) {
-        for twin in &twins {
-            answer(change, twin, &source).await?;
-        }
-    } else if let Some((first, others)) = twins.split_first() {
-        // the first takes the place of its source; the others wait for it
-        let (priority, key) = (first.priority, first.key);
-        sqlx::query("update job set twin_of = null where id = ?")
-            .bind(key)
-            .execute(change.sql())
-            .await?;
-        change.moves(Move::Part);
-        change.moves(Move::Enter { priority, key });
-        if !others.is_empty() {
-            sqlx::query("update job set twin_of = ? where twin_of = ?")
-                .bind(key)
-                .bind(job.key)
-                .execute(change.sql())
-                .await?;
-        }
-    }
-    Ok(())
-}
-
-/// Answers a queued job with the end of another one of the same input: it runs, and has ended.
-pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> Result<()> {
-    let job = start(change, job).await?;
-    sqlx::query(
-        "update job set cached_from = ?, twin_of = null,
-                        result_job = (select coalesce(result_job, id) from job where id = ?) where id = ?",
-    )
-    .bind(source.id.0.to_string())
-    .bind(source.key)
-    .bind(job.key)
-    .execute(change.sql())
-    .await?;
-    let ending = Ending {
-        status: source.status,
-        reason: source.reason,
-        failure: source.failure.clone(),
-        result: source.result_available,
-    };
-    close(change, &job, &ending).await
+    twins::settle(change, job).await
 }
 
 /// The end itself. The last word on a job.
-async fn close(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
+pub(super) async fn close(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
     debug_assert!(ending.status.is_terminal());
     // Lists count on it that nobody ends before it was accepted, also where the clock was set back.
     let now = Time::now().max(job.created_at);

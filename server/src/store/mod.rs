@@ -6,6 +6,7 @@
 
 mod change;
 mod delete;
+mod edit;
 mod events;
 mod jobs;
 mod line;
@@ -17,6 +18,7 @@ mod settings;
 mod submit;
 #[cfg(test)]
 mod tests;
+mod twins;
 
 use std::{
     fs::{File, OpenOptions, TryLockError},
@@ -32,11 +34,12 @@ use sqlx::{
 };
 
 pub use delete::Deletion;
-pub use jobs::{CancelOutcome, Claim, Edit, Ending, LastWords};
+pub use edit::Edit;
+pub use jobs::{CancelOutcome, Claim, Ending, LastWords};
 use line::{Line, Move};
 pub use list::{Cursor, Filter, GroupBy, Order, OrderBy};
 pub use meshes::{Removal, StoredMesh};
-pub use results::{PIECE_BYTES, PartInfo, Parts, ProfilePoints, Snapshot};
+pub use results::{PIECE_BYTES, PIECES_PER_COMMIT, PartInfo, Parts, ProfilePoints, Snapshot};
 pub use submit::{Accepted, NewJob, OWNER, RequestKey, Submission};
 
 use crate::job::JobId;

@@ -17,11 +17,11 @@ use crate::{
     run::Document,
 };
 
-/// Bytes of one piece; larger rows make SQLite chain pages and readers hold more.
+/// Bytes of one piece of a stored result or mesh; larger rows make SQLite chain pages and readers hold more.
 pub const PIECE_BYTES: usize = 256 << 10;
 /// Pieces per transaction: 1 MiB holds the single writer for some ten milliseconds, so that a
 /// cancel or a submit beside a large result still answers at once.
-const PIECES_PER_COMMIT: usize = 4;
+pub const PIECES_PER_COMMIT: usize = 4;
 
 /// A document as it is stored: name, JSON and SHA-256 of each part.
 #[derive(Debug)]

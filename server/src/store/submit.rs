@@ -1,4 +1,4 @@
-//! Accepting jobs: keys, names, answers from earlier results, and one commit for many clients.
+//! Accepting jobs: keys, names, and one commit for many clients.
 //!
 //! A commit costs a flush of the disk, whatever it holds. Submissions that arrive while one is under
 //! way therefore wait together and share the next: each in a part of its own, so that one that is
@@ -15,19 +15,17 @@ use super::{
     jobs::{self, Claim},
     line::Move,
     meshes,
-    rows::{from_row, read},
+    rows::read,
+    twins,
 };
 use crate::{
     event::Payload,
-    job::{Cache, Job, JobId, Limits, Reason, Status},
+    job::{Cache, Job, JobId, Limits, Status},
     time::Time,
 };
 
 /// Submissions that share a commit at most.
 const TOGETHER: usize = 64;
-
-/// Jobs that wait for the end of one other at most.
-const MOST_TWINS: i64 = 100;
 
 /// A job that is about to be accepted.
 #[derive(Clone, Debug)]
@@ -350,12 +348,12 @@ async fn deleted_name(connection: &mut sqlx::SqliteConnection, key: i64) -> Resu
 /// Inserts a job: waiting, or answered at once by an earlier result, or joined to a twin.
 async fn insert(change: &mut Change<'_>, new: &NewJob, max_queued: u32) -> Result<i64> {
     let answer = match new.cache {
-        Cache::Use => earlier(change, &new.input_hash).await?,
+        Cache::Use => twins::earlier(change, &new.input_hash).await?,
         Cache::Refresh | Cache::Off => None,
     };
     let twin_of = match (&answer, new.cache) {
         (Some(source), _) => Some(source.key), // for a moment
-        (None, Cache::Use) => under_way(change, new).await?,
+        (None, Cache::Use) => twins::under_way(change, new).await?,
         (None, _) => None,
     };
     let waits = twin_of.is_none();
@@ -407,7 +405,7 @@ async fn insert(change: &mut Change<'_>, new: &NewJob, max_queued: u32) -> Resul
     });
     if let Some(source) = answer {
         let job = read(change.sql(), key).await?;
-        jobs::answer(change, &job, &source).await?;
+        twins::answer(change, &job, &source).await?;
     }
     Ok(key)
 }
@@ -429,52 +427,4 @@ pub(super) async fn write_labels(
             .await?;
     }
     Ok(())
-}
-
-pub(super) const EARLIER: &str = "select * from job indexed by job_answer
-     where input_hash = ? and status = 'succeeded' and result_available = 'final' and cache <> 'off'
-           and solver_version = ?
-     order by id desc limit 1";
-
-pub(super) const UNDER_WAY: &str = "select id from job indexed by job_under_way
-     where input_hash = ? and status in ('queued', 'running') and twin_of is null and cache <> 'off'
-           and cancel_requested = 0 and (status = 'running' or priority >= ?)
-     order by id limit 1";
-
-/// The newest job of this input with a final result of this very program that may answer others.
-pub(super) async fn earlier(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job>> {
-    let row = sqlx::query(EARLIER)
-        .bind(input_hash)
-        .bind(env!("CARGO_PKG_VERSION"))
-        .fetch_optional(change.sql())
-        .await?;
-    row.as_ref().map(from_row).transpose()
-}
-
-/// A job at work on this input that will answer the new one too. One that waits behind the new one's
-/// priority, or that is about to be canceled, would make it late.
-async fn under_way(change: &mut Change<'_>, new: &NewJob) -> Result<Option<i64>> {
-    let source: Option<i64> = sqlx::query_scalar(UNDER_WAY)
-        .bind(&new.input_hash)
-        .bind(new.priority)
-        .fetch_optional(change.sql())
-        .await?;
-    let Some(source) = source else {
-        return Ok(None);
-    };
-    // They end in one transaction with it. Those beyond wait in line, and are answered when it is their turn.
-    let twins: i64 = sqlx::query_scalar("select count(*) from job where twin_of = ?")
-        .bind(source)
-        .fetch_one(change.sql())
-        .await?;
-    Ok((twins < MOST_TWINS).then_some(source))
-}
-
-/// Whether the end of a job is that of its twins too.
-pub(super) fn is_shared(status: Status, reason: Option<Reason>) -> bool {
-    match status {
-        Status::Succeeded => true,
-        Status::Failed => reason.is_some_and(Reason::belongs_to_the_problem),
-        Status::Queued | Status::Running | Status::Canceled => false,
-    }
 }

@@ -76,7 +76,7 @@ async fn an_older_store_is_brought_up_to_date_with_all_that_is_in_it() {
 async fn the_questions_of_the_queue_are_answered_by_indexes() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
-    for question in [jobs::NEXT, jobs::LATE, submit::EARLIER, submit::UNDER_WAY] {
+    for question in [jobs::NEXT, jobs::LATE, twins::EARLIER, twins::UNDER_WAY] {
         let plan = sqlx::AssertSqlSafe(format!("explain query plan {question}"));
         let plan: Vec<(i64, i64, i64, String)> =
             sqlx::query_as(plan).fetch_all(&store.reader).await.unwrap();

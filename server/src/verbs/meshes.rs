@@ -18,14 +18,9 @@ use crate::{
     digest,
     error::ApiError,
     mesh::MeshInfo,
-    store::{Cursor, Removal, StoredMesh},
+    store::{Cursor, PIECE_BYTES, PIECES_PER_COMMIT, Removal, StoredMesh},
     violations,
 };
-
-/// As of a result: larger pieces make SQLite chain pages.
-const PIECE_BYTES: usize = 256 << 10;
-/// 1 MiB holds the single writer for some ten milliseconds.
-const PIECES_PER_COMMIT: usize = 4;
 
 /// Stores a mesh file that arrives in pieces, and says whether it is new. The file streams to the disk
 /// and from there through the reader: only the parsed mesh is ever in memory.

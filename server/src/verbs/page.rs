@@ -3,6 +3,7 @@
 use sha2::{Digest, Sha256};
 
 use crate::{
+    digest::hex,
     job::Job,
     store::{Cursor, Filter, Order, OrderBy},
 };
@@ -45,10 +46,7 @@ pub fn cursor(token: &str, list: &str) -> Option<Cursor> {
 /// Ties a token to its list. No secret: who forges one sees what the list would have shown anyway.
 fn seal(Cursor { micros, key }: Cursor, list: &str) -> String {
     let hash = Sha256::digest(format!("{micros} {key} {list}"));
-    hash.iter()
-        .take(4)
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
+    hex(&hash[..4])
 }
 
 #[cfg(test)]

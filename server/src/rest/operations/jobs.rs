@@ -12,9 +12,8 @@ use crate::{
     event::Event,
     job::{Job, Status},
     rest::{
-        events, jobs,
-        submission::{Edits, Submission, Submissions},
-        submit,
+        bodies::{Edits, Submission, Submissions},
+        events, jobs, submit,
     },
     verbs::{
         jobs::{Count, MAX_PAGE_SIZE, Many},

@@ -24,6 +24,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .tested(&[
                 "service::results::a_result_has_its_summary_profiles_and_fields",
                 "service::results::a_result_is_not_there_before_the_end_nor_after_an_end_without_one",
+                "service::results::finished_load_steps_of_a_running_job_are_served",
             ]),
         get("/v1/jobs/{id}/history", results::history)
             .rpcs(&["ListIterations"])
@@ -46,7 +47,9 @@ pub(super) fn operations() -> Vec<Operation> {
             .fails(NOTHING)
             .tested(&[
                 "service::results::every_format_has_its_type_its_name_and_its_first_bytes",
-                "service::results::what_is_not_there_is_said_with_what_is", "service::files::tables_have_tags_and_ranges_too"]),
+                "service::results::what_is_not_there_is_said_with_what_is",
+                "service::results::a_profile_is_given_at_nodes_at_friction_points_or_at_any_number_of_places",
+                "service::files::tables_have_tags_and_ranges_too"]),
         get("/v1/jobs/{id}/fields", results::fields)
             .rpcs(&["StreamResult"])
             .says("Mesh, displacements and stresses")

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     catalog::{Code, Kind},
-    rest::{docs, openapi, service, submission::BareProblem, submit},
+    rest::{bodies::BareProblem, docs, openapi, service, submit},
     verbs::{
         problems::Judgement,
         queue::{Caller, Info, QueueState},

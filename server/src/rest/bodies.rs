@@ -1,8 +1,10 @@
-//! Bodies that carry a problem: an envelope of ours around a text for the solver's own parser.
+//! Bodies of requests in JSON: what each may hold, and all that is wrong with one. A problem in it is a text
+//! for the solver's own parser.
 
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 use serde_json::value::RawValue;
 use solver::{
     error::{Violation, escape},
@@ -95,229 +97,176 @@ type Read<T> = Result<T, Vec<Violation>>;
 /// A body `{problem, name, labels, priority, limits, cache}`. The problem's text goes to the solver's own
 /// strict parser; what is wrong with it comes together with what is wrong around it.
 pub(super) fn submission(text: &str) -> Result<Draft, ApiError> {
-    let mut fields = object(text, "an object with the field problem")?;
-    if let Some(violation) = unwrapped(&fields) {
+    let mut body = Body::open(text, "an object with the field problem")?;
+    if let Some(violation) = body.unwrapped() {
         return Ok((Envelope::default(), Err(vec![violation])));
     }
-    let mut violations = Violations::default();
-    let mut envelope = Envelope::default();
-    let problem = problem(&mut fields, &mut violations);
-    take(
-        &mut fields,
-        "name",
-        "a string",
-        &mut violations,
-        &mut envelope.name,
-    );
-    take(
-        &mut fields,
-        "labels",
-        "an object of strings",
-        &mut violations,
-        &mut envelope.labels,
-    );
-    take(
-        &mut fields,
-        "priority",
-        "a whole number from -10 to 10",
-        &mut violations,
-        &mut envelope.priority,
-    );
-    let limits = "an object {timeout_s, queue_ttl_s} of numbers";
-    take(
-        &mut fields,
-        "limits",
-        limits,
-        &mut violations,
-        &mut envelope.limits,
-    );
-    let cache = "use, refresh or off";
-    take(
-        &mut fields,
-        "cache",
-        cache,
-        &mut violations,
-        &mut envelope.cache,
-    );
+    let problem = body.problem();
+    let envelope = Envelope {
+        name: body.take("name", "a string"),
+        labels: body.take("labels", LABELS).unwrap_or_default(),
+        priority: body.take("priority", PRIORITY).unwrap_or_default(),
+        limits: body.take("limits", LIMITS).unwrap_or_default(),
+        cache: body
+            .take("cache", "use, refresh or off")
+            .unwrap_or_default(),
+    };
     let known = "problem, name, labels, priority, limits, cache";
-    unknown(fields, known, &mut violations);
-    Ok((envelope, together(violations, problem)))
+    Ok((envelope, body.close(known, problem)))
 }
 
 /// A body `{jobs: […]}`, each as a submission of its own.
 pub(super) fn batch(text: &str) -> Result<Read<Vec<Draft>>, ApiError> {
-    let mut fields = object(text, "an object with the field jobs")?;
-    let mut violations = Violations::default();
-    let mut texts: Vec<&RawValue> = vec![];
-    match fields.remove("jobs") {
-        Some(raw) => match serde_json::from_str(raw.get()) {
-            Ok(jobs) => texts = jobs,
-            Err(_) => violations.add(wrong_type("/jobs", raw, "an array of submissions")),
-        },
-        None => violations.add(Violation {
-            pointer: "/jobs".into(),
-            reason: "missing".into(),
-            got: "nothing".into(),
-            expected: "1 … 1000 submissions".into(),
-            hint: "Send {\"jobs\": [{\"problem\": {…}}, …]}.".into(),
-        }),
-    }
-    unknown(fields, "jobs", &mut violations);
+    let mut body = Body::open(text, "an object with the field jobs")?;
+    let some = "1 … 1000 submissions";
+    let hint = "Send {\"jobs\": [{\"problem\": {…}}, …]}.";
+    let texts = body.require("jobs", some, hint).and_then(|raw| {
+        let texts = serde_json::from_str::<Vec<&RawValue>>(raw.get()).ok();
+        if texts.is_none() {
+            body.wrong_type("jobs", raw, "an array of submissions");
+        }
+        texts
+    });
     let mut drafts = vec![];
     // one more than there may be: the verb says that they are too many
-    for (n, text) in texts.iter().take(MOST_JOBS + 1).enumerate() {
+    for (n, text) in texts.iter().flatten().take(MOST_JOBS + 1).enumerate() {
         let at = format!("/jobs/{n}");
         match submission(text.get()) {
             Ok((envelope, problem)) => {
                 if let Err(found) = &problem {
-                    violations.extend(prefixed(&at, found.clone()));
+                    body.violations.extend(prefixed(&at, found.clone()));
                 }
                 drafts.push((envelope, problem));
             }
-            Err(ApiError::InvalidProblem(found)) => violations.extend(prefixed(&at, found)),
+            Err(ApiError::InvalidProblem(found)) => body.violations.extend(prefixed(&at, found)),
             Err(other) => return Err(other),
         }
     }
-    Ok(if violations.is_empty() {
-        Ok(drafts)
-    } else {
-        Err(violations.into_vec())
-    })
+    Ok(body.close("jobs", Some(drafts)))
 }
 
 /// A body `{name, labels, priority, pinned}`: what is absent stays, and a name of null is taken away.
 pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
-    let mut fields = object(text, "an object with what to change")?;
-    let mut violations = Violations::default();
-    let mut edit = Edit::default();
-    if fields.get("name").is_some_and(|raw| raw.get() == "null") {
-        fields.remove("name");
-        edit.name = Some(None);
-    }
-    let mut name: Option<String> = None;
-    take(
-        &mut fields,
-        "name",
-        "a string or null",
-        &mut violations,
-        &mut name,
-    );
-    if name.is_some() {
-        edit.name = Some(name);
-    }
-    let labels = "an object of strings";
-    take(
-        &mut fields,
-        "labels",
-        labels,
-        &mut violations,
-        &mut edit.labels,
-    );
-    let priority = "a whole number from -10 to 10";
-    take(
-        &mut fields,
-        "priority",
-        priority,
-        &mut violations,
-        &mut edit.priority,
-    );
-    take(
-        &mut fields,
-        "pinned",
-        "true or false",
-        &mut violations,
-        &mut edit.pinned,
-    );
-    unknown(fields, "name, labels, priority, pinned", &mut violations);
-    if violations.is_empty() {
-        Ok(edit)
-    } else {
-        Err(ApiError::InvalidProblem(violations.into_vec()))
-    }
+    let mut body = Body::open(text, "an object with what to change")?;
+    let unnamed = body.fields.get("name").is_some_and(|raw| is_null(raw));
+    let name: Option<String> = body.take("name", "a string or null");
+    let edit = Edit {
+        name: (unnamed || name.is_some()).then_some(name),
+        labels: body.take("labels", LABELS),
+        priority: body.take("priority", PRIORITY),
+        pinned: body.take("pinned", "true or false"),
+    };
+    let known = "name, labels, priority, pinned";
+    body.close(known, Some(edit))
+        .map_err(ApiError::InvalidProblem)
 }
 
 /// A body `{problem}`.
 pub(super) fn bare_problem(text: &str) -> Result<Read<Problem>, ApiError> {
-    let mut fields = object(text, "an object with the field problem")?;
-    if let Some(violation) = unwrapped(&fields) {
+    let mut body = Body::open(text, "an object with the field problem")?;
+    if let Some(violation) = body.unwrapped() {
         return Ok(Err(vec![violation]));
     }
-    let mut violations = Violations::default();
-    let problem = problem(&mut fields, &mut violations);
-    unknown(fields, "problem", &mut violations);
-    Ok(together(violations, problem))
+    let problem = body.problem();
+    Ok(body.close("problem", problem))
 }
 
-fn object<'a>(text: &'a str, expected: &str) -> Result<BTreeMap<String, &'a RawValue>, ApiError> {
-    // First only the syntax, so that a well-formed array is told that it should be an object.
-    let whole: &RawValue =
-        serde_json::from_str(text).map_err(|error| ApiError::MalformedJson(error.to_string()))?;
-    serde_json::from_str(whole.get())
-        .map_err(|_| ApiError::InvalidProblem(vec![wrong_type("", whole, expected)]))
+const LABELS: &str = "an object of strings";
+const PRIORITY: &str = "a whole number from -10 to 10";
+const LIMITS: &str = "an object {timeout_s, queue_ttl_s} of numbers";
+
+/// An object whose fields are taken out one by one; all that is wrong with them is said at the end.
+struct Body<'a> {
+    fields: BTreeMap<String, &'a RawValue>,
+    violations: Violations,
 }
 
-/// The problem itself where an envelope around it was expected: to call each of its names unknown
-/// would not help.
-fn unwrapped(fields: &BTreeMap<String, &RawValue>) -> Option<Violation> {
-    let has = |name: &str| fields.contains_key(name);
-    (!has("problem") && (has("analysis") || has("mesh"))).then(|| Violation {
-        pointer: AT.into(),
-        reason: "missing".into(),
-        got: "the bare problem".into(),
-        expected: "an object with the field problem".into(),
-        hint: "Wrap it as {\"problem\": …}.".into(),
-    })
-}
+impl<'a> Body<'a> {
+    fn open(text: &'a str, expected: &str) -> Result<Self, ApiError> {
+        // First only the syntax, so that a well-formed array is told that it should be an object.
+        let whole: &RawValue = serde_json::from_str(text)
+            .map_err(|error| ApiError::MalformedJson(error.to_string()))?;
+        let fields = serde_json::from_str(whole.get())
+            .map_err(|_| ApiError::InvalidProblem(vec![wrong_type("", whole, expected)]))?;
+        let violations = Violations::default();
+        Ok(Body { fields, violations })
+    }
 
-fn problem(
-    fields: &mut BTreeMap<String, &RawValue>,
-    violations: &mut Violations,
-) -> Option<Problem> {
-    match fields.remove("problem") {
-        Some(raw) => match solver::parse(raw.get()) {
-            Ok(problem) => return Some(problem),
-            Err(found) => violations.extend(prefixed(AT, found)),
-        },
-        None => violations.add(Violation {
+    /// The problem itself where an envelope around it was expected: to call each of its names unknown
+    /// would not help.
+    fn unwrapped(&self) -> Option<Violation> {
+        let has = |name: &str| self.fields.contains_key(name);
+        (!has("problem") && (has("analysis") || has("mesh"))).then(|| Violation {
             pointer: AT.into(),
             reason: "missing".into(),
-            got: "nothing".into(),
-            expected: "the problem to solve".into(),
-            hint: "Send {\"problem\": {…}}.".into(),
-        }),
+            got: "the bare problem".into(),
+            expected: "an object with the field problem".into(),
+            hint: "Wrap it as {\"problem\": …}.".into(),
+        })
     }
-    None
+
+    /// The field `problem`, read by the solver's own parser.
+    fn problem(&mut self) -> Option<Problem> {
+        let raw = self.require(
+            "problem",
+            "the problem to solve",
+            "Send {\"problem\": {…}}.",
+        )?;
+        let problem = solver::parse(raw.get());
+        problem
+            .map_err(|found| self.violations.extend(prefixed(AT, found)))
+            .ok()
+    }
+
+    /// A field that must be there.
+    fn require(&mut self, name: &str, expected: &str, hint: &str) -> Option<&'a RawValue> {
+        let found = self.fields.remove(name);
+        if found.is_none() {
+            self.violations.add(Violation {
+                pointer: format!("/{name}"),
+                reason: "missing".into(),
+                got: "nothing".into(),
+                expected: expected.into(),
+                hint: hint.into(),
+            });
+        }
+        found
+    }
+
+    /// A field that may be there; null is as good as absent.
+    fn take<T: DeserializeOwned>(&mut self, name: &str, expected: &str) -> Option<T> {
+        let raw = self.fields.remove(name).filter(|raw| !is_null(raw))?;
+        let value = serde_json::from_str(raw.get());
+        value.map_err(|_| self.wrong_type(name, raw, expected)).ok()
+    }
+
+    fn wrong_type(&mut self, name: &str, raw: &RawValue, expected: &str) {
+        self.violations
+            .add(wrong_type(&format!("/{name}"), raw, expected));
+    }
+
+    /// What was read, if nothing was wrong and nothing unknown is left over.
+    fn close<T>(mut self, known: &str, read: Option<T>) -> Read<T> {
+        // One more than are listed: the list shall say that there are more.
+        for name in self.fields.into_keys().take(violations::MOST + 1) {
+            let name = violations::name(&name);
+            self.violations.add(Violation {
+                pointer: format!("/{}", escape(&name)),
+                reason: "unknown_name".into(),
+                got: format!("{name:?}"),
+                expected: format!("one of {known}"),
+                hint: "Check the spelling, or leave it out.".into(),
+            });
+        }
+        match read {
+            Some(read) if self.violations.is_empty() => Ok(read),
+            _ => Err(self.violations.into_vec()),
+        }
+    }
 }
 
-/// Reads one field into its place; null is as good as absent.
-fn take<T: serde::de::DeserializeOwned>(
-    fields: &mut BTreeMap<String, &RawValue>,
-    name: &str,
-    expected: &str,
-    violations: &mut Violations,
-    place: &mut T,
-) {
-    let Some(raw) = fields.remove(name).filter(|raw| raw.get() != "null") else {
-        return;
-    };
-    match serde_json::from_str(raw.get()) {
-        Ok(value) => *place = value,
-        Err(_) => violations.add(wrong_type(&format!("/{name}"), raw, expected)),
-    }
-}
-
-fn unknown(fields: BTreeMap<String, &RawValue>, known: &str, violations: &mut Violations) {
-    // One more than are listed: the list shall say that there are more.
-    for name in fields.into_keys().take(violations::MOST + 1) {
-        let name = violations::name(&name);
-        violations.add(Violation {
-            pointer: format!("/{}", escape(&name)),
-            reason: "unknown_name".into(),
-            got: format!("{name:?}"),
-            expected: format!("one of {known}"),
-            hint: "Check the spelling, or leave it out.".into(),
-        });
-    }
+fn is_null(raw: &RawValue) -> bool {
+    raw.get() == "null"
 }
 
 fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
@@ -328,13 +277,6 @@ fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
         got,
         expected: expected.into(),
         hint: "See /v1/schema/problem.json for the problem itself.".into(),
-    }
-}
-
-fn together(violations: Violations, problem: Option<Problem>) -> Read<Problem> {
-    match problem {
-        Some(problem) if violations.is_empty() => Ok(problem),
-        _ => Err(violations.into_vec()),
     }
 }
 

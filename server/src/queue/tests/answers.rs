@@ -1,0 +1,166 @@
+//! Jobs of one input: earlier results, and twins.
+
+use super::*;
+
+#[tokio::test]
+async fn an_earlier_result_answers_at_once_and_survives_its_source() {
+    let rig = rig(fake::solve).await;
+    rig.queue.start();
+    let source = rig.submit_as(same()).await;
+    rig.until_done(&source).await;
+    let cached = rig.submit_as(same()).await;
+    assert_eq!(
+        (cached.status, cached.cached_from, cached.attempt),
+        (Status::Succeeded, Some(source.id), 1)
+    );
+    let events = rig.store.events_after(cached.key, 0, 100).await.unwrap();
+    let kinds: Vec<_> = events.iter().map(|event| event.payload.kind()).collect();
+    assert_eq!(kinds, ["status", "status", "done"]);
+    let part = |key| rig.store.piece(key, "fields", 0);
+    let bytes = part(source.key).await.unwrap().unwrap();
+    assert_eq!(cached.result_key, source.key);
+    rig.store.delete(source.key).await.unwrap();
+    assert_eq!(part(cached.result_key).await.unwrap(), Some(bytes));
+    // and goes with the last that serves it
+    rig.store.delete(cached.key).await.unwrap();
+    assert_eq!(part(cached.result_key).await.unwrap(), None);
+    let fresh = rig.submit_as(same()).await;
+    assert_eq!(fresh.cached_from, None);
+}
+
+#[tokio::test]
+async fn who_wants_no_earlier_result_gets_none_and_may_keep_his_own() {
+    let rig = rig(fake::solve).await;
+    rig.queue.start();
+    let off = rig.submit().await;
+    rig.until_done(&off).await;
+    let used = rig.submit_as(same()).await;
+    assert_eq!(used.cached_from, None, "an answer that was to stay private");
+    rig.until_done(&used).await;
+    let anew = NewJob {
+        cache: Cache::Refresh,
+        ..new(0)
+    };
+    let anew = rig.submit_as(anew).await;
+    assert_eq!(anew.cached_from, None);
+    rig.until_done(&anew).await;
+    let later = rig.submit_as(same()).await;
+    assert_eq!(later.cached_from, Some(anew.id));
+}
+
+#[tokio::test]
+async fn a_twin_ends_as_its_source_ends() {
+    let rig = rig(fake::solve).await; // its workers start later
+    let source = rig.submit_as(same()).await;
+    let twin = rig.submit_as(same()).await;
+    let place = twin.queue.clone().unwrap();
+    assert_eq!((place.position, place.reason), (1, Waiting::Joined));
+    assert_eq!(rig.store.waiting(), 2, "one in line, one for its end");
+    rig.queue.start();
+    let done = rig.until_done(&twin).await;
+    assert_eq!(
+        (done.status, done.cached_from, done.attempt),
+        (Status::Succeeded, Some(source.id), 1)
+    );
+    let twin = rig.store.job(twin.id).await.unwrap().unwrap();
+    assert_eq!(twin.result_key, source.key);
+}
+
+#[tokio::test]
+async fn canceling_one_of_two_twins_leaves_the_other() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start();
+    let source = rig.submit_as(same()).await;
+    let first = rig.submit_as(same()).await;
+    let second = rig.submit_as(same()).await;
+    // the twin alone
+    rig.queue.cancel(first.key).await.unwrap();
+    assert_eq!(rig.until_done(&first).await.status, Status::Canceled);
+    let source_now = rig.store.job(source.id).await.unwrap().unwrap();
+    assert_eq!(source_now.status, Status::Running);
+    // the source: the other twin takes its place
+    rig.queue.cancel(source.key).await.unwrap();
+    assert_eq!(rig.until_done(&source).await.status, Status::Canceled);
+    rig.until(&second, |event| event.seq == 2).await;
+    let second_now = rig.store.job(second.id).await.unwrap().unwrap();
+    assert_eq!(
+        (
+            second_now.status,
+            second_now.cached_from,
+            second_now.twin_of
+        ),
+        (Status::Running, None, None)
+    );
+}
+
+#[tokio::test]
+async fn twins_count_as_waiting_and_one_that_is_to_go_first_goes_alone() {
+    let rig = rig(fake::solve).await; // its workers start later
+    let source = rig.submit_as(same()).await;
+    let twin = rig.submit_as(same()).await;
+    let other = rig.submit_as(same()).await;
+    assert_eq!(rig.store.waiting(), 3);
+    let full = Submission {
+        max_queued: 3,
+        ..submission(vec![same()], None)
+    };
+    let refused = rig.queue.submit(full).await.unwrap_err();
+    assert!(matches!(refused, StoreError::QueueFull), "{refused}");
+    let first = Edit {
+        priority: Some(5),
+        ..Edit::default()
+    };
+    let twin = rig.store.edit(twin.id, &first, None).await.unwrap();
+    let place = twin.unwrap().unwrap().queue.unwrap();
+    assert_eq!(
+        (place.position, place.reason),
+        (1, Waiting::WorkersBusy),
+        "before its source"
+    );
+    assert_eq!(rig.store.waiting(), 3);
+    rig.queue.start();
+    // the source is answered by it when its turn comes, and the other twin by the source
+    for job in [&source, &other] {
+        assert_eq!(rig.until_done(job).await.status, Status::Succeeded);
+    }
+    let source = rig.store.job(source.id).await.unwrap().unwrap();
+    assert!(source.cached_from.is_some());
+    assert_eq!(rig.store.waiting(), 0);
+}
+
+/// A job that waits, with somebody who watches it, is answered in the commit of another one's submit.
+#[tokio::test]
+async fn who_is_answered_beside_a_submit_is_told_of_it() {
+    let rig = rig(fake::solve).await; // its workers never start: we claim in their place
+    let waiting = rig.submit_as(same()).await;
+    let anew = NewJob {
+        cache: Cache::Refresh,
+        ..new(5)
+    };
+    let source = rig.submit_as(anew).await;
+    let claim = rig.store.claim_next().await.unwrap().0.unwrap();
+    assert_eq!(claim.job.id, source.id);
+    let solved = Ending {
+        status: Status::Succeeded,
+        reason: None,
+        failure: None,
+        result: ResultAvailable::Final,
+    };
+    let finished = rig
+        .store
+        .finish(source.key, 1, &solved, LastWords::default(), None);
+    finished.await.unwrap().unwrap();
+    let submission = Submission {
+        claim: true,
+        ..submission(vec![new(0)], None)
+    };
+    let accepted = rig.store.submit(submission).await.unwrap();
+    assert!(accepted.changed.contains(&waiting.key), "{accepted:?}");
+    let answered = rig.store.job(waiting.id).await.unwrap().unwrap();
+    assert_eq!(
+        (answered.status, answered.cached_from),
+        (Status::Succeeded, Some(source.id))
+    );
+    let claimed = accepted.claim.unwrap().job;
+    assert_eq!(claimed.id, accepted.jobs[0].id);
+}

@@ -1,0 +1,141 @@
+//! The queue with stand-ins for the solver: what a real one does only on its worst days.
+#![allow(clippy::unwrap_used)]
+
+mod answers;
+mod line;
+mod starts;
+mod submits;
+
+use std::time::Instant;
+
+use solver::{
+    error::SolveError,
+    mesh::Mesh,
+    problem::Problem,
+    solution::{Observer, Outcome, Progress, Solution},
+};
+
+use super::*;
+use crate::{
+    digest,
+    event::{Event, Payload},
+    fake,
+    job::{Cache, JobId, Limits, Reason, ResultAvailable, Waiting},
+    store::{Edit, Filter, GroupBy, NewJob, Order, RequestKey, StoreError},
+};
+
+struct Rig {
+    store: Arc<Store>,
+    queue: Arc<Queue>,
+    folder: tempfile::TempDir,
+}
+
+async fn rig(solve: Solve) -> Rig {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let queue = Queue::new(store.clone(), solve, 1);
+    Rig {
+        store,
+        queue,
+        folder,
+    }
+}
+
+/// A job that is solved on its own.
+fn new(priority: i32) -> NewJob {
+    let problem = fake::problem();
+    NewJob {
+        id: None,
+        name: None,
+        labels: Default::default(),
+        priority,
+        limits: Limits::default(),
+        cache: Cache::Off,
+        parent: None,
+        title: problem.title.clone(),
+        input_hash: digest::input_hash(&problem).unwrap(),
+        problem: serde_json::to_string(&problem).unwrap(),
+        mesh: None,
+        payload: "payload".into(),
+    }
+}
+
+impl Rig {
+    async fn submit(&self) -> Job {
+        self.submit_as(new(0)).await
+    }
+
+    async fn submit_as(&self, new: NewJob) -> Job {
+        let submission = Submission {
+            jobs: vec![new],
+            key: None,
+            max_queued: 10,
+            claim: false,
+        };
+        let accepted = self.queue.submit(submission).await.unwrap();
+        accepted.jobs.into_iter().next().unwrap()
+    }
+
+    /// Ends a start by hand.
+    async fn finish(&self, job: &Job, attempt: i32) -> Option<Vec<i64>> {
+        let last = LastWords::default();
+        let ending = Ending::canceled();
+        let finished = self.store.finish(job.key, attempt, &ending, last, None);
+        finished.await.unwrap()
+    }
+
+    async fn until(&self, job: &Job, done: impl Fn(&Event) -> bool) -> Vec<Event> {
+        let mut news = self.queue.subscribe(job.key);
+        loop {
+            let events = self.store.events_after(job.key, 0, 100_000).await.unwrap();
+            if events.iter().any(&done) {
+                return events;
+            }
+            news.news().await;
+        }
+    }
+
+    async fn until_done(&self, job: &Job) -> Job {
+        let events = self
+            .until(job, |event| matches!(event.payload, Payload::Done { .. }))
+            .await;
+        assert!(
+            events
+                .iter()
+                .map(|event| event.seq)
+                .eq(1..=events.len() as i64),
+            "seq is dense from 1"
+        );
+        match events.into_iter().next_back().unwrap().payload {
+            // The number in our store is not part of the story.
+            Payload::Done { job: done } => Job {
+                key: job.key,
+                result_key: job.key,
+                cache: job.cache,
+                ..*done
+            },
+            other => unreachable!("{other:?} after done"),
+        }
+    }
+}
+
+/// With the input of the others, and ready to be answered with theirs.
+fn same() -> NewJob {
+    NewJob {
+        cache: Cache::Use,
+        ..new(0)
+    }
+}
+
+fn submission(jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
+    let key = key.map(|key| RequestKey {
+        key: key.into(),
+        payload: jobs[0].payload.clone(),
+    });
+    Submission {
+        jobs,
+        key,
+        max_queued: 1000,
+        claim: false,
+    }
+}

@@ -1,0 +1,367 @@
+//! What becomes of a start: its end, its cancel, its time-out, its drain.
+
+use super::*;
+
+#[tokio::test]
+async fn a_job_runs_to_its_end_and_its_result_is_stored() {
+    let rig = rig(fake::solve).await;
+    rig.queue.start();
+    let job = rig.submit().await;
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.result_available, done.attempt),
+        (Status::Succeeded, ResultAvailable::Final, 1)
+    );
+    assert!(
+        rig.store
+            .piece(job.key, "fields", 0)
+            .await
+            .unwrap()
+            .is_some()
+    );
+    let mut snapshot = rig.store.snapshot(job.id).await.unwrap().unwrap();
+    assert_eq!(snapshot.profiled_boundaries().await.unwrap(), ["top"]);
+}
+
+#[tokio::test]
+async fn a_panicking_solver_fails_its_job_and_not_its_worker() {
+    let rig = rig(fake::solve_with_a_panic).await;
+    rig.queue.start();
+    for _ in 0..2 {
+        let job = rig.submit().await;
+        let done = rig.until_done(&job).await;
+        assert_eq!(
+            (done.status, done.reason),
+            (Status::Failed, Some(Reason::Internal))
+        );
+        let detail = done.failure.unwrap().detail;
+        assert!(
+            detail.contains("incident") && !detail.contains("on purpose"),
+            "{detail}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_canceled_running_job_keeps_its_last_state() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start();
+    let job = rig.submit().await;
+    rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
+        .await;
+    assert_eq!(
+        rig.queue.cancel(job.key).await.unwrap(),
+        CancelOutcome::Requested { attempt: 1 }
+    );
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.result_available),
+        (Status::Canceled, ResultAvailable::Partial)
+    );
+    assert!(
+        rig.store
+            .piece(job.key, "fields", 0)
+            .await
+            .unwrap()
+            .is_none(),
+        "a canceled job has no fields"
+    );
+}
+
+/// Settles where the forces do not balance.
+fn unbalanced(
+    _: &Problem,
+    _: Option<&Mesh>,
+    _: &mut Observer<'_>,
+) -> std::result::Result<Solution, SolveError> {
+    let mut solution = fake::solution();
+    solution.summary.outcome = Outcome::FalseConvergence;
+    solution.summary.converged = false;
+    solution.summary.residuals.equilibrium = 0.5;
+    Ok(solution)
+}
+
+#[tokio::test]
+async fn a_job_that_converged_to_no_balance_fails_and_keeps_its_result() {
+    let rig = rig(unbalanced).await;
+    rig.queue.start();
+    let job = rig.submit().await;
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.reason, done.result_available),
+        (
+            Status::Failed,
+            Some(Reason::FalseConvergence),
+            ResultAvailable::Partial
+        )
+    );
+    let failure = done.failure.unwrap();
+    assert_eq!(failure.code, "false-convergence");
+    assert!(failure.detail.contains("5.000e-1"), "{}", failure.detail);
+    assert!(
+        rig.store
+            .piece(job.key, "fields", 0)
+            .await
+            .unwrap()
+            .is_some()
+    );
+}
+
+/// At work in one long phase, with nothing to tell.
+fn busy(
+    _: &Problem,
+    _: Option<&Mesh>,
+    observe: &mut Observer<'_>,
+) -> std::result::Result<Solution, SolveError> {
+    while observe(Progress::Pulse).is_continue() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    Err(SolveError::Stopped)
+}
+
+#[tokio::test]
+async fn a_pulse_is_answered_and_not_recorded() {
+    let rig = rig(busy).await;
+    rig.queue.start();
+    let job = rig.submit().await;
+    rig.until(&job, |event| event.seq == 2).await; // running
+    let start = Instant::now();
+    rig.queue.cancel(job.key).await.unwrap();
+    let done = rig.until_done(&job).await;
+    assert!(start.elapsed() < COOPERATION, "{:?}", start.elapsed());
+    assert_eq!((done.status, done.progress), (Status::Canceled, None));
+    let events = rig.store.events_after(job.key, 0, 100).await.unwrap();
+    let kinds: Vec<_> = events.iter().map(|event| event.payload.kind()).collect();
+    assert_eq!(kinds, ["status", "status", "done"]);
+}
+
+/// As one long factorisation: deaf for a second.
+fn deaf(
+    problem: &Problem,
+    _: Option<&Mesh>,
+    observe: &mut Observer<'_>,
+) -> std::result::Result<Solution, SolveError> {
+    std::thread::sleep(Duration::from_secs(1));
+    fake::solve(problem, None, observe)
+}
+
+#[tokio::test]
+async fn a_deaf_solver_delays_only_its_slot_and_not_the_cancel() {
+    let rig = rig(deaf).await;
+    rig.queue.start();
+    let job = rig.submit().await;
+    rig.until(&job, |event| {
+        matches!(
+            event.payload,
+            Payload::Status {
+                status: Status::Running,
+                ..
+            }
+        )
+    })
+    .await;
+    let start = Instant::now();
+    rig.queue.cancel(job.key).await.unwrap();
+    let done = rig.until_done(&job).await;
+    assert!(
+        start.elapsed() < Duration::from_millis(500),
+        "{:?}",
+        start.elapsed()
+    );
+    assert_eq!(
+        (done.status, done.result_available),
+        (Status::Canceled, ResultAvailable::None)
+    );
+    // The slot comes back, and the late result changes nothing.
+    let next = rig.submit().await;
+    assert_eq!(rig.until_done(&next).await.status, Status::Succeeded);
+    assert_eq!(rig.store.job(job.id).await.unwrap().unwrap(), done);
+}
+
+#[tokio::test]
+async fn a_running_job_that_no_worker_holds_is_canceled_at_once() {
+    let rig = rig(fake::solve).await; // its workers never start: nobody holds what we claim
+    let job = rig.submit().await;
+    rig.store.claim_next().await.unwrap().0.unwrap();
+    let outcome = rig.queue.cancel(job.key).await.unwrap();
+    assert!(matches!(outcome, CancelOutcome::Canceled(_)), "{outcome:?}");
+    assert_eq!(rig.until_done(&job).await.status, Status::Canceled);
+    assert_eq!(
+        rig.queue.cancel(job.key).await.unwrap(),
+        CancelOutcome::AlreadyTerminal
+    );
+}
+
+#[tokio::test]
+async fn a_drain_puts_a_running_job_back_without_using_up_a_start() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start();
+    let job = rig.submit().await;
+    rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
+        .await;
+    rig.queue.drain().await;
+    let drained = rig.store.job(job.id).await.unwrap().unwrap();
+    assert_eq!(
+        (drained.status, drained.attempt, drained.max_attempts),
+        (Status::Queued, 1, 4)
+    );
+}
+
+#[tokio::test]
+async fn a_job_that_loses_three_workers_fails() {
+    let rig = rig(fake::solve).await; // its workers never start: we claim, and die, in their place
+    let job = rig.submit().await;
+    for attempt in 1..=3 {
+        let claim = rig.store.claim_next().await.unwrap().0.unwrap();
+        assert_eq!((claim.job.id, claim.job.attempt), (job.id, attempt));
+        assert_eq!(rig.store.requeue_interrupted().await.unwrap(), 1);
+    }
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.reason),
+        (Status::Failed, Some(Reason::WorkerLost))
+    );
+}
+
+#[tokio::test]
+async fn a_running_job_with_a_cancel_request_is_canceled_at_the_next_start() {
+    let rig = rig(fake::solve).await;
+    let job = rig.submit().await;
+    rig.store.claim_next().await.unwrap().0.unwrap();
+    rig.store.request_cancel(job.key).await.unwrap();
+    rig.store.requeue_interrupted().await.unwrap();
+    assert_eq!(rig.until_done(&job).await.status, Status::Canceled);
+}
+
+#[tokio::test]
+async fn a_drain_says_what_became_of_each_job() {
+    let rig = rig(fake::solve).await;
+    let (one, two) = (rig.submit().await, rig.submit().await);
+    for _ in 0..2 {
+        rig.store.claim_next().await.unwrap().0.unwrap();
+    }
+    rig.store.request_cancel(one.key).await.unwrap();
+    let drain = async |job: &Job| rig.store.requeue_drained(job.key, 1).await.unwrap();
+    assert_eq!(drain(&one).await, Some(Status::Canceled));
+    assert_eq!(drain(&two).await, Some(Status::Queued));
+    assert_eq!(drain(&two).await, None, "it runs no more");
+}
+
+#[tokio::test]
+async fn what_an_overtaken_start_says_is_not_recorded() {
+    let rig = rig(fake::solve).await;
+    let job = rig.submit().await;
+    rig.store.claim_next().await.unwrap().0.unwrap();
+    rig.store.requeue_interrupted().await.unwrap();
+    let again = rig.store.claim_next().await.unwrap().0.unwrap();
+    let line = [(
+        crate::time::Time::now(),
+        Payload::Iteration(fake::iteration(1)),
+    )];
+    assert!(
+        !rig.store
+            .append_events(job.key, 1, &line, &Default::default())
+            .await
+            .unwrap()
+    );
+    assert_eq!(rig.finish(&job, 1).await, None);
+    assert!(
+        rig.store
+            .append_events(job.key, again.job.attempt, &line, &Default::default())
+            .await
+            .unwrap()
+    );
+}
+
+#[tokio::test]
+async fn a_job_out_of_time_fails_and_keeps_its_last_state() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start();
+    let mut short = new(0);
+    short.limits.timeout_s = 0.05;
+    let job = rig.submit_as(short).await;
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.reason, done.result_available),
+        (
+            Status::Failed,
+            Some(Reason::TimedOut),
+            ResultAvailable::Partial
+        )
+    );
+    assert_eq!(done.failure.unwrap().code, "timed-out");
+}
+
+#[tokio::test]
+async fn a_deaf_solver_out_of_time_is_ended_over_its_head() {
+    fn very_deaf(
+        _: &Problem,
+        _: Option<&Mesh>,
+        _: &mut Observer<'_>,
+    ) -> std::result::Result<Solution, SolveError> {
+        std::thread::sleep(Duration::from_secs(4));
+        Err(SolveError::Stopped)
+    }
+    let rig = rig(very_deaf).await;
+    rig.queue.start();
+    let mut short = new(0);
+    short.limits.timeout_s = 0.05;
+    let job = rig.submit_as(short).await;
+    let start = Instant::now();
+    let done = rig.until_done(&job).await;
+    assert_eq!(done.reason, Some(Reason::TimedOut));
+    assert!(
+        start.elapsed() < Duration::from_secs(3),
+        "{:?}",
+        start.elapsed()
+    );
+    assert_eq!(rig.queue.state().idle, 0, "its slot waits for the solver");
+}
+
+/// Eight steps that take no time: what they found is written once, and not eight times.
+#[tokio::test]
+async fn what_many_quick_steps_have_found_is_not_written_after_each() {
+    fn quick_steps(
+        _: &Problem,
+        _: Option<&Mesh>,
+        observe: &mut Observer<'_>,
+    ) -> std::result::Result<Solution, SolveError> {
+        let mut solution = fake::solution();
+        for _ in 0..8 {
+            if observe(Progress::Step(&solution)).is_break() {
+                return Err(SolveError::Stopped);
+            }
+        }
+        while observe(Progress::Pulse).is_continue() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        solution.summary.outcome = Outcome::Canceled;
+        Err(SolveError::Stopped)
+    }
+    let rig = rig(quick_steps).await;
+    rig.queue.start();
+    let job = rig.submit().await;
+    let found = loop {
+        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        if job.result_available == ResultAvailable::Partial {
+            break job;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    };
+    assert_eq!(
+        (found.status, found.result_key),
+        (Status::Running, -job.key)
+    );
+    rig.queue.cancel(job.key).await.unwrap();
+    let done = rig.until_done(&job).await;
+    assert_eq!(
+        (done.status, done.result_available),
+        (Status::Canceled, ResultAvailable::Partial)
+    );
+    let mut kept = rig.store.snapshot(job.id).await.unwrap().unwrap();
+    assert!(kept.part("summary").await.unwrap().is_some());
+    assert!(
+        kept.part("history").await.unwrap().is_none(),
+        "what was told went on after it"
+    );
+}

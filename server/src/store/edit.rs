@@ -1,0 +1,91 @@
+//! Changing what may be changed of a job: its names, its priority, how long it is kept.
+
+use std::collections::BTreeMap;
+
+use super::{
+    Result, Store,
+    line::Move,
+    rows::{from_row, read},
+    submit, twins,
+};
+use crate::job::{Job, JobId};
+
+/// What is changed of a job; what is absent stays.
+#[derive(Clone, Debug, Default)]
+pub struct Edit {
+    /// A name, or none.
+    pub name: Option<Option<String>>,
+    /// All labels.
+    pub labels: Option<BTreeMap<String, String>>,
+    /// −10 … 10.
+    pub priority: Option<i32>,
+    /// Never removed by age.
+    pub pinned: Option<bool>,
+}
+
+impl Store {
+    /// Changes what may be changed of a job, if it still is of that version. `Err` holds the version
+    /// that it is of instead; `None`: there is no such job.
+    pub async fn edit(
+        &self,
+        id: JobId,
+        edit: &Edit,
+        version: Option<i64>,
+    ) -> Result<Option<std::result::Result<Job, i64>>> {
+        let mut change = self.change().await?;
+        let row = sqlx::query("select * from job where uuid = ?")
+            .bind(id.0.to_string())
+            .fetch_optional(change.sql())
+            .await?;
+        let Some(row) = row else { return Ok(None) };
+        let job = from_row(&row)?;
+        if version.is_some_and(|version| version != job.version) {
+            return Ok(Some(Err(job.version)));
+        }
+        let key = job.key;
+        let name = edit.name.as_ref().unwrap_or(&job.name);
+        let labels = edit.labels.as_ref().unwrap_or(&job.labels);
+        let priority = edit.priority.unwrap_or(job.priority);
+        let pinned = edit.pinned.unwrap_or(job.pinned);
+        let same = *name == job.name
+            && *labels == job.labels
+            && priority == job.priority
+            && pinned == job.pinned;
+        if !same {
+            sqlx::query(
+                "update job set name = ?, labels = ?, priority = ?, pinned = ?, version = version + 1 where id = ?",
+            )
+            .bind(name)
+            .bind(serde_json::to_string(labels)?)
+            .bind(priority)
+            .bind(pinned)
+            .bind(key)
+            .execute(change.sql())
+            .await?;
+            if *labels != job.labels {
+                sqlx::query("delete from job_label where job_id = ?")
+                    .bind(key)
+                    .execute(change.sql())
+                    .await?;
+                submit::write_labels(&mut change, key, job.created_at, labels).await?;
+            }
+            if job.waits_in_line() && priority != job.priority {
+                let left = job.priority;
+                change.moves(Move::Leave {
+                    priority: left,
+                    key,
+                });
+                change.moves(Move::Enter { priority, key });
+            }
+            if let Some(source) = job.twin_of {
+                twins::leave_source(&mut change, &job, source, priority).await?;
+            }
+        }
+        let edited = read(change.sql(), key).await?;
+        change.commit().await?;
+        let mut edited = [edited];
+        self.try_to_place(&mut edited).await;
+        let [edited] = edited;
+        Ok(Some(Ok(edited)))
+    }
+}
