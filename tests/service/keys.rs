@@ -15,6 +15,16 @@ fn body(name: &str) -> Value {
     json!({ "problem": example_json("sheet"), "name": name, "cache": "off" })
 }
 
+/// The same over gRPC.
+fn grpc_body(name: &str) -> pb::CreateJobRequest {
+    pb::CreateJobRequest {
+        problem: Some(message(&example("sheet"))),
+        name: Some(name.into()),
+        cache: pb::Cache::Off.into(),
+        ..Default::default()
+    }
+}
+
 #[tokio::test]
 async fn a_key_answers_with_the_same_job_as_it_is_now() {
     let server = server().await;
@@ -47,12 +57,9 @@ async fn a_key_answers_with_the_same_job_as_it_is_now() {
 
     // the same key over the other protocol is the same request
     let mut grpc = connect(&server).await;
-    let request = |name: &str| pb::CreateJobRequest {
-        problem: Some(message(&example("sheet"))),
-        name: Some(name.into()),
-        cache: pb::Cache::Off.into(),
+    let request = |name| pb::CreateJobRequest {
         request_id: Some("k".into()),
-        ..Default::default()
+        ..grpc_body(name)
     };
     let twin = grpc.create_job(request("a")).await.unwrap();
     assert_eq!(twin.metadata().get("idempotency-replayed").unwrap(), "true");
@@ -122,12 +129,9 @@ async fn a_job_may_have_a_name_of_the_clients_own() {
     let (status, _) = put("job_7", body("a")).await;
     assert_eq!(status, StatusCode::NOT_FOUND);
     let mut grpc = connect(&server).await;
-    let request = |name: &str| pb::CreateJobRequest {
-        problem: Some(message(&example("sheet"))),
-        name: Some(name.into()),
-        cache: pb::Cache::Off.into(),
+    let request = |name| pb::CreateJobRequest {
         job_id: Some(id.into()),
-        ..Default::default()
+        ..grpc_body(name)
     };
     let twin = grpc.create_job(request("a")).await.unwrap().into_inner();
     assert_eq!(twin.status(), pb::Status::Succeeded);
@@ -204,14 +208,8 @@ async fn a_batch_is_accepted_whole_or_not_at_all() {
     );
 
     let mut grpc = connect(&server).await;
-    let job = |name: &str| pb::CreateJobRequest {
-        problem: Some(message(&example("sheet"))),
-        name: Some(name.into()),
-        cache: pb::Cache::Off.into(),
-        ..Default::default()
-    };
     let request = pb::BatchCreateJobsRequest {
-        jobs: vec![job("a"), job("b"), job("c")],
+        jobs: vec![grpc_body("a"), grpc_body("b"), grpc_body("c")],
         request_id: Some("b".into()),
     };
     let twin = grpc.batch_create_jobs(request).await.unwrap().into_inner();

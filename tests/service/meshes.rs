@@ -85,41 +85,20 @@ async fn a_mesh_is_stored_once_and_told_apart_by_its_content() {
         (StatusCode::CREATED, &json!("abaqus"))
     );
 
-    let list: Value = server
-        .get("/v1/meshes?page_size=1")
-        .send()
-        .await
-        .unwrap()
-        .json()
-        .await
-        .unwrap();
+    let list: Value = server.json("/v1/meshes?page_size=1").await;
     assert_eq!(list["meshes"][0], deck);
     let next = format!(
         "/v1/meshes?page_size=1&page_token={}",
         list["next_page_token"].as_str().unwrap()
     );
-    let rest: Value = server
-        .get(&next)
-        .send()
-        .await
-        .unwrap()
-        .json()
-        .await
-        .unwrap();
+    let rest: Value = server.json(&next).await;
     assert_eq!(
         (&rest["meshes"][0], &rest["next_page_token"]),
         (&first, &Value::Null)
     );
 
     let path = format!("/v1/meshes/{}", deck["hash"].as_str().unwrap());
-    let one: Value = server
-        .get(&path)
-        .send()
-        .await
-        .unwrap()
-        .json()
-        .await
-        .unwrap();
+    let one: Value = server.json(&path).await;
     assert_eq!(one, deck);
     for (request, status) in [
         (server.delete(&path), StatusCode::NO_CONTENT),
