@@ -234,11 +234,9 @@ impl JobService for Grpc {
 
     async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {
         let id = id(&request.into_inner().id)?;
-        let (summary, steps) = results::summary(&self.service, id).await?;
-        Ok(Response::new(pb::Result {
-            summary: Some(summary.into()),
-            steps: steps.into_iter().map(Into::into).collect(),
-        }))
+        Ok(Response::new(
+            results::result(&self.service, id).await?.into(),
+        ))
     }
 
     async fn get_profile(

@@ -205,6 +205,8 @@ async fn both_protocols_serve_every_load_step() {
         .await
         .unwrap()
         .into_inner();
+    assert_eq!(result["result_available"], "final");
+    assert_eq!(twin.result_available(), pb::ResultAvailable::Final);
     let (steps, twins) = (result["steps"].as_array().unwrap(), twin.steps);
     assert_eq!((steps.len(), twins.len()), (2, 2));
     for (step, twin) in steps.iter().zip(twins) {

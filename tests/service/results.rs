@@ -18,8 +18,12 @@ async fn a_result_has_its_summary_profiles_and_fields() {
     let result = server.json(&format!("/v1/jobs/{id}/result")).await;
     let summary = &result["summary"];
     assert_eq!(
-        (&summary["converged"], &result["steps"]),
-        (&json!(true), &json!([]))
+        (
+            &result["result_available"],
+            &summary["converged"],
+            &result["steps"]
+        ),
+        (&json!("final"), &json!(true), &json!([]))
     );
     // Thesis 4.1(i) on the coarse grid: T = +14.17.
     assert!((summary["tangential_force"].as_f64().unwrap() - 14.17).abs() < 0.01);
@@ -275,6 +279,11 @@ async fn finished_load_steps_of_a_running_job_are_served() {
     let result = server.json(&at("result")).await;
     let steps = result["steps"].as_array().unwrap();
     assert_eq!((steps.len(), &steps[0]["name"]), (1, &json!("indent")));
+    // its summary has converged; that there is more to come is said beside it
+    assert_eq!(
+        (&result["result_available"], &result["summary"]["converged"]),
+        (&json!("partial"), &json!(true))
+    );
     let first = result["summary"]["normal_force"].as_f64().unwrap();
     assert!(first > 0.0);
     let profile = server.json(&at("profiles/top?step=indent")).await;
@@ -296,6 +305,7 @@ async fn finished_load_steps_of_a_running_job_are_served() {
     );
     let result = server.json(&at("result")).await;
     assert_eq!(result["steps"][0]["summary"]["normal_force"], first);
+    assert_eq!(result["result_available"], "partial");
 }
 
 #[tokio::test]

@@ -24,7 +24,7 @@ use crate::{
         jobs::Cancellation,
         problems::Judgement,
         queue::{Caller, Info, QueueState, ServiceLimits},
-        results::StepResult,
+        results::{JobResult, StepResult},
     },
 };
 
@@ -122,11 +122,7 @@ impl From<Job> for pb::Job {
                     detail,
                 },
             ),
-            result_available: match job.result_available {
-                ResultAvailable::None => pb::ResultAvailable::None.into(),
-                ResultAvailable::Partial => pb::ResultAvailable::Partial.into(),
-                ResultAvailable::Final => pb::ResultAvailable::Final.into(),
-            },
+            result_available: pb::ResultAvailable::from(job.result_available).into(),
             cached_from: job.cached_from.map(|id| id.to_string()),
             parent: job.parent.map(|id| id.to_string()),
             pinned: job.pinned,
@@ -372,6 +368,31 @@ impl From<Summary> for pb::Summary {
             input_hash,
             digest,
             ..solution.into()
+        }
+    }
+}
+
+impl From<ResultAvailable> for pb::ResultAvailable {
+    fn from(available: ResultAvailable) -> Self {
+        match available {
+            ResultAvailable::None => pb::ResultAvailable::None,
+            ResultAvailable::Partial => pb::ResultAvailable::Partial,
+            ResultAvailable::Final => pb::ResultAvailable::Final,
+        }
+    }
+}
+
+impl From<JobResult> for pb::Result {
+    fn from(result: JobResult) -> Self {
+        let JobResult {
+            result_available,
+            summary,
+            steps,
+        } = result;
+        pb::Result {
+            summary: Some(summary.into()),
+            steps: steps.into_iter().map(Into::into).collect(),
+            result_available: pb::ResultAvailable::from(result_available).into(),
         }
     }
 }

@@ -7,8 +7,6 @@ use axum::{
     http::{HeaderMap, header},
     response::Response,
 };
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::{
     Rest, data,
@@ -17,26 +15,16 @@ use super::{
 use crate::{
     error::ApiError,
     formats::{self, Format},
-    run::Summary,
-    verbs::results::{self, Points},
+    verbs::results::{self, JobResult, Points},
 };
-
-/// The scalars of a result, whole and by load step.
-#[derive(Serialize, JsonSchema)]
-#[schemars(rename = "Result")]
-pub(super) struct Found {
-    summary: Summary,
-    steps: Vec<results::StepResult>,
-}
 
 pub(super) async fn result(
     State(rest): State<Rest>,
     RawQuery(query): RawQuery,
     path: JobPath,
-) -> Result<Json<Found>, ApiError> {
+) -> Result<Json<JobResult>, ApiError> {
     Params::parse(query.as_deref(), &[])?;
-    let (summary, steps) = results::summary(&rest.service, path.id).await?;
-    Ok(Json(Found { summary, steps }))
+    Ok(Json(results::result(&rest.service, path.id).await?))
 }
 
 pub(super) async fn history(

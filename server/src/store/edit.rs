@@ -76,6 +76,7 @@ impl Store {
                     key,
                 });
                 change.moves(Move::Enter { priority, key });
+                twins::overtake(&mut change, key, priority).await?;
             }
             if let Some(source) = job.twin_of {
                 twins::leave_source(&mut change, &job, source, priority).await?;

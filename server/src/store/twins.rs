@@ -53,39 +53,61 @@ pub(super) async fn under_way(change: &mut Change<'_>, new: &NewJob) -> Result<O
     Ok((twins < MOST_TWINS).then_some(source))
 }
 
+/// The jobs that wait for the end of this one, in the order in which they would run.
+async fn twins_of(change: &mut Change<'_>, source: i64) -> Result<Vec<Job>> {
+    let rows = sqlx::query("select * from job where twin_of = ? order by priority desc, id")
+        .bind(source)
+        .fetch_all(change.sql())
+        .await?;
+    rows.iter().map(from_row).collect()
+}
+
 /// What becomes of the jobs that waited for the end of this one: they end as it has ended, or the first of
 /// them takes its place.
 pub(super) async fn settle(change: &mut Change<'_>, job: &Job) -> Result<()> {
-    let twins = sqlx::query("select * from job where twin_of = ? order by priority desc, id")
-        .bind(job.key)
-        .fetch_all(change.sql())
-        .await?;
-    let twins = twins.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
-    if twins.is_empty() {
+    let twins = twins_of(change, job.key).await?;
+    let Some(first) = twins.first() else {
         return Ok(());
-    }
+    };
     let source = read(change.sql(), job.key).await?;
-    if is_shared(source.status, source.reason) {
-        for twin in &twins {
-            answer(change, twin, &source).await?;
-        }
-    } else if let Some((first, others)) = twins.split_first() {
-        // the first takes the place of its source; the others wait for it
-        let (priority, key) = (first.priority, first.key);
-        sqlx::query("update job set twin_of = null where id = ?")
-            .bind(key)
-            .execute(change.sql())
-            .await?;
-        change.moves(Move::Part);
-        change.moves(Move::Enter { priority, key });
-        if !others.is_empty() {
-            sqlx::query("update job set twin_of = ? where twin_of = ?")
-                .bind(key)
-                .bind(job.key)
-                .execute(change.sql())
-                .await?;
-        }
+    if !is_shared(source.status, source.reason) {
+        return succeed(change, first, job.key).await;
     }
+    for twin in &twins {
+        answer(change, twin, &source).await?;
+    }
+    Ok(())
+}
+
+/// A queued job has a lower priority now. If one of its twins goes before it, the others wait for that one.
+pub(super) async fn overtake(change: &mut Change<'_>, source: i64, priority: i32) -> Result<()> {
+    let twins = twins_of(change, source).await?;
+    match twins.first() {
+        Some(first) if first.priority > priority => succeed(change, first, source).await,
+        _ => Ok(()),
+    }
+}
+
+/// A twin takes the place of its source; the others wait for it.
+async fn succeed(change: &mut Change<'_>, twin: &Job, source: i64) -> Result<()> {
+    part(change, twin, twin.priority).await?;
+    sqlx::query("update job set twin_of = ? where twin_of = ?")
+        .bind(twin.key)
+        .bind(source)
+        .execute(change.sql())
+        .await?;
+    Ok(())
+}
+
+/// A twin waits in line itself.
+async fn part(change: &mut Change<'_>, twin: &Job, priority: i32) -> Result<()> {
+    let key = twin.key;
+    sqlx::query("update job set twin_of = null where id = ?")
+        .bind(key)
+        .execute(change.sql())
+        .await?;
+    change.moves(Move::Part);
+    change.moves(Move::Enter { priority, key });
     Ok(())
 }
 
@@ -93,7 +115,9 @@ pub(super) async fn settle(change: &mut Change<'_>, job: &Job) -> Result<()> {
 fn is_shared(status: Status, reason: Option<Reason>) -> bool {
     match status {
         Status::Succeeded => true,
-        Status::Failed => reason.is_some_and(Reason::belongs_to_the_problem),
+        // what has cost the process several times is not tried again for each of them
+        Status::Failed => reason
+            .is_some_and(|reason| reason.belongs_to_the_problem() || reason == Reason::WorkerLost),
         Status::Queued | Status::Running | Status::Canceled => false,
     }
 }
@@ -130,12 +154,5 @@ pub(super) async fn leave_source(
     if source.status != Status::Queued || source.priority >= priority {
         return Ok(());
     }
-    let key = job.key;
-    sqlx::query("update job set twin_of = null where id = ?")
-        .bind(key)
-        .execute(change.sql())
-        .await?;
-    change.moves(Move::Part);
-    change.moves(Move::Enter { priority, key });
-    Ok(())
+    part(change, job, priority).await
 }

@@ -28,13 +28,29 @@ pub struct StepResult {
     pub summary: solver::solution::Summary,
 }
 
-/// The summary of a job that has one, and those of its load steps: of one that runs, those that are done.
-pub async fn summary(service: &Service, id: JobId) -> Result<(Summary, Vec<StepResult>), ApiError> {
+/// The scalars of a result, whole and by load step.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Result")]
+pub struct JobResult {
+    /// As of the job: `partial` where it has not come to its end, or to none that can be trusted. The summary
+    /// may say that the last finished load step has converged; the others are missing all the same.
+    pub result_available: ResultAvailable,
+    /// That of the last load step that is done.
+    pub summary: Summary,
+    /// Those that are done.
+    pub steps: Vec<StepResult>,
+}
+
+/// The scalars of a job that has some.
+pub async fn result(service: &Service, id: JobId) -> Result<JobResult, ApiError> {
     let mut found = with_result(service, id).await?;
     let bytes = found.part("summary").await?;
     let bytes = bytes.ok_or_else(|| ApiError::internal(format!("{id} has no summary")))?;
-    let summary = serde_json::from_slice(&bytes).map_err(ApiError::internal)?;
-    Ok((summary, steps(&mut found).await?))
+    Ok(JobResult {
+        result_available: found.job.result_available,
+        summary: serde_json::from_slice(&bytes).map_err(ApiError::internal)?,
+        steps: steps(&mut found).await?,
+    })
 }
 
 async fn steps(found: &mut Snapshot) -> Result<Vec<StepResult>, ApiError> {

@@ -106,12 +106,8 @@ async fn twins_count_as_waiting_and_one_that_is_to_go_first_goes_alone() {
     };
     let refused = rig.queue.submit(full).await.unwrap_err();
     assert!(matches!(refused, StoreError::QueueFull), "{refused}");
-    let first = Edit {
-        priority: Some(5),
-        ..Edit::default()
-    };
-    let twin = rig.store.edit(twin.id, &first, None).await.unwrap();
-    let place = twin.unwrap().unwrap().queue.unwrap();
+    let twin = rig.put_at(&twin, 5).await;
+    let place = twin.queue.unwrap();
     assert_eq!(
         (place.position, place.reason),
         (1, Waiting::WorkersBusy),
@@ -163,4 +159,43 @@ async fn who_is_answered_beside_a_submit_is_told_of_it() {
     );
     let claimed = accepted.claim.unwrap().job;
     assert_eq!(claimed.id, accepted.jobs[0].id);
+}
+
+#[tokio::test]
+async fn a_source_that_is_to_go_later_leaves_its_place_to_its_first_twin() {
+    let rig = rig(fake::solve).await; // its workers start later
+    let source = rig.submit_as(same()).await;
+    let twin = rig.submit_as(same()).await;
+    let other = rig.submit_as(same()).await;
+    let source = rig.put_at(&source, -1).await;
+    assert_eq!(source.queue.unwrap().position, 2);
+    let found = async |job: &Job| rig.store.job(job.id).await.unwrap().unwrap();
+    assert_eq!(found(&twin).await.queue.unwrap().position, 1);
+    assert_eq!(found(&other).await.twin_of, Some(twin.key));
+    assert_eq!(rig.store.waiting(), 3);
+    rig.queue.start();
+    for job in [&twin, &other] {
+        assert_eq!(rig.until_done(job).await.status, Status::Succeeded);
+    }
+    assert_eq!(found(&other).await.cached_from, Some(twin.id));
+}
+
+#[tokio::test]
+async fn a_poison_job_takes_the_process_down_three_times_and_not_once_more_for_a_twin() {
+    let rig = rig(fake::solve).await; // its workers never start: we claim, and die, in their place
+    let poison = rig.submit_as(same()).await;
+    let twin = rig.submit_as(same()).await;
+    for _ in 1..=3 {
+        let claim = rig.store.claim_next().await.unwrap().0.unwrap();
+        assert_eq!(claim.job.key, poison.key);
+        rig.store.requeue_interrupted().await.unwrap();
+    }
+    for job in [&poison, &twin] {
+        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        assert_eq!(
+            (job.status, job.reason),
+            (Status::Failed, Some(Reason::WorkerLost))
+        );
+    }
+    assert!(rig.store.claim_next().await.unwrap().0.is_none());
 }

@@ -76,6 +76,15 @@ impl Rig {
         accepted.jobs.into_iter().next().unwrap()
     }
 
+    async fn put_at(&self, job: &Job, priority: i32) -> Job {
+        let edit = Edit {
+            priority: Some(priority),
+            ..Edit::default()
+        };
+        let edited = self.store.edit(job.id, &edit, None).await.unwrap();
+        edited.unwrap().unwrap()
+    }
+
     /// Ends a start by hand.
     async fn finish(&self, job: &Job, attempt: i32) -> Option<Vec<i64>> {
         let last = LastWords::default();

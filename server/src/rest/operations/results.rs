@@ -12,6 +12,7 @@ use crate::{
     catalog::Code,
     formats::Format,
     rest::{plots, results},
+    verbs::results::JobResult,
 };
 
 pub(super) fn operations() -> Vec<Operation> {
@@ -19,7 +20,7 @@ pub(super) fn operations() -> Vec<Operation> {
         get("/v1/jobs/{id}/result", results::result)
             .rpcs(&["GetResult"])
             .says("Sums up what a job has found, whole and by load step")
-            .answers(200, "The summary", json::<results::Found>())
+            .answers(200, "The summary", json::<JobResult>())
             .fails(NOTHING)
             .tested(&[
                 "service::results::a_result_has_its_summary_profiles_and_fields",
