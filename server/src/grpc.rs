@@ -9,7 +9,9 @@ use tonic::{Request, Response, Status, Streaming, metadata::MetadataValue, servi
 use tonic_health::server::HealthReporter;
 
 use crate::{
-    convert::{bad, draft, edit, filter, judgement, problem_from_pb, problem_to_pb},
+    convert::{
+        bad, draft, edit, filter, judgement, limits_from_pb, problem_from_pb, problem_to_pb,
+    },
     error::ApiError,
     formats::Format,
     job::{Job, JobId},
@@ -23,7 +25,7 @@ use crate::{
         jobs::{self, MAX_PAGE_SIZE, Many, PAGE_SIZE},
         meshes, problems, queue,
         results::{self, Points},
-        submit::{self, Draft, Handed},
+        submit::{self, Changes, Draft, Handed},
         watch::{self, Until},
     },
     violations,
@@ -206,7 +208,7 @@ impl JobService for Grpc {
         let until = match (until_terminal, version) {
             (true, _) => Until::Terminal,
             (false, Some(version)) => Until::Changed(version),
-            (false, None) => Until::Changed(jobs::get(&self.service, id).await?.version),
+            (false, None) => Until::News,
         };
         let (job, met) = watch::wait(&self.service, id, until, wait_s).await?;
         Ok(Response::new(pb::WaitJobResponse {
@@ -255,7 +257,12 @@ impl JobService for Grpc {
             Some(text) => match Points::parse(text) {
                 // more would not fit into a message
                 Some(Points::Spaced(count)) if count > MAX_PLACES => {
-                    return Err(bad("points", text, "at most 10000 places over gRPC").into());
+                    return Err(bad(
+                        "points",
+                        text,
+                        "nodes, friction, or a number from 2 to 10000 (REST: 100000)",
+                    )
+                    .into());
                 }
                 Some(points) => points,
                 None => return Err(bad("points", text, Points::EXPECTED).into()),
@@ -353,8 +360,14 @@ impl JobService for Grpc {
         let pb::RetryJobRequest {
             id: name,
             request_id,
+            limits,
+            priority,
         } = request.into_inner();
-        let handed = submit::retry(&self.service, id(&name)?, request_id).await?;
+        let changes = Changes {
+            limits: limits.map(limits_from_pb),
+            priority,
+        };
+        let handed = submit::retry(&self.service, id(&name)?, changes, request_id).await?;
         let response = Response::new(handed.accepted.into());
         Ok(noting_replay(response, handed.replayed))
     }

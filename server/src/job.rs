@@ -332,7 +332,8 @@ impl ResultAvailable {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
-    /// Seconds from a start to the end; then it fails with `timed_out`.
+    /// Seconds from a start to the end; then it fails with `timed_out`. Its solver then has two more to hand
+    /// over its last state.
     pub timeout_s: f64,
     /// Seconds that it may wait for a start; then it fails with `queue_expired`.
     pub queue_ttl_s: f64,

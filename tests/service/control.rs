@@ -53,10 +53,64 @@ async fn a_job_that_has_ended_is_tried_again_as_a_new_one() {
     let mut grpc = connect(&server).await;
     let request = pb::RetryJobRequest {
         id: id.into(),
-        request_id: None,
+        ..Default::default()
     };
     let third = grpc.retry_job(request).await.unwrap().into_inner();
     assert_eq!(third.parent.as_deref(), Some(id));
+}
+
+#[tokio::test]
+async fn a_job_that_ran_out_of_time_is_given_more() {
+    let server = server().await;
+    let body = json!({ "problem": large(), "cache": "off", "limits": { "timeout_s": 0.2 } });
+    let first = server.solve(&body).await;
+    assert_eq!(first["reason"], "timed_out");
+    let retry = format!("/v1/jobs/{}/retry", first["id"].as_str().unwrap());
+    let (status, second) = answer(
+        server
+            .post(&retry)
+            .json(&json!({ "limits": { "timeout_s": 900, "queue_ttl_s": 60 }, "priority": 3 })),
+    )
+    .await;
+    assert_eq!(status, StatusCode::ACCEPTED);
+    assert_eq!(
+        (&second["limits"], &second["priority"]),
+        (
+            &json!({ "timeout_s": 900.0, "queue_ttl_s": 60.0 }),
+            &json!(3)
+        )
+    );
+    assert_eq!(second["parent"], first["id"]);
+    server.cancel(second["id"].as_str().unwrap()).await;
+    // what it does not know, and what is out of bounds
+    for (body, pointer) in [
+        (json!({ "timeout_s": 900 }), "/timeout_s"),
+        (
+            json!({ "limits": { "timeout_s": -1 } }),
+            "/limits/timeout_s",
+        ),
+        (json!({ "priority": 11 }), "/priority"),
+    ] {
+        let (status, refused) = answer(server.post(&retry).json(&body)).await;
+        assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
+        assert_eq!(refused["errors"][0]["pointer"], pointer, "{refused}");
+    }
+    let request = pb::RetryJobRequest {
+        id: first["id"].as_str().unwrap().into(),
+        limits: Some(pb::Limits {
+            timeout_s: Some(800.0),
+            queue_ttl_s: None,
+        }),
+        priority: Some(-2),
+        ..Default::default()
+    };
+    let third = connect(&server).await.retry_job(request).await;
+    let third = third.unwrap().into_inner();
+    assert_eq!(
+        (third.limits.unwrap().timeout_s, third.priority),
+        (Some(800.0), -2)
+    );
+    server.cancel(&third.id).await;
 }
 
 #[tokio::test]

@@ -140,7 +140,7 @@ async fn what_one_protocol_refuses_the_other_refuses_alike() {
         );
         let retry = pb::RetryJobRequest {
             id: id.clone(),
-            request_id: None,
+            ..Default::default()
         };
         let retried = rest(Method::POST, &at("/retry"), None).await;
         assert_eq!(refused(grpc.retry_job(retry).await), retried);

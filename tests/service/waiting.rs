@@ -81,8 +81,12 @@ async fn a_long_poll_returns_with_the_next_version_or_at_its_limit() {
     assert_eq!(status, StatusCode::OK);
     assert!(time < Duration::from_secs(20), "{time:?}");
     assert_eq!(server.job(&id).await["status"], "succeeded");
-    // terminal already: at once
-    assert!(poll("wait=30&until=terminal", None).await.1 < Duration::from_secs(5));
+    // terminal already: at once, also for a client that knows no version and comes too late
+    for query in ["wait=30&until=terminal", "wait=30"] {
+        let (status, time) = poll(query, None).await;
+        assert_eq!(status, StatusCode::OK);
+        assert!(time < Duration::from_secs(5), "{query}");
+    }
     for bad in ["wait=61", "wait=-1", "wait=x", "until=tomorrow", "for=ever"] {
         assert_eq!(poll(bad, None).await.0, StatusCode::BAD_REQUEST, "{bad}");
     }
@@ -99,22 +103,12 @@ async fn a_long_poll_returns_with_the_next_version_or_at_its_limit() {
         .await
         .unwrap()
         .into_inner();
-    assert!(met.met && met.job.unwrap().status() == pb::Status::Succeeded);
-    assert!(
-        !grpc
-            .wait_job(request(None, false))
-            .await
-            .unwrap()
-            .into_inner()
-            .met
-    );
-    assert!(
-        grpc.wait_job(request(Some(1), false))
-            .await
-            .unwrap()
-            .into_inner()
-            .met
-    );
+    assert!(met.met && met.job.as_ref().unwrap().status() == pb::Status::Succeeded);
+    let version = met.job.unwrap().version;
+    for (known, met) in [(None, true), (Some(1), true), (Some(version), false)] {
+        let waited = grpc.wait_job(request(known, false)).await.unwrap();
+        assert_eq!(waited.into_inner().met, met, "{known:?}");
+    }
 }
 
 #[tokio::test]

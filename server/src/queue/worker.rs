@@ -27,7 +27,7 @@ use crate::{
 /// Lines that a solver may be ahead of its recorder; then it waits.
 const AHEAD: usize = 256;
 
-/// A solver whose job has run out of time gets this long to leave its last state.
+/// A solver whose job has run out of time gets this long to leave its last state; `Limits` says so.
 const LAST_STATE: Duration = Duration::from_secs(2);
 
 /// One start of a job, from claim to end.

@@ -17,7 +17,7 @@ use crate::{
     store::Edit,
     verbs::{
         problems::{AT, prefixed},
-        submit::{Draft, Envelope, MOST_JOBS},
+        submit::{Changes, Draft, Envelope, MOST_JOBS},
     },
     violations::{self, Violations},
 };
@@ -74,6 +74,19 @@ pub(super) struct Edits {
     /// Never removed by age.
     #[schemars(default)]
     pinned: Option<bool>,
+}
+
+/// A body that changes a job as it is tried again: what is absent stays; for its schema only.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[allow(dead_code)]
+pub(super) struct Retry {
+    /// What it may take.
+    #[schemars(default)]
+    limits: Option<Limits>,
+    /// Higher first.
+    #[schemars(default, range(min = -10, max = 10))]
+    priority: Option<i32>,
 }
 
 /// Key or value of a label.
@@ -159,6 +172,17 @@ pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
     let known = "name, labels, priority, pinned";
     body.close(known, Some(edit))
         .map_err(ApiError::InvalidProblem)
+}
+
+/// A body `{limits, priority}`: what is absent stays.
+pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
+    let mut body = Body::open(text, "an object with what to change")?;
+    let changes = Changes {
+        limits: body.take("limits", LIMITS),
+        priority: body.take("priority", PRIORITY),
+    };
+    let changes = body.close("limits, priority", Some(changes));
+    changes.map_err(ApiError::InvalidProblem)
 }
 
 /// A body `{problem}`.
@@ -314,6 +338,9 @@ mod tests {
         let ApiError::InvalidProblem(edits) = edit(OTHER).unwrap_err() else {
             unreachable!("it is well-formed");
         };
+        let ApiError::InvalidProblem(changes) = retry(OTHER).unwrap_err() else {
+            unreachable!("it is well-formed");
+        };
         for (told, mut described) in [
             (
                 submission(OTHER).unwrap().1.unwrap_err(),
@@ -328,6 +355,7 @@ mod tests {
                 described::<BareProblem>(),
             ),
             (edits, described::<Edits>()),
+            (changes, described::<Retry>()),
         ] {
             let mut known = known(told);
             known.sort();

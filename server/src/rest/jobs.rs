@@ -47,7 +47,7 @@ pub(super) async fn get(
     let mut job = verbs::get(&rest.service, path.id).await?;
     if let Some(wait_s) = wait_s {
         let known = seen.as_ref().and_then(Tags::version);
-        let until = until.unwrap_or(Until::Changed(known.unwrap_or(job.version)));
+        let until = until.unwrap_or(known.map_or(Until::News, Until::Changed));
         (job, _) = watch::wait(&rest.service, path.id, until, wait_s).await?;
     }
     let tag = tag(&job);

@@ -110,7 +110,8 @@ impl Schemas {
         }
         if let Some(body) = &operation.body {
             let content = content(&mut self.requests, body, operation.example.as_ref());
-            described["requestBody"] = json!({ "required": true, "content": content });
+            described["requestBody"] =
+                json!({ "required": operation.needs_body, "content": content });
         }
         for answer in &operation.answers {
             described["responses"][answer.status.to_string()] = self.answer(answer);

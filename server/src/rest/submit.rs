@@ -2,7 +2,7 @@
 
 use axum::{
     Json,
-    body::Body,
+    body::{Body, HttpBody},
     extract::{RawQuery, State},
     http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::{
     Rest,
-    bodies::{bare_problem, batch, submission},
+    bodies::{self, bare_problem, batch, submission},
     events,
     jobs::{one, tag},
     request::{JobPath, Params, idempotency_key, json_text, preferred_wait_s, wants},
@@ -22,7 +22,7 @@ use crate::{
     job::{Job, JobId},
     verbs::{
         problems,
-        submit::{self as verbs, Handed},
+        submit::{self as verbs, Changes, Handed},
         watch::{self, MAX_WAIT_S, Until},
     },
 };
@@ -70,10 +70,15 @@ pub(super) async fn retry(
     RawQuery(query): RawQuery,
     headers: HeaderMap,
     path: JobPath,
+    body: Body,
 ) -> Result<Response, ApiError> {
     Params::parse(query.as_deref(), &[])?;
     let key = idempotency_key(&headers)?;
-    let handed = verbs::retry(&rest.service, path.id, key).await?;
+    let changes = match body.is_end_stream() {
+        false => bodies::retry(&json_text(&headers, body, rest.service.max_body_bytes).await?)?,
+        true => Changes::default(), // nothing was sent
+    };
+    let handed = verbs::retry(&rest.service, path.id, changes, key).await?;
     answer(&rest, &headers, handed, false).await
 }
 

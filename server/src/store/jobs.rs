@@ -224,7 +224,7 @@ impl Store {
         for row in &rows {
             let job = from_row(row)?;
             let detail = format!(
-                "no worker was free within {} s; see limits.queue_ttl_s",
+                "it was not started within {} s; see limits.queue_ttl_s",
                 job.limits.queue_ttl_s
             );
             end(

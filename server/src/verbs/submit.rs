@@ -132,10 +132,20 @@ pub async fn create_batch(
     .await
 }
 
+/// What is changed of a job that is tried again; what is absent stays.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Changes {
+    /// What it may take.
+    pub limits: Option<Limits>,
+    /// Higher first.
+    pub priority: Option<i32>,
+}
+
 /// Tries a job that has ended again: the same problem and envelope as a new job, solved anew.
 pub async fn retry(
     service: &Arc<Service>,
     id: JobId,
+    changes: Changes,
     key: Option<String>,
 ) -> Result<Handed<Job>, ApiError> {
     service.accepting()?;
@@ -145,7 +155,8 @@ pub async fn retry(
         let key = match key {
             None => None,
             Some(key) => {
-                let payload = digest::of_json(&("retry", id)).map_err(ApiError::internal)?;
+                let payload =
+                    digest::of_json(&("retry", id, changes)).map_err(ApiError::internal)?;
                 Some(RequestKey { key, payload })
             }
         };
@@ -169,8 +180,8 @@ pub async fn retry(
         let envelope = Envelope {
             name,
             labels,
-            priority,
-            limits,
+            priority: changes.priority.unwrap_or(priority),
+            limits: changes.limits.unwrap_or(limits),
             // who kept its result to itself means that still
             cache: match cache {
                 Cache::Off => Cache::Off,

@@ -25,15 +25,9 @@ pub enum Until {
     Terminal,
     /// Its version is another than this one.
     Changed(i64),
-}
-
-impl Until {
-    fn is_met_by(self, job: &Job) -> bool {
-        match self {
-            Until::Terminal => job.status.is_terminal(),
-            Until::Changed(version) => job.version != version,
-        }
-    }
+    /// Its version is another than when it was asked for; or it has ended: a client that knows no version
+    /// waits for news of its job, and there will be none.
+    News,
 }
 
 /// The job when that has come to pass, or as it is after `seconds` or when the service stops; and whether
@@ -45,12 +39,18 @@ pub async fn wait(
     seconds: f64,
 ) -> Result<(Job, bool), ApiError> {
     let end = Instant::now() + Duration::from_secs_f64(seconds.clamp(0.0, MAX_WAIT_S));
-    let mut job = jobs::get(service, id).await?;
-    let mut news = service.queue.subscribe(job.key);
+    let at_arrival = jobs::get(service, id).await?;
+    let mut news = service.queue.subscribe(at_arrival.key);
     loop {
         // Read after subscribing: a change in between is not overlooked.
-        job = jobs::get(service, id).await?;
-        if until.is_met_by(&job) {
+        let job = jobs::get(service, id).await?;
+        let has_ended = job.status.is_terminal();
+        let met = match until {
+            Until::Terminal => has_ended,
+            Until::Changed(version) => job.version != version,
+            Until::News => has_ended || job.version != at_arrival.version,
+        };
+        if met {
             return Ok((job, true));
         }
         tokio::select! {

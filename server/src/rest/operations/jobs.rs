@@ -12,7 +12,7 @@ use crate::{
     event::Event,
     job::{Job, Status},
     rest::{
-        bodies::{Edits, Submission, Submissions},
+        bodies::{Edits, Retry, Submission, Submissions},
         events, jobs, submit,
     },
     verbs::{
@@ -128,10 +128,11 @@ pub(super) fn operations() -> Vec<Operation> {
             ]),
         post("/v1/jobs/{id}/retry", submit::retry)
             .rpcs(&["RetryJob"])
-            .says("Hands in the problem of a job that has ended once more, to be solved anew as a job whose parent it is")
+            .says("Hands in the problem of a job that has ended once more, to be solved anew as a job whose parent it is; a body changes what the new one may take")
+            .may_take(json::<Retry>())
             .hands_in()
             .fails(&[Code::JobActive])
-            .tested(&["service::control::a_job_that_has_ended_is_tried_again_as_a_new_one", "service::control::a_job_that_waits_or_runs_is_neither_retried_nor_deleted"]),
+            .tested(&["service::control::a_job_that_has_ended_is_tried_again_as_a_new_one", "service::control::a_job_that_ran_out_of_time_is_given_more", "service::control::a_job_that_waits_or_runs_is_neither_retried_nor_deleted"]),
         delete("/v1/jobs/{id}", jobs::delete)
             .rpcs(&["DeleteJob"])
             .says("Deletes a job that has ended, with its events and its result")
@@ -147,7 +148,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .tested(&["service::control::many_jobs_are_canceled_and_deleted_by_a_filter_and_not_without_one"]),
         delete("/v1/jobs", jobs::delete_many)
             .rpcs(&["DeleteJobs"])
-            .says("Deletes all jobs of a filter that have ended")
+            .says("Deletes all jobs of a filter that have ended, pinned ones too")
             .with(filters())
             .answers(200, "How many there were, and how many of them are gone", json::<Many>())
             .fails(&[Code::MissingFilter])

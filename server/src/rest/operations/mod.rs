@@ -79,6 +79,7 @@ pub(super) struct Operation {
     pub(super) parameters: Vec<Parameter>,
     /// What is sent.
     pub(super) body: Option<Content>,
+    pub(super) needs_body: bool,
     /// Such a body.
     pub(super) example: Option<Value>,
     /// What comes back when all is well.
@@ -133,6 +134,7 @@ where
         summary: "",
         parameters: vec![],
         body: None,
+        needs_body: true,
         example: None,
         answers: vec![],
         strict: true,
@@ -178,6 +180,14 @@ impl Operation {
     fn takes(mut self, body: Content) -> Self {
         self.body = Some(body);
         self
+    }
+
+    /// A body that may also be left out.
+    fn may_take(self, body: Content) -> Self {
+        Operation {
+            needs_body: false,
+            ..self.takes(body)
+        }
     }
 
     fn for_example(mut self, body: Value) -> Self {
