@@ -68,6 +68,9 @@ impl App {
         );
         queue.start();
         info!(%address, workers = config.workers, "listening on {address}");
+        if !address.ip().is_loopback() {
+            warn!(%address, "whoever can reach {address} may do anything here: there is no authentication");
+        }
         Ok(App {
             address,
             store,

@@ -57,8 +57,13 @@ pub enum ApiError {
     #[error("this path does not know the method; the header Allow lists those it does")]
     MethodNotAllowed,
     /// None of the wanted formats exists.
-    #[error("not available in this format; available: {0}")]
-    NotAcceptable(String),
+    #[error("not available as {got}; available: {available}")]
+    NotAcceptable {
+        /// What was asked for.
+        got: String,
+        /// The names of those that there are.
+        available: String,
+    },
     /// A body in a format that is not understood.
     #[error("expected a body of type application/json, got {0}")]
     UnsupportedMedia(String),
@@ -66,10 +71,12 @@ pub enum ApiError {
     #[error("the job is {0}; cancel it, or wait for its end")]
     JobActive(&'static str),
     /// The name belongs to a job with other content.
-    #[error("{0} was handed in with other content")]
+    #[error("{0} was handed in with other content; make a new id for another job")]
     IdConflict(JobId),
     /// The key belongs to a request with other content.
-    #[error("this key was used for another request")]
+    #[error(
+        "this key was used for a request with other content; use a new key, or hand in the same again"
+    )]
     KeyReuse,
     /// The job was changed since.
     #[error("the job is of version {0}")]
@@ -89,10 +96,18 @@ pub enum ApiError {
         /// The limit.
         limit_bytes: usize,
     },
+    /// What was asked for does not fit into one message.
+    #[error(
+        "the answer is larger than a message may be (1 MiB); over REST it is not bounded: {instead}"
+    )]
+    AnswerTooLarge {
+        /// Where it is to be had.
+        instead: &'static str,
+    },
     /// The job would need too much.
     #[error(
-        "the job has {} unknowns and needs about {} bytes of memory; the budget is {budget_bytes} bytes",
-        estimate.dofs, estimate.memory_bytes
+        "the job has {} unknowns and needs about {} of memory; the budget is {}; take a coarser mesh or refine less",
+        count(estimate.dofs), size(estimate.memory_bytes), size(*budget_bytes)
     )]
     ProblemTooLarge {
         /// What it would need.
@@ -146,7 +161,7 @@ impl ApiError {
             ApiError::Deleted(_) => Code::Deleted,
             ApiError::NoResult(_) => Code::NoResult,
             ApiError::MethodNotAllowed => Code::MethodNotAllowed,
-            ApiError::NotAcceptable(_) => Code::NotAcceptable,
+            ApiError::NotAcceptable { .. } => Code::NotAcceptable,
             ApiError::UnsupportedMedia(_) => Code::UnsupportedMedia,
             ApiError::JobActive(_) | ApiError::MeshInUse => Code::JobActive,
             ApiError::IdConflict(_) => Code::IdConflict,
@@ -154,7 +169,9 @@ impl ApiError {
             ApiError::StaleVersion(_) => Code::StaleVersion,
             ApiError::RangeNotSatisfiable(_) => Code::RangeNotSatisfiable,
             ApiError::ResultNotReady(_) => Code::ResultNotReady,
-            ApiError::PayloadTooLarge { .. } => Code::PayloadTooLarge,
+            ApiError::PayloadTooLarge { .. } | ApiError::AnswerTooLarge { .. } => {
+                Code::PayloadTooLarge
+            }
             ApiError::ProblemTooLarge { .. } => Code::ProblemTooLarge,
             ApiError::InvalidProblem(_) => Code::InvalidProblem,
             ApiError::RateLimited => Code::RateLimited,
@@ -246,17 +263,44 @@ impl From<ApiError> for Status {
         if let Some(seconds) = kind.retry_after_s {
             details.set_retry_info(Some(std::time::Duration::from_secs(seconds)));
         }
-        // Details travel in a header; a mesh with a thousand bad elements would burst it.
-        const MOST: usize = 50;
-        for v in error.violations().iter().take(MOST) {
+        // Details travel in a header, a third longer for its coding, beside the message; clients take 8 KiB of
+        // headers.
+        const MOST_BYTES: usize = 2400;
+        let mut bytes = 0;
+        let all = error.violations();
+        for (n, v) in all.iter().enumerate() {
             let text = format!(
                 "{}: expected {}, got {}. {}",
                 v.reason, v.expected, v.got, v.hint
             );
             // They quote their input, and so may be as long as that.
-            details.add_bad_request_violation(shortened(&v.pointer, 300), shortened(&text, 300));
+            let (pointer, text) = (shortened(&v.pointer, 300), shortened(&text, 300));
+            bytes += pointer.len() + text.len() + 10;
+            if bytes > MOST_BYTES {
+                let more = format!("and {} more, which do not fit in here", all.len() - n);
+                details.add_bad_request_violation("", more);
+                break;
+            }
+            details.add_bad_request_violation(pointer, text);
         }
         Status::with_error_details(grpc, format!("{}: {error}", kind.code), details)
+    }
+}
+
+/// Bytes for people. By hand, as it is a line: what a crate would do beside it nobody needs.
+pub fn size(bytes: u64) -> String {
+    match bytes {
+        u64::MAX => "more memory than there is".into(),
+        bytes if bytes >> 30 > 0 => format!("{:.1} GiB", bytes as f64 / (1u64 << 30) as f64),
+        bytes => format!("{:.1} MiB", bytes as f64 / (1u64 << 20) as f64),
+    }
+}
+
+/// A number of unknowns for people; estimates end where numbers do.
+pub fn count(unknowns: u64) -> String {
+    match unknowns {
+        u64::MAX => "more than 10^19".into(),
+        unknowns => unknowns.to_string(),
     }
 }
 
@@ -266,7 +310,7 @@ fn summed_up(violations: &[Violation]) -> String {
     let shown: Vec<String> = violations
         .iter()
         .take(SHOWN)
-        .map(|violation| shortened(&violation.to_string(), 300))
+        .map(|violation| shortened(&violation.to_string(), 120))
         .collect();
     let more = if violations.len() > SHOWN { " …" } else { "" };
     format!(
@@ -305,6 +349,25 @@ mod tests {
         let details = status.get_error_details();
         assert_eq!(details.bad_request().unwrap().field_violations.len(), 2);
         assert_eq!(details.error_info().unwrap().reason, "invalid-problem");
+    }
+
+    /// Of the headers that clients take: grpcio 8 KiB.
+    #[test]
+    fn many_violations_fit_into_the_headers_of_an_answer() {
+        for length in [1, 20, 300] {
+            let long = violation(&format!("/problem/{}", "ü".repeat(length)));
+            let status = Status::from(ApiError::InvalidProblem(vec![long; 100]));
+            let details = status.get_error_details();
+            let shown = &details.bad_request().unwrap().field_violations;
+            assert!((3..100).contains(&shown.len()));
+            assert!(shown.last().unwrap().description.contains("more"));
+            let headers = status.into_http::<()>();
+            let bytes = |(name, value): (&axum::http::HeaderName, &axum::http::HeaderValue)| {
+                name.as_str().len() + value.len() + 32
+            };
+            let total: usize = headers.headers().iter().map(bytes).sum();
+            assert!(total < 7500, "{total}");
+        }
     }
 
     #[test]

@@ -2,16 +2,15 @@
 
 use std::{pin::Pin, sync::Arc};
 
-use axum::Router;
+use axum::{Router, middleware::map_response};
 use futures_util::{Stream, StreamExt};
+use prost::Message;
 use sha2::{Digest, Sha256};
-use tonic::{Request, Response, Status, Streaming, metadata::MetadataValue, service::Routes};
+use tonic::{Code, Request, Response, Status, Streaming, metadata::MetadataValue, service::Routes};
 use tonic_health::server::HealthReporter;
 
 use crate::{
-    convert::{
-        bad, draft, edit, filter, judgement, limits_from_pb, problem_from_pb, problem_to_pb,
-    },
+    convert::{bad, draft, edit, filter, judgement, problem_from_pb, problem_to_pb},
     error::ApiError,
     formats::Format,
     job::{Job, JobId},
@@ -31,7 +30,7 @@ use crate::{
     violations,
 };
 
-/// Largest message taken in; the contract's promise. (tonic answers a larger one with OUT_OF_RANGE.)
+/// Largest message, both ways; the contract's promise.
 const MAX_MESSAGE_BYTES: usize = 1 << 20;
 /// Rows of a history in one answer, some 200 bytes each: it shall not be larger either.
 const MAX_ROWS: usize = 4000;
@@ -54,7 +53,33 @@ pub async fn router(
         .add_service(health)
         .add_service(reflection().build_v1()?)
         .add_service(reflection().build_v1alpha()?);
-    Ok((routes.into_axum_router(), reporter))
+    let router = routes.into_axum_router();
+    Ok((router.layer(map_response(too_large)), reporter))
+}
+
+/// tonic refuses a message over the limit before it reaches us, and without details. All that we refuse has
+/// some.
+async fn too_large(response: axum::response::Response) -> axum::response::Response {
+    let bare = Status::from_header_map(response.headers())
+        .is_some_and(|status| status.code() == Code::OutOfRange && status.details().is_empty());
+    match bare {
+        true => Status::from(ApiError::PayloadTooLarge {
+            limit_bytes: MAX_MESSAGE_BYTES,
+        })
+        .into_http(),
+        false => response,
+    }
+}
+
+/// So many of these jobs fit into one message; at least one.
+fn fitting(jobs: &[pb::Job]) -> usize {
+    const AROUND: usize = 16; // tag and length of each, and the page's token
+    let mut bytes = 0;
+    let fits = |job: &&pb::Job| {
+        bytes += job.encoded_len() + AROUND;
+        bytes <= MAX_MESSAGE_BYTES
+    };
+    jobs.iter().take_while(fits).count().max(1)
 }
 
 /// Health turns to NOT_SERVING before the listener closes.
@@ -115,7 +140,7 @@ impl JobService for Grpc {
             .into());
         }
         let handed = self.hand_in(request).await?;
-        let events = self.events(handed.accepted.key, 0);
+        let events = self.events(&handed.accepted, 0);
         Ok(noting_replay(Response::new(events), handed.replayed))
     }
 
@@ -149,7 +174,14 @@ impl JobService for Grpc {
         request: Request<pb::GetJobProblemRequest>,
     ) -> Reply<pb::Problem> {
         let problem = jobs::problem(&self.service, id(&request.into_inner().id)?).await?;
-        Ok(Response::new(problem_to_pb(&problem)))
+        let message = problem_to_pb(&problem);
+        if message.encoded_len() > MAX_MESSAGE_BYTES {
+            return Err(ApiError::AnswerTooLarge {
+                instead: "GET /v1/jobs/{id}/problem",
+            }
+            .into());
+        }
+        Ok(Response::new(message))
     }
 
     async fn list_jobs(
@@ -169,10 +201,20 @@ impl JobService for Grpc {
         let filter = filter(jobs)?;
         let page_size = page_size(size)?;
         let token = Some(page_token.as_str()).filter(|token| !token.is_empty());
-        let page = jobs::list(&self.service, &filter, order, page_size, token).await?;
+        let list = async |size| {
+            let page = jobs::list(&self.service, &filter, order, size, token).await?;
+            let jobs: Vec<pb::Job> = page.jobs.into_iter().map(Into::into).collect();
+            Ok::<_, ApiError>((jobs, page.next))
+        };
+        let (mut jobs, mut next) = list(page_size).await?;
+        let fitting = fitting(&jobs);
+        if fitting < jobs.len() {
+            // a shorter page, whose token goes on where it ends
+            (jobs, next) = list(fitting as i64).await?;
+        }
         Ok(Response::new(pb::ListJobsResponse {
-            jobs: page.jobs.into_iter().map(Into::into).collect(),
-            next_page_token: page.next.unwrap_or_default(),
+            jobs,
+            next_page_token: next.unwrap_or_default(),
         }))
     }
 
@@ -231,7 +273,7 @@ impl JobService for Grpc {
         if watch::is_silent(&self.service, &job, after_seq).await? {
             return Ok(Response::new(futures_util::stream::empty().boxed()));
         }
-        Ok(Response::new(self.events(job.key, after_seq)))
+        Ok(Response::new(self.events(&job, after_seq)))
     }
 
     async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {
@@ -363,8 +405,13 @@ impl JobService for Grpc {
             limits,
             priority,
         } = request.into_inner();
+        let pb::Limits {
+            timeout_s,
+            queue_ttl_s,
+        } = limits.unwrap_or_default();
         let changes = Changes {
-            limits: limits.map(limits_from_pb),
+            timeout_s,
+            queue_ttl_s,
             priority,
         };
         let handed = submit::retry(&self.service, id(&name)?, changes, request_id).await?;
@@ -484,8 +531,8 @@ impl Grpc {
         Ok(submit::create(&self.service, draft, id, key).await?)
     }
 
-    fn events(&self, key: i64, after: i64) -> EventStream {
-        watch::watch(self.service.clone(), key, after)
+    fn events(&self, job: &Job, after: i64) -> EventStream {
+        watch::watch(self.service.clone(), (job.id, job.key), after)
             .map(|event| event.map(Into::into).map_err(Into::into))
             .boxed()
     }
@@ -512,8 +559,12 @@ fn beyond(offset: u64, total: u64) -> Result<(), ApiError> {
 }
 
 fn id(text: &str) -> Result<JobId, ApiError> {
-    JobId::parse(text)
-        .ok_or_else(|| ApiError::NotFound(format!("there is no job {:?}", violations::name(text))))
+    JobId::parse(text).ok_or_else(|| {
+        ApiError::NotFound(format!(
+            "there is no job {:?}: ids are job_ and a UUID in lower case",
+            violations::name(text)
+        ))
+    })
 }
 
 fn page_size(asked: i32) -> Result<i64, ApiError> {

@@ -304,7 +304,8 @@ impl Reason {
 pub enum ResultAvailable {
     /// Nothing.
     None,
-    /// The last state of a job that did not converge or was canceled.
+    /// The last state of a job that did not converge or was canceled, or the finished load steps of one that
+    /// runs.
     Partial,
     /// A converged result.
     Final,

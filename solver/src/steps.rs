@@ -55,10 +55,7 @@ pub fn run(
         };
         history.extend(rows.iter().cloned());
         ends.push(StepSolution {
-            name: step
-                .name
-                .clone()
-                .unwrap_or_else(|| (number + 1).to_string()),
+            name: step.name.clone().unwrap_or_else(|| number.to_string()),
             summary: summary.clone(),
             history: rows,
             profiles: reported.profiles.clone(),

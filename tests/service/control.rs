@@ -62,14 +62,14 @@ async fn a_job_that_has_ended_is_tried_again_as_a_new_one() {
 #[tokio::test]
 async fn a_job_that_ran_out_of_time_is_given_more() {
     let server = server().await;
-    let body = json!({ "problem": large(), "cache": "off", "limits": { "timeout_s": 0.2 } });
+    let body = json!({ "problem": large(), "cache": "off", "limits": { "timeout_s": 0.2, "queue_ttl_s": 60 } });
     let first = server.solve(&body).await;
     assert_eq!(first["reason"], "timed_out");
     let retry = format!("/v1/jobs/{}/retry", first["id"].as_str().unwrap());
     let (status, second) = answer(
         server
             .post(&retry)
-            .json(&json!({ "limits": { "timeout_s": 900, "queue_ttl_s": 60 }, "priority": 3 })),
+            .json(&json!({ "limits": { "timeout_s": 900 }, "priority": 3 })),
     )
     .await;
     assert_eq!(status, StatusCode::ACCEPTED);

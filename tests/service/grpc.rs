@@ -1,12 +1,14 @@
 //! The eight calls of `signorini.v1.JobService`, and what stands beside them.
 
+use reqwest::StatusCode;
+use serde_json::json;
 use service::{
     convert::problem_to_pb,
     pb::{self, job_service_client::JobServiceClient},
 };
 use solver::problem::Problem;
 use suite::{
-    example,
+    example, example_json,
     harness::{Server, large},
 };
 use tonic::{Code, transport::Channel};
@@ -198,7 +200,8 @@ async fn errors_carry_codes_and_details() {
     let many = grpc.create_job(request).await.unwrap_err();
     assert_eq!(many.code(), Code::InvalidArgument, "{many}");
     let details = many.get_error_details();
-    assert!(details.bad_request().unwrap().field_violations.len() >= 20);
+    let told = &details.bad_request().unwrap().field_violations;
+    assert!(told.len() > 5 && told.last().unwrap().description.contains("more"));
     let long = pb::GetJobRequest {
         id: "x".repeat(1 << 19),
     };
@@ -211,10 +214,54 @@ async fn errors_carry_codes_and_details() {
         problem: Some(problem_to_pb(&problem)),
         ..Default::default()
     };
-    assert_eq!(
-        grpc.create_job(request).await.unwrap_err().code(),
-        Code::OutOfRange
-    );
+    let refused = grpc.create_job(request).await.unwrap_err();
+    assert_eq!(refused.code(), Code::OutOfRange);
+    let details = refused.get_error_details();
+    assert_eq!(details.error_info().unwrap().reason, "payload-too-large");
+}
+
+/// What REST has accepted and gives in one piece may be too much for a message.
+#[tokio::test]
+async fn no_answer_is_larger_than_a_message_may_be() {
+    use prost::Message;
+    const MOST: usize = 1 << 20;
+    let server = Server::start(SIGNORINI, &[]).await;
+    server.post("/v1/queue/pause").send().await.unwrap();
+    let mut labels = serde_json::Map::new();
+    for n in 0..64 {
+        labels.insert(format!("label {n}"), json!("x".repeat(250)));
+    }
+    let job = json!({ "problem": example_json("sheet"), "labels": labels });
+    let batch = json!({ "jobs": vec![job; 150] });
+    let accepted = server.post("/v1/jobs/batch").json(&batch).send().await;
+    assert_eq!(accepted.unwrap().status(), StatusCode::ACCEPTED);
+    let mut grpc = connect(&server).await;
+    let (mut found, mut page_token) = (vec![], String::new());
+    loop {
+        let request = pb::ListJobsRequest {
+            page_size: 1000,
+            page_token,
+            ..Default::default()
+        };
+        let page = grpc.list_jobs(request).await.unwrap().into_inner();
+        assert!(page.encoded_len() <= MOST, "{}", page.encoded_len());
+        page_token = page.next_page_token;
+        found.extend(page.jobs.into_iter().map(|job| job.id));
+        if page_token.is_empty() {
+            break;
+        }
+    }
+    let count = found.len();
+    found.sort();
+    found.dedup();
+    assert_eq!((count, found.len()), (150, 150));
+
+    let mut large = example_json("sheet");
+    large["title"] = json!("x".repeat(2 * MOST));
+    let id = server.submit(&large).await;
+    let refused = grpc.get_job_problem(pb::GetJobProblemRequest { id }).await;
+    let details = refused.unwrap_err().get_error_details();
+    assert_eq!(details.error_info().unwrap().reason, "payload-too-large");
 }
 
 #[tokio::test]

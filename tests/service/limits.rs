@@ -6,7 +6,7 @@ use reqwest::StatusCode;
 use serde_json::{Value, json};
 use suite::{
     example_json,
-    harness::{Server, large},
+    harness::{Server, answer, large},
 };
 
 use crate::{SIGNORINI, server};
@@ -85,19 +85,28 @@ async fn bodies_that_take_long_to_explain_do_not_hold_up_the_others() {
 #[tokio::test]
 async fn a_problem_over_the_memory_budget_is_refused_with_the_figures() {
     let server = Server::start(SIGNORINI, &["--memory-budget-bytes", "1000000000"]).await;
-    for path in ["/v1/jobs", "/v1/problems/validate"] {
-        let response = server
-            .post(path)
-            .json(&json!({ "problem": large() }))
-            .send()
-            .await
-            .unwrap();
-        assert_eq!(response.status(), StatusCode::PAYLOAD_TOO_LARGE);
-        let document: Value = response.json().await.unwrap();
-        assert_eq!(document["code"], "problem-too-large");
-        assert!(document["estimate"]["memory_bytes"].as_u64().unwrap() > 1_000_000_000);
-        assert_eq!(document["memory_budget_bytes"], 1_000_000_000);
-    }
+    let body = json!({ "problem": large() });
+    let (status, document) = answer(server.post("/v1/jobs").json(&body)).await;
+    assert_eq!(
+        (status, &document["code"]),
+        (StatusCode::PAYLOAD_TOO_LARGE, &json!("problem-too-large"))
+    );
+    assert!(document["estimate"]["memory_bytes"].as_u64().unwrap() > 1_000_000_000);
+    assert_eq!(document["memory_budget_bytes"], 1_000_000_000);
+    let detail = document["detail"].as_str().unwrap();
+    assert!(detail.contains("the budget is 953.7 MiB"), "{detail}");
+    // who only asks is answered, with the same figures
+    let (status, judgement) = answer(server.post("/v1/problems/validate").json(&body)).await;
+    assert_eq!(
+        (status, &judgement["valid"]),
+        (StatusCode::OK, &json!(false))
+    );
+    let violation = &judgement["violations"][0];
+    assert_eq!(
+        (&violation["pointer"], &violation["reason"]),
+        (&json!("/problem/mesh"), &json!("too_large"))
+    );
+    assert_eq!(judgement["estimate"], document["estimate"]);
     // A size beyond all numbers is refused as quickly.
     let mut hopeless = example_json("sheet");
     hopeless["mesh"]["refine"] = json!(4_000_000_000u32);

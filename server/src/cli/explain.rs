@@ -7,7 +7,7 @@ use crate::catalog::{Code, Kind};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The code, as in `code` of an error or a failure; without one, all of them are listed
+    /// The code, as in `code` or `type` of an error, or a job's `reason`; without one, all of them are listed
     code: Option<String>,
 }
 
@@ -19,8 +19,9 @@ pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
         }
         return Ok(Exit::Ok);
     };
-    // a job's reason is the same word with underscores
-    let Some(found) = Code::parse(&code.replace('_', "-")) else {
+    // a job's reason is the same word with underscores, the type of an error its page
+    let word = code.rsplit('/').next().unwrap_or_default();
+    let Some(found) = Code::parse(&word.replace('_', "-")) else {
         eprintln!(
             "signorini: there is no error {code:?}; `signorini explain` lists those that there are"
         );

@@ -9,4 +9,4 @@ mod request;
 pub use answer::{judgement, pb_status, status};
 pub use message::problem_to_pb;
 pub use problem::problem_from_pb;
-pub use request::{bad, draft, edit, filter, limits_from_pb};
+pub use request::{bad, draft, edit, filter};

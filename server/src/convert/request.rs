@@ -28,6 +28,8 @@ pub fn draft(request: pb::CreateJobRequest) -> Draft {
         ..
     } = request;
     let mut violations = vec![];
+    let defaults = Limits::default();
+    let limits = limits.unwrap_or_default();
     let cache = match pb::Cache::try_from(cache) {
         Ok(pb::Cache::Unspecified | pb::Cache::Use) => Cache::Use,
         Ok(pb::Cache::Refresh) => Cache::Refresh,
@@ -47,7 +49,10 @@ pub fn draft(request: pb::CreateJobRequest) -> Draft {
         name,
         labels,
         priority,
-        limits: limits.map(limits_from_pb).unwrap_or_default(),
+        limits: Limits {
+            timeout_s: limits.timeout_s.unwrap_or(defaults.timeout_s),
+            queue_ttl_s: limits.queue_ttl_s.unwrap_or(defaults.queue_ttl_s),
+        },
         cache,
     };
     let problem = problem_from_pb(problem.unwrap_or_default()); // which lacks everything, and is told so
@@ -58,15 +63,6 @@ pub fn draft(request: pb::CreateJobRequest) -> Draft {
         Err(found) => Err(found.into_iter().chain(violations).collect()),
     };
     (envelope, problem)
-}
-
-/// What a job may take.
-pub fn limits_from_pb(limits: pb::Limits) -> Limits {
-    let defaults = Limits::default();
-    Limits {
-        timeout_s: limits.timeout_s.unwrap_or(defaults.timeout_s),
-        queue_ttl_s: limits.queue_ttl_s.unwrap_or(defaults.queue_ttl_s),
-    }
 }
 
 /// Which jobs.

@@ -83,12 +83,35 @@ enum Why {
     Unwanted,
 }
 
+/// Ever longer waits between tries to store what must not be lost.
+#[derive(Debug)]
+struct Pauses(Duration);
+
+impl Default for Pauses {
+    fn default() -> Self {
+        Pauses(Duration::from_millis(100))
+    }
+}
+
+impl Pauses {
+    /// Waits; false if the service stops meanwhile.
+    async fn next(&mut self, queue: &Queue) -> bool {
+        const LONGEST: Duration = Duration::from_secs(10);
+        let pause = self.0;
+        self.0 = (pause * 3).min(LONGEST);
+        tokio::select! {
+            () = tokio::time::sleep(pause) => true,
+            () = queue.stopping.cancelled() => false,
+        }
+    }
+}
+
 /// How the queue stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct State {
     /// No new job is started.
     pub paused: bool,
-    /// Jobs that wait for a worker.
+    /// Jobs that wait for a worker, or for the end of another one of the same input.
     pub queued: usize,
     /// Jobs in the hands of workers.
     pub running: usize,
@@ -124,19 +147,17 @@ impl Queue {
 
     /// Accepts jobs. They are on the disk when this returns; if a worker is free, the first of the queue is
     /// in its hands with the same commit.
-    pub async fn submit(self: &Arc<Self>, mut submission: Submission) -> Result<Accepted> {
-        let slot = self.free_slot();
-        submission.claim = false;
-        let Some(slot) = slot else {
-            let mut accepted = self.store.submit(submission).await?;
+    pub async fn submit(self: &Arc<Self>, submission: Submission) -> Result<Accepted> {
+        let Some(slot) = self.free_slot() else {
+            let mut accepted = self.store.submit(submission, false).await?;
             self.announce(&accepted.changed);
             self.wake.notify_one();
             self.store.try_to_place(&mut accepted.jobs).await;
             return Ok(accepted);
         };
         let _gate = self.gate.read().await;
-        submission.claim = !self.stopping.is_cancelled() && !self.store.is_paused();
-        let submitted = self.store.submit(submission).await;
+        let claim = !self.stopping.is_cancelled() && !self.store.is_paused();
+        let submitted = self.store.submit(submission, claim).await;
         match submitted {
             Ok(mut accepted) => {
                 self.announce(&accepted.changed);

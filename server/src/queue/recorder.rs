@@ -7,8 +7,9 @@ use tokio::{
     sync::mpsc,
     time::{Instant, sleep_until},
 };
+use tracing::warn;
 
-use super::{Queue, Running, Why};
+use super::{Pauses, Queue, Running, Why};
 use crate::{
     event::Payload,
     job::{Job, Progress},
@@ -29,6 +30,8 @@ pub(super) enum Line {
     Event(Time, Payload),
     /// What it has found so far, ready to be stored.
     Partial(Box<Parts>),
+    /// The end of the sweeps will be that of the job: there are no further increments, steps or grids.
+    OneLevel,
 }
 
 /// Lines that are written together.
@@ -37,37 +40,61 @@ struct Batch {
     events: Vec<(Time, Payload)>,
     /// What comes after them.
     partial: Option<Box<Parts>>,
+    one_level: bool,
     /// Nothing comes after them: the solver hung up.
     last: bool,
 }
 
 /// Writes until the solver hangs up, and gives what it said last: that is written with the job's end, in
-/// one commit. When the start is no longer current, or the store fails, the solver is told to stop and the
-/// rest is thrown away.
+/// one commit. What cannot be stored is tried again, while the solver waits for us: a full disk may pass. When
+/// the start is no longer current, the solver is told to stop and the rest is thrown away.
 pub(super) async fn record(
     queue: &Queue,
     job: &Job,
     running: &Running,
     mut lines: mpsc::Receiver<Line>,
-) -> Result<LastWords> {
-    let mut progress = Progress::default();
-    let written = loop {
+) -> LastWords {
+    let (mut progress, mut one_level) = (Progress::default(), false);
+    loop {
         let batch = next_batch(&mut lines).await;
         let payloads = batch.events.iter().map(|(_, payload)| payload);
+        one_level |= batch.one_level;
         payloads.for_each(|payload| follow(&mut progress, payload));
+        if !one_level {
+            progress.eta_s = None; // the end of these sweeps is not the job's
+        }
         if batch.last {
             let lines = batch.events;
-            return Ok(LastWords { lines, progress });
+            return LastWords { lines, progress };
         }
-        match write(queue, job, running, &batch, &progress).await {
-            Ok(true) => {}
-            Ok(false) => break Ok(LastWords::default()),
-            Err(error) => break Err(error),
+        if !written(queue, job, running, &batch, &progress).await {
+            break;
         }
-    };
+    }
     running.stop(Why::Unwanted);
     while lines.recv().await.is_some() {} // the solver must not block on a full channel
-    written
+    LastWords::default()
+}
+
+/// Writes a batch, however long that takes; false when the start is no longer current, or the service stops.
+async fn written(
+    queue: &Queue,
+    job: &Job,
+    running: &Running,
+    batch: &Batch,
+    progress: &Progress,
+) -> bool {
+    let mut pauses = Pauses::default();
+    loop {
+        let cause = match write(queue, job, running, batch, progress).await {
+            Ok(written) => return written,
+            Err(cause) => cause,
+        };
+        warn!(job.id = %job.id, %cause, "events of job {} could not be stored yet: {cause}", job.id);
+        if !pauses.next(queue).await {
+            return false;
+        }
+    }
 }
 
 /// Writes a batch; false when the start is no longer current.
@@ -119,6 +146,7 @@ impl Batch {
         match line {
             Line::Event(time, payload) => self.events.push((time, payload)),
             Line::Partial(parts) => self.partial = Some(parts),
+            Line::OneLevel => self.one_level = true,
         }
     }
 
@@ -130,7 +158,10 @@ impl Batch {
 /// Keeps up with what the solver says.
 fn follow(progress: &mut Progress, payload: &Payload) {
     match payload {
-        Payload::Stage { stage } => progress.stage = phase_name(*stage).to_string(),
+        Payload::Stage { stage } => {
+            progress.stage = phase_name(*stage).to_string();
+            progress.eta_s = None; // of a phase nothing is known
+        }
         Payload::Iteration(row) => {
             *progress = Progress {
                 stage: progress.stage.clone(),

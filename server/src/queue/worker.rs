@@ -5,7 +5,7 @@ use std::{any::Any, ops::ControlFlow, sync::Arc, time::Duration, time::Instant};
 use solver::{
     error::SolveError,
     mesh::Mesh,
-    problem::Problem,
+    problem::{Problem, Refine, Step},
     solution::{Outcome, Progress},
 };
 use tokio::{sync::mpsc, task::JoinError};
@@ -13,7 +13,7 @@ use tracing::{error, info, warn};
 use uuid::Uuid;
 
 use super::{
-    Queue, Running, Why,
+    Pauses, Queue, Running, Why,
     recorder::{self, Line},
 };
 use crate::{
@@ -54,16 +54,10 @@ pub(super) async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) 
         .map_err(Unsolved::Solve)
     });
     let clock = tokio::spawn(time_out(queue.clone(), job.clone(), running.clone()));
-    let recorded = recorder::record(queue, &job, &running, lines).await;
+    let last = recorder::record(queue, &job, &running, lines).await;
     let solved = solving.await;
     clock.abort();
-    let (last, (ending, parts)) = match recorded {
-        Ok(last) => (
-            last,
-            judge(&job, solved, running.stop.get() == Some(&Why::OutOfTime)),
-        ),
-        Err(cause) => (LastWords::default(), (internal(&job, &cause), None)),
-    };
+    let (ending, parts) = judge(&job, solved, running.stop.get() == Some(&Why::OutOfTime));
     end(queue, &job, ending, last, parts).await;
     queue.release(&job);
 }
@@ -117,6 +111,14 @@ fn solve_aloud(
     let start = Instant::now();
     let problem: Problem = solver::parse(problem).map_err(SolveError::Invalid)?;
     let parse_s = start.elapsed().as_secs_f64();
+    let single = |step: &Step| step.increments == 1;
+    if problem.steps.len() <= 1
+        && problem.steps.iter().all(single)
+        && matches!(problem.mesh.refine, Refine::Times(_))
+    {
+        // whether anybody listens is seen at the next word
+        let _ = say(Some(Line::OneLevel));
+    }
     let event = |payload| Some(Line::Event(Time::now(), payload));
     let mut partials = Partials::default();
     let document = run::run(&problem, mesh, parse_s, solve, &mut |said| {
@@ -139,7 +141,7 @@ fn solve_aloud(
 }
 
 /// What finished load steps have found, from time to time: each time all of it is written, and a problem may
-/// have thousands of steps.
+/// have a thousand steps. Where it has grown large the last that was written stays until the end.
 #[derive(Default)]
 struct Partials {
     /// Not before this moment.
@@ -149,6 +151,8 @@ struct Partials {
 impl Partials {
     /// What there is, if it is time for it.
     fn next(&mut self, so_far: &SoFar<'_>) -> Option<Line> {
+        /// They are written at once, and hold the single writer for so long: some 40 ms.
+        const MOST_BYTES: usize = 4 << 20;
         /// A tenth of the time, and at most once a second.
         const SHARE: u32 = 10;
         const PAUSE: Duration = Duration::from_secs(1);
@@ -159,7 +163,8 @@ impl Partials {
         // what is not finite, or has no JSON, is told at the end
         let parts = Parts::of(&so_far.document().ok()?).ok();
         self.next = Some(start + (start.elapsed() * SHARE).max(PAUSE));
-        Some(Line::Partial(Box::new(parts?)))
+        let parts = parts.filter(|parts| parts.bytes() <= MOST_BYTES)?;
+        Some(Line::Partial(Box::new(parts)))
     }
 }
 
@@ -285,18 +290,16 @@ fn panicked(error: JoinError) -> String {
     format!("the solver panicked: {}", text(&*panic).unwrap_or_default())
 }
 
-/// Stores the result, then the end. What fails is tried again, since a job must not stay running;
-/// if the store stays broken, the next start of the service puts the job back.
+/// Stores the result, then the end. What fails is tried again for as long as it takes, since a job must not
+/// stay running: a full disk may pass. When the service stops, its next start puts the job back.
 async fn end(queue: &Queue, job: &Job, ending: Ending, last: LastWords, parts: Option<Parts>) {
-    for pause_ms in [100, 1000, 5000, 0] {
-        let cause = match try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
-            Ok(()) => return,
-            Err(cause) => cause,
-        };
-        warn!(job.id = %job.id, %cause, "job {} could not be ended: {cause}", job.id);
-        tokio::time::sleep(Duration::from_millis(pause_ms)).await;
+    let mut pauses = Pauses::default();
+    while let Err(cause) = try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
+        warn!(job.id = %job.id, %cause, "job {} could not be ended yet: {cause}", job.id);
+        if !pauses.next(queue).await {
+            return;
+        }
     }
-    error!(job.id = %job.id, "job {} stays running until it is canceled or the service restarted", job.id);
 }
 
 async fn try_to_end(

@@ -1,10 +1,13 @@
 //! Bodies of requests in JSON: what each may hold, and all that is wrong with one. A problem in it is a text
 //! for the solver's own parser.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt};
 
 use schemars::JsonSchema;
-use serde::de::DeserializeOwned;
+use serde::{
+    Deserialize, Deserializer,
+    de::{DeserializeOwned, MapAccess, Visitor},
+};
 use serde_json::value::RawValue;
 use solver::{
     error::{Violation, escape},
@@ -65,13 +68,13 @@ pub(super) struct Edits {
     /// A name for people, at most 256 characters; null takes it away.
     #[schemars(default, length(max = 256))]
     name: Option<String>,
-    /// All labels that it shall have, at most 64.
+    /// All labels that it shall have, at most 64: they replace those that it had; null takes them away.
     #[schemars(default, extend("maxProperties" = 64))]
     labels: Option<BTreeMap<Label, Label>>,
     /// Higher first.
     #[schemars(default, range(min = -10, max = 10))]
     priority: Option<i32>,
-    /// Never removed by age.
+    /// Never removed by age. Who deletes it deletes it all the same.
     #[schemars(default)]
     pinned: Option<bool>,
 }
@@ -81,12 +84,22 @@ pub(super) struct Edits {
 #[schemars(deny_unknown_fields)]
 #[allow(dead_code)]
 pub(super) struct Retry {
-    /// What it may take.
+    /// What it may take; what is absent stays.
     #[schemars(default)]
-    limits: Option<Limits>,
+    limits: Option<NewLimits>,
     /// Higher first.
     #[schemars(default, range(min = -10, max = 10))]
     priority: Option<i32>,
+}
+
+/// Limits that are changed.
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct NewLimits {
+    /// Seconds from a start to the end.
+    timeout_s: Option<f64>,
+    /// Seconds that it may wait for a start.
+    queue_ttl_s: Option<f64>,
 }
 
 /// Key or value of a label.
@@ -158,14 +171,16 @@ pub(super) fn batch(text: &str) -> Result<Read<Vec<Draft>>, ApiError> {
     Ok(body.close("jobs", Some(drafts)))
 }
 
-/// A body `{name, labels, priority, pinned}`: what is absent stays, and a name of null is taken away.
+/// A body `{name, labels, priority, pinned}`: what is absent stays, and a name or labels of null are taken away.
 pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
     let mut body = Body::open(text, "an object with what to change")?;
-    let unnamed = body.fields.get("name").is_some_and(|raw| is_null(raw));
+    let nulls = |name| body.fields.get(name).is_some_and(|raw| is_null(raw));
+    let (unnamed, unlabeled) = (nulls("name"), nulls("labels"));
     let name: Option<String> = body.take("name", "a string or null");
+    let labels = body.take("labels", "an object of strings, or null");
     let edit = Edit {
         name: (unnamed || name.is_some()).then_some(name),
-        labels: body.take("labels", LABELS),
+        labels: labels.or(unlabeled.then(BTreeMap::new)),
         priority: body.take("priority", PRIORITY),
         pinned: body.take("pinned", "true or false"),
     };
@@ -177,8 +192,13 @@ pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
 /// A body `{limits, priority}`: what is absent stays.
 pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
     let mut body = Body::open(text, "an object with what to change")?;
+    let NewLimits {
+        timeout_s,
+        queue_ttl_s,
+    } = body.take("limits", LIMITS).unwrap_or_default();
     let changes = Changes {
-        limits: body.take("limits", LIMITS),
+        timeout_s,
+        queue_ttl_s,
         priority: body.take("priority", PRIORITY),
     };
     let changes = body.close("limits, priority", Some(changes));
@@ -197,7 +217,7 @@ pub(super) fn bare_problem(text: &str) -> Result<Read<Problem>, ApiError> {
 
 const LABELS: &str = "an object of strings";
 const PRIORITY: &str = "a whole number from -10 to 10";
-const LIMITS: &str = "an object {timeout_s, queue_ttl_s} of numbers";
+const LIMITS: &str = "an object of timeout_s and queue_ttl_s, each a number, and nothing else";
 
 /// An object whose fields are taken out one by one; all that is wrong with them is said at the end.
 struct Body<'a> {
@@ -207,12 +227,28 @@ struct Body<'a> {
 
 impl<'a> Body<'a> {
     fn open(text: &'a str, expected: &str) -> Result<Self, ApiError> {
+        if text.trim().is_empty() {
+            let nothing = format!("the body is empty; expected {expected}");
+            return Err(ApiError::MalformedJson(nothing));
+        }
         // First only the syntax, so that a well-formed array is told that it should be an object.
         let whole: &RawValue = serde_json::from_str(text)
             .map_err(|error| ApiError::MalformedJson(error.to_string()))?;
-        let fields = serde_json::from_str(whole.get())
+        let Pairs(pairs) = serde_json::from_str(whole.get())
             .map_err(|_| ApiError::InvalidProblem(vec![wrong_type("", whole, expected)]))?;
-        let violations = Violations::default();
+        let mut violations = Violations::default();
+        let mut fields = BTreeMap::new();
+        for (name, value) in pairs {
+            if fields.insert(name.clone(), value).is_some() {
+                violations.add(Violation {
+                    pointer: format!("/{}", escape(&violations::name(&name))),
+                    reason: "duplicate_name".into(),
+                    got: "the name twice".into(),
+                    expected: "each name once".into(),
+                    hint: "Leave one of them out: it would have had no effect.".into(),
+                });
+            }
+        }
         Ok(Body { fields, violations })
     }
 
@@ -289,18 +325,42 @@ impl<'a> Body<'a> {
     }
 }
 
+/// The members of an object as they come. A map would keep the last one of a name, without a word.
+struct Pairs<'a>(Vec<(String, &'a RawValue)>);
+
+impl<'de> Deserialize<'de> for Pairs<'de> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Members;
+        impl<'de> Visitor<'de> for Members {
+            type Value = Pairs<'de>;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str("an object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+                let mut pairs = vec![];
+                while let Some(pair) = map.next_entry()? {
+                    pairs.push(pair);
+                }
+                Ok(Pairs(pairs))
+            }
+        }
+        deserializer.deserialize_map(Members)
+    }
+}
+
 fn is_null(raw: &RawValue) -> bool {
     raw.get() == "null"
 }
 
 fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
-    let got: String = raw.get().chars().take(60).collect();
     Violation {
         pointer: pointer.into(),
         reason: "wrong_type".into(),
-        got,
+        got: violations::name(raw.get()),
         expected: expected.into(),
-        hint: "See /v1/schema/problem.json for the problem itself.".into(),
+        hint: "The bodies of all requests are described in /openapi.json.".into(),
     }
 }
 

@@ -68,7 +68,7 @@ pub(super) async fn watch(
 /// The events of a job after number `after` as server-sent events.
 pub(super) fn stream(service: &Arc<Service>, job: &Job, after: i64) -> Response {
     // An error just ends the stream: without `done` the client knows that there is more to come.
-    let events = verbs::watch(service.clone(), job.key, after)
+    let events = verbs::watch(service.clone(), (job.id, job.key), after)
         .map(|event| event.and_then(|event| told(&event)))
         .inspect_err(|error| tracing::debug!(%error, "event stream ended: {error}"))
         .take_while(|event| std::future::ready(event.is_ok()));
@@ -79,7 +79,7 @@ pub(super) fn stream(service: &Arc<Service>, job: &Job, after: i64) -> Response 
 
 /// The same, a line each.
 fn lines(service: &Arc<Service>, job: &Job, after: i64) -> Response {
-    let lines = verbs::watch(service.clone(), job.key, after)
+    let lines = verbs::watch(service.clone(), (job.id, job.key), after)
         .map(|event| {
             let mut line = serde_json::to_vec(&event?).map_err(ApiError::internal)?;
             line.push(b'\n');

@@ -22,8 +22,11 @@ pub(super) const FILTERS: [&str; 9] = [
 ];
 
 /// A query with filters, and with `more` parameters.
-pub(super) fn parse(query: Option<&str>, more: &[&str]) -> Result<(Filter, Params), ApiError> {
-    let known: Vec<&str> = FILTERS.iter().chain(more).copied().collect();
+pub(super) fn parse(
+    query: Option<&str>,
+    more: &[&'static str],
+) -> Result<(Filter, Params), ApiError> {
+    let known: Vec<&'static str> = FILTERS.iter().chain(more).copied().collect();
     let params = Params::parse(query, &known)?;
     let status = |word: &str| {
         Status::parse(word).ok_or(ApiError::BadParameter {

@@ -32,7 +32,7 @@ impl<S: Send + Sync> FromRequestParts<S> for JobPath {
         match JobId::parse(&id) {
             Some(id) => Ok(JobPath { id, boundary, plot }),
             None => Err(ApiError::NotFound(format!(
-                "there is no job {:?}",
+                "there is no job {:?}: ids are job_ and a UUID in lower case",
                 violations::name(&id)
             ))),
         }
@@ -56,47 +56,50 @@ impl<S: Send + Sync> FromRequestParts<S> for TextPath {
 /// Parameters `label.{key}` stand for any key.
 pub(super) const ANY_LABEL: &str = "label.{key}";
 const LABEL: &str = "label.";
+/// The one parameter that may come several times, beside those of labels: any of its values.
+const MANY: &str = "status";
 
 /// The parameters of a query, each of them known.
 pub(super) struct Params(Vec<(String, String)>);
 
 impl Params {
-    /// Reads a query; a name that is not among `known` is refused, since it was meant to do something.
-    pub(super) fn parse(query: Option<&str>, known: &[&str]) -> Result<Params, ApiError> {
+    /// Reads a query; a name that is not among `known` is refused, since it was meant to do something, and so
+    /// is a second value, since the first was.
+    pub(super) fn parse(query: Option<&str>, known: &[&'static str]) -> Result<Params, ApiError> {
         let pairs: Vec<(String, String)> =
             form_urlencoded::parse(query.unwrap_or_default().as_bytes())
                 .into_owned()
                 .collect();
-        match pairs.iter().find(|(name, _)| {
+        for (n, (name, value)) in pairs.iter().enumerate() {
             let label = name.starts_with(LABEL) && known.contains(&ANY_LABEL);
-            !label && !known.contains(&name.as_str())
-        }) {
-            Some((name, _)) => {
-                let known = if known.is_empty() {
-                    "none".into()
-                } else {
-                    known.join(", ")
+            let own = if label { ANY_LABEL } else { name };
+            let Some(known) = known.iter().find(|known| **known == own) else {
+                let known = match known {
+                    [] => "none".into(),
+                    known => known.join(", "),
                 };
-                Err(ApiError::UnknownParameter {
-                    name: name.clone(),
-                    known,
-                })
+                let name = name.clone();
+                return Err(ApiError::UnknownParameter { name, known });
+            };
+            let again = pairs[..n].iter().any(|(other, _)| other == name);
+            if again && ![MANY, ANY_LABEL].contains(known) {
+                return Err(ApiError::BadParameter {
+                    name: known,
+                    got: format!("a second one, {value}"),
+                    expected: "one value",
+                });
             }
-            None => Ok(Params(pairs)),
         }
+        Ok(Params(pairs))
     }
 
-    /// The last value of that name.
+    /// The value of that name.
     pub(super) fn one(&self, name: &str) -> Option<&str> {
-        self.0
-            .iter()
-            .rev()
-            .find(|(key, _)| key == name)
-            .map(|(_, value)| value.as_str())
+        self.all(name).next()
     }
 
     /// All values of that name.
-    pub(super) fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a str> {
+    pub(super) fn all(&self, name: &str) -> impl Iterator<Item = &str> {
         self.0
             .iter()
             .filter(move |(key, _)| key == name)
@@ -233,18 +236,45 @@ pub(super) fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Api
     Ok(Some(text.to_owned()))
 }
 
-/// Whether the client wants this media type rather than JSON.
-pub(super) fn wants(headers: &HeaderMap, media: &[&str]) -> bool {
+/// The media types that the client takes, as it says.
+pub(super) fn accepted(headers: &HeaderMap) -> Vec<&str> {
     let values = headers.get_all(header::ACCEPT).iter();
-    let first = values
+    values
         .filter_map(|value| value.to_str().ok())
         .flat_map(|value| value.split(','))
-        .map(|range| {
-            let name = range.split(';').next().unwrap_or_default();
-            name.trim().to_ascii_lowercase()
-        })
-        .find(|name| name == "application/json" || media.contains(&name.as_str()));
-    first.is_some_and(|name| name != "application/json")
+        .collect()
+}
+
+/// How much a media type is wanted: the weight of the most specific range that covers it; how specific that is;
+/// and where it stands, the first one highest.
+pub(super) fn weight(accepted: &[&str], media: &str) -> (f32, u8, isize) {
+    let group = media.split('/').next().unwrap_or_default();
+    let mut found = (0.0, 0, 0);
+    for (place, range) in (0..).zip(accepted) {
+        let mut parts = range.split(';').map(str::trim);
+        let name = parts.next().unwrap_or_default().to_ascii_lowercase();
+        let q = parts
+            .find_map(|part| part.strip_prefix("q=")?.parse().ok())
+            .unwrap_or(1.0);
+        let specific = match name.split_once('/') {
+            _ if name == media => 3,
+            Some((start, "*")) if start == group => 2,
+            Some(("*", "*")) => 1,
+            _ => continue,
+        };
+        if specific >= found.1 {
+            found = (q, specific, -place);
+        }
+    }
+    found
+}
+
+/// Whether the client wants one of these media types rather than JSON.
+pub(super) fn wants(headers: &HeaderMap, media: &[&str]) -> bool {
+    let accepted = accepted(headers);
+    let json = weight(&accepted, "application/json");
+    let mut weights = media.iter().map(|media| weight(&accepted, media));
+    weights.any(|weight| weight.0 > 0.0 && weight > json)
 }
 
 /// The body as text, if it says that it is JSON and is not too large.
@@ -263,9 +293,11 @@ pub(super) async fn json_text(
         .unwrap_or_default()
         .trim()
         .to_ascii_lowercase();
-    if essence != "application/json"
-        && !(essence.starts_with("application/") && essence.ends_with("+json"))
-    {
+    // a patch format has a meaning of its own, which is not ours
+    let json = essence.starts_with("application/")
+        && essence.ends_with("+json")
+        && !essence.ends_with("-patch+json");
+    if essence != "application/json" && !json {
         return Err(ApiError::UnsupportedMedia(content_type.into()));
     }
     if let Some(coding) = headers.get(header::CONTENT_ENCODING)
@@ -350,8 +382,37 @@ mod tests {
     }
 
     #[test]
+    fn what_a_client_wants_rather_than_json_goes_by_its_weights() {
+        let wants = |accept: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert("accept", accept.parse().unwrap());
+            wants(&headers, &["text/html"])
+        };
+        for html in [
+            "text/html",
+            "text/html,application/xhtml+xml,*/*;q=0.8",
+            "text/html, application/json",
+            "*/*, text/html",
+        ] {
+            assert!(wants(html), "{html}");
+        }
+        for json in [
+            "*/*",
+            "application/json, text/html",
+            "text/html;q=0.1, application/json",
+            "text/html;q=0, */*",
+            "image/png",
+        ] {
+            assert!(!wants(json), "{json}");
+        }
+    }
+
+    #[test]
     fn a_parameter_that_nobody_knows_is_refused() {
         assert!(Params::parse(Some("status=queued&color=red"), &["status"]).is_err());
+        assert!(Params::parse(Some("name=a&name=b"), &["name"]).is_err());
+        assert!(Params::parse(Some("label.a=1&label.a=2"), &[ANY_LABEL]).is_ok());
+        assert!(Params::parse(Some("status=queued&status=failed"), &["status"]).is_ok());
         assert_eq!(
             Params::parse(Some("status=queued"), &["status"])
                 .unwrap()

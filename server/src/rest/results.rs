@@ -4,18 +4,19 @@ use axum::{
     Json,
     body::Body,
     extract::{RawQuery, State},
-    http::{HeaderMap, header},
+    http::HeaderMap,
     response::Response,
 };
 
 use super::{
     Rest, data,
-    request::{JobPath, Params},
+    request::{JobPath, Params, accepted, weight},
 };
 use crate::{
     error::ApiError,
     formats::{self, Format},
     verbs::results::{self, JobResult, Points},
+    violations,
 };
 
 pub(super) async fn result(
@@ -97,54 +98,29 @@ fn choose(
     parameter: Option<&str>,
     headers: &HeaderMap,
 ) -> Result<Format, ApiError> {
-    let none = || {
-        let available: Vec<&str> = formats.iter().map(|format| format.name()).collect();
-        ApiError::NotAcceptable(available.join(", "))
+    let names: Vec<&str> = formats.iter().map(|format| format.name()).collect();
+    let none = |got: &str| ApiError::NotAcceptable {
+        got: violations::name(got),
+        available: names.join(", "),
     };
     if let Some(wanted) = parameter {
         let named = formats.iter().find(|format| format.name() == wanted);
-        return named.copied().ok_or_else(none);
+        return named.copied().ok_or_else(|| none(wanted));
     }
-    let accept: Vec<&str> = headers
-        .get_all(header::ACCEPT)
-        .iter()
-        .filter_map(|value| value.to_str().ok())
-        .collect();
+    let accept = accepted(headers);
     if accept.is_empty() {
-        return formats.first().copied().ok_or_else(none);
+        return formats.first().copied().ok_or_else(|| none("anything"));
     }
     // Each range with its weight; the best wanted format wins, ours first among equals.
     let mut best: Option<(f32, Format)> = None;
     for format in formats {
-        let weight = weight(&accept, format.media_type());
+        let (weight, ..) = weight(&accept, format.media_type());
         if weight > best.map_or(0.0, |(weight, _)| weight) {
             best = Some((weight, *format));
         }
     }
-    best.map(|(_, format)| format).ok_or_else(none)
-}
-
-/// How much a media type is wanted: the weight of the most specific range that covers it.
-fn weight(accept: &[&str], media: &str) -> f32 {
-    let group = media.split('/').next().unwrap_or_default();
-    let mut found = (0, 0.0);
-    for range in accept.iter().flat_map(|value| value.split(',')) {
-        let mut parts = range.split(';').map(str::trim);
-        let name = parts.next().unwrap_or_default().to_ascii_lowercase();
-        let q = parts
-            .find_map(|part| part.strip_prefix("q=")?.parse().ok())
-            .unwrap_or(1.0);
-        let specific = match name.split_once('/') {
-            _ if name == media => 3,
-            Some((start, "*")) if start == group => 2,
-            Some(("*", "*")) => 1,
-            _ => continue,
-        };
-        if specific >= found.0 {
-            found = (specific, q);
-        }
-    }
-    found.1
+    best.map(|(_, format)| format)
+        .ok_or_else(|| none(&accept.join(", ")))
 }
 
 #[cfg(test)]
@@ -155,7 +131,7 @@ mod tests {
     fn chosen(parameter: Option<&str>, accept: Option<&str>) -> Option<&'static str> {
         let mut headers = HeaderMap::new();
         if let Some(accept) = accept {
-            headers.insert(header::ACCEPT, accept.parse().unwrap());
+            headers.insert("accept", accept.parse().unwrap());
         }
         choose(Format::OF_TABLES, parameter, &headers)
             .ok()

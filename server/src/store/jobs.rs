@@ -1,6 +1,6 @@
 //! The life of a job: claimed, ended, put back. Every change of status goes through `change`.
 
-use sqlx::SqliteConnection;
+use sqlx::{Row, SqliteConnection};
 
 use super::{
     Result, Store, StoreError,
@@ -222,7 +222,8 @@ impl Store {
             .fetch_all(change.sql())
             .await?;
         for row in &rows {
-            let job = from_row(row)?;
+            // as it is now: it may have been a twin of one that has just ended
+            let job = read(change.sql(), row.try_get("id")?).await?;
             let detail = format!(
                 "it was not started within {} s; see limits.queue_ttl_s",
                 job.limits.queue_ttl_s
@@ -239,7 +240,7 @@ impl Store {
 }
 
 /// Jobs that have waited too long, at most so many.
-pub(super) const LATE: &str = "select * from job indexed by job_expiry
+pub(super) const LATE: &str = "select id from job indexed by job_expiry
      where status = 'queued' and expires_at <= ?
            and (twin_of is null or exists
                 (select 1 from job source where source.id = job.twin_of and source.status = 'queued'))
@@ -284,6 +285,9 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         {
             twins::answer(change, &waiting, &source).await?;
             twins::settle(change, &waiting).await?;
+            continue;
+        }
+        if waiting.cache == Cache::Use && twins::join_running(change, &waiting).await? {
             continue;
         }
         let job = start(change, &waiting).await?;
@@ -379,6 +383,8 @@ async fn requeue(change: &mut Change<'_>, job: &Job, why: Requeue) -> Result<()>
         .bind(job.key)
         .execute(change.sql())
         .await?;
+    // it runs no more: a twin of a higher priority need not wait for it
+    twins::overtake(change, job.key, job.priority).await?;
     let back = [(Time::now(), Payload::requeued(why))];
     events::append(change.sql(), job.key, job.attempt, &back).await?;
     change.changed(job.key);

@@ -134,13 +134,13 @@ impl Store {
         .await?)
     }
 
-    /// Whether the job is terminal, and its `done` so among its events; also when it is no longer there.
-    pub async fn has_ended(&self, key: i64) -> Result<bool> {
+    /// Whether the job is terminal, and its `done` so among its events; `None` when it is no longer there.
+    pub async fn has_ended(&self, key: i64) -> Result<Option<bool>> {
         let status: Option<String> = sqlx::query_scalar("select status from job where id = ?")
             .bind(key)
             .fetch_optional(&self.reader)
             .await?;
-        Ok(status.is_none_or(|word| Status::parse(&word).is_some_and(Status::is_terminal)))
+        Ok(status.map(|word| Status::parse(&word).is_some_and(Status::is_terminal)))
     }
 
     /// At most `limit` jobs of a list, after `cursor`.

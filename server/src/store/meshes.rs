@@ -69,9 +69,17 @@ impl Store {
         Ok(())
     }
 
-    /// The mesh is complete; false if it was there already.
-    pub async fn insert_mesh(&self, info: &MeshInfo) -> Result<bool> {
+    /// The mesh is complete with so many pieces; false if it was there already. `None`: some of them were
+    /// removed meanwhile, with an earlier mesh of the same file, and must be written again.
+    pub async fn insert_mesh(&self, info: &MeshInfo, pieces: i64) -> Result<Option<bool>> {
         let mut tx = self.begin().await?;
+        let there: i64 = sqlx::query_scalar("select count(*) from mesh_piece where hash = ?")
+            .bind(&info.hash)
+            .fetch_one(&mut *tx)
+            .await?;
+        if there != pieces {
+            return Ok(None);
+        }
         let done = sqlx::query(
             "insert into mesh (hash, info, created_at) values (?, ?, ?) on conflict do nothing",
         )
@@ -81,7 +89,7 @@ impl Store {
         .execute(&mut *tx)
         .await?;
         tx.commit().await?;
-        Ok(done.rows_affected() > 0)
+        Ok(Some(done.rows_affected() > 0))
     }
 
     /// The parsed mesh as it was written.

@@ -96,6 +96,11 @@ impl Parts {
         Ok(Parts(parts.into_iter().map(hashed).collect()))
     }
 
+    /// All of them together.
+    pub fn bytes(&self) -> usize {
+        self.0.iter().map(|part| part.body.len()).sum()
+    }
+
     /// All pieces, in groups that are written together.
     fn groups(&self) -> Vec<Vec<Piece<'_>>> {
         let mut groups: Vec<Vec<Piece<'_>>> = vec![vec![]];

@@ -74,8 +74,6 @@ pub struct Submission {
     pub key: Option<RequestKey>,
     /// Most jobs that may wait.
     pub max_queued: u32,
-    /// Somebody is free to run a job: the next one of the queue is claimed with the same commit.
-    pub claim: bool,
 }
 
 /// What became of a submission.
@@ -91,7 +89,7 @@ pub struct Accepted {
     pub changed: Vec<i64>,
 }
 
-type Asking = (Submission, oneshot::Sender<Result<Accepted>>);
+type Asking = (Submission, bool, oneshot::Sender<Result<Accepted>>);
 
 /// Where submissions wait for the next commit.
 #[derive(Debug)]
@@ -106,11 +104,12 @@ impl Door {
 }
 
 impl Store {
-    /// Accepts jobs. They are on the disk when this returns.
-    pub async fn submit(&self, submission: Submission) -> Result<Accepted> {
+    /// Accepts jobs. They are on the disk when this returns. With `claim` somebody is free to run a job, and the
+    /// next one of the queue is claimed with the same commit.
+    pub async fn submit(&self, submission: Submission, claim: bool) -> Result<Accepted> {
         let (reply, answer) = oneshot::channel();
         let gone = || StoreError::Folder("the store is closed".into());
-        let sent = self.door.0.send((submission, reply)).await;
+        let sent = self.door.0.send((submission, claim, reply)).await;
         sent.map_err(|_| gone())?;
         answer.await.map_err(|_| gone())?
     }
@@ -143,20 +142,28 @@ impl Store {
     }
 
     async fn commit_together(&self, asking: Vec<Asking>) {
-        let (submissions, replies): (Vec<Submission>, Vec<_>) = asking.into_iter().unzip();
+        let (mut submissions, mut replies) = (vec![], vec![]);
+        for (submission, claim, reply) in asking {
+            submissions.push((submission, claim));
+            replies.push(reply);
+        }
         let mut answers = vec![];
         let committed = async {
             let mut change = self.change().await?;
-            for submission in submissions {
+            for (submission, claim) in submissions {
                 let mark = change.mark().await?;
-                let accepted = accept(&mut change, submission).await;
+                let accepted = accept(&mut change, submission, claim).await;
                 let accepted = accepted.map(|accepted| Accepted {
                     changed: change.changed_since(mark),
                     ..accepted
                 });
                 match &accepted {
                     Ok(_) => change.keep().await?,
-                    Err(_) => change.undo(mark).await?,
+                    // a full disk has made the database undo all of it: what it said then is the cause
+                    Err(_) if change.undo(mark).await.is_err() => {
+                        return Err(accepted.err().unwrap_or(StoreError::Full));
+                    }
+                    Err(_) => {}
                 }
                 answers.push(accepted);
             }
@@ -178,12 +185,11 @@ impl Store {
     }
 }
 
-async fn accept(change: &mut Change<'_>, submission: Submission) -> Result<Accepted> {
+async fn accept(change: &mut Change<'_>, submission: Submission, claim: bool) -> Result<Accepted> {
     let Submission {
         jobs,
         key,
         max_queued,
-        claim,
     } = submission;
     if let Some(old) = known(change, &jobs, key.as_ref()).await? {
         return Ok(Accepted {

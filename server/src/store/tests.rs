@@ -6,6 +6,28 @@ use sqlx::migrate::Migrator;
 use super::*;
 use crate::job::{Limits, Status};
 
+impl Store {
+    /// Makes the disk full after so many more pages, until that is found out: the connection that has met it is
+    /// replaced.
+    pub(crate) async fn bound(&self, more: i64) {
+        let pages: i64 = sqlx::query_scalar("pragma page_count")
+            .fetch_one(&self.writer)
+            .await
+            .unwrap();
+        let limit = sqlx::AssertSqlSafe(format!("pragma max_page_count = {}", pages + more));
+        sqlx::query(limit).execute(&self.writer).await.unwrap();
+    }
+
+    /// Nobody has found out yet.
+    pub(crate) async fn is_bound(&self) -> bool {
+        let pages: i64 = sqlx::query_scalar("pragma max_page_count")
+            .fetch_one(&self.writer)
+            .await
+            .unwrap();
+        pages < 1_000_000
+    }
+}
+
 /// A store as it was before the job API, with a job that had ended and one that was waiting.
 async fn older_store(folder: &Path) {
     let migrations = folder.join("migrations");
@@ -92,16 +114,8 @@ async fn the_questions_of_the_queue_are_answered_by_indexes() {
 async fn a_full_disk_refuses_and_does_not_end_the_writing_for_ever() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
-    let limit = async |pages: i64| {
-        let limit = sqlx::AssertSqlSafe(format!("pragma max_page_count = {pages}"));
-        sqlx::query(limit).execute(&store.writer).await.unwrap();
-    };
-    let (pages,): (i64,) = sqlx::query_as("pragma page_count")
-        .fetch_one(&store.writer)
-        .await
-        .unwrap();
-    limit(pages + 4).await;
-    let submission = || Submission {
+    store.bound(4).await;
+    let submission = |problem: &str| Submission {
         jobs: vec![NewJob {
             id: None,
             name: Some("x".repeat(1000)),
@@ -111,25 +125,28 @@ async fn a_full_disk_refuses_and_does_not_end_the_writing_for_ever() {
             cache: crate::job::Cache::Off,
             parent: None,
             title: None,
-            input_hash: "sha256:0".into(),
-            problem: "{}".into(),
+            input_hash: format!("sha256:{}", problem.len()),
+            problem: problem.into(),
             mesh: None,
             payload: String::new(),
         }],
         key: None,
         max_queued: 1_000_000,
-        claim: false,
     };
     let mut accepted = 0;
     let refused = loop {
-        match store.submit(submission()).await {
+        match store.submit(submission("{}"), false).await {
             Ok(_) => accepted += 1,
             Err(refused) => break refused,
         }
     };
     assert!(matches!(refused, StoreError::Full), "{refused}");
     assert_eq!(store.waiting(), accepted, "the line is what is on the disk");
-    limit(1_000_000).await; // there is room again
-    store.submit(submission()).await.unwrap();
+    store.bound(4).await;
+    // so large that the database has to write before it is told to commit, and undoes everything by itself
+    let large = store.submit(submission(&"x".repeat(20 << 20)), false).await;
+    assert!(matches!(large, Err(StoreError::Full)), "{large:?}");
+    store.bound(1_000_000).await; // there is room again
+    store.submit(submission("{}"), false).await.unwrap();
     assert_eq!(store.waiting(), accepted + 1);
 }

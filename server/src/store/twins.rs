@@ -42,16 +42,49 @@ pub(super) async fn under_way(change: &mut Change<'_>, new: &NewJob) -> Result<O
         .bind(new.priority)
         .fetch_optional(change.sql())
         .await?;
-    let Some(source) = source else {
-        return Ok(None);
-    };
-    // They end in one transaction with it. Those beyond wait in line, and are answered when it is their turn.
-    let twins: i64 = sqlx::query_scalar("select count(*) from job where twin_of = ?")
-        .bind(source)
-        .fetch_one(change.sql())
-        .await?;
-    Ok((twins < MOST_TWINS).then_some(source))
+    // Twins end in one transaction with their source. Those beyond wait in line, and are answered when it is
+    // their turn.
+    Ok(match source {
+        Some(source) if count(change, source).await? < MOST_TWINS => Some(source),
+        _ => None,
+    })
 }
+
+async fn count(change: &mut Change<'_>, source: i64) -> Result<i64> {
+    let twins = sqlx::query_scalar("select count(*) from job where twin_of = ?")
+        .bind(source)
+        .fetch_one(change.sql());
+    Ok(twins.await?)
+}
+
+/// Lets a job whose turn it is wait for one that runs on the same input, and its own twins with it; false if
+/// there is none, or too many wait for it. They are apart where one had to go before the other.
+pub(super) async fn join_running(change: &mut Change<'_>, job: &Job) -> Result<bool> {
+    let source: Option<i64> = sqlx::query_scalar(UNDER_WAY)
+        .bind(&job.input_hash)
+        .bind(NOBODY_WAITING)
+        .fetch_optional(change.sql())
+        .await?;
+    let Some(source) = source else {
+        return Ok(false);
+    };
+    if count(change, source).await? + count(change, job.key).await? >= MOST_TWINS {
+        return Ok(false);
+    }
+    sqlx::query("update job set twin_of = ? where id = ? or twin_of = ?")
+        .bind(source)
+        .bind(job.key)
+        .bind(job.key)
+        .execute(change.sql())
+        .await?;
+    let (priority, key) = (job.priority, job.key);
+    change.moves(Move::Leave { priority, key });
+    change.moves(Move::Join);
+    Ok(true)
+}
+
+/// A priority that none that waits has: only running ones are left.
+const NOBODY_WAITING: i32 = i32::MAX;
 
 /// The jobs that wait for the end of this one, in the order in which they would run.
 async fn twins_of(change: &mut Change<'_>, source: i64) -> Result<Vec<Job>> {

@@ -10,7 +10,7 @@ use std::{
 use futures_util::{Stream, StreamExt};
 use sha2::{Digest, Sha256};
 use solver::{error::Violation, io::ReadError, mesh::Mesh};
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::io::{AsyncReadExt, AsyncSeekExt, AsyncWriteExt};
 use tracing::info;
 
 use super::{Service, detached, page};
@@ -60,8 +60,13 @@ pub async fn upload(
     let service = service.clone();
     detached(async move {
         let (info, encoded) = parsed;
-        store(&service, &info.hash, encoded).await?;
-        let new = service.store.insert_mesh(&info).await?;
+        let mut encoded = tokio::fs::File::from_std(encoded);
+        let new = loop {
+            let pieces = store(&service, &info.hash, &mut encoded).await?;
+            if let Some(new) = service.store.insert_mesh(&info, pieces).await? {
+                break new;
+            }
+        };
         info!(
             mesh.hash = info.hash,
             info.nodes, "mesh {} stored", info.hash
@@ -89,7 +94,6 @@ fn parse(
         .into_inner()
         .map_err(|error| unwritten(error.into_error()))?;
     encoded.flush().map_err(unwritten)?;
-    encoded.rewind().map_err(ApiError::internal)?;
     Ok((info, encoded))
 }
 
@@ -100,14 +104,19 @@ fn refused(error: ReadError) -> ApiError {
     }
 }
 
-async fn store(service: &Service, hash: &str, encoded: File) -> Result<(), ApiError> {
-    let mut encoded = tokio::fs::File::from_std(encoded);
+/// Writes all pieces, and counts them.
+async fn store(
+    service: &Service,
+    hash: &str,
+    encoded: &mut tokio::fs::File,
+) -> Result<i64, ApiError> {
+    encoded.rewind().await.map_err(ApiError::internal)?;
     let mut first = 0;
     loop {
         let mut group = Vec::with_capacity(PIECES_PER_COMMIT);
         while group.len() < PIECES_PER_COMMIT {
             let mut piece = Vec::with_capacity(PIECE_BYTES);
-            let mut limited = (&mut encoded).take(PIECE_BYTES as u64);
+            let mut limited = (&mut *encoded).take(PIECE_BYTES as u64);
             let read = limited.read_to_end(&mut piece).await;
             read.map_err(ApiError::internal)?;
             if piece.is_empty() {
@@ -116,7 +125,7 @@ async fn store(service: &Service, hash: &str, encoded: File) -> Result<(), ApiEr
             group.push(piece);
         }
         if group.is_empty() {
-            return Ok(());
+            return Ok(first);
         }
         service.store.write_mesh_pieces(hash, first, &group).await?;
         first += group.len() as i64;

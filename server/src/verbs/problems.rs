@@ -5,7 +5,11 @@ use serde::Serialize;
 use solver::{Estimate, error::Violation, mesh::Mesh, problem::Problem, solution::Warning};
 
 use super::{Service, meshes};
-use crate::{digest, error::ApiError, mesh::MeshInfo};
+use crate::{
+    digest,
+    error::{ApiError, count, size},
+    mesh::MeshInfo,
+};
 
 /// What there is to say about a problem.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -16,7 +20,7 @@ pub struct Judgement {
     pub violations: Vec<Violation>,
     /// What to know before trusting its result.
     pub warnings: Vec<Warning>,
-    /// What it would cost; absent when it is invalid.
+    /// What it would cost; absent when it could not be read.
     pub estimate: Option<Estimate>,
     /// Its fingerprint; absent when it could not be read.
     pub input_hash: Option<String>,
@@ -32,41 +36,61 @@ pub async fn validate(
 ) -> Result<Judgement, ApiError> {
     let problem = match problem {
         Ok(problem) => problem,
-        Err(violations) => return Ok(Judgement::invalid(violations, None)),
+        Err(violations) => return Ok(Judgement::unread(violations)),
     };
     let budget_bytes = service.memory_budget_bytes;
     let stored = match stored(service, &problem).await {
         Err(ApiError::InvalidProblem(violations)) => {
-            return Ok(Judgement::invalid(violations, None));
+            return Ok(Judgement::unread(violations));
         }
         stored => stored?,
     };
     let judge = move || {
-        let estimate = affordable(&problem, stored.as_ref(), budget_bytes)?;
-        let input_hash = digest::input_hash(&problem).ok();
-        Ok(match check(&problem, stored.as_ref()) {
-            Ok(warnings) => Judgement {
-                valid: true,
-                violations: vec![],
-                warnings,
-                estimate: Some(estimate),
-                input_hash,
-            },
-            Err(violations) => Judgement::invalid(violations, input_hash),
-        })
+        let estimate = estimate(&problem, stored.as_ref());
+        let judged = match estimate.memory_bytes > budget_bytes {
+            true => Err(vec![too_large(&estimate, budget_bytes)]),
+            false => check(&problem, stored.as_ref()),
+        };
+        let (warnings, violations) = match judged {
+            Ok(warnings) => (warnings, vec![]),
+            Err(violations) => (vec![], violations),
+        };
+        let at = |warning: Warning| Warning {
+            pointer: format!("{AT}{}", warning.pointer),
+            ..warning
+        };
+        Judgement {
+            valid: violations.is_empty(),
+            violations,
+            warnings: warnings.into_iter().map(at).collect(),
+            estimate: Some(estimate),
+            input_hash: digest::input_hash(&problem).ok(),
+        }
     };
-    service.work(judge).await?
+    service.work(judge).await
 }
 
 impl Judgement {
-    fn invalid(violations: Vec<Violation>, input_hash: Option<String>) -> Judgement {
+    fn unread(violations: Vec<Violation>) -> Judgement {
         Judgement {
             valid: false,
             violations,
             warnings: vec![],
             estimate: None,
-            input_hash,
+            input_hash: None,
         }
+    }
+}
+
+/// What an answer says of a problem that a request would be refused for.
+fn too_large(estimate: &Estimate, budget_bytes: u64) -> Violation {
+    let (unknowns, memory) = (count(estimate.dofs), size(estimate.memory_bytes));
+    Violation {
+        pointer: format!("{AT}/mesh"),
+        reason: "too_large".into(),
+        got: format!("{unknowns} unknowns, which need about {memory}"),
+        expected: format!("at most {} of memory", size(budget_bytes)),
+        hint: "Take a coarser mesh or refine less, or ask the operator for a larger budget.".into(),
     }
 }
 
@@ -99,7 +123,13 @@ pub async fn admit(service: &Service, mut problem: Problem) -> Result<Admitted, 
     let budget_bytes = service.memory_budget_bytes;
     let stored = stored(service, &problem).await?;
     let admit = move || {
-        affordable(&problem, stored.as_ref(), budget_bytes)?;
+        let estimate = estimate(&problem, stored.as_ref());
+        if estimate.memory_bytes > budget_bytes {
+            return Err(ApiError::ProblemTooLarge {
+                estimate,
+                budget_bytes,
+            });
+        }
         check(&problem, stored.as_ref()).map_err(ApiError::InvalidProblem)?;
         let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
         let title = problem.title.take();
@@ -115,20 +145,9 @@ pub async fn admit(service: &Service, mut problem: Problem) -> Result<Admitted, 
 }
 
 /// The estimate is made before anything is meshed: a mesh may be what we cannot afford.
-fn affordable(
-    problem: &Problem,
-    stored: Option<&(MeshInfo, Mesh)>,
-    budget_bytes: u64,
-) -> Result<Estimate, ApiError> {
+fn estimate(problem: &Problem, stored: Option<&(MeshInfo, Mesh)>) -> Estimate {
     let size = stored.map(|(info, _)| info.size());
-    let estimate = solver::estimate(problem, size.as_ref());
-    if estimate.memory_bytes > budget_bytes {
-        return Err(ApiError::ProblemTooLarge {
-            estimate,
-            budget_bytes,
-        });
-    }
-    Ok(estimate)
+    solver::estimate(problem, size.as_ref())
 }
 
 fn check(

@@ -22,7 +22,7 @@ use crate::{
 /// What is said of one load step.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct StepResult {
-    /// Its name in the problem, or its number from 1.
+    /// Its name in the problem, or its number from 0.
     pub name: String,
     /// Its end.
     pub summary: solver::solution::Summary,
@@ -43,14 +43,22 @@ pub struct JobResult {
 
 /// The scalars of a job that has some.
 pub async fn result(service: &Service, id: JobId) -> Result<JobResult, ApiError> {
-    let mut found = with_result(service, id).await?;
-    let bytes = found.part("summary").await?;
-    let bytes = bytes.ok_or_else(|| ApiError::internal(format!("{id} has no summary")))?;
-    Ok(JobResult {
-        result_available: found.job.result_available,
-        summary: serde_json::from_slice(&bytes).map_err(ApiError::internal)?,
-        steps: steps(&mut found).await?,
-    })
+    let load = async {
+        let mut found = with_result(service, id).await?;
+        let summary = found.part("summary").await?;
+        let summary = summary.ok_or_else(|| ApiError::internal(format!("{id} has no summary")))?;
+        let steps = found.part("steps").await?;
+        Ok((found.job.result_available, summary, steps))
+    };
+    let read = |(result_available, summary, steps): (_, Vec<u8>, Option<Vec<u8>>)| {
+        let steps = steps.map_or(Ok(vec![]), |steps| serde_json::from_slice(&steps));
+        Ok(JobResult {
+            result_available,
+            summary: serde_json::from_slice(&summary).map_err(ApiError::internal)?,
+            steps: steps.map_err(ApiError::internal)?,
+        })
+    };
+    service.work_on(load, read).await?
 }
 
 async fn steps(found: &mut Snapshot) -> Result<Vec<StepResult>, ApiError> {
@@ -226,6 +234,9 @@ fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, A
     let named = steps.iter().position(|step| step.name == wanted);
     let numbered = wanted.parse().ok().filter(|n| *n < steps.len());
     named.or(numbered).ok_or_else(|| {
+        if steps.is_empty() {
+            return ApiError::NotFound(format!("{id} has no load steps; leave `step` out"));
+        }
         let names: Vec<_> = steps
             .iter()
             .take(20)

@@ -104,7 +104,10 @@ pub async fn create_batch(
             reason: "out_of_range".into(),
             got: format!("{} jobs", drafts.len()),
             expected: "1 … 1000 jobs".into(),
-            hint: "Hand them in in several batches.".into(),
+            hint: match drafts.is_empty() {
+                true => "Send {\"jobs\": [{\"problem\": {…}}, …]}.".into(),
+                false => "Hand them in in several batches.".into(),
+            },
         }]));
     }
     let service = service.clone();
@@ -135,8 +138,10 @@ pub async fn create_batch(
 /// What is changed of a job that is tried again; what is absent stays.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Changes {
-    /// What it may take.
-    pub limits: Option<Limits>,
+    /// Seconds from a start to the end.
+    pub timeout_s: Option<f64>,
+    /// Seconds that it may wait for a start.
+    pub queue_ttl_s: Option<f64>,
     /// Higher first.
     pub priority: Option<i32>,
 }
@@ -181,7 +186,10 @@ pub async fn retry(
             name,
             labels,
             priority: changes.priority.unwrap_or(priority),
-            limits: changes.limits.unwrap_or(limits),
+            limits: Limits {
+                timeout_s: changes.timeout_s.unwrap_or(limits.timeout_s),
+                queue_ttl_s: changes.queue_ttl_s.unwrap_or(limits.queue_ttl_s),
+            },
             // who kept its result to itself means that still
             cache: match cache {
                 Cache::Off => Cache::Off,
@@ -349,7 +357,6 @@ async fn hand_in(
         jobs,
         key,
         max_queued: limit,
-        claim: false,
     };
     let accepted = service.queue.submit(submission).await;
     let accepted = accepted.map_err(|error| match error {
@@ -424,14 +431,19 @@ pub(super) fn label_violations(labels: &BTreeMap<String, String>) -> Vec<Violati
         ));
     }
     for (key, value) in labels.iter().take(LABELS) {
-        let longest = key.chars().count().max(value.chars().count());
-        if longest > MOST || key.is_empty() {
-            found.push(violation(
-                format!("/labels/{}", escape(&shortened(key, MOST))),
-                format!("{longest} characters"),
-                "1 … 256 characters, as key and as value",
-                "Shorten it.",
-            ));
+        let pointer = || format!("/labels/{}", escape(&shortened(key, MOST)));
+        let length = key.chars().count();
+        if length == 0 || length > MOST {
+            let (got, hint) = (
+                format!("a key of {length} characters"),
+                "Name it otherwise.",
+            );
+            found.push(violation(pointer(), got, "a key of 1 … 256", hint));
+        }
+        let length = value.chars().count();
+        if length > MOST {
+            let got = format!("a value of {length} characters");
+            found.push(violation(pointer(), got, "at most 256", "Shorten it."));
         }
     }
     found

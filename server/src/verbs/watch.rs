@@ -61,11 +61,11 @@ pub async fn wait(
 }
 
 /// Stored events after number `after`, then live ones; ends after `done`, or with the job if `after`
-/// lies beyond that. When the service stops it ends with an error, so that nobody takes that for the
-/// end of the job.
+/// lies beyond that. When the service stops, or the job is deleted before, it ends with an error, so that
+/// nobody takes that for the end of the job.
 pub fn watch(
     service: Arc<Service>,
-    key: i64,
+    (id, key): (JobId, i64),
     after: i64,
 ) -> impl Stream<Item = Result<Event, ApiError>> + Send {
     try_stream! {
@@ -86,9 +86,13 @@ pub fn watch(
             if idle && ended {
                 return;
             }
-            if idle && service.store.has_ended(key).await? {
-                ended = true;
-                continue; // once more: `done` may have come after the look for events
+            if idle {
+                let has_ended = service.store.has_ended(key).await?;
+                // deleted: whoever has not seen `done` by now does not see it any more
+                if has_ended.ok_or(ApiError::Deleted(id))? {
+                    ended = true;
+                    continue; // once more: `done` may have come after the look for events
+                }
             }
             if service.queue.stopping().is_cancelled() {
                 Err(ApiError::Draining)?;

@@ -29,7 +29,8 @@ pub struct MeshInput {
     /// The hash of a mesh that was uploaded to the service, `sha256:…`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stored: Option<String>,
-    /// How often every element is split, or the tolerance that a grid is refined to.
+    /// How often every element is split into four (each time that many more unknowns), or the tolerance that a
+    /// grid is refined to.
     #[serde(default)]
     pub refine: Refine,
     /// Further names for parts of boundaries, e.g. `{"taper": {"side": "top", "x": [1, 3]}}`.

@@ -38,7 +38,7 @@ pub struct Solution {
 /// The end of one load step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepSolution {
-    /// Its name in the problem, or its number from 1.
+    /// Its name in the problem, or its number from 0.
     pub name: String,
     /// As of a whole solution.
     pub summary: Summary,

@@ -146,11 +146,8 @@ async fn who_is_answered_beside_a_submit_is_told_of_it() {
         .store
         .finish(source.key, 1, &solved, LastWords::default(), None);
     finished.await.unwrap().unwrap();
-    let submission = Submission {
-        claim: true,
-        ..submission(vec![new(0)], None)
-    };
-    let accepted = rig.store.submit(submission).await.unwrap();
+    let submission = submission(vec![new(0)], None);
+    let accepted = rig.store.submit(submission, true).await.unwrap();
     assert!(accepted.changed.contains(&waiting.key), "{accepted:?}");
     let answered = rig.store.job(waiting.id).await.unwrap().unwrap();
     assert_eq!(
@@ -198,4 +195,57 @@ async fn a_poison_job_takes_the_process_down_three_times_and_not_once_more_for_a
         );
     }
     assert!(rig.store.claim_next().await.unwrap().0.is_none());
+}
+
+#[tokio::test]
+async fn a_source_that_is_put_back_leaves_its_place_to_a_twin_that_goes_first() {
+    let rig = rig(fake::solve).await; // its workers never start: we claim, and die, in their place
+    let at = |priority| NewJob { priority, ..same() };
+    let source = rig.submit_as(at(-5)).await;
+    rig.store.claim_next().await.unwrap().0.unwrap();
+    let twin = rig.submit_as(at(5)).await;
+    assert_eq!(twin.twin_of, Some(source.key));
+    let between = rig.submit().await;
+    rig.store.requeue_interrupted().await.unwrap();
+    let place = async |job: &Job| {
+        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        job.queue.unwrap().position
+    };
+    assert_eq!((place(&twin).await, place(&between).await), (1, 2));
+}
+
+#[tokio::test]
+async fn whose_turn_it_is_joins_a_job_that_runs_on_the_same_input() {
+    let rig = rig(fake::solve).await; // its workers never start: we claim in their place
+    let first = rig.submit_as(same()).await;
+    let twin = rig.submit_as(same()).await;
+    let before = rig
+        .submit_as(NewJob {
+            priority: 5,
+            ..same()
+        })
+        .await;
+    assert_eq!(before.twin_of, None, "it is not made late by one behind it");
+    let claim = rig.store.claim_next().await.unwrap().0.unwrap();
+    assert_eq!(claim.job.key, before.key);
+    assert!(rig.store.claim_next().await.unwrap().0.is_none());
+    for job in [&first, &twin] {
+        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        assert_eq!(job.twin_of, Some(before.key));
+    }
+    assert_eq!(rig.store.waiting(), 2);
+    let ending = Ending {
+        status: Status::Succeeded,
+        reason: None,
+        failure: None,
+        result: ResultAvailable::Final,
+    };
+    let last = LastWords::default();
+    rig.store
+        .finish(before.key, 1, &ending, last, None)
+        .await
+        .unwrap();
+    let first = rig.store.job(first.id).await.unwrap().unwrap();
+    assert_eq!(first.cached_from, Some(before.id));
+    assert_eq!(rig.store.waiting(), 0);
 }

@@ -112,3 +112,24 @@ async fn the_line_in_memory_is_the_queue_on_the_disk() {
     assert_eq!(claimed[0].1, moved[1].id);
     assert_eq!(rig.store.waiting(), 0);
 }
+
+#[tokio::test]
+async fn a_job_and_its_twin_may_have_waited_too_long_at_the_same_moment() {
+    let rig = rig(fake::solve).await; // its workers never start
+    let short = || {
+        let mut job = same();
+        job.limits.queue_ttl_s = 0.05;
+        job
+    };
+    let jobs = [rig.submit_as(short()).await, rig.submit_as(short()).await];
+    assert!(jobs[1].twin_of.is_some());
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    rig.store.expire_queued(Time::now()).await.unwrap();
+    for job in &jobs {
+        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        assert_eq!(job.reason, Some(Reason::QueueExpired));
+    }
+    assert_eq!(rig.store.waiting(), 0);
+    let next = rig.submit().await;
+    assert_eq!(next.queue.unwrap().position, 1);
+}

@@ -70,7 +70,6 @@ impl Rig {
             jobs: vec![new],
             key: None,
             max_queued: 10,
-            claim: false,
         };
         let accepted = self.queue.submit(submission).await.unwrap();
         accepted.jobs.into_iter().next().unwrap()
@@ -145,6 +144,5 @@ fn submission(jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
         jobs,
         key,
         max_queued: 1000,
-        claim: false,
     }
 }

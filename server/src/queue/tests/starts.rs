@@ -365,3 +365,24 @@ async fn what_many_quick_steps_have_found_is_not_written_after_each() {
         "what was told went on after it"
     );
 }
+
+/// Its events cannot be stored for a moment.
+#[tokio::test]
+async fn a_full_disk_holds_a_job_up_and_does_not_end_it() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start();
+    let mut short = new(0);
+    short.limits.timeout_s = 1.0;
+    let job = rig.submit_as(short).await;
+    rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
+        .await;
+    rig.store.bound(0).await;
+    let done = rig.until_done(&job).await;
+    assert!(!rig.store.is_bound().await, "the disk was full meanwhile");
+    assert_eq!(
+        (done.status, done.reason),
+        (Status::Failed, Some(Reason::TimedOut))
+    );
+    let told = rig.store.iterations(job.key, 1).await.unwrap();
+    assert_eq!(told.len(), done.progress.unwrap().iteration as usize);
+}

@@ -1,12 +1,12 @@
 //! `/docs`: Swagger UI showing `/openapi.json`. It is compiled in, so the page works without a network.
 
 use axum::{
-    extract::{Path, RawQuery},
+    extract::RawQuery,
     http::{HeaderName, header},
     response::IntoResponse,
 };
 
-use super::request::Params;
+use super::request::{Params, TextPath};
 use crate::{error::ApiError, violations};
 
 const PAGE: &str = include_str!("index.html");
@@ -46,7 +46,7 @@ pub(super) async fn page(RawQuery(query): RawQuery) -> Result<impl IntoResponse,
 
 pub(super) async fn file(
     RawQuery(query): RawQuery,
-    Path(name): Path<String>,
+    TextPath(name): TextPath,
 ) -> Result<impl IntoResponse, ApiError> {
     Params::parse(query.as_deref(), &[])?;
     let found = FILES.iter().find(|(known, ..)| *known == name);

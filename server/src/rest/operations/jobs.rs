@@ -121,6 +121,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .says("Asks a job to stop; it is terminal within half a second")
             .answers(200, "What that did, and the job", json::<jobs::Canceled>())
             .headed([etag()])
+            .fails(&[Code::StorageFull])
             .tested(&[
                 "service::cancel::a_queued_job_is_canceled_at_once_and_never_runs",
                 "service::cancel::a_running_large_job_is_canceled_within_half_a_second_in_any_phase",
@@ -137,21 +138,21 @@ pub(super) fn operations() -> Vec<Operation> {
             .rpcs(&["DeleteJob"])
             .says("Deletes a job that has ended, with its events and its result")
             .answers(204, "It is gone; for 7 days its name answers 410", nothing())
-            .fails(&[Code::JobActive])
+            .fails(&[Code::JobActive, Code::StorageFull])
             .tested(&["service::control::a_deleted_job_is_gone_with_all_that_belonged_to_it", "service::control::a_job_that_waits_or_runs_is_neither_retried_nor_deleted"]),
         post("/v1/jobs/cancel", jobs::cancel_many)
             .rpcs(&["CancelJobs"])
             .says("Asks all jobs of a filter to stop")
             .with(filters())
             .answers(200, "How many there were, and how many of them changed", json::<Many>())
-            .fails(&[Code::MissingFilter])
+            .fails(&[Code::MissingFilter, Code::StorageFull])
             .tested(&["service::control::many_jobs_are_canceled_and_deleted_by_a_filter_and_not_without_one"]),
         delete("/v1/jobs", jobs::delete_many)
             .rpcs(&["DeleteJobs"])
             .says("Deletes all jobs of a filter that have ended, pinned ones too")
             .with(filters())
             .answers(200, "How many there were, and how many of them are gone", json::<Many>())
-            .fails(&[Code::MissingFilter])
+            .fails(&[Code::MissingFilter, Code::StorageFull])
             .tested(&["service::control::many_jobs_are_canceled_and_deleted_by_a_filter_and_not_without_one"]),
     ]
 }
@@ -214,9 +215,17 @@ pub(super) fn filters() -> [Parameter; 9] {
         labels(),
         query("name", text(), "Only jobs of this name"),
         query("input_hash", text(), "Only jobs with this input"),
-        query("created_after", time(), "Only jobs accepted later"),
+        query(
+            "created_after",
+            time(),
+            "Only jobs accepted at this time or later",
+        ),
         query("created_before", time(), "Only jobs accepted earlier"),
-        query("finished_after", time(), "Only jobs that ended later"),
+        query(
+            "finished_after",
+            time(),
+            "Only jobs that ended at this time or later",
+        ),
         query("finished_before", time(), "Only jobs that ended earlier"),
     ]
 }

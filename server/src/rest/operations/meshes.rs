@@ -17,7 +17,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .headed([location()])
             .answers(201, "What is said of a new mesh", json::<MeshInfo>())
             .headed([location()])
-            .fails(&[Code::MalformedJson, Code::InvalidProblem, Code::PayloadTooLarge, Code::StorageFull])
+            .fails(&[Code::MalformedJson, Code::InvalidProblem, Code::PayloadTooLarge, Code::Draining, Code::StorageFull])
             .tested(&[
                 "service::meshes::what_gmsh_wrote_is_stored_and_solved",
                 "service::meshes::a_mesh_is_stored_once_and_told_apart_by_its_content",
@@ -38,7 +38,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .rpcs(&["DeleteMesh"])
             .says("Removes a stored mesh that no waiting or running job needs")
             .answers(204, "It is gone", nothing())
-            .fails(&[Code::JobActive])
+            .fails(&[Code::JobActive, Code::StorageFull])
             .tested(&["service::meshes::a_mesh_is_kept_for_the_jobs_that_wait_for_it"]),
     ]
 }

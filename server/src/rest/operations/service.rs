@@ -21,7 +21,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .takes(json::<BareProblem>())
             .for_example(submission())
             .answers(200, "All that there is to say of it", json::<Judgement>())
-            .fails(&[Code::InvalidProblem, Code::ProblemTooLarge])
+            .fails(&[Code::InvalidProblem])
             .tested(&["service::validate::a_good_problem_is_valid_and_has_a_price", "service::validate::a_bad_problem_is_an_answer_and_not_an_error"]),
         get("/v1/queue", service::queue)
             .rpcs(&["GetQueue"])
