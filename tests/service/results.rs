@@ -252,6 +252,36 @@ async fn a_result_is_not_there_before_the_end_nor_after_an_end_without_one() {
     assert_eq!(never.json::<Value>().await.unwrap()["code"], "no-result");
 }
 
+/// Names and numbers of load steps mean the same one.
+#[tokio::test]
+async fn load_steps_without_names_are_numbered_from_0() {
+    let server = server().await;
+    let mut problem = example_json("rectangular_punch");
+    problem["steps"] = json!([{ "indentation": 0.5 }, { "name": "0" }, { "indentation": 0.8 }]);
+    let id = server.submit(&problem).await;
+    server.until_done(&id).await;
+    let at = |what: &str| format!("/v1/jobs/{id}/{what}");
+    let result = server.json(&at("result")).await;
+    let names: Vec<_> = result["steps"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|step| step["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["0", "0", "2"]);
+    let force = async |step: &str| {
+        let profile = server.json(&at(&format!("profiles/top?step={step}"))).await;
+        let stress = profile["normal_stress"].as_array().unwrap();
+        stress
+            .iter()
+            .map(|s| s.as_f64().unwrap())
+            .sum::<f64>()
+            .abs()
+    };
+    let forces = [force("0").await, force("1").await, force("2").await];
+    assert!(forces[0] < forces[2] && forces[2] < forces[1], "{forces:?}");
+}
+
 /// Load steps: while the second runs, what the first has found is there.
 #[tokio::test]
 async fn finished_load_steps_of_a_running_job_are_served() {

@@ -59,10 +59,7 @@ pub(super) async fn record(
         let batch = next_batch(&mut lines).await;
         let payloads = batch.events.iter().map(|(_, payload)| payload);
         one_level |= batch.one_level;
-        payloads.for_each(|payload| follow(&mut progress, payload));
-        if !one_level {
-            progress.eta_s = None; // the end of these sweeps is not the job's
-        }
+        payloads.for_each(|payload| follow(&mut progress, payload, one_level));
         if batch.last {
             let lines = batch.events;
             return LastWords { lines, progress };
@@ -156,7 +153,7 @@ impl Batch {
 }
 
 /// Keeps up with what the solver says.
-fn follow(progress: &mut Progress, payload: &Payload) {
+fn follow(progress: &mut Progress, payload: &Payload, one_level: bool) {
     match payload {
         Payload::Stage { stage } => {
             progress.stage = phase_name(*stage).to_string();
@@ -170,7 +167,8 @@ fn follow(progress: &mut Progress, payload: &Payload) {
                 tolerance: Some(row.tolerance),
                 contact_changes: Some(row.contact.entered + row.contact.left),
                 rate: row.contraction,
-                eta_s: eta_s(row),
+                // of several levels the end of these sweeps is not the job's
+                eta_s: eta_s(row).filter(|_| one_level),
             }
         }
         Payload::Status { .. } | Payload::Warning(_) | Payload::Done { .. } => {}
@@ -195,6 +193,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::fake;
+    use solver::solution::Phase;
 
     #[tokio::test]
     async fn a_batch_ends_when_the_solver_hangs_up_or_after_fifty_rows() {
@@ -224,5 +223,14 @@ mod tests {
             (eta_s(&row).unwrap() - 8.0).abs() < 1e-9,
             "four sweeps of two seconds"
         );
+        let mut progress = Progress::default();
+        let row = Payload::Iteration(row);
+        follow(&mut progress, &row, false);
+        assert_eq!(progress.eta_s, None, "there are more steps");
+        follow(&mut progress, &row, true);
+        assert!(progress.eta_s.is_some());
+        let stage = Phase::Recover;
+        follow(&mut progress, &Payload::Stage { stage }, true);
+        assert_eq!((progress.eta_s, progress.rate), (None, Some(0.1)));
     }
 }

@@ -62,7 +62,14 @@ pub async fn plot(
             ..read(problem.as_bytes())?
         };
         let stored = match &problem.mesh.stored {
-            Some(hash) if plot == Plot::Mesh => store.mesh_body(hash).await?,
+            Some(hash) if plot == Plot::Mesh => {
+                let gone = || {
+                    ApiError::NotFound(format!(
+                        "{id} has no plot mesh: {hash} was removed; deformed has the elements too"
+                    ))
+                };
+                Some(store.mesh_body(hash).await?.ok_or_else(gone)?)
+            }
             _ => None,
         };
         Ok((job, problem, columns, history, fields, stored))

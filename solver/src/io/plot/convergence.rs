@@ -89,7 +89,7 @@ fn steps(problem: &Problem, history: &[Iteration], named: bool) -> Vec<(f64, Str
         if before != Some(row.step) {
             let step = problem.steps.get(row.step as usize);
             let name = step.and_then(|step| step.name.clone());
-            let name = name.unwrap_or_else(|| format!("step {}", row.step + 1));
+            let name = name.unwrap_or_else(|| format!("step {}", row.step));
             let word = if named {
                 super::page::shortened(&name, 20)
             } else {

@@ -18,6 +18,9 @@ const LEGEND: i32 = 22;
 const LEFT: i32 = 84;
 /// Lines of boundaries that lie over one another, the first below (pixels).
 const WIDTHS: [f64; 3] = [5.0, 2.4, 1.2];
+/// With more elements than this only the outline is drawn: the lines would cover the body, and viewers refuse
+/// files of some ten megabytes.
+const DRAWN: usize = 30_000;
 /// More boundaries than this are not named.
 const MOST: usize = 24;
 
@@ -59,17 +62,27 @@ pub fn mesh_svg(
 
     let on_page = |side: &[u32; 3]| side.map(|n| frame.at(nodes[n as usize]));
     let sides = Sides::of(elements, nodes.len());
+    let each = elements.len() <= DRAWN;
     let (mut inside, mut lines) = (Path::default(), Path::default());
-    for element in elements {
+    if each {
+        for element in elements {
+            inside.sides(
+                &element.sides().map(|s| on_page(&s)).collect::<Vec<_>>(),
+                true,
+            );
+        }
+    } else {
+        // what lies between its outline and its holes
         inside.sides(
-            &element.sides().map(|s| on_page(&s)).collect::<Vec<_>>(),
-            true,
+            &sides.surface.iter().map(on_page).collect::<Vec<_>>(),
+            false,
         );
     }
-    lines.sides(&sides.all.iter().map(on_page).collect::<Vec<_>>(), false);
-    let finest = if elements.len() > 4000 { 3 } else { 7 };
+    let drawn = if each { &sides.all } else { &sides.surface };
+    lines.sides(&drawn.iter().map(on_page).collect::<Vec<_>>(), false);
+    let finest = if each && elements.len() > 4000 { 3 } else { 7 };
     let (fill, line) = (hex(palette.body), hex(palette.reference));
-    let mut content = inside.drawn(&format!(r#"fill="{fill}""#));
+    let mut content = inside.drawn(&format!(r#"fill="{fill}" fill-rule="evenodd""#));
     content += &lines.drawn(&format!(
         r#"fill="none" stroke="{line}" stroke-width="{finest}""#
     ));
@@ -113,7 +126,10 @@ pub fn mesh_svg(
     let title = problem.title.as_deref().unwrap_or("Mesh");
     let unit = page::length(&problem.units);
     let axes = body::coordinates(&problem.analysis).map(|name| with_unit(name, unit));
-    let caption = format!("{} elements, {} nodes", elements.len(), nodes.len());
+    let mut caption = format!("{} elements, {} nodes", elements.len(), nodes.len());
+    if !each {
+        caption += "; too many to be drawn one by one";
+    }
     page::page(theme, title, height + legend, |area| {
         body::axes(area, theme, frame, &caption, [&axes[0], &axes[1]])?;
         for (k, (label, (row, x))) in labels.iter().zip(&places).enumerate() {
@@ -188,6 +204,22 @@ fn places(labels: &[String]) -> Vec<(i32, i32)> {
 mod tests {
     use super::*;
     use crate::io::plot::tests::problem;
+    use crate::problem::Refine;
+
+    #[test]
+    fn of_a_very_fine_mesh_the_outline_is_drawn() {
+        let mut problem = problem();
+        let size = |problem: &Problem| {
+            let svg = mesh_svg(Theme::Light, problem, None, &Fields::default()).unwrap();
+            (svg.len(), svg.contains("too many to be drawn"))
+        };
+        problem.mesh.refine = Refine::Times(6);
+        let (fine, outlined) = size(&problem);
+        assert!(!outlined);
+        problem.mesh.refine = Refine::Times(7);
+        let (finer, outlined) = size(&problem);
+        assert!(outlined && finer < fine, "{finer} {fine}");
+    }
 
     #[test]
     fn a_mesh_has_its_elements_and_the_names_of_its_boundaries() {

@@ -182,7 +182,7 @@ mod tests {
         .unwrap();
         let history = solution(&problem).history;
         let svg = convergence_svg(Theme::Light, &problem, &history).unwrap();
-        for text in ["indent", "step 2", "tolerance", "nodes in contact", "10⁻¹⁰"] {
+        for text in ["indent", "step 1", "tolerance", "nodes in contact", "10⁻¹⁰"] {
             assert!(svg.contains(text), "{text}");
         }
         assert!(convergence_svg(Theme::Light, &problem, &[]).is_err());

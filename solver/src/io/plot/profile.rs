@@ -6,11 +6,11 @@ use std::ops::Range;
 use super::figure::{Curve, Look, Panel, figure};
 use super::page::{self, with_unit};
 use super::theme::Theme;
-use crate::problem::Problem;
+use crate::problem::{Contact, Problem};
 use crate::solution::ContactProfile;
 
-/// For each contact boundary: σ_n above, σ_t with the friction bound ±τ below, against arc length.
-/// Stresses are negative in compression. `Err` says why a figure could not be drawn.
+/// For each contact boundary: σ_n above, and where there is friction σ_t with its bound ±τ below, against arc
+/// length. Stresses are negative in compression. `Err` says why a figure could not be drawn.
 pub fn profile_svg(
     theme: Theme,
     problem: &Problem,
@@ -27,7 +27,7 @@ pub fn profile_svg(
     figure(theme, title, &panels)
 }
 
-fn panels(problem: &Problem, name: &str, profile: &ContactProfile) -> [Panel; 2] {
+fn panels(problem: &Problem, name: &str, profile: &ContactProfile) -> Vec<Panel> {
     let shown = stressed(profile);
     let curve = |label: &str, look: Look, values: &[f64]| Curve {
         label: label.to_owned(),
@@ -44,18 +44,21 @@ fn panels(problem: &Problem, name: &str, profile: &ContactProfile) -> [Panel; 2]
         curves,
         ..Panel::default()
     };
-    [
-        panel(vec![curve("σ_n", Look::Line(0), &profile.normal_stress)]),
-        panel(vec![
-            curve(
-                "±τ, friction bound",
-                Look::Reference,
-                &profile.friction_bound,
-            ),
-            curve("", Look::Reference, &opposite),
-            curve("σ_t", Look::Line(1), &profile.tangential_stress),
-        ]),
-    ]
+    let normal = vec![curve("σ_n", Look::Line(0), &profile.normal_stress)];
+    let tangential = vec![
+        curve(
+            "±τ, friction bound",
+            Look::Reference,
+            &profile.friction_bound,
+        ),
+        curve("", Look::Reference, &opposite),
+        curve("σ_t", Look::Line(1), &profile.tangential_stress),
+    ];
+    let rough = |contact: &Contact| contact.boundary == name && contact.friction.is_some();
+    match problem.contacts.iter().any(rough) {
+        true => vec![panel(normal), panel(tangential)],
+        false => vec![panel(normal)],
+    }
 }
 
 /// The nodes under stress and a margin of a fifth on each side: a contact is often a small part of
@@ -95,8 +98,14 @@ mod tests {
             ("left".to_owned(), profile.clone()),
             ("top".to_owned(), profile),
         ]);
-        let problem = problem();
+        let mut problem = problem();
+        let smooth = profile_svg(Theme::Light, &problem, &two).unwrap();
+        let mut left = problem.contacts[0].clone();
+        left.boundary = "left".into();
+        problem.contacts.push(left);
         let svg = profile_svg(Theme::Light, &problem, &two).unwrap();
+        assert_eq!(svg.matches("±τ").count(), 2);
+        assert_eq!(smooth.matches("±τ").count(), 1, "no friction, no bound");
         assert!(svg.starts_with("<svg") && svg.contains("Punch") && svg.contains("`left` [mm]"));
         assert!(svg.contains("stress [MPa]"));
         assert!(svg.matches("<polyline").count() >= 8);
