@@ -5,7 +5,10 @@ use std::time::{Duration, Instant};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use service::pb;
-use suite::{example, example_json, harness::Server};
+use suite::{
+    example, example_json,
+    harness::{Server, answer},
+};
 
 use crate::{
     SIGNORINI,
@@ -171,4 +174,22 @@ async fn events_come_as_lines_to_who_prefers_lines() {
             .collect();
         assert_eq!(lines, told[2..]);
     }
+    let request = server.get(&format!("/v1/jobs/{id}/events"));
+    let (status, refused) = answer(request.header("Accept", "image/png")).await;
+    assert_eq!(status, StatusCode::NOT_ACCEPTABLE);
+    let detail = refused["detail"].as_str().unwrap();
+    assert_eq!(
+        detail,
+        "not available as image/png; available: text/event-stream, application/jsonl"
+    );
+    // and to who hands a job in
+    let body = json!({ "problem": example_json("sheet"), "cache": "off" });
+    let request = server
+        .post("/v1/jobs")
+        .header("Accept", "application/jsonl");
+    let response = request.json(&body).send().await.unwrap();
+    assert_eq!(response.status(), StatusCode::ACCEPTED);
+    let text = response.text().await.unwrap();
+    let last: Value = serde_json::from_str(text.lines().last().unwrap()).unwrap();
+    assert_eq!(last["type"], "done");
 }

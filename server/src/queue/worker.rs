@@ -58,7 +58,10 @@ pub(super) async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) 
     let solved = solving.await;
     clock.abort();
     let (ending, parts) = judge(&job, solved, running.stop.get() == Some(&Why::OutOfTime));
-    end(queue, &job, ending, last, parts).await;
+    // at a drain it is put back, by that or by the next start, and not canceled
+    if !(ending.status == Status::Canceled && queue.stopping.is_cancelled()) {
+        end(queue, &job, ending, last, parts).await;
+    }
     queue.release(&job);
 }
 

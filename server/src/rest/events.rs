@@ -15,19 +15,20 @@ use futures_util::{StreamExt, TryStreamExt};
 
 use super::{
     Rest,
-    request::{JobPath, Params, wants},
+    request::{JobPath, Params, accepted, wants, weight},
 };
 use crate::{
     error::ApiError,
     event::Event,
     job::Job,
     verbs::{Service, jobs, watch as verbs},
+    violations,
 };
 
 /// Tells proxies and clients that the line still stands.
 const PING: Duration = Duration::from_secs(15);
 /// Server-sent events.
-pub(super) const SSE: &str = "text/event-stream";
+const SSE: &str = "text/event-stream";
 /// A JSON object per line, by its names.
 const LINES: [&str; 2] = ["application/jsonl", "application/x-ndjson"];
 
@@ -59,14 +60,37 @@ pub(super) async fn watch(
     if verbs::is_silent(&rest.service, &job, after).await? {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    if wants(&headers, &LINES) {
-        return Ok(lines(&rest.service, &job, after));
+    let accepted = accepted(&headers);
+    let some = |media: &str| weight(&accepted, media).0 > 0.0;
+    if !accepted.is_empty()
+        && ![SSE, LINES[0], LINES[1], "application/json"]
+            .into_iter()
+            .any(some)
+    {
+        return Err(ApiError::NotAcceptable {
+            got: violations::name(&accepted.join(", ")),
+            available: format!("{SSE}, {}", LINES[0]),
+        });
     }
-    Ok(stream(&rest.service, &job, after))
+    Ok(wanted(&headers, &rest.service, &job, after)
+        .unwrap_or_else(|| stream(&rest.service, &job, after)))
 }
 
-/// The events of a job after number `after` as server-sent events.
-pub(super) fn stream(service: &Arc<Service>, job: &Job, after: i64) -> Response {
+/// The events of a job after number `after`, if the client wants these rather than JSON.
+pub(super) fn wanted(
+    headers: &HeaderMap,
+    service: &Arc<Service>,
+    job: &Job,
+    after: i64,
+) -> Option<Response> {
+    if wants(headers, &[SSE]) {
+        return Some(stream(service, job, after));
+    }
+    wants(headers, &LINES).then(|| lines(service, job, after))
+}
+
+/// As server-sent events.
+fn stream(service: &Arc<Service>, job: &Job, after: i64) -> Response {
     // An error just ends the stream: without `done` the client knows that there is more to come.
     let events = verbs::watch(service.clone(), (job.id, job.key), after)
         .map(|event| event.and_then(|event| told(&event)))
@@ -77,7 +101,7 @@ pub(super) fn stream(service: &Arc<Service>, job: &Job, after: i64) -> Response 
         .into_response()
 }
 
-/// The same, a line each.
+/// A line each.
 fn lines(service: &Arc<Service>, job: &Job, after: i64) -> Response {
     let lines = verbs::watch(service.clone(), (job.id, job.key), after)
         .map(|event| {

@@ -15,7 +15,7 @@ use super::{
     bodies::{self, bare_problem, batch, submission},
     events,
     jobs::{one, tag},
-    request::{JobPath, Params, idempotency_key, json_text, preferred_wait_s, wants},
+    request::{JobPath, Params, idempotency_key, json_text, preferred_wait_s},
 };
 use crate::{
     error::ApiError,
@@ -93,8 +93,7 @@ async fn answer(
         accepted: mut job,
         replayed,
     } = handed;
-    if wants(headers, &[events::SSE]) {
-        let mut response = events::stream(&rest.service, &job, 0);
+    if let Some(mut response) = events::wanted(headers, &rest.service, &job, 0) {
         *response.status_mut() = StatusCode::ACCEPTED;
         set(&mut response, header::LOCATION, location(&job));
         set(&mut response, header::ETAG, tag(&job));

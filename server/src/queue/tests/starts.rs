@@ -207,6 +207,25 @@ async fn a_drain_puts_a_running_job_back_without_using_up_a_start() {
     );
 }
 
+/// The drain could not store it: the next start of the service finds it running.
+#[tokio::test]
+async fn a_job_that_could_not_be_put_back_is_not_canceled() {
+    let rig = rig(fake::solve_until_stopped).await;
+    rig.queue.start();
+    let job = rig.submit().await;
+    rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
+        .await;
+    let running = rig.queue.running().get(&job.key).cloned().unwrap();
+    rig.queue.stopping.cancel();
+    running.stop(Why::Unwanted);
+    while rig.queue.state().running > 0 {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    assert_eq!(rig.store.requeue_interrupted().await.unwrap(), 1);
+    let job = rig.store.job(job.id).await.unwrap().unwrap();
+    assert_eq!((job.status, job.attempt), (Status::Queued, 1));
+}
+
 #[tokio::test]
 async fn a_job_that_loses_three_workers_fails() {
     let rig = rig(fake::solve).await; // its workers never start: we claim, and die, in their place

@@ -104,6 +104,7 @@ pub(super) fn operations() -> Vec<Operation> {
             ])
             .answers(200, "The events, each with its number; a comment every 15 s", [stream::<Event>(), lines()].concat())
             .answers(204, "Nothing lies after that event of a job that has ended", nothing())
+            .fails(&[Code::NotAcceptable])
             .tested(&[
                 "service::watch::the_story_of_a_job_is_told_in_order_and_can_be_told_again",
                 "service::watch::a_client_that_reconnects_after_each_event_gets_every_event_exactly_once", "service::waiting::events_come_as_lines_to_who_prefers_lines"]),
@@ -172,14 +173,14 @@ impl Operation {
     /// Answers with the job that was handed in: when it is done, at once, or with its events.
     fn hands_in(self) -> Self {
         let applied = header("Preference-Applied", text(), "The wait that was kept");
-        let accepted = [json::<Job>(), stream::<Event>()].concat();
+        let accepted = [json::<Job>(), stream::<Event>(), lines()].concat();
         self.with([key(), prefer()])
             .answers(201, "The terminal job: it was done in time", json::<Job>())
             .headed([location(), etag(), applied])
             .maybe(replayed())
             .answers(
                 202,
-                "The accepted job; with Accept: text/event-stream its events, as from /events",
+                "The accepted job; with Accept: text/event-stream or application/jsonl its events, as from /events",
                 accepted,
             )
             .headed([location()])
