@@ -290,7 +290,7 @@ impl From<ApiError> for Status {
 /// Bytes for people. By hand, as it is a line: what a crate would do beside it nobody needs.
 pub fn size(bytes: u64) -> String {
     match bytes {
-        u64::MAX => "more memory than there is".into(),
+        u64::MAX => "more than 10^10 GiB".into(),
         bytes if bytes >> 30 > 0 => format!("{:.1} GiB", bytes as f64 / (1u64 << 30) as f64),
         bytes => format!("{:.1} MiB", bytes as f64 / (1u64 << 20) as f64),
     }

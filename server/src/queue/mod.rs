@@ -79,7 +79,7 @@ impl Running {
 enum Why {
     /// The job has run longer than it may.
     OutOfTime,
-    /// Nobody waits for what it finds: the job was canceled or put back, or its events cannot be stored.
+    /// Nobody waits for what it finds: the job was canceled or put back.
     Unwanted,
 }
 
@@ -230,7 +230,7 @@ impl Queue {
                     running.stop(Why::Unwanted);
                     tokio::spawn(self.clone().cancel_over_its_head(key, running.attempt));
                 }
-                // Its worker could not end it and has given it up: nobody else would.
+                // Its worker has let it go, as the service stops: nobody else would end it.
                 None => {
                     let ended = self.end(key, attempt, &Ending::canceled()).await?;
                     outcome = match ended {

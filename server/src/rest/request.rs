@@ -56,8 +56,8 @@ impl<S: Send + Sync> FromRequestParts<S> for TextPath {
 /// Parameters `label.{key}` stand for any key.
 pub(super) const ANY_LABEL: &str = "label.{key}";
 const LABEL: &str = "label.";
-/// The one parameter that may come several times, beside those of labels: any of its values.
-const MANY: &str = "status";
+/// Parameters that may come several times.
+const REPEATABLE: [&str; 2] = ["status", ANY_LABEL];
 
 /// The parameters of a query, each of them known.
 pub(super) struct Params(Vec<(String, String)>);
@@ -82,7 +82,7 @@ impl Params {
                 return Err(ApiError::UnknownParameter { name, known });
             };
             let again = pairs[..n].iter().any(|(other, _)| other == name);
-            if again && ![MANY, ANY_LABEL].contains(known) {
+            if again && !REPEATABLE.contains(known) {
                 return Err(ApiError::BadParameter {
                     name: known,
                     got: format!("a second one, {value}"),

@@ -2,7 +2,7 @@
 
 use sqlx::SqliteConnection;
 
-use super::{Result, Store, jobs, results, submit};
+use super::{Result, Store, results, rows::find, submit};
 use crate::{job::JobId, time::Time};
 
 /// A deleted job's name answers *gone* for so long, then *unknown*.
@@ -23,7 +23,7 @@ impl Store {
     /// Deletes a terminal job with its events, and its result unless another job serves it.
     pub async fn delete(&self, key: i64) -> Result<Deletion> {
         let mut change = self.change().await?;
-        let Some(job) = jobs::find(change.sql(), key).await? else {
+        let Some(job) = find(change.sql(), key).await? else {
             return Ok(Deletion::Unknown);
         };
         if !job.status.is_terminal() {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{
     Result, Store,
     line::Move,
-    rows::{from_row, read},
+    rows::{named, read},
     submit, twins,
 };
 use crate::job::{Job, JobId};
@@ -33,12 +33,9 @@ impl Store {
         version: Option<i64>,
     ) -> Result<Option<std::result::Result<Job, i64>>> {
         let mut change = self.change().await?;
-        let row = sqlx::query("select * from job where uuid = ?")
-            .bind(id.0.to_string())
-            .fetch_optional(change.sql())
-            .await?;
-        let Some(row) = row else { return Ok(None) };
-        let job = from_row(&row)?;
+        let Some(job) = named(change.sql(), id).await? else {
+            return Ok(None);
+        };
         if version.is_some_and(|version| version != job.version) {
             return Ok(Some(Err(job.version)));
         }

@@ -1,6 +1,6 @@
 //! The life of a job: claimed, ended, put back. Every change of status goes through `change`.
 
-use sqlx::{Row, SqliteConnection};
+use sqlx::SqliteConnection;
 
 use super::{
     Result, Store, StoreError,
@@ -8,7 +8,7 @@ use super::{
     events,
     line::Move,
     results::{self, Parts, running},
-    rows::{from_row, read},
+    rows::{find, from_row, read},
     twins,
 };
 use crate::{
@@ -216,14 +216,14 @@ impl Store {
             return Ok(vec![]);
         }
         let mut change = self.change().await?;
-        let rows = sqlx::query(LATE)
+        let late: Vec<i64> = sqlx::query_scalar(LATE)
             .bind(now.micros())
             .bind(AT_ONCE)
             .fetch_all(change.sql())
             .await?;
-        for row in &rows {
+        for key in late {
             // as it is now: it may have been a twin of one that has just ended
-            let job = read(change.sql(), row.try_get("id")?).await?;
+            let job = read(change.sql(), key).await?;
             let detail = format!(
                 "it was not started within {} s; see limits.queue_ttl_s",
                 job.limits.queue_ttl_s
@@ -245,14 +245,6 @@ pub(super) const LATE: &str = "select id from job indexed by job_expiry
            and (twin_of is null or exists
                 (select 1 from job source where source.id = job.twin_of and source.status = 'queued'))
      order by expires_at limit ?";
-
-pub(super) async fn find(connection: &mut SqliteConnection, key: i64) -> Result<Option<Job>> {
-    let row = sqlx::query("select * from job where id = ?")
-        .bind(key)
-        .fetch_optional(connection)
-        .await?;
-    row.as_ref().map(from_row).transpose()
-}
 
 /// Whether this start of the job still has the word.
 pub(super) async fn is_current(tx: &mut SqliteConnection, key: i64, attempt: i32) -> Result<bool> {

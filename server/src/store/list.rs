@@ -7,7 +7,10 @@
 
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
-use super::{Result, Store, rows::from_row};
+use super::{
+    Result, Store,
+    rows::{from_row, named},
+};
 use crate::{
     job::{Job, JobId, Status},
     time::Time,
@@ -112,12 +115,9 @@ impl Store {
     /// The job of that name.
     pub async fn job(&self, id: JobId) -> Result<Option<Job>> {
         let mut connection = self.reader.acquire().await?;
-        let row = sqlx::query("select * from job where uuid = ?")
-            .bind(id.0.to_string())
-            .fetch_optional(&mut *connection)
-            .await?;
-        let Some(row) = row else { return Ok(None) };
-        let mut job = from_row(&row)?;
+        let Some(mut job) = named(&mut connection, id).await? else {
+            return Ok(None);
+        };
         self.place(&mut connection, std::slice::from_mut(&mut job))
             .await?;
         Ok(Some(job))
@@ -333,9 +333,7 @@ async fn few<'a>(
 /// What leads where every filter leaves many jobs: an index in the order of the list. One lead, or where only
 /// statuses can one for each of them, since their lists are merged.
 fn leads(filter: &Filter, order: Order) -> Vec<Lead<'_>> {
-    let mut statuses = filter.statuses.clone();
-    statuses.sort_by_key(|status| status.as_str());
-    statuses.dedup();
+    let statuses = &filter.statuses;
     let by_status: Vec<Lead<'_>> = statuses.iter().copied().map(Lead::Status).collect();
     // most jobs succeed: of the others there are fewer than most filters leave
     let of_the_others = !by_status.is_empty() && !statuses.contains(&Status::Succeeded);

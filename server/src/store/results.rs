@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use solver::solution::ContactProfile;
 use sqlx::{Sqlite, SqliteConnection, Transaction};
 
-use super::{Result, Store, jobs::is_current, rows::from_row};
+use super::{Result, Store, jobs::is_current, rows::named};
 use crate::{
     job::{Job, JobId},
     run::Document,
@@ -199,13 +199,8 @@ impl Store {
     /// parts are replaced and removed.
     pub async fn snapshot(&self, id: JobId) -> Result<Option<Snapshot>> {
         let mut tx = self.reader.begin().await?;
-        let row = sqlx::query("select * from job where uuid = ?")
-            .bind(id.0.to_string())
-            .fetch_optional(&mut *tx)
-            .await?;
-        let Some(row) = row else { return Ok(None) };
-        let job = from_row(&row)?;
-        Ok(Some(Snapshot { job, tx }))
+        let job = named(&mut tx, id).await?;
+        Ok(job.map(|job| Snapshot { job, tx }))
     }
 
     /// One piece of a part, from 0; `None` after the last.

@@ -20,8 +20,26 @@ pub(super) async fn read(tx: &mut SqliteConnection, key: i64) -> Result<Job> {
     )
 }
 
+/// The job, if it is still there.
+pub(super) async fn find(connection: &mut SqliteConnection, key: i64) -> Result<Option<Job>> {
+    let row = sqlx::query("select * from job where id = ?")
+        .bind(key)
+        .fetch_optional(connection)
+        .await?;
+    row.as_ref().map(from_row).transpose()
+}
+
+/// The job of that name, without its place in the queue.
+pub(super) async fn named(connection: &mut SqliteConnection, id: JobId) -> Result<Option<Job>> {
+    let row = sqlx::query("select * from job where uuid = ?")
+        .bind(id.0.to_string())
+        .fetch_optional(connection)
+        .await?;
+    row.as_ref().map(from_row).transpose()
+}
+
 impl Store {
-    /// The same where the work is done already, and an answer without places is better than none.
+    /// As `place`, where the work is done already, and an answer without places is better than none.
     pub async fn try_to_place(&self, jobs: &mut [Job]) {
         if jobs.iter().all(|job| job.status != Status::Queued) {
             return;
@@ -61,7 +79,7 @@ impl Store {
                     });
                 continue;
             };
-            let Some(source) = super::jobs::find(connection, source).await? else {
+            let Some(source) = find(connection, source).await? else {
                 continue; // it ended, and was deleted, since this job was read
             };
             let (position, ahead) = position(source.priority, source.key).unwrap_or_default();

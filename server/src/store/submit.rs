@@ -10,12 +10,12 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::{
     Result, Store, StoreError,
-    change::Change,
+    change::{Change, Mark},
     events,
     jobs::{self, Claim},
     line::Move,
     meshes,
-    rows::read,
+    rows::{find, read},
     twins,
 };
 use crate::{
@@ -152,20 +152,17 @@ impl Store {
             let mut change = self.change().await?;
             for (submission, claim) in submissions {
                 let mark = change.mark().await?;
-                let accepted = accept(&mut change, submission, claim).await;
-                let accepted = accepted.map(|accepted| Accepted {
-                    changed: change.changed_since(mark),
-                    ..accepted
-                });
-                match &accepted {
-                    Ok(_) => change.keep().await?,
-                    // a full disk has made the database undo all of it: what it said then is the cause
-                    Err(_) if change.undo(mark).await.is_err() => {
-                        return Err(accepted.err().unwrap_or(StoreError::Full));
+                match accept(&mut change, mark, submission, claim).await {
+                    Ok(accepted) => {
+                        change.keep().await?;
+                        answers.push(Ok(accepted));
                     }
-                    Err(_) => {}
+                    Err(cause) => match change.undo(mark).await {
+                        Ok(()) => answers.push(Err(cause)),
+                        // a full disk made the database undo all of it by itself, and is what to tell
+                        Err(_) => return Err(cause),
+                    },
                 }
-                answers.push(accepted);
             }
             change.commit().await
         }
@@ -185,7 +182,12 @@ impl Store {
     }
 }
 
-async fn accept(change: &mut Change<'_>, submission: Submission, claim: bool) -> Result<Accepted> {
+async fn accept(
+    change: &mut Change<'_>,
+    mark: Mark,
+    submission: Submission,
+    claim: bool,
+) -> Result<Accepted> {
     let Submission {
         jobs,
         key,
@@ -228,7 +230,7 @@ async fn accept(change: &mut Change<'_>, submission: Submission, claim: bool) ->
         jobs: accepted,
         replayed: false,
         claim,
-        changed: vec![],
+        changed: change.changed_since(mark),
     })
 }
 
@@ -319,7 +321,7 @@ async fn remaining(
 ) -> Result<Option<Vec<Job>>> {
     let (mut jobs, mut deleted) = (vec![], None);
     for key in keys {
-        match jobs::find(connection, key).await? {
+        match find(connection, key).await? {
             Some(job) => jobs.push(job),
             None => deleted = deleted_name(connection, key).await?.or(deleted),
         }

@@ -75,6 +75,12 @@ impl Rig {
         accepted.jobs.into_iter().next().unwrap()
     }
 
+    /// Its solver has said something.
+    async fn until_at_work(&self, job: &Job) {
+        self.until(job, |event| matches!(event.payload, Payload::Iteration(_)))
+            .await;
+    }
+
     async fn put_at(&self, job: &Job, priority: i32) -> Job {
         let edit = Edit {
             priority: Some(priority),

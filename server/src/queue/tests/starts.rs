@@ -47,8 +47,7 @@ async fn a_canceled_running_job_keeps_its_last_state() {
     let rig = rig(fake::solve_until_stopped).await;
     rig.queue.start();
     let job = rig.submit().await;
-    rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
-        .await;
+    rig.until_at_work(&job).await;
     assert_eq!(
         rig.queue.cancel(job.key).await.unwrap(),
         CancelOutcome::Requested { attempt: 1 }
@@ -197,8 +196,7 @@ async fn a_drain_puts_a_running_job_back_without_using_up_a_start() {
     let rig = rig(fake::solve_until_stopped).await;
     rig.queue.start();
     let job = rig.submit().await;
-    rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
-        .await;
+    rig.until_at_work(&job).await;
     rig.queue.drain().await;
     let drained = rig.store.job(job.id).await.unwrap().unwrap();
     assert_eq!(
@@ -213,8 +211,7 @@ async fn a_job_that_could_not_be_put_back_is_not_canceled() {
     let rig = rig(fake::solve_until_stopped).await;
     rig.queue.start();
     let job = rig.submit().await;
-    rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
-        .await;
+    rig.until_at_work(&job).await;
     let running = rig.queue.running().get(&job.key).cloned().unwrap();
     rig.queue.stopping.cancel();
     running.stop(Why::Unwanted);
@@ -393,8 +390,7 @@ async fn a_full_disk_holds_a_job_up_and_does_not_end_it() {
     let mut short = new(0);
     short.limits.timeout_s = 1.0;
     let job = rig.submit_as(short).await;
-    rig.until(&job, |event| matches!(event.payload, Payload::Iteration(_)))
-        .await;
+    rig.until_at_work(&job).await;
     rig.store.bound(0).await;
     let done = rig.until_done(&job).await;
     assert!(!rig.store.is_bound().await, "the disk was full meanwhile");
