@@ -1,7 +1,9 @@
 //! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms of its own
 //! group and of the groups above it; ARCHITECTURE.md has the finer order.
 
-// What everybody may know: kinds of errors, points in time, a job and its moves, what its watchers are told.
+// What everybody may know: who asks, kinds of errors, points in time, a job and its moves, what its watchers are
+// told.
+pub mod caller;
 pub mod catalog;
 pub mod event;
 pub mod job;

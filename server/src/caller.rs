@@ -1,0 +1,82 @@
+//! Who asks for something, what they may do, and whose things they see.
+
+use std::collections::BTreeSet;
+
+use strum::VariantArray;
+
+/// What a caller may do.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, strum::IntoStaticStr, strum::VariantArray,
+)]
+#[strum(serialize_all = "snake_case")]
+pub enum Scope {
+    /// Look at jobs, results and meshes.
+    Read,
+    /// Hand in jobs and meshes.
+    Submit,
+    /// Cancel and delete them.
+    Cancel,
+    /// All of that with what belongs to others, and pause the queue.
+    Admin,
+}
+
+/// Who asks: every verb takes one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Caller {
+    owner: String,
+    scopes: BTreeSet<Scope>,
+}
+
+impl Caller {
+    /// Everybody, as long as nobody is told apart: one owner, who may do everything.
+    pub fn local() -> Caller {
+        Caller {
+            owner: "local".into(),
+            scopes: Scope::VARIANTS.iter().copied().collect(),
+        }
+    }
+
+    /// The owner of what this caller hands in.
+    pub fn owner(&self) -> &str {
+        &self.owner
+    }
+
+    /// What this caller may do.
+    pub fn scopes(&self) -> impl Iterator<Item = Scope> {
+        self.scopes.iter().copied()
+    }
+
+    /// Whose jobs this caller sees.
+    pub fn sees(&self) -> Owners<'_> {
+        match self.scopes.contains(&Scope::Admin) {
+            true => Owners::All,
+            false => Owners::Only(&self.owner),
+        }
+    }
+}
+
+/// Whose things a question to the store is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Owners<'a> {
+    /// Everybody's.
+    All,
+    /// Those of this owner.
+    Only(&'a str),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_is_no_administrator_sees_only_what_is_their_own() {
+        let local = Caller::local();
+        assert_eq!(local.sees(), Owners::All);
+        let scopes = BTreeSet::from([Scope::Read, Scope::Submit]);
+        let ada = Caller {
+            owner: "ada".into(),
+            scopes,
+        };
+        assert_eq!(ada.sees(), Owners::Only("ada"));
+    }
+}
