@@ -1,13 +1,13 @@
-//! What can be set. One struct: its doc comments are the help text, its order the order of help.
+//! The configuration: one struct, whose doc comments are the help text, in the order of the help.
 
 use std::{net::SocketAddr, path::PathBuf};
 
 use clap::Args;
 
-/// Settings of the service. A flag wins over its environment variable.
+/// Settings of the service. A flag takes precedence over its environment variable.
 #[derive(Clone, Debug, Args)]
 pub struct Config {
-    /// Address and port for REST and gRPC alike; port 0 takes a free one
+    /// Address and port of both REST and gRPC; port 0 chooses a free one
     #[arg(
         long,
         env = "SIGNORINI_LISTEN",
@@ -16,7 +16,7 @@ pub struct Config {
     )]
     pub listen: SocketAddr,
 
-    /// Folder that holds everything durable
+    /// Folder of the store: jobs, results, meshes
     #[arg(
         long,
         env = "SIGNORINI_DATA",
@@ -30,7 +30,7 @@ pub struct Config {
           value_parser = clap::value_parser!(u16).range(1..=256))]
     pub workers: u16,
 
-    /// Most jobs that may wait; more are refused until some have run
+    /// Maximum number of jobs in the queue; further ones are refused
     #[arg(
         long,
         env = "SIGNORINI_MAX_QUEUED",
@@ -43,15 +43,15 @@ pub struct Config {
     #[allow(missing_docs)] // a doc comment here would become the help of the command
     pub memory: MemoryBudget,
 
-    /// Largest request body over REST
+    /// Maximum size of a request body over REST
     #[arg(long, env = "SIGNORINI_MAX_BODY_BYTES", default_value_t = 16 << 20, value_name = "BYTES")]
     pub max_body_bytes: usize,
 
-    /// Largest mesh file that can be uploaded
+    /// Maximum size of an uploaded mesh file
     #[arg(long, env = "SIGNORINI_MAX_MESH_BYTES", default_value_t = 512 << 20, value_name = "BYTES")]
     pub max_mesh_bytes: usize,
 
-    /// After SIGTERM, open requests get this long to end; running jobs go back to the queue at once
+    /// Time that open requests get to finish after SIGTERM; running jobs are requeued at once
     #[arg(
         long,
         env = "SIGNORINI_GRACE_S",
@@ -61,11 +61,11 @@ pub struct Config {
     pub grace_s: u64,
 }
 
-/// What one problem may cost.
+/// The memory that one problem may need.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct MemoryBudget {
-    /// Most memory that one problem may need, by the estimate made before it is meshed
-    /// [default: half of the machine's]
+    /// Maximum memory of one problem, by an estimate made before it is meshed
+    /// [default: half of the machine's memory]
     #[arg(long, env = "SIGNORINI_MEMORY_BUDGET_BYTES", value_name = "BYTES")]
     memory_budget_bytes: Option<u64>,
 }
@@ -78,7 +78,7 @@ impl MemoryBudget {
     }
 }
 
-/// Memory of this machine, or of the container that we are confined to.
+/// Memory of this machine, or of the container that the process runs in.
 fn machine_memory() -> u64 {
     // Unknown is no reason to refuse everything; 8 GiB is a common small machine.
     const UNKNOWN: u64 = 8 << 30;

@@ -1,5 +1,5 @@
-//! `signorini demo`: the main job on real input. A service on a free port with a store of its own;
-//! five examples over both protocols; everything through the front door, as any client would.
+//! `signorini demo`: a service on a free port with a temporary store, to which the five examples are
+//! submitted over both protocols, as any client would do it.
 
 use std::io::{IsTerminal, Write};
 
@@ -42,13 +42,13 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
 async fn show(url: &str) -> anyhow::Result<Exit> {
     println!("Service at {url}, REST and gRPC on one port, its store in a temporary folder.\n");
     let rest = Rest {
-        // Our own address: no proxy of the environment knows it.
+        // A local address, which a proxy from the environment could not reach.
         client: Client::builder().no_proxy().build()?,
         url: url.to_string(),
     };
     let mut grpc = JobServiceClient::connect(url.to_string()).await?;
 
-    // All ten jobs at once; two run at a time, the rest waits in the queue.
+    // All ten jobs at once: two run at a time, the others wait in the queue.
     let mut jobs = vec![];
     for (name, text) in examples::ALL {
         jobs.push((
@@ -107,7 +107,7 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// A REST client, as simple as can be.
+/// A minimal REST client.
 struct Rest {
     client: Client,
     url: String,
@@ -126,7 +126,7 @@ impl Rest {
         Ok(body)
     }
 
-    /// Hands a problem in; gives the job's id.
+    /// Submits a problem; returns the job's id.
     async fn submit(&self, name: &str, text: &str) -> anyhow::Result<String> {
         let problem: Value = serde_json::from_str(text)?;
         // solved on its own, so that there is something to watch and to compare
@@ -174,7 +174,7 @@ impl Rest {
     }
 }
 
-/// Hands a problem in; gives the job's id.
+/// Submits a problem; returns the job's id.
 async fn submit_grpc(
     grpc: &mut JobServiceClient<Channel>,
     name: &str,
@@ -260,7 +260,7 @@ impl Line {
             format!("{k:>4} {stage:<12} residual {residual:8.2e}  friction {friction:8.2e}");
         let mut out = std::io::stdout().lock();
         if self.terminal {
-            // Back to the start of the line, write, clear what is left of it.
+            // return to the start of the line, write, clear the rest
             write!(out, "\r{}{}\x1b[K", self.head, self.last)?;
         } else {
             writeln!(out, "{}{}", self.head, self.last)?;

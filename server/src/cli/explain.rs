@@ -1,4 +1,4 @@
-//! `signorini explain CODE`: what a kind of error means, and what to do.
+//! `signorini explain CODE`: what an error code means and what to do about it.
 
 use clap::Args;
 
@@ -7,7 +7,7 @@ use crate::catalog::{Code, Kind};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The code, as in `code` or `type` of an error, or a job's `reason`; without one, all of them are listed
+    /// A code: the `code` or `type` of an error, or the `reason` of a job; without it, all codes are listed
     code: Option<String>,
 }
 
@@ -23,7 +23,7 @@ pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
     let word = code.rsplit('/').next().unwrap_or_default();
     let Some(found) = Code::parse(&word.replace('_', "-")) else {
         eprintln!(
-            "signorini: there is no error {code:?}; `signorini explain` lists those that there are"
+            "signorini: there is no error code {code:?}; `signorini explain` lists all of them"
         );
         return Ok(Exit::Invalid);
     };

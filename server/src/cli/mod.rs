@@ -16,20 +16,20 @@ use tracing_subscriber::EnvFilter;
 
 use crate::{config::Config, rest};
 
-/// What the process tells its caller. The names are the API's.
+/// Exit codes of the process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
-    /// All is well.
+    /// Success.
     Ok = 0,
     /// Something failed.
     Failed = 1,
-    /// The input is wrong.
+    /// The input is invalid.
     Invalid = 2,
-    /// There is a solution, but it did not converge.
+    /// The solution did not converge.
     NotConverged = 9,
 }
 
-/// Frictional contact problems, solved on their own or as jobs of a service
+/// Solves frictional contact problems, one at a time or as jobs of a service
 #[derive(Debug, Parser)]
 #[command(name = "signorini", version, arg_required_else_help = true)]
 struct Cli {
@@ -41,23 +41,23 @@ struct Cli {
 enum Command {
     /// Start the service: REST and gRPC on one port
     Serve(Config),
-    /// Solve one problem here, without a service. Exit code: 0 converged, 9 not converged, 2 invalid
+    /// Solve one problem without a service. Exit code: 0 converged, 9 not converged, 2 invalid input
     Solve(solve::Arguments),
-    /// Print the JSON Schema of a problem: every name, what it means and its default
+    /// Print the JSON Schema of a problem: every field with its meaning and default
     Schema,
-    /// Say what an error code means, and what to do
+    /// Explain an error code and what to do about it
     Explain(explain::Arguments),
-    /// Print the description of the API over REST (OpenAPI 3.1)
+    /// Print the OpenAPI 3.1 description of the REST API
     Openapi {
-        /// As a page for people, with the rpcs and the tests: docs/api.md
+        /// Print the reference in Markdown instead, with rpcs and tests: docs/api.md
         #[arg(long)]
         reference: bool,
     },
-    /// Start a service for the occasion, submit five examples over REST and gRPC, watch them converge
+    /// Start a temporary service, submit the five examples over REST and gRPC, and watch them converge
     Demo,
 }
 
-/// Everything that the binary does.
+/// Parses the command line and runs the command.
 pub fn main() -> ExitCode {
     let Cli { command } = Cli::parse();
     let exit = match command {
@@ -96,8 +96,8 @@ fn with_runtime(command: impl Future<Output = anyhow::Result<Exit>>) -> anyhow::
         .enable_all()
         .build()?;
     let exit = runtime.block_on(command);
-    // Not dropped, which would wait for solvers that nobody can interrupt. All that is durable has
-    // been closed; the process ends over their heads.
+    // Dropping it would wait for solvers, which cannot be interrupted. The store is closed already, so
+    // the process may exit while they still run.
     runtime.shutdown_background();
     exit
 }
@@ -110,7 +110,7 @@ fn log(default: LevelFilter) {
     tracing_subscriber::fmt()
         .with_env_filter(filter.from_env_lossy())
         .with_writer(std::io::stderr)
-        // a log that cannot be written shall not end what it tells of
+        // a log that cannot be written must not end the process
         .log_internal_errors(false)
         .with_ansi(std::io::stderr().is_terminal())
         .init();

@@ -1,4 +1,4 @@
-//! `-o`: what a file is to hold, by its name, and writing it whole or not at all.
+//! `-o`: what a file holds according to its name, and writing it atomically.
 
 use std::{
     fs::File,
@@ -19,11 +19,11 @@ use crate::{
 
 /// The help of `-o`.
 pub(super) const HELP: &str = "\
-Write the result there, by its ending: .json everything; .csv, .jsonl, .arrow the profile of the \
-contact; .npz fields, profiles and history; .vtu the fields; .svg the profile as a figure. A part may \
-be named before the ending: punch.history.csv, punch.fields.npz, and punch.mesh.svg, .deformed.svg, \
-.convergence.svg for the other figures; of several contacts one must be: \
-punch.profile.top.csv. May be repeated; - is JSON on standard output. Without it a summary is printed";
+Write the result to this file, in the format of its extension: .json everything; .csv, .jsonl, .arrow the \
+profile of the contact; .npz fields, profiles and history; .vtu the fields; .svg the profile as a figure. \
+Put a part before the extension to choose it: punch.history.csv, punch.fields.npz, punch.mesh.svg, \
+punch.deformed.svg, punch.convergence.svg; with several contacts name the boundary: \
+punch.profile.top.csv. Can be repeated; - writes JSON to standard output. Without it a summary is printed";
 
 /// One file to write.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,8 +45,8 @@ enum Part {
 }
 
 impl Output {
-    /// What `path` asks for, of a problem with these contact boundaries. An `Err` says why there is
-    /// no such thing: before hours of solving, not after.
+    /// What `path` asks for, in a problem with these contact boundaries; an `Err` says why it cannot be
+    /// written. Called before the problem is solved, which may take hours.
     pub(super) fn parse(path: &Path, contacts: &[&str]) -> Result<Output, String> {
         if path.as_os_str() == "-" {
             return Ok(Output {
@@ -69,7 +69,7 @@ impl Output {
                 .collect();
             let endings = endings.join(", ");
             said(format!(
-                "a file must end in one of {endings}; or be -, for JSON on standard output"
+                "the file must have one of the extensions {endings}, or be - for JSON on standard output"
             ))
         })?;
         let folder = path
@@ -138,14 +138,14 @@ impl Output {
     }
 }
 
-/// The part that the name before the ending asks for, or what the ending stands for by itself.
+/// The part named before the extension, or the default part of the extension.
 fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
     let words: Vec<&str> = stem.split('.').collect();
     let last = words.last().copied().unwrap_or_default();
     if format == Format::Svg {
         return Ok(Part::Plot(last.parse().unwrap_or(Plot::Profile)));
     }
-    // a boundary may have any name, with dots or a word of ours: one that the problem has goes first
+    // a boundary may have any name, with dots or one of the words below: a name that exists wins
     let after = words.iter().enumerate();
     let after = after.filter(|(_, word)| **word == "profile");
     let mut named: Vec<String> = after
@@ -194,8 +194,8 @@ fn one_of(contacts: &[&str], asked: Option<String>, ending: &str) -> Result<Stri
     }
 }
 
-/// Writes beside `path` and renames, so that there is never half a file of that name, and an older
-/// one stays until the new one is whole. A pipe or device is written to as it is.
+/// Writes a temporary file beside `path` and renames it, so that there is never half a file of that
+/// name and an older one stays until the new one is complete. A pipe or device is written directly.
 fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,

@@ -1,4 +1,4 @@
-//! Results for people: a line per iteration, a summary, a table of stresses.
+//! Results as text: a line per iteration, a summary, a table of stresses.
 
 use std::fmt::Write;
 
@@ -38,9 +38,9 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
     let ended = match s.outcome {
         Outcome::Converged => "converged",
         Outcome::NotConverged => "NOT CONVERGED",
-        Outcome::ContactCycling => "NOT CONVERGED: the contact set repeats itself",
+        Outcome::ContactCycling => "NOT CONVERGED: the iteration cycles",
         Outcome::FalseConvergence => {
-            "NOT CONVERGED: it settled, but not in a solution; see the residuals"
+            "NOT CONVERGED: the iteration settled in a state that is not a solution; see the residuals"
         }
         Outcome::Canceled => "CANCELED",
     };
@@ -106,7 +106,7 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
     }
     if let Some(second) = &s.uniqueness {
         let found = match (second.converged, second.agrees) {
-            (false, _) => "unknown: from the bonded state the method does not converge".to_string(),
+            (false, _) => "unknown: the method does not converge from the bonded state".to_string(),
             (true, true) => "the bonded state leads to the same solution".to_string(),
             (true, false) => format!(
                 "NO: the bonded state leads to Y {}",

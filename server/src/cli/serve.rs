@@ -11,7 +11,7 @@ use crate::{app::App, config::Config};
 
 /// Serves until SIGTERM or SIGINT.
 pub(super) async fn run(config: Config) -> anyhow::Result<Exit> {
-    // Before anything else, so that no signal finds us unprepared.
+    // Installed first, so that no signal arrives before its handler.
     let mut terminate = signal(SignalKind::terminate()).context("SIGTERM cannot be caught")?;
     let mut interrupt = signal(SignalKind::interrupt()).context("SIGINT cannot be caught")?;
     let app = App::start(&config).await?;
@@ -24,7 +24,7 @@ pub(super) async fn run(config: Config) -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// The first line of standard output is the address: with port 0 nobody could guess it.
+/// Prints the address as the first line of standard output; with port 0 it is not known beforehand.
 fn announce(url: &str) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{url}")?;

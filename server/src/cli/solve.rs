@@ -1,4 +1,4 @@
-//! `signorini solve FILE`: the same code as a worker's, without a service.
+//! `signorini solve FILE`: runs the same code as a worker of the service.
 
 use std::{
     io::Write,
@@ -92,7 +92,7 @@ pub(super) fn run(
             Said::Progress(Progress::Warning(warning)) => {
                 eprintln!("warning: {}: {}", warning.pointer, warning.message)
             }
-            // Ctrl-C ends the process anyway
+            // Ctrl-C ends the process
             Said::Progress(Progress::Step(_) | Progress::Pulse) | Said::Step(_) => {}
         }
         ControlFlow::Continue(())
