@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use solver::{
     error::SolveError,
-    mesh::Mesh,
+    mesh::External,
     problem::Problem,
     solution::{
         ContactCount, ContactProfile, ErrorEstimate, Fields, ForcePair, FrictionCount, Iteration,
@@ -120,7 +120,7 @@ pub(crate) fn iteration(k: u32) -> Iteration {
 /// Solves anything at once, as [`solution`].
 pub(crate) fn solve(
     _: &Problem,
-    _: Option<&Mesh>,
+    _: Option<External>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     let mut solution = solution();
@@ -142,7 +142,7 @@ pub(crate) fn solve(
 /// Iterates until it is stopped.
 pub(crate) fn solve_until_stopped(
     _: &Problem,
-    _: Option<&Mesh>,
+    _: Option<External>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     let mut solution = solution();
@@ -160,7 +160,7 @@ pub(crate) fn solve_until_stopped(
 /// Panics, as no solver should.
 pub(crate) fn solve_with_a_panic(
     _: &Problem,
-    _: Option<&Mesh>,
+    _: Option<External>,
     _: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     unreachable!("the fake solver panics on purpose")

@@ -1,11 +1,9 @@
 //! What a result can be written as: one list of formats, and one way to write each, for the data
 //! routes and for `signorini solve -o`.
 
+use files::{npz::Npz, table::Table};
 use serde::Serialize;
-use solver::{
-    io::{self, npz::Npz, table::Table},
-    solution::{ContactProfile, Fields, Iteration},
-};
+use solver::solution::{ContactProfile, Fields, Iteration};
 
 use crate::run::Document;
 
@@ -96,8 +94,8 @@ fn rows<T: Serialize + ?Sized>(
         Format::Json => serde_json::to_vec(part).map_err(|error| error.to_string()),
         Format::Csv => table(part).csv().map(String::into_bytes),
         Format::Jsonl => table(part).jsonl().map(String::into_bytes),
-        Format::Arrow => io::arrow::file(&table(part)),
-        Format::Npz => io::npz::file(&table(part)),
+        Format::Arrow => files::arrow::file(&table(part)),
+        Format::Npz => files::npz::file(&table(part)),
         Format::Vtu | Format::Svg => Err(format!("rows are not written as {}", format.name())),
     }
 }
@@ -106,8 +104,8 @@ fn rows<T: Serialize + ?Sized>(
 pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
     match format {
         Format::Json => serde_json::to_vec(fields).map_err(|error| error.to_string()),
-        Format::Npz => io::fields::npz(fields),
-        Format::Vtu => io::vtu::file(fields),
+        Format::Npz => files::fields::npz(fields),
+        Format::Vtu => files::vtu::file(fields),
         Format::Csv | Format::Jsonl | Format::Arrow | Format::Svg => {
             Err(format!("fields are not written as {}", format.name()))
         }
@@ -118,7 +116,7 @@ pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
 /// `profiles/top/normal_stress`, and of each load step `steps/0/profiles/top/normal_stress`.
 pub fn everything_as_npz(document: &Document) -> Result<Vec<u8>, String> {
     let mut npz = Npz::new();
-    io::fields::add(&mut npz, "fields/", &document.fields)?;
+    files::fields::add(&mut npz, "fields/", &document.fields)?;
     npz.table("history/", &Table::of_history(&document.history))?;
     for (boundary, profile) in &document.profiles {
         npz.table(

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use files::MeshFormat;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use solver::{
     MeshSize,
     element::Family,
-    io::MeshFormat,
     mesh::{Edge, Mesh},
     solution::Warning,
 };

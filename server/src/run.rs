@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use solver::{
     error::SolveError,
-    mesh::Mesh,
+    mesh::{External, Mesh},
     problem::Problem,
     solution::{
         ContactProfile, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution,
@@ -55,7 +55,7 @@ pub struct Summary {
 pub type Timings = BTreeMap<String, f64>;
 
 /// The solver, or what stands in for it in a test.
-pub type Solve = fn(&Problem, Option<&Mesh>, &mut Observer<'_>) -> Result<Solution, SolveError>;
+pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Solution, SolveError>;
 
 /// What a run says on its way.
 #[derive(Debug)]
@@ -86,14 +86,17 @@ impl SoFar<'_> {
 /// the caller's own phase.
 pub fn run(
     problem: &Problem,
-    stored: Option<&Mesh>,
+    stored: Option<Mesh>,
     parse_s: f64,
     solve: Solve,
     say: &mut dyn FnMut(Said<'_>) -> ControlFlow<()>,
 ) -> Result<Document, SolveError> {
     let mut watch = Stopwatch::new(parse_s);
     let mut broken = false;
-    let solved = solve(problem, stored, &mut |mut progress| {
+    // reading it is a part of meshing, which the solver begins with
+    watch.enter(Phase::Mesh);
+    let external = files::external_mesh(problem, stored);
+    let solved = solve(problem, external, &mut |mut progress| {
         match &mut progress {
             Progress::Phase(phase) => watch.enter(*phase),
             Progress::Iteration(row) => {

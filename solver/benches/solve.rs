@@ -9,6 +9,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
+use solver::problem::{Problem, Refine};
 use solver::solution::{Phase, Progress, Solution};
 
 fn main() {
@@ -87,8 +88,8 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
 }
 
 fn solve(text: &str, refine: u32, phases: &mut Vec<(Phase, f64)>) -> Solution {
-    let mut problem = solver::parse(text).unwrap();
-    problem.mesh.refine = solver::problem::Refine::Times(refine);
+    let mut problem: Problem = serde_json::from_str(text).unwrap();
+    problem.mesh.refine = Refine::Times(refine);
     let solution = solver::solve(&problem, &mut |progress| {
         if let Progress::Phase(phase) = progress {
             phases.push((phase, now()));

@@ -2,7 +2,7 @@
 //! Oden and Pires (A.C. Bolt, MSc thesis, University of Cape Town, 1983).
 //!
 //! A library of pure functions: no clock, thread, file or network; the same problem gives the same
-//! bits. From the ground up; each room uses only rooms in the groups above it.
+//! bits. Reading and writing of any format is the business of the crate `files`. From the ground up; each room uses only rooms in the groups above it.
 
 // What is asked and answered, as plain data; violations and errors.
 pub mod error;
@@ -17,10 +17,9 @@ pub mod linear;
 pub mod friction;
 pub mod mesh;
 
-// A standard elastic program; the geometry of the contact boundary; problems in, figures out.
+// A standard elastic program; the geometry of the contact boundary.
 pub mod contact;
 pub mod elasticity;
-pub mod io;
 
 // Every check: the only door to a problem that can be solved.
 pub mod model;
@@ -38,7 +37,7 @@ pub mod steps;
 pub mod adapt;
 
 use error::{SolveError, Violation};
-use mesh::Mesh;
+use mesh::External;
 use model::Model;
 use problem::{Problem, Refine};
 use solution::{Observer, Phase, Progress, Solution, Warning};
@@ -51,17 +50,17 @@ pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, 
     solve_on(problem, None, observe)
 }
 
-/// Solves a problem that may name a stored mesh: `stored` is that mesh.
+/// Solves a problem that may only name or quote its mesh: `external` is what was read.
 pub fn solve_on(
     problem: &Problem,
-    stored: Option<&Mesh>,
+    external: Option<External>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     match problem.mesh.refine {
-        Refine::Times(_) => solve_once(problem, stored, observe),
+        Refine::Times(_) => solve_once(problem, external, observe),
         Refine::Adaptive(goal) => {
-            check(problem, stored).map_err(SolveError::Invalid)?;
-            // only grids are refined so, and a grid is never stored
+            check(problem, external).map_err(SolveError::Invalid)?;
+            // only grids are refined so, and a grid stands in the problem itself
             let solve =
                 |problem: &Problem, observe: &mut Observer<'_>| solve_once(problem, None, observe);
             adapt::run(problem, &goal, &solve, observe)
@@ -72,11 +71,11 @@ pub fn solve_on(
 /// On one mesh.
 fn solve_once(
     problem: &Problem,
-    stored: Option<&Mesh>,
+    external: Option<External>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     begin(observe, Phase::Mesh)?;
-    let model = Model::new(problem, stored).map_err(SolveError::Invalid)?;
+    let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
     for warning in &model.warnings {
         begin_warning(observe, warning)?;
     }
@@ -85,8 +84,11 @@ fn solve_once(
 }
 
 /// Checks a problem without solving it: its warnings, or everything that is wrong with it.
-pub fn check(problem: &Problem, stored: Option<&Mesh>) -> Result<Vec<Warning>, Vec<Violation>> {
-    Model::new(problem, stored).map(|model| model.warnings)
+pub fn check(
+    problem: &Problem,
+    external: Option<External>,
+) -> Result<Vec<Warning>, Vec<Violation>> {
+    Model::new(problem, external).map(|model| model.warnings)
 }
 
 fn begin(observe: &mut Observer<'_>, phase: Phase) -> Result<(), SolveError> {
@@ -105,5 +107,4 @@ fn begin_warning(observe: &mut Observer<'_>, warning: &Warning) -> Result<(), So
     }
 }
 
-pub use io::json::{parse, schema};
 pub use model::estimate::{Estimate, MeshSize, estimate};

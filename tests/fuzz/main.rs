@@ -6,10 +6,10 @@
 
 use std::path::Path;
 
+use files::{ReadError, abaqus, read_mesh};
 use proptest::prelude::*;
 use proptest::sample::Index;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-use solver::io::{ReadError, abaqus, read_mesh};
 
 /// What a number becomes.
 const EXTREMES: [&str; 12] = [
@@ -222,11 +222,11 @@ fn changed_problems_are_checked_or_refused() {
         let Ok(text) = std::str::from_utf8(file) else {
             return false;
         };
-        match solver::parse(text) {
+        match files::parse(text) {
             // what would be refused for its size is not meshed
             Ok(problem) => {
                 solver::estimate(&problem, None).memory_bytes > 32 << 20
-                    || solver::check(&problem, None).is_ok()
+                    || solver::check(&problem, files::external_mesh(&problem, None)).is_ok()
             }
             Err(violations) => {
                 assert!(!violations.is_empty());
@@ -256,7 +256,7 @@ fn noise_is_refused() {
         .run(&(starts, noise), |(start, noise)| {
             let file = [start.as_bytes(), &noise].concat();
             assert!(!read(&file));
-            let _ = solver::parse(&String::from_utf8_lossy(&file));
+            let _ = files::parse(&String::from_utf8_lossy(&file));
             Ok(())
         })
         .unwrap_or_else(|failure| panic!("{failure}"));

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::Path;
 
-use solver::io::plot::{Curve, Look, Panel, Theme, figure};
+use files::plot::{Curve, Look, Panel, Theme, figure};
 use solver::problem::{AdaptiveRefine, BoundaryValue, Obstacle, Problem, Refine};
 use solver::solution::{ContactProfile, Solution, Summary};
 
@@ -20,7 +20,7 @@ pub(crate) const EXAMPLES: [(&str, &str, [f64; 3]); 5] = [
 ];
 
 pub(crate) fn example(name: &str) -> Problem {
-    solver::parse(&suite::example(name)).unwrap()
+    files::parse(&suite::example(name)).unwrap()
 }
 
 pub(crate) fn solve(problem: &Problem) -> Solution {

@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use solver::io::plot::{Parts, Plot, Theme, draw};
+use files::plot::{Parts, Plot, Theme, draw};
 
 /// Name of the example, and what there is to see.
 const EXAMPLES: [(&str, &str); 5] = [
@@ -66,7 +66,7 @@ fn main() {
 
     let mut text = String::from(INTRODUCTION);
     for (name, seen) in EXAMPLES {
-        let problem = solver::parse(&suite::example(name)).unwrap();
+        let problem = files::parse(&suite::example(name)).unwrap();
         let solution = solver::solve(&problem, &mut |_| ControlFlow::Continue(())).unwrap();
         let parts = Parts {
             history: &solution.history,

@@ -21,7 +21,7 @@ pub(crate) async fn connect(server: &Server) -> JobServiceClient<Channel> {
 }
 
 pub(crate) fn message(text: &str) -> pb::Problem {
-    problem_to_pb(&solver::parse(text).unwrap())
+    problem_to_pb(&files::parse(text).unwrap())
 }
 
 #[tokio::test]
@@ -208,7 +208,7 @@ async fn errors_carry_codes_and_details() {
     assert_eq!(grpc.get_job(long).await.unwrap_err().code(), Code::NotFound);
 
     // A message over 1 MiB.
-    let mut problem: Problem = solver::parse(&example("sheet")).unwrap();
+    let mut problem: Problem = files::parse(&example("sheet")).unwrap();
     problem.title = Some("x".repeat(2 << 20));
     let request = pb::CreateJobRequest {
         problem: Some(problem_to_pb(&problem)),

@@ -248,7 +248,7 @@ async fn grpc_stores_and_tells_the_same() {
         .await
         .unwrap_err();
     assert_eq!(refused.code(), Code::InvalidArgument);
-    let problem = solver::parse(&pulled(json!({"stored": mesh.hash})).to_string()).unwrap();
+    let problem = files::parse(&pulled(json!({"stored": mesh.hash})).to_string()).unwrap();
     let job = pb::CreateJobRequest {
         problem: Some(service::convert::problem_to_pb(&problem)),
         wait: Some(60.0),

@@ -1,7 +1,7 @@
 //! Decks of Abaqus and CalculiX. That the numbers agree with CalculiX's own is `tests/calculix.py`.
 
+use files::{ReadError, abaqus};
 use serde_json::json;
-use solver::io::{ReadError, abaqus};
 use solver::mesh::Mesh;
 use solver::problem::{Analysis, BoundaryValue};
 

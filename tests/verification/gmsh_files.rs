@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
+use files::gmsh;
 use serde_json::{Value, json};
 use solver::element::Family;
-use solver::io::gmsh;
 use solver::mesh::Mesh;
 use solver::problem::Problem;
 
@@ -264,7 +264,9 @@ fn boundaries_are_found_by_box_and_by_normal() {
         "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
         "supports": [{"boundary": "low", "ux": 0, "uy": 0}],
     });
-    let model = solver::model::Model::new(&problem(&text.to_string()), None).unwrap();
+    let problem = problem(&text.to_string());
+    let external = files::external_mesh(&problem, None);
+    let model = solver::model::Model::new(&problem, external).unwrap();
     let length = |name: &str| -> f64 {
         let chord = |edge: &[u32; 3]| {
             let [[x0, y0], [x1, y1], _] = model.mesh.edge_nodes(edge);
@@ -290,7 +292,7 @@ fn boundaries_are_found_by_box_and_by_normal() {
 fn a_broken_file_is_refused_with_its_line() {
     let good = String::from_utf8(bytes("fillet-mixed-msh22-ascii")).unwrap();
     let said = |text: &str| {
-        let Err(solver::io::ReadError::Invalid(list)) = gmsh::read(text.as_bytes()) else {
+        let Err(files::ReadError::Invalid(list)) = gmsh::read(text.as_bytes()) else {
             panic!("a broken file was read");
         };
         format!("{}: {}; {}", list[0].reason, list[0].got, list[0].expected)

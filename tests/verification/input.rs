@@ -536,7 +536,7 @@ fn endless_lists_of_faults_are_cut_short() {
     assert_eq!(violations(&p), [pair("/supports", "too_many")]);
 
     let faults = vec![r#"{"a": 0}"#; 20_000].join(",");
-    let list = solver::parse(&format!(r#"{{"supports": [{faults}]}}"#)).unwrap_err();
+    let list = files::parse(&format!(r#"{{"supports": [{faults}]}}"#)).unwrap_err();
     assert_eq!(list.len(), 100);
 }
 

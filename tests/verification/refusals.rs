@@ -414,7 +414,7 @@ fn the_thesis_has_no_triangles_and_an_element_no_seven_nodes() {
     thesis.solver.algorithm = solver::problem::Algorithm::Thesis;
     assert_eq!(violations(&thesis), [pair("/solver/algorithm", "not_used")]);
     let text = serde_json::to_string(&with(&with_triangle)).unwrap();
-    let violations = solver::parse(&text.replace("[0,1,2,3,4,5]", "[0,1,2,3,4,5,5]")).unwrap_err();
+    let violations = files::parse(&text.replace("[0,1,2,3,4,5]", "[0,1,2,3,4,5,5]")).unwrap_err();
     assert_eq!(violations[0].pointer, "/mesh/inline/elements/0");
     assert!(
         violations[0].got.contains("7 nodes"),

@@ -13,12 +13,13 @@ pub(crate) fn example(name: &str) -> Problem {
 
 /// A problem from JSON.
 pub(crate) fn problem(json: &str) -> Problem {
-    solver::parse(json).unwrap_or_else(|violations| panic!("{violations:#?}"))
+    files::parse(json).unwrap_or_else(|violations| panic!("{violations:#?}"))
 }
 
 /// Solves a problem that must converge.
 pub(crate) fn solve(problem: &Problem) -> Solution {
-    let solution = solver::solve(problem, &mut quiet).unwrap();
+    let external = files::external_mesh(problem, None);
+    let solution = solver::solve_on(problem, external, &mut quiet).unwrap();
     assert!(solution.summary.converged, "{:#?}", solution.summary);
     solution
 }

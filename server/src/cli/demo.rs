@@ -180,7 +180,7 @@ async fn submit_grpc(
     name: &str,
     text: &str,
 ) -> anyhow::Result<String> {
-    let problem = match solver::parse(text) {
+    let problem = match files::parse(text) {
         Ok(problem) => problem_to_pb(&problem),
         Err(violations) => bail!("{name}: {violations:?}"),
     };

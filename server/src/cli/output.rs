@@ -7,10 +7,8 @@ use std::{
 };
 
 use anyhow::Context;
-use solver::{
-    io::plot::{self, Parts, Plot, Theme},
-    problem::Problem,
-};
+use files::plot::{self, Parts, Plot, Theme};
+use solver::problem::Problem;
 
 use crate::{
     formats::{self, Format},

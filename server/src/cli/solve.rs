@@ -9,9 +9,9 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
+use files::plot::Theme;
 use solver::{
     error::{SolveError, Violation},
-    io::plot::Theme,
     solution::Progress,
 };
 
@@ -57,9 +57,9 @@ pub(super) fn run(
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("inp"));
     let read = if deck {
-        solver::io::abaqus::problem(&text)
+        files::abaqus::problem(&text)
     } else {
-        solver::parse(&text)
+        files::parse(&text)
     };
     let problem = match read {
         Ok(problem) => problem,
@@ -118,7 +118,7 @@ pub(super) fn run(
 
 /// `signorini schema`.
 pub(super) fn schema() -> anyhow::Result<Exit> {
-    print(&format!("{:#}\n", solver::schema()))?;
+    print(&format!("{:#}\n", files::schema()))?;
     Ok(Exit::Ok)
 }
 

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use files::MeshFormat;
 use prost_types::Timestamp;
 use solver::{
     error::Violation,
-    io::MeshFormat,
     problem::NormalOf,
     solution::{
         Comparison, ContactProfile, ContactSummary, ErrorEstimate, Iteration, NodeState, Outcome,

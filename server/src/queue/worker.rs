@@ -42,7 +42,7 @@ pub(super) async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) 
     let store = queue.store.clone();
     let solving = tokio::task::spawn_blocking(move || {
         let mesh = mesh.map(|hash| stored_mesh(&store, &hash)).transpose()?;
-        solve_aloud(&problem, mesh.as_ref(), solve, |line| {
+        solve_aloud(&problem, mesh, solve, |line| {
             // An error means that the recorder is gone, and with it everybody who would listen.
             let heard = line.is_none_or(|line| say.blocking_send(line).is_ok());
             if heard && stop.get().is_none() {
@@ -107,12 +107,12 @@ fn stored_mesh(store: &Store, hash: &str) -> Result<Mesh, Unsolved> {
 /// whether to go on. On a blocking thread.
 fn solve_aloud(
     problem: &str,
-    mesh: Option<&Mesh>,
+    mesh: Option<Mesh>,
     solve: Solve,
     mut say: impl FnMut(Option<Line>) -> ControlFlow<()>,
 ) -> Result<Solved, SolveError> {
     let start = Instant::now();
-    let problem: Problem = solver::parse(problem).map_err(SolveError::Invalid)?;
+    let problem: Problem = files::parse(problem).map_err(SolveError::Invalid)?;
     let parse_s = start.elapsed().as_secs_f64();
     let single = |step: &Step| step.increments == 1;
     if problem.steps.len() <= 1

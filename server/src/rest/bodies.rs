@@ -272,7 +272,7 @@ impl<'a> Body<'a> {
             "the problem to solve",
             "Send {\"problem\": {…}}.",
         )?;
-        let problem = solver::parse(raw.get());
+        let problem = files::parse(raw.get());
         problem
             .map_err(|found| self.violations.extend(prefixed(AT, found)))
             .ok()

@@ -5,7 +5,7 @@ use axum::{
     http::{HeaderName, header},
     response::IntoResponse,
 };
-use solver::io::plot::{Plot, Style};
+use files::plot::{Plot, Style};
 
 use super::{
     Rest,

@@ -111,7 +111,7 @@ fn page(kind: &Kind) -> String {
 /// The JSON Schema of a problem.
 pub(super) async fn schema(RawQuery(query): RawQuery) -> Result<Json<Value>, ApiError> {
     Params::parse(query.as_deref(), &[])?;
-    Ok(Json(solver::schema()))
+    Ok(Json(files::schema()))
 }
 
 /// The API over gRPC.

@@ -7,9 +7,10 @@ use std::{
     sync::Arc,
 };
 
+use files::ReadError;
 use futures_util::{Stream, StreamExt};
 use sha2::{Digest, Sha256};
-use solver::{error::Violation, io::ReadError, mesh::Mesh};
+use solver::{error::Violation, mesh::Mesh};
 use tokio::io::{AsyncReadExt, AsyncSeekExt, AsyncWriteExt};
 use tracing::info;
 
@@ -86,7 +87,7 @@ fn parse(
     file.rewind().map_err(ApiError::internal)?;
     let encoded = tempfile::tempfile_in(folder).map_err(unwritten)?;
     let reader = BufReader::with_capacity(PIECE_BYTES, file);
-    let (format, mesh, warnings) = solver::io::read_mesh(reader).map_err(refused)?;
+    let (format, mesh, warnings) = files::read_mesh(reader).map_err(refused)?;
     let info = MeshInfo::new(hash, bytes, (format, &mesh, warnings));
     let out = BufWriter::with_capacity(PIECE_BYTES, encoded);
     let out = postcard::to_io(&mesh, out).map_err(ApiError::internal)?;

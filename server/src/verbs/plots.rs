@@ -2,9 +2,9 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
+use files::plot::{self, Parts, Plot, Style};
 use serde::de::DeserializeOwned;
 use solver::{
-    io::plot::{self, Parts, Plot, Style},
     mesh::Mesh,
     problem::Problem,
     solution::{ContactProfile, Fields, Iteration},

@@ -49,7 +49,7 @@ pub async fn validate(
         let estimate = estimate(&problem, stored.as_ref());
         let judged = match estimate.memory_bytes > budget_bytes {
             true => Err(vec![too_large(&estimate, budget_bytes)]),
-            false => check(&problem, stored.as_ref()),
+            false => check(&problem, stored),
         };
         let (warnings, violations) = match judged {
             Ok(warnings) => (warnings, vec![]),
@@ -130,7 +130,7 @@ pub async fn admit(service: &Service, mut problem: Problem) -> Result<Admitted, 
                 budget_bytes,
             });
         }
-        check(&problem, stored.as_ref()).map_err(ApiError::InvalidProblem)?;
+        check(&problem, stored).map_err(ApiError::InvalidProblem)?;
         let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
         let title = problem.title.take();
         let json = serde_json::to_string(&problem).map_err(ApiError::internal)?;
@@ -152,10 +152,10 @@ fn estimate(problem: &Problem, stored: Option<&(MeshInfo, Mesh)>) -> Estimate {
 
 fn check(
     problem: &Problem,
-    stored: Option<&(MeshInfo, Mesh)>,
+    stored: Option<(MeshInfo, Mesh)>,
 ) -> Result<Vec<Warning>, Vec<Violation>> {
-    solver::check(problem, stored.map(|(_, mesh)| mesh))
-        .map_err(|violations| prefixed(AT, violations))
+    let external = files::external_mesh(problem, stored.map(|(_, mesh)| mesh));
+    solver::check(problem, external).map_err(|violations| prefixed(AT, violations))
 }
 
 /// Moves violations to where their subject stands in a request.

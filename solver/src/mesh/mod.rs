@@ -17,6 +17,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::element::Element;
+use crate::error::Violation;
+use crate::solution::Warning;
 
 /// A side of an element on the surface of the body: start, end, midside node, so directed that the
 /// body lies on the right (a top edge runs along +x). The outward normal is the direction turned
@@ -36,6 +38,28 @@ pub struct Mesh {
     pub groups: BTreeMap<String, Vec<u32>>,
     /// Nodes by the name of their set.
     pub node_sets: BTreeMap<String, Vec<u32>>,
+}
+
+/// A mesh that a problem only names or quotes, and that its caller has read or fetched.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ExternalMesh {
+    /// The mesh, before it is refined.
+    pub mesh: Mesh,
+    /// What was changed when it was read; pointers are those of the problem.
+    pub warnings: Vec<Warning>,
+}
+
+/// What came of reading such a mesh: the mesh, or everything that is wrong with it. Pointers are those of
+/// the problem.
+pub type External = Result<ExternalMesh, Vec<Violation>>;
+
+impl From<Mesh> for ExternalMesh {
+    fn from(mesh: Mesh) -> Self {
+        ExternalMesh {
+            mesh,
+            warnings: Vec::new(),
+        }
+    }
 }
 
 impl Mesh {

@@ -2,11 +2,9 @@
 
 use super::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
 use super::findings::{ALIGNED, Findings};
-use crate::error::{Violation, escape};
-use crate::io::{ReadError, abaqus, gmsh};
-use crate::mesh::{self, Edge, Mesh};
+use crate::error::escape;
+use crate::mesh::{self, Edge, External, Mesh};
 use crate::problem::{AdaptiveRefine, Analysis, BoundaryPart, BoundaryValue, MeshInput, Refine};
-use crate::solution::Warning;
 
 /// Sides face one way when their normals differ by no more (degrees).
 const SAME_DIRECTION: f64 = 1.0;
@@ -19,12 +17,12 @@ impl Findings {
     pub(super) fn mesh(
         &mut self,
         input: &MeshInput,
-        stored: Option<&Mesh>,
+        external: Option<External>,
         analysis: &Analysis,
         contacts: usize,
     ) -> Option<Mesh> {
         let before = self.violations.len();
-        let mut mesh = self.source(input, stored);
+        let mut mesh = self.source(input, external);
         let refine = match input.refine {
             Refine::Times(times) => times,
             Refine::Adaptive(goal) => {
@@ -177,7 +175,7 @@ impl Findings {
     }
 
     /// The mesh as it is given, before it is refined.
-    fn source(&mut self, input: &MeshInput, stored: Option<&Mesh>) -> Option<Mesh> {
+    fn source(&mut self, input: &MeshInput, external: Option<External>) -> Option<Mesh> {
         let forms = [
             ("grid", input.grid.is_some()),
             ("inline", input.inline.is_some()),
@@ -215,56 +213,39 @@ impl Findings {
                 .map_err(|v| self.violations.extend(v))
                 .ok();
         }
-        if let Some(text) = &input.gmsh {
-            return self.file("/mesh/gmsh", gmsh::read(text.as_bytes()));
+        match external {
+            Some(Ok(found)) => {
+                self.warnings.extend(found.warnings);
+                Some(found.mesh)
+            }
+            Some(Err(faults)) => {
+                self.violations.extend(faults);
+                None
+            }
+            None => {
+                self.absent(input);
+                None
+            }
         }
-        if let Some(text) = &input.abaqus {
-            return self.file("/mesh/abaqus", abaqus::read(text.as_bytes()));
-        }
-        if stored.is_none() {
-            self.say(
-                "/mesh/stored",
-                "unknown_mesh",
-                input.stored.as_deref().unwrap_or_default(),
-                "a mesh that this service has stored",
-                "Upload it first (POST /v1/meshes); `signorini solve` has no store: give the mesh itself.",
-            );
-        }
-        stored.cloned()
     }
 
-    /// What was read from a file, with its warnings.
-    fn file(
-        &mut self,
-        pointer: &str,
-        read: Result<(Mesh, Vec<Warning>), ReadError>,
-    ) -> Option<Mesh> {
-        match read {
-            Ok((mesh, notes)) => {
-                for note in notes {
-                    self.warn(&note.code, pointer, note.message);
-                }
-                Some(mesh)
-            }
-            Err(ReadError::Invalid(faults)) => {
-                let here = |fault| Violation {
-                    pointer: pointer.to_owned(),
-                    ..fault
-                };
-                self.violations.extend(faults.into_iter().map(here));
-                None
-            }
-            // a text in memory can always be read
-            Err(ReadError::Io(error)) => {
-                self.say(
-                    pointer,
-                    "malformed",
-                    error,
-                    "a readable text",
-                    "Send it again.",
-                );
-                None
-            }
+    /// The caller has no mesh for what the problem names or quotes.
+    fn absent(&mut self, input: &MeshInput) {
+        match &input.stored {
+            Some(hash) => self.say(
+                "/mesh/stored",
+                "unknown_mesh",
+                hash,
+                "a mesh that this service has stored",
+                "Upload it first (POST /v1/meshes); `signorini solve` has no store: give the mesh itself.",
+            ),
+            None => self.say(
+                "/mesh",
+                "unknown_mesh",
+                "a text that nobody has read",
+                "a mesh that was read from it",
+                "Read it before the problem is checked.",
+            ),
         }
     }
 

@@ -22,7 +22,7 @@ use findings::Findings;
 use crate::contact::ContactBoundary;
 use crate::elasticity::{Loads, Section};
 use crate::error::Violation;
-use crate::mesh::Mesh;
+use crate::mesh::{External, Mesh};
 use crate::problem::{Condition, Friction, NormalOf, Problem, SolverControls, Step};
 use crate::solution::Warning;
 
@@ -134,8 +134,8 @@ impl ContactModel {
 }
 
 impl Model {
-    /// Checks and numbers a problem; `stored`: the mesh that it names by its hash, where it does.
-    pub fn new(problem: &Problem, stored: Option<&Mesh>) -> Result<Model, Vec<Violation>> {
+    /// Checks and numbers a problem; `external`: the mesh that it only names or quotes, where it does.
+    pub fn new(problem: &Problem, external: Option<External>) -> Result<Model, Vec<Violation>> {
         let mut findings = Findings::default();
         findings.finite(problem);
         // numbers that are not finite would make nonsense of every later check
@@ -157,7 +157,7 @@ impl Model {
         for (i, contact) in problem.contacts.iter().enumerate() {
             findings.contact_numbers(&analysis, contact, &format!("/contacts/{i}"));
         }
-        let Some(mesh) = findings.mesh(&problem.mesh, stored, &analysis, problem.contacts.len())
+        let Some(mesh) = findings.mesh(&problem.mesh, external, &analysis, problem.contacts.len())
         else {
             return Err(findings.into_violations());
         };

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use strum::IntoStaticStr;
 
 use crate::element::Element;
 use crate::problem::NormalOf;
@@ -229,8 +230,9 @@ pub struct Warning {
 }
 
 /// Where in the method an iteration belongs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Stage {
     /// The first solution, without friction.
     Frictionless,
@@ -250,14 +252,7 @@ pub enum Stage {
 impl Stage {
     /// The name that the API has for it.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Stage::Frictionless => "frictionless",
-            Stage::Bonded => "bonded",
-            Stage::Outer => "outer",
-            Stage::Inner => "inner",
-            Stage::Newton => "newton",
-            Stage::Thesis => "thesis",
-        }
+        self.into()
     }
 }
 
@@ -397,8 +392,9 @@ impl ContactProfile {
 }
 
 /// State of a contact node, or of a point between two.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum NodeState {
     /// Not in contact.
     Open,
@@ -406,6 +402,13 @@ pub enum NodeState {
     Stick,
     /// In contact and sliding, or in contact without friction.
     Slip,
+}
+
+impl NodeState {
+    /// The name that the API has for it.
+    pub fn as_str(self) -> &'static str {
+        self.into()
+    }
 }
 
 /// Values at all nodes of the mesh, in its order.

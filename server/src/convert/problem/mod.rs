@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn every_example_survives_the_way_through_grpc() {
         for (name, text) in examples::ALL {
-            let problem: Problem = solver::parse(text).unwrap();
+            let problem: Problem = files::parse(text).unwrap();
             assert_eq!(
                 problem_from_pb(problem_to_pb(&problem)).unwrap(),
                 problem,

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use solver::{
     error::SolveError,
-    mesh::Mesh,
+    mesh::External,
     problem::Problem,
     solution::{Observer, Outcome, Progress, Solution},
 };

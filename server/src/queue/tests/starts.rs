@@ -70,7 +70,7 @@ async fn a_canceled_running_job_keeps_its_last_state() {
 /// Settles where the forces do not balance.
 fn unbalanced(
     _: &Problem,
-    _: Option<&Mesh>,
+    _: Option<External>,
     _: &mut Observer<'_>,
 ) -> std::result::Result<Solution, SolveError> {
     let mut solution = fake::solution();
@@ -109,7 +109,7 @@ async fn a_job_that_converged_to_no_balance_fails_and_keeps_its_result() {
 /// At work in one long phase, with nothing to tell.
 fn busy(
     _: &Problem,
-    _: Option<&Mesh>,
+    _: Option<External>,
     observe: &mut Observer<'_>,
 ) -> std::result::Result<Solution, SolveError> {
     while observe(Progress::Pulse).is_continue() {
@@ -137,7 +137,7 @@ async fn a_pulse_is_answered_and_not_recorded() {
 /// As one long factorisation: deaf for a second.
 fn deaf(
     problem: &Problem,
-    _: Option<&Mesh>,
+    _: Option<External>,
     observe: &mut Observer<'_>,
 ) -> std::result::Result<Solution, SolveError> {
     std::thread::sleep(Duration::from_secs(1));
@@ -312,7 +312,7 @@ async fn a_job_out_of_time_fails_and_keeps_its_last_state() {
 async fn a_deaf_solver_out_of_time_is_ended_over_its_head() {
     fn very_deaf(
         _: &Problem,
-        _: Option<&Mesh>,
+        _: Option<External>,
         _: &mut Observer<'_>,
     ) -> std::result::Result<Solution, SolveError> {
         std::thread::sleep(Duration::from_secs(4));
@@ -339,7 +339,7 @@ async fn a_deaf_solver_out_of_time_is_ended_over_its_head() {
 async fn what_many_quick_steps_have_found_is_not_written_after_each() {
     fn quick_steps(
         _: &Problem,
-        _: Option<&Mesh>,
+        _: Option<External>,
         observe: &mut Observer<'_>,
     ) -> std::result::Result<Solution, SolveError> {
         let mut solution = fake::solution();

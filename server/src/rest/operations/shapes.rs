@@ -146,7 +146,7 @@ pub(super) fn lines() -> Content {
     vec![("application/jsonl", anything)]
 }
 
-/// A problem, as it is read: JSON Schema of `solver::schema`.
+/// A problem, as it is read: JSON Schema of `files::schema`.
 pub(super) fn the_problem() -> Content {
     vec![(
         "application/json",

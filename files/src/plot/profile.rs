@@ -6,8 +6,8 @@ use std::ops::Range;
 use super::figure::{Curve, Look, Panel, figure};
 use super::page::{self, with_unit};
 use super::theme::Theme;
-use crate::problem::{Contact, Problem};
-use crate::solution::ContactProfile;
+use solver::problem::{Contact, Problem};
+use solver::solution::ContactProfile;
 
 /// For each contact boundary: σ_n above, and where there is friction σ_t with its bound ±τ below, against arc
 /// length. Stresses are negative in compression. `Err` says why a figure could not be drawn.
@@ -83,7 +83,7 @@ fn stressed(profile: &ContactProfile) -> Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::plot::tests::problem;
+    use crate::plot::tests::problem;
 
     #[test]
     fn a_figure_holds_its_curves_and_survives_a_flat_profile() {

@@ -7,8 +7,8 @@ use super::bands::{BAR, Bands};
 use super::body::{self, Frame, Path, Sides, Window};
 use super::page::{self, number, with_unit};
 use super::theme::{Theme, hex};
-use crate::problem::{Analysis, Problem};
-use crate::solution::{ContactProfile, Fields, NodeState};
+use solver::problem::{Analysis, Problem};
+use solver::solution::{ContactProfile, Fields, NodeState};
 
 /// The largest displacement is drawn as this part of the body, or of the window at the contact.
 const VISIBLE: f64 = 0.1;
@@ -299,7 +299,7 @@ impl Body<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::plot::tests::{problem, solution};
+    use crate::plot::tests::{problem, solution};
 
     #[test]
     fn displacements_are_scaled_by_round_factors_or_not_at_all() {
@@ -393,7 +393,7 @@ mod tests {
         let grid = problem.mesh.grid.as_mut().unwrap();
         grid.x = (0..=100).map(|k| 0.04 * f64::from(k)).collect();
         grid.y = (0..=50).map(|k| 0.04 * f64::from(k) - 2.0).collect();
-        let mesh = crate::mesh::grid_mesh(grid);
+        let mesh = solver::mesh::grid_mesh(grid);
         let column = |f: &dyn Fn(f64, f64) -> f64| {
             mesh.nodes.iter().map(|p| f(p[0], p[1])).collect::<Vec<_>>()
         };
@@ -419,7 +419,7 @@ mod tests {
         )
         .unwrap();
         assert!(svg.len() < 2_000_000, "{}", svg.len());
-        let svg = super::super::mesh_svg(Theme::Light, &problem, None, &fields).unwrap();
+        let svg = crate::plot::mesh_svg(Theme::Light, &problem, None, &fields).unwrap();
         assert!(svg.len() < 2_000_000, "{}", svg.len());
     }
 }

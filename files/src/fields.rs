@@ -1,26 +1,26 @@
 //! The fields as arrays, the same in VTU and NPZ: vectors and tensors by components in VTK's order,
 //! with what is usually drawn of a stress. The NPZ has the integration points beside them.
 
-use super::npz::Npz;
-use super::stress::{Stress, principal, von_mises};
-use crate::element::Element;
-use crate::solution::Fields;
+use crate::npz::Npz;
+use crate::stress::{Stress, principal, von_mises};
+use solver::element::Element;
+use solver::solution::Fields;
 
 /// One quantity at all nodes.
-pub(super) struct Array {
-    pub(super) name: &'static str,
+pub(crate) struct Array {
+    pub(crate) name: &'static str,
     /// One name per component; none for a scalar.
-    pub(super) components: &'static [&'static str],
-    pub(super) data: Data,
+    pub(crate) components: &'static [&'static str],
+    pub(crate) data: Data,
 }
 
-pub(super) enum Data {
+pub(crate) enum Data {
     Real(Vec<f64>),
     Small(Vec<i8>),
 }
 
 /// Made one after the other: all of them together are larger than the fields.
-pub(super) fn point_data(fields: &Fields) -> impl Iterator<Item = Array> {
+pub(crate) fn point_data(fields: &Fields) -> impl Iterator<Item = Array> {
     const ARRAYS: [fn(&Fields) -> Array; 5] = [
         |fields| {
             let columns = (&fields.ux, &fields.uy);
@@ -50,7 +50,7 @@ pub(super) fn point_data(fields: &Fields) -> impl Iterator<Item = Array> {
 }
 
 /// Positions, or other vectors in the plane, with z = 0.
-pub(super) fn plane(x: &[f64], y: &[f64]) -> Vec<f64> {
+pub(crate) fn plane(x: &[f64], y: &[f64]) -> Vec<f64> {
     x.iter().zip(y).flat_map(|(x, y)| [*x, *y, 0.0]).collect()
 }
 
@@ -131,7 +131,7 @@ pub fn npz(fields: &Fields) -> Result<Vec<u8>, String> {
 
 /// That arrays which belong together have equal length, and elements only nodes that exist: a file
 /// that breaks this crashes the program that reads it.
-pub(super) fn check(fields: &Fields) -> Result<(), String> {
+pub(crate) fn check(fields: &Fields) -> Result<(), String> {
     let f = fields;
     let nodes = f.x.len();
     let same = |what: &str, found: usize, expected: usize| match found == expected {
@@ -174,10 +174,10 @@ pub(super) fn check(fields: &Fields) -> Result<(), String> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
-    use crate::io::npz::tests::read;
-    use crate::solution::GaussFields;
+    use crate::npz::tests::read;
+    use solver::solution::GaussFields;
 
     /// A quadrilateral with a triangle on its right side.
     pub(crate) fn mixed() -> Fields {
@@ -263,7 +263,7 @@ pub(super) mod tests {
             let mut fields = mixed();
             spoil(&mut fields);
             assert!(npz(&fields).is_err());
-            assert!(super::super::vtu::file(&fields).is_err());
+            assert!(crate::vtu::file(&fields).is_err());
         }
     }
 }

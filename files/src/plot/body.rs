@@ -8,8 +8,8 @@ use plotters::prelude::*;
 
 use super::page::{self, Area, Fallible, HEAD, WIDTH, px, say, tick};
 use super::theme::{Theme, hex};
-use crate::element::Element;
-use crate::mesh::runs;
+use solver::element::Element;
+use solver::mesh::runs;
 
 /// Around the axes (pixels): numbers and names left and below, a caption above.
 const EDGE: i32 = 4;
@@ -275,9 +275,9 @@ impl Sides {
 }
 
 /// Coordinates as the theory names them.
-pub(super) fn coordinates(analysis: &crate::problem::Analysis) -> [&'static str; 2] {
+pub(super) fn coordinates(analysis: &solver::problem::Analysis) -> [&'static str; 2] {
     match analysis {
-        crate::problem::Analysis::Axisymmetric {} => ["r", "z"],
+        solver::problem::Analysis::Axisymmetric {} => ["r", "z"],
         _ => ["x", "y"],
     }
 }
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn the_surface_is_what_one_element_has_alone() {
-        let strip = crate::mesh::grid_mesh(&crate::problem::Grid {
+        let strip = solver::mesh::grid_mesh(&solver::problem::Grid {
             x: vec![0.0, 1.0, 2.0],
             y: vec![0.0, 1.0],
             top: None,

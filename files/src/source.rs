@@ -3,7 +3,7 @@
 use std::io::{self, BufRead};
 use std::str::FromStr;
 
-use crate::error::Violation;
+use solver::error::Violation;
 
 /// No line of a mesh file is longer; a file that is no text shall not fill the memory.
 const LONGEST_LINE: u64 = 1 << 20;
@@ -18,20 +18,20 @@ pub enum ReadError {
 }
 
 /// A reader that counts lines.
-pub(super) struct Source<R> {
+pub(crate) struct Source<R> {
     reader: R,
     /// The current line without its end.
     text: String,
     /// Where in it the next word begins.
     at: usize,
     /// Its number, from 1; in binary sections the number of the section's first line.
-    pub(super) line: u64,
+    pub(crate) line: u64,
     /// Bytes are in the other order than this machine's.
-    pub(super) swapped: bool,
+    pub(crate) swapped: bool,
 }
 
 impl<R: BufRead> Source<R> {
-    pub(super) fn new(reader: R) -> Self {
+    pub(crate) fn new(reader: R) -> Self {
         Source {
             reader,
             text: String::new(),
@@ -42,7 +42,7 @@ impl<R: BufRead> Source<R> {
     }
 
     /// Goes to the next line; false at the end of the file.
-    pub(super) fn advance(&mut self) -> Result<bool, ReadError> {
+    pub(crate) fn advance(&mut self) -> Result<bool, ReadError> {
         let mut bytes = std::mem::take(&mut self.text).into_bytes();
         bytes.clear();
         self.at = 0;
@@ -78,13 +78,13 @@ impl<R: BufRead> Source<R> {
     }
 
     /// The current line; its words are taken.
-    pub(super) fn text(&mut self) -> &str {
+    pub(crate) fn text(&mut self) -> &str {
         self.at = self.text.len();
         &self.text
     }
 
     /// The next word, on this line or a later one.
-    pub(super) fn word(&mut self, what: &str) -> Result<&str, ReadError> {
+    pub(crate) fn word(&mut self, what: &str) -> Result<&str, ReadError> {
         loop {
             let rest = &self.text[self.at..];
             let trimmed = rest.trim_start();
@@ -106,7 +106,7 @@ impl<R: BufRead> Source<R> {
     }
 
     /// The next word as a number.
-    pub(super) fn number<T: FromStr>(&mut self, what: &str) -> Result<T, ReadError> {
+    pub(crate) fn number<T: FromStr>(&mut self, what: &str) -> Result<T, ReadError> {
         let word = self.word(what)?;
         match word.parse() {
             Ok(number) => Ok(number),
@@ -118,7 +118,7 @@ impl<R: BufRead> Source<R> {
     }
 
     /// The next bytes of a binary section.
-    pub(super) fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N], ReadError> {
+    pub(crate) fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N], ReadError> {
         let mut bytes = [0; N];
         match self.reader.read_exact(&mut bytes) {
             Ok(()) => {
@@ -138,7 +138,7 @@ impl<R: BufRead> Source<R> {
     }
 
     /// An error at the current line.
-    pub(super) fn fault(&self, reason: &str, got: &str, expected: &str, hint: &str) -> ReadError {
+    pub(crate) fn fault(&self, reason: &str, got: &str, expected: &str, hint: &str) -> ReadError {
         ReadError::Invalid(vec![Violation {
             pointer: String::new(),
             reason: reason.to_owned(),
@@ -152,7 +152,7 @@ impl<R: BufRead> Source<R> {
 /// Nodes by the file's own numbers. These are mostly dense, so a list does; what lies far beyond goes
 /// into a map, so that one large number does not fill the memory.
 #[derive(Default)]
-pub(super) struct Labels {
+pub(crate) struct Labels {
     dense: Vec<u32>,
     sparse: std::collections::HashMap<u64, u32>,
     count: u32,
@@ -160,7 +160,7 @@ pub(super) struct Labels {
 
 impl Labels {
     /// The next node has this number; false, and nothing done, if another has it already.
-    pub(super) fn add(&mut self, label: u64) -> bool {
+    pub(crate) fn add(&mut self, label: u64) -> bool {
         if self.get(label).is_some() {
             return false;
         }
@@ -182,7 +182,7 @@ impl Labels {
 
     /// The places of all numbers first, first + step, … up to last. A range may be as wide as numbers
     /// go: what is looked at are the numbers that exist.
-    pub(super) fn range(&self, first: u64, last: u64, step: u64) -> Vec<u32> {
+    pub(crate) fn range(&self, first: u64, last: u64, step: u64) -> Vec<u32> {
         let inside =
             |label: u64| label >= first && label <= last && (label - first).is_multiple_of(step);
         let dense = (0u64..)
@@ -197,7 +197,7 @@ impl Labels {
     }
 
     /// The place of a node in the file.
-    pub(super) fn get(&self, label: u64) -> Option<u32> {
+    pub(crate) fn get(&self, label: u64) -> Option<u32> {
         let dense = usize::try_from(label).ok().and_then(|l| self.dense.get(l));
         dense
             .copied()
@@ -207,7 +207,7 @@ impl Labels {
 }
 
 /// The plane that the nodes must lie in: z is the same for all.
-pub(super) struct Plane {
+pub(crate) struct Plane {
     lowest: (f64, u64),
     highest: (f64, u64),
     extent: f64,
@@ -224,7 +224,7 @@ impl Default for Plane {
 }
 
 impl Plane {
-    pub(super) fn add(&mut self, label: u64, [x, y, z]: [f64; 3]) {
+    pub(crate) fn add(&mut self, label: u64, [x, y, z]: [f64; 3]) {
         if z < self.lowest.0 {
             self.lowest = (z, label);
         }
@@ -235,7 +235,7 @@ impl Plane {
     }
 
     /// What is wrong, if the nodes do not lie in one plane z = const.
-    pub(super) fn fault(&self) -> Option<Violation> {
+    pub(crate) fn fault(&self) -> Option<Violation> {
         /// Rounding of a file with some nine digits.
         const FLAT: f64 = 1e-9;
         let ((low, at_low), (high, at_high)) = (self.lowest, self.highest);

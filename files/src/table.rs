@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use crate::solution::{ContactProfile, Iteration, NodeState};
+use solver::solution::{ContactProfile, Iteration};
 
 /// Columns of equal length, in their order.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -159,17 +159,6 @@ impl Table {
     }
 }
 
-impl NodeState {
-    /// The name that the API has for it.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            NodeState::Open => "open",
-            NodeState::Stick => "stick",
-            NodeState::Slip => "slip",
-        }
-    }
-}
-
 fn column(name: &'static str, values: Values) -> Column {
     Column { name, values }
 }
@@ -187,9 +176,9 @@ fn push(text: &mut String, value: impl std::fmt::Display) {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
-    use crate::solution::{ContactCount, ForcePair, FrictionCount, Stage};
+    use solver::solution::{ContactCount, ForcePair, FrictionCount, NodeState, Stage};
 
     pub(crate) fn profile() -> ContactProfile {
         let column = |value: f64| vec![value, -0.0, 5e-324];

@@ -2,7 +2,7 @@
 
 use super::block::Block;
 use super::deck::{Deck, Elastic, ElementType, Section, Theory};
-use crate::element::Family;
+use solver::element::Family;
 
 /// A keyword line in parts.
 pub(super) struct Keyword {

@@ -9,10 +9,10 @@
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
-use super::source::{Labels, Plane, ReadError, Source};
-use crate::element::Element;
-use crate::mesh::{self, Mesh, NO_NODE, RawMesh};
-use crate::solution::Warning;
+use crate::source::{Labels, Plane, ReadError, Source};
+use solver::element::Element;
+use solver::mesh::{self, Mesh, NO_NODE, RawMesh};
+use solver::solution::Warning;
 
 /// What Gmsh calls the kinds of elements that we read, with their nodes.
 const KINDS: [(i64, usize, Kind); 8] = [

@@ -7,7 +7,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::body::{Frame, Path};
 use super::page::{self, Area, Fallible, WIDTH, number, px, round_up};
 use super::theme::{Theme, hex, viridis};
-use crate::element::{Element, Family};
+use solver::element::{Element, Family};
 
 /// No more bands than this, and about half as many at least.
 const BANDS: f64 = 14.0;

@@ -1,10 +1,12 @@
-//! What comes in and what goes out: readers, text and bytes, never paths.
+//! Problems and meshes from texts and files, results and figures as files: what goes between `solver`
+//! and the outside. Bytes in, bytes out, never a path.
 
-// In.
+// In: problems as JSON; meshes as Gmsh files and as decks of Abaqus or CalculiX.
 pub mod abaqus;
 pub mod gmsh;
 pub mod json;
 
+mod external;
 mod file;
 mod source;
 
@@ -19,5 +21,7 @@ pub mod vtu;
 
 mod number; // what these share
 
+pub use external::external_mesh;
 pub use file::{MeshFormat, read_mesh};
+pub use json::{parse, schema};
 pub use source::ReadError;

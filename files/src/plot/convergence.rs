@@ -2,8 +2,8 @@
 
 use super::figure::{Curve, Look, Panel, Scale, figure};
 use super::theme::Theme;
-use crate::problem::Problem;
-use crate::solution::Iteration;
+use solver::problem::Problem;
+use solver::solution::Iteration;
 
 /// Every residual on a logarithmic axis with the tolerance above, the contact set below, against the
 /// number of the iteration; vertical lines where load steps begin. `Err` says why it could not be drawn.

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::deck::{Deck, MOST_LISTED, Target};
-use crate::error::Violation;
-use crate::io::source::Labels;
-use crate::mesh::RawMesh;
+use crate::source::Labels;
+use solver::error::Violation;
+use solver::mesh::RawMesh;
 
 impl Deck {
     /// The name of what a load or support refers to; as `into_raw` gives it to the mesh.

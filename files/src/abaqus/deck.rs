@@ -5,10 +5,10 @@ use std::io::BufRead;
 
 use super::block::Block;
 use super::keyword::Keyword;
-use crate::element::Family;
-use crate::error::Violation;
-use crate::io::source::{Labels, Plane, ReadError, Source};
-use crate::mesh::RawMesh;
+use crate::source::{Labels, Plane, ReadError, Source};
+use solver::element::Family;
+use solver::error::Violation;
+use solver::mesh::RawMesh;
 
 /// More faults than this say nothing new.
 pub(super) const MOST_LISTED: usize = 50;

@@ -15,9 +15,9 @@ pub use problem::problem;
 
 use std::io::BufRead;
 
-use super::source::ReadError;
-use crate::mesh::{self, Mesh};
-use crate::solution::Warning;
+use crate::source::ReadError;
+use solver::mesh::{self, Mesh};
+use solver::solution::Warning;
 
 /// Reads the mesh of a deck, with what was changed on the way. What the deck says of the analysis is
 /// not looked at, but that the sets and faces it loads have names: `SET P3` for a pressure on the third

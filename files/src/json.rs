@@ -9,8 +9,8 @@ use jsonschema::error::{TypeKind, ValidationErrorKind};
 use jsonschema::{ValidationError, Validator};
 use serde_json::Value;
 
-use crate::error::{Violation, escape};
-use crate::problem::Problem;
+use solver::error::{Violation, escape};
+use solver::problem::Problem;
 
 /// The JSON Schema of a problem (draft 2020-12).
 pub fn schema() -> Value {

@@ -6,7 +6,7 @@ use arrow_array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt32Array}
 use arrow_ipc::writer::FileWriter;
 use arrow_schema::{ArrowError, DataType, Field, Schema};
 
-use super::table::{Table, Values};
+use crate::table::{Table, Values};
 
 /// The bytes of the file. A missing number is null.
 pub fn file(table: &Table) -> Result<Vec<u8>, String> {
@@ -52,7 +52,7 @@ fn array(values: &Values) -> (DataType, ArrayRef, bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::table::tests::{history, profile};
+    use crate::table::tests::{history, profile};
     use arrow_array::Array;
     use arrow_array::cast::AsArray;
     use arrow_array::types::{Float64Type, UInt32Type};

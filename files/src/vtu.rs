@@ -9,10 +9,10 @@ use std::io::Write;
 use base64::{Engine, engine::general_purpose::STANDARD as BASE64};
 use flate2::{Compression, write::ZlibEncoder};
 
-use super::fields::{Data, check, plane, point_data};
-use super::number::Number;
-use crate::element::Family;
-use crate::solution::Fields;
+use crate::fields::{Data, check, plane, point_data};
+use crate::number::Number;
+use solver::element::Family;
+use solver::solution::Fields;
 
 /// VTK_QUADRATIC_TRIANGLE. Its nodes, and those below, stand in our own order.
 const QUADRATIC_TRIANGLE: u8 = 22;
@@ -111,7 +111,7 @@ fn data_array<T: Number>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::fields::tests::mixed;
+    use crate::fields::tests::mixed;
     use std::io::Read;
 
     /// The bytes of an array, block by block, as a reader goes about it.

@@ -7,8 +7,8 @@ use std::io::{Cursor, Write};
 use zip::write::{SimpleFileOptions, ZipWriter};
 use zip::{CompressionMethod, result::ZipResult};
 
-use super::number::Number;
-use super::table::{Table, Values};
+use crate::number::Number;
+use crate::table::{Table, Values};
 
 /// An archive being written. `numpy.load` gives it back as arrays by name.
 pub struct Npz {
@@ -136,9 +136,9 @@ fn failed(error: impl std::fmt::Display) -> String {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
-    use crate::io::table::tests::{history, profile};
+    use crate::table::tests::{history, profile};
     use std::collections::BTreeMap;
     use std::io::Read;
 

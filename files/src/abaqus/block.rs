@@ -1,8 +1,8 @@
 //! Blocks of data lines: what each line adds to the deck.
 
 use super::deck::{Deck, Elastic, ElementType, Force, Prescribed, Pressure, Target};
-use crate::element::{Element, Family};
-use crate::mesh::NO_NODE;
+use solver::element::{Element, Family};
+use solver::mesh::NO_NODE;
 
 /// What the data lines that follow belong to.
 pub(super) enum Block {

@@ -5,7 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::theme::Theme;
-use crate::problem::Units;
+use solver::problem::Units;
 
 /// Width of every figure (pixels).
 pub(super) const WIDTH: i32 = 720;

@@ -23,9 +23,9 @@ pub use mesh::mesh_svg;
 pub use profile::profile_svg;
 pub use theme::Theme;
 
-use crate::mesh::Mesh;
-use crate::problem::Problem;
-use crate::solution::{ContactProfile, Fields, Iteration};
+use solver::mesh::Mesh;
+use solver::problem::Problem;
+use solver::solution::{ContactProfile, Fields, Iteration};
 
 /// What can be drawn of a problem and its solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,7 +117,7 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::*;
-    use crate::solution::Solution;
+    use solver::solution::Solution;
 
     /// A small problem with everything that a figure shows.
     pub(super) fn problem() -> Problem {
@@ -139,7 +139,7 @@ mod tests {
     }
 
     pub(super) fn solution(problem: &Problem) -> Solution {
-        crate::solve(problem, &mut |_| ControlFlow::Continue(())).unwrap()
+        solver::solve(problem, &mut |_| ControlFlow::Continue(())).unwrap()
     }
 
     #[test]

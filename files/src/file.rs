@@ -5,11 +5,11 @@ use std::io::BufRead;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ReadError, abaqus, gmsh};
-use crate::error::Violation;
-use crate::mesh::{Mesh, inline_mesh, inverted};
-use crate::problem::InlineMesh;
-use crate::solution::Warning;
+use crate::{ReadError, abaqus, gmsh};
+use solver::error::Violation;
+use solver::mesh::{Mesh, inline_mesh, inverted};
+use solver::problem::InlineMesh;
+use solver::solution::Warning;
 
 /// Formats of mesh files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -1,9 +1,9 @@
 //! A deck as a whole problem: what is not understood is an error with its line.
 
 use super::deck::{Deck, Elastic, ElementType, Section, Theory};
-use crate::error::Violation;
-use crate::io::source::ReadError;
-use crate::problem::{
+use crate::source::ReadError;
+use solver::error::Violation;
+use solver::problem::{
     Analysis, BoundaryValue, Load, Material, MeshInput, Orthotropic, Problem, SolverControls,
     Support,
 };

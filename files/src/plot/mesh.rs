@@ -3,15 +3,16 @@
 use std::collections::BTreeMap;
 
 use plotters::prelude::*;
+use solver::error::Violation;
+use solver::mesh::Mesh;
+use solver::model::Model;
+use solver::problem::Problem;
+use solver::solution::Fields;
 
 use super::body::{self, Path, Sides, Window};
 use super::page::{self, WIDTH, px, say, with_unit};
 use super::theme::{Theme, hex};
-use crate::error::Violation;
-use crate::mesh::Mesh;
-use crate::model::Model;
-use crate::problem::Problem;
-use crate::solution::Fields;
+use crate::external_mesh;
 
 /// Height of one line of the legend (pixels).
 const LEGEND: i32 = 22;
@@ -38,7 +39,8 @@ pub fn mesh_svg(
             .first()
             .map_or_else(String::new, |v| v.to_string())
     };
-    let mesh = Model::new(problem, stored).map_err(refused)?.mesh;
+    let external = external_mesh(problem, stored.cloned());
+    let mesh = Model::new(problem, external).map_err(refused)?.mesh;
     let refined: Vec<[f64; 2]> = fields
         .x
         .iter()
@@ -203,8 +205,8 @@ fn places(labels: &[String]) -> Vec<(i32, i32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::plot::tests::problem;
-    use crate::problem::Refine;
+    use crate::plot::tests::problem;
+    use solver::problem::Refine;
 
     #[test]
     fn of_a_very_fine_mesh_the_outline_is_drawn() {
@@ -246,10 +248,10 @@ mod tests {
                 .contains("/mesh")
         );
         let wrong = Fields {
-            elements: vec![crate::element::Element::Triangle([0, 1, 2, 3, 4, 5])],
+            elements: vec![solver::element::Element::Triangle([0, 1, 2, 3, 4, 5])],
             ..Fields::default()
         };
-        let problem = super::super::tests::problem();
+        let problem = crate::plot::tests::problem();
         assert!(mesh_svg(Theme::Light, &problem, None, &wrong).is_err());
     }
 }
