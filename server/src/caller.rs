@@ -64,6 +64,16 @@ pub enum Owners<'a> {
     Only(&'a str),
 }
 
+impl Owners<'_> {
+    /// Whether what belongs to `owner` is among them.
+    pub fn include(self, owner: &str) -> bool {
+        match self {
+            Owners::All => true,
+            Owners::Only(only) => only == owner,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -78,5 +88,7 @@ mod tests {
             scopes,
         };
         assert_eq!(ada.sees(), Owners::Only("ada"));
+        assert!(ada.sees().include("ada") && !ada.sees().include("bob"));
+        assert!(local.sees().include("bob"));
     }
 }

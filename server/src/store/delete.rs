@@ -2,8 +2,8 @@
 
 use sqlx::SqliteConnection;
 
-use super::{Result, Store, results, rows::find, submit};
-use crate::{job::JobId, time::Time};
+use super::{Result, Store, results, rows::find};
+use crate::{caller::Owners, job::JobId, time::Time};
 
 /// A deleted job's name answers *gone* for so long, then *unknown*.
 const REMEMBERED_S: f64 = 7.0 * 86_400.0;
@@ -21,18 +21,20 @@ pub enum Deletion {
 
 impl Store {
     /// Deletes a terminal job with its events, and its result unless another job serves it.
-    pub async fn delete(&self, key: i64) -> Result<Deletion> {
+    pub async fn delete(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
         let mut change = self.change().await?;
-        let Some(job) = find(change.sql(), key).await? else {
+        let job = find(change.sql(), key).await?;
+        let Some(job) = job.filter(|job| owners.include(&job.owner)) else {
             return Ok(Deletion::Unknown);
         };
         if !job.status.is_terminal() {
             return Ok(Deletion::Active);
         }
         let tx = change.sql();
-        sqlx::query("insert into deleted_job (uuid, id, deleted_at) values (?, ?, ?)")
+        sqlx::query("insert into deleted_job (uuid, id, owner, deleted_at) values (?, ?, ?, ?)")
             .bind(job.id.0.to_string())
             .bind(key)
+            .bind(&job.owner)
             .bind(Time::now().micros())
             .execute(&mut *tx)
             .await?;
@@ -58,10 +60,11 @@ impl Store {
         Ok(Deletion::Deleted)
     }
 
-    /// Whether a job of that name was deleted not long ago.
-    pub async fn was_deleted(&self, id: JobId) -> Result<bool> {
+    /// Whether a job of that public id was deleted not long ago.
+    pub async fn was_deleted(&self, owners: Owners<'_>, id: JobId) -> Result<bool> {
         let mut connection = self.reader.acquire().await?;
-        submit::was_deleted(&mut connection, id).await
+        let owner = owner_of_deleted(&mut connection, id).await?;
+        Ok(owner.is_some_and(|owner| owners.include(&owner)))
     }
 
     /// Forgets names of jobs that were deleted long ago.
@@ -82,6 +85,31 @@ impl Store {
         }
         Ok(())
     }
+}
+
+/// Whose a job was that was deleted not long ago; none if there was no such job.
+pub(super) async fn owner_of_deleted(
+    connection: &mut SqliteConnection,
+    id: JobId,
+) -> Result<Option<String>> {
+    Ok(
+        sqlx::query_scalar("select owner from deleted_job where uuid = ?")
+            .bind(id.0.to_string())
+            .fetch_optional(connection)
+            .await?,
+    )
+}
+
+/// The public id of a deleted job by its number.
+pub(super) async fn deleted_id(
+    connection: &mut SqliteConnection,
+    key: i64,
+) -> Result<Option<JobId>> {
+    let uuid: Option<String> = sqlx::query_scalar("select uuid from deleted_job where id = ?")
+        .bind(key)
+        .fetch_optional(connection)
+        .await?;
+    Ok(uuid.and_then(|text| text.parse().ok()).map(JobId))
 }
 
 /// Whether a job serves the result of this number: its own, or another's.

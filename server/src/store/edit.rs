@@ -8,7 +8,10 @@ use super::{
     rows::{named, read},
     submit, twins,
 };
-use crate::job::{Job, JobId};
+use crate::{
+    caller::Owners,
+    job::{Job, JobId},
+};
 
 /// What is changed of a job; what is absent stays.
 #[derive(Clone, Debug, Default)]
@@ -28,12 +31,13 @@ impl Store {
     /// that it is of instead; `None`: there is no such job.
     pub async fn edit(
         &self,
+        owners: Owners<'_>,
         id: JobId,
         edit: &Edit,
         version: Option<i64>,
     ) -> Result<Option<std::result::Result<Job, i64>>> {
         let mut change = self.change().await?;
-        let Some(job) = named(change.sql(), id).await? else {
+        let Some(job) = named(change.sql(), owners, id).await? else {
             return Ok(None);
         };
         if version.is_some_and(|version| version != job.version) {

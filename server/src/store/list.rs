@@ -12,6 +12,7 @@ use super::{
     rows::{from_row, named},
 };
 use crate::{
+    caller::Owners,
     job::{Job, JobId, Status},
     time::Time,
 };
@@ -50,6 +51,18 @@ impl Filter {
         self.labels.sort_unstable();
         self.labels.dedup();
         self
+    }
+
+    /// The same filter on the jobs of these owners; none if it asks for the jobs of another.
+    fn among(&self, owners: Owners<'_>) -> Option<Self> {
+        let mut filter = self.clone();
+        if let Owners::Only(owner) = owners {
+            let asked = filter.owner.get_or_insert_with(|| owner.to_owned());
+            if asked != owner {
+                return None;
+            }
+        }
+        Some(filter)
     }
 
     /// Leaves no job out.
@@ -96,7 +109,7 @@ pub enum GroupBy {
 
 /// What finds the rows of a list.
 #[derive(Clone, Copy)]
-enum Lead<'a> {
+pub(super) enum Lead<'a> {
     Label(&'a (String, String)),
     InputHash(&'a str),
     Name(&'a str),
@@ -112,10 +125,10 @@ enum Lead<'a> {
 const FEW: i64 = 1000;
 
 impl Store {
-    /// The job of that name.
-    pub async fn job(&self, id: JobId) -> Result<Option<Job>> {
+    /// The job of that public id, with its place in the queue.
+    pub async fn job(&self, owners: Owners<'_>, id: JobId) -> Result<Option<Job>> {
         let mut connection = self.reader.acquire().await?;
-        let Some(mut job) = named(&mut connection, id).await? else {
+        let Some(mut job) = named(&mut connection, owners, id).await? else {
             return Ok(None);
         };
         self.place(&mut connection, std::slice::from_mut(&mut job))
@@ -146,31 +159,21 @@ impl Store {
     /// At most `limit` jobs of a list, after `cursor`.
     pub async fn jobs(
         &self,
+        owners: Owners<'_>,
         filter: &Filter,
         order: Order,
         cursor: Option<Cursor>,
         limit: i64,
     ) -> Result<Vec<Job>> {
+        let Some(filter) = &filter.among(owners) else {
+            return Ok(vec![]);
+        };
         let mut connection = self.lists.acquire().await?;
         let leads = match few(&mut connection, filter, order).await? {
             Some(lead) => vec![lead],
             None => leads(filter, order),
         };
-        let mut query = QueryBuilder::<Sqlite>::new("");
-        for (n, lead) in leads.iter().enumerate() {
-            query.push(if n == 0 {
-                "select * from ("
-            } else {
-                " union all select * from ("
-            });
-            page(&mut query, filter, *lead, order, cursor);
-            query.push(" limit ").push_bind(limit).push(")");
-        }
-        if leads.len() > 1 {
-            let (by, direction) = (order.by.column(), order.direction());
-            query.push(format!(" order by {by} {direction}, id {direction} limit "));
-            query.push_bind(limit);
-        }
+        let mut query = page_of_jobs(filter, &leads, order, cursor, limit);
         let rows = query.build().fetch_all(&mut *connection).await?;
         let mut jobs = rows.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
         self.place(&mut connection, &mut jobs).await?;
@@ -180,20 +183,14 @@ impl Store {
     /// How many jobs there are, in groups if asked for, the groups by name.
     pub async fn count(
         &self,
+        owners: Owners<'_>,
         filter: &Filter,
         group_by: Option<GroupBy>,
     ) -> Result<Vec<(String, i64)>> {
-        let group = match group_by {
-            Some(GroupBy::Status) => "status",
-            Some(GroupBy::Owner) => "owner",
-            None => "''",
+        let Some(filter) = &filter.among(owners) else {
+            return Ok(vec![]);
         };
-        let mut query = QueryBuilder::<Sqlite>::new(format!(
-            "select {group} as kind, count(*) as jobs from job where true"
-        ));
-        conditions(&mut query, filter, None);
-        times(&mut query, filter, "job.created_at", None);
-        query.push(" group by kind order by kind");
+        let mut query = counted(filter, group_by);
         let rows = query.build().fetch_all(&self.lists).await?;
         rows.iter()
             .map(|row| Ok((row.try_get("kind")?, row.try_get("jobs")?)))
@@ -203,16 +200,16 @@ impl Store {
     /// The numbers of at most `limit` jobs, in order of arrival, after one number and up to another.
     pub async fn keys(
         &self,
+        owners: Owners<'_>,
         filter: &Filter,
         after: i64,
         up_to: i64,
         limit: i64,
     ) -> Result<Vec<i64>> {
-        let mut query = QueryBuilder::<Sqlite>::new("select id from job where id > ");
-        query.push_bind(after).push(" and id <= ").push_bind(up_to);
-        conditions(&mut query, filter, None);
-        times(&mut query, filter, "job.created_at", None);
-        query.push(" order by id limit ").push_bind(limit);
+        let Some(filter) = &filter.among(owners) else {
+            return Ok(vec![]);
+        };
+        let mut query = keys_of_jobs(filter, after, up_to, limit);
         Ok(query.build_query_scalar().fetch_all(&self.lists).await?)
     }
 
@@ -221,6 +218,63 @@ impl Store {
         let last = sqlx::query_scalar("select coalesce(max(id), 0) from job");
         Ok(last.fetch_one(&self.reader).await?)
     }
+}
+
+/// At most `limit` jobs: of each lead so many, and of all of them together.
+pub(super) fn page_of_jobs(
+    filter: &Filter,
+    leads: &[Lead<'_>],
+    order: Order,
+    cursor: Option<Cursor>,
+    limit: i64,
+) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::<Sqlite>::new("");
+    for (n, lead) in leads.iter().enumerate() {
+        query.push(if n == 0 {
+            "select * from ("
+        } else {
+            " union all select * from ("
+        });
+        page(&mut query, filter, *lead, order, cursor);
+        query.push(" limit ").push_bind(limit).push(")");
+    }
+    if leads.len() > 1 {
+        let (by, direction) = (order.by.column(), order.direction());
+        query.push(format!(" order by {by} {direction}, id {direction} limit "));
+        query.push_bind(limit);
+    }
+    query
+}
+
+/// The number of jobs in each group.
+pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> QueryBuilder<Sqlite> {
+    let group = match group_by {
+        Some(GroupBy::Status) => "status",
+        Some(GroupBy::Owner) => "owner",
+        None => "''",
+    };
+    let mut query = QueryBuilder::<Sqlite>::new(format!(
+        "select {group} as kind, count(*) as jobs from job where true"
+    ));
+    conditions(&mut query, filter, None);
+    times(&mut query, filter, "job.created_at", None);
+    query.push(" group by kind order by kind");
+    query
+}
+
+/// At most `limit` numbers of jobs, in order.
+pub(super) fn keys_of_jobs(
+    filter: &Filter,
+    after: i64,
+    up_to: i64,
+    limit: i64,
+) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::<Sqlite>::new("select id from job where id > ");
+    query.push_bind(after).push(" and id <= ").push_bind(up_to);
+    conditions(&mut query, filter, None);
+    times(&mut query, filter, "job.created_at", None);
+    query.push(" order by id limit ").push_bind(limit);
+    query
 }
 
 impl OrderBy {
@@ -286,6 +340,7 @@ async fn few<'a>(
     let mut candidates: Vec<Lead<'a>> = filter.labels.iter().map(Lead::Label).collect();
     candidates.extend(filter.input_hash.as_deref().map(Lead::InputHash));
     candidates.extend(filter.name.as_deref().map(Lead::Name));
+    candidates.extend(filter.owner.as_deref().map(Lead::Owner));
     if let [status] = filter.statuses[..] {
         candidates.push(Lead::Status(status));
     }
@@ -316,7 +371,10 @@ async fn few<'a>(
                 query.push("job indexed by job_by_finished where finished_at is not null");
                 times(&mut query, filter, "finished_at", None);
             }
-            Lead::Owner(_) | Lead::All => continue,
+            Lead::Owner(owner) => {
+                query.push("job where owner = ").push_bind(owner);
+            }
+            Lead::All => continue,
         }
         query.push(" limit ").push_bind(FEW + 1).push(")");
         let jobs: i64 = query
@@ -332,14 +390,15 @@ async fn few<'a>(
 
 /// What leads where every filter leaves many jobs: an index in the order of the list. One lead, or where only
 /// statuses can one for each of them, since their lists are merged.
-fn leads(filter: &Filter, order: Order) -> Vec<Lead<'_>> {
+pub(super) fn leads(filter: &Filter, order: Order) -> Vec<Lead<'_>> {
     let statuses = &filter.statuses;
     let by_status: Vec<Lead<'_>> = statuses.iter().copied().map(Lead::Status).collect();
+    let owner_or_all = filter.owner.as_deref().map_or(Lead::All, Lead::Owner);
     // most jobs succeed: of the others there are fewer than most filters leave
     let of_the_others = !by_status.is_empty() && !statuses.contains(&Status::Succeeded);
     if order.by == OrderBy::FinishedAt || of_the_others {
         return match by_status.is_empty() {
-            true => vec![Lead::All],
+            true => vec![owner_or_all],
             false => by_status,
         };
     }
@@ -355,7 +414,7 @@ fn leads(filter: &Filter, order: Order) -> Vec<Lead<'_>> {
     if !by_status.is_empty() {
         return by_status;
     }
-    vec![filter.owner.as_deref().map_or(Lead::All, Lead::Owner)]
+    vec![owner_or_all]
 }
 
 /// One ordered list without its limit.
@@ -394,15 +453,22 @@ fn page(
             ));
             query.push_bind(status.as_str());
         }
-        Lead::Owner(owner) if by_creation => {
-            query.push("select * from job indexed by job_by_owner where owner = ");
+        Lead::Owner(owner) => {
+            let index = if by_creation {
+                "job_by_owner"
+            } else {
+                "job_by_owner_finished"
+            };
+            query.push(format!(
+                "select * from job indexed by {index} where owner = "
+            ));
             query.push_bind(owner.to_owned());
         }
         Lead::Ended => {
             query
                 .push("select * from job indexed by job_by_finished where finished_at is not null");
         }
-        Lead::Owner(_) | Lead::All => {
+        Lead::All => {
             let index = if by_creation {
                 "job_by_created"
             } else {

@@ -3,6 +3,12 @@
 //! One connection writes, always in `begin immediate`, so that no transaction ever fails half-way
 //! for want of a lock; others read at the same time (WAL). A commit is on the disk when it returns
 //! (synchronous FULL). Each method answers one question, in one transaction.
+//!
+//! Who names a job by its public id, or asks for a list, says whose jobs are meant ([`Owners`]): a job of
+//! another owner is not found, as if there were none. Keys, the store's own numbers of jobs, come only from such
+//! answers.
+//!
+//! [`Owners`]: crate::caller::Owners
 
 mod change;
 mod delete;
@@ -40,7 +46,7 @@ use line::{Line, Move};
 pub use list::{Cursor, Filter, GroupBy, Order, OrderBy};
 pub use meshes::{Removal, StoredMesh};
 pub use results::{PIECE_BYTES, PIECES_PER_COMMIT, PartInfo, Parts, ProfilePoints, Snapshot};
-pub use submit::{Accepted, NewJob, OWNER, RequestKey, Submission};
+pub use submit::{Accepted, NewJob, RequestKey, Submission};
 
 use crate::job::JobId;
 

@@ -13,6 +13,7 @@ use sqlx::{Sqlite, SqliteConnection, Transaction};
 
 use super::{Result, Store, jobs::is_current, rows::named};
 use crate::{
+    caller::Owners,
     job::{Job, JobId},
     run::Document,
 };
@@ -197,9 +198,9 @@ impl Store {
 
     /// A job with what there is of its result, as of one moment: while it runs, or is being deleted, the
     /// parts are replaced and removed.
-    pub async fn snapshot(&self, id: JobId) -> Result<Option<Snapshot>> {
+    pub async fn snapshot(&self, owners: Owners<'_>, id: JobId) -> Result<Option<Snapshot>> {
         let mut tx = self.reader.begin().await?;
-        let job = named(&mut tx, id).await?;
+        let job = named(&mut tx, owners, id).await?;
         Ok(job.map(|job| Snapshot { job, tx }))
     }
 

@@ -7,6 +7,7 @@ use uuid::Uuid;
 
 use super::{Result, Store, StoreError, results::running};
 use crate::{
+    caller::Owners,
     job::{Cache, Job, JobId, Limits, QueuePosition, Reason, ResultAvailable, Status, Waiting},
     time::Time,
 };
@@ -29,13 +30,18 @@ pub(super) async fn find(connection: &mut SqliteConnection, key: i64) -> Result<
     row.as_ref().map(from_row).transpose()
 }
 
-/// The job of that name, without its place in the queue.
-pub(super) async fn named(connection: &mut SqliteConnection, id: JobId) -> Result<Option<Job>> {
+/// The job of that public id, without its place in the queue. A job of another owner is not found.
+pub(super) async fn named(
+    connection: &mut SqliteConnection,
+    owners: Owners<'_>,
+    id: JobId,
+) -> Result<Option<Job>> {
     let row = sqlx::query("select * from job where uuid = ?")
         .bind(id.0.to_string())
         .fetch_optional(connection)
         .await?;
-    row.as_ref().map(from_row).transpose()
+    let job = row.as_ref().map(from_row).transpose()?;
+    Ok(job.filter(|job| owners.include(&job.owner)))
 }
 
 impl Store {

@@ -11,6 +11,7 @@ use tokio::sync::{mpsc, oneshot};
 use super::{
     Result, Store, StoreError,
     change::{Change, Mark},
+    delete::{deleted_id, owner_of_deleted},
     events,
     jobs::{self, Claim},
     line::Move,
@@ -19,6 +20,7 @@ use super::{
     twins,
 };
 use crate::{
+    caller::Owners,
     event::Payload,
     job::{Cache, Job, JobId, Limits, Status},
     time::Time,
@@ -68,6 +70,8 @@ pub struct RequestKey {
 /// Jobs that are accepted together or not at all.
 #[derive(Clone, Debug)]
 pub struct Submission {
+    /// Whose jobs, and whose key.
+    pub owner: String,
     /// One or more.
     pub jobs: Vec<NewJob>,
     /// The client's key.
@@ -114,10 +118,10 @@ impl Store {
         answer.await.map_err(|_| gone())?
     }
 
-    /// The jobs of a key that was used before.
-    pub async fn replay(&self, key: &RequestKey) -> Result<Option<Vec<Job>>> {
+    /// The jobs of a key that this owner has used before.
+    pub async fn replay(&self, owner: &str, key: &RequestKey) -> Result<Option<Vec<Job>>> {
         let mut connection = self.reader.acquire().await?;
-        let Some(keys) = keyed(&mut connection, OWNER, key).await? else {
+        let Some(keys) = keyed(&mut connection, owner, key).await? else {
             return Ok(None);
         };
         let Some(mut jobs) = remaining(&mut connection, keys).await? else {
@@ -127,8 +131,8 @@ impl Store {
         Ok(Some(jobs))
     }
 
-    /// The job of a client's own name, if it was handed in with that payload.
-    pub async fn replay_named(&self, id: JobId, payload: &str) -> Result<Option<Job>> {
+    /// The job of an id that the client made, if this owner handed it in with that payload.
+    pub async fn replay_named(&self, owner: &str, id: JobId, payload: &str) -> Result<Option<Job>> {
         let same: Option<i64> =
             sqlx::query_scalar("select id from job where uuid = ? and payload = ?")
                 .bind(id.0.to_string())
@@ -136,7 +140,7 @@ impl Store {
                 .fetch_optional(&self.reader)
                 .await?;
         match same {
-            Some(_) => self.job(id).await,
+            Some(_) => self.job(Owners::Only(owner), id).await,
             None => Ok(None),
         }
     }
@@ -189,11 +193,12 @@ async fn accept(
     claim: bool,
 ) -> Result<Accepted> {
     let Submission {
+        owner,
         jobs,
         key,
         max_queued,
     } = submission;
-    if let Some(old) = known(change, &jobs, key.as_ref()).await? {
+    if let Some(old) = known(change, &owner, &jobs, key.as_ref()).await? {
         return Ok(Accepted {
             jobs: old,
             replayed: true,
@@ -203,13 +208,13 @@ async fn accept(
     }
     let mut keys = vec![];
     for new in &jobs {
-        keys.push(insert(change, new, max_queued).await?);
+        keys.push(insert(change, &owner, new, max_queued).await?);
     }
     if let (Some(key), Some(first)) = (&key, keys.first()) {
         sqlx::query(
             "insert or replace into request_key (owner, key, payload, first_job, jobs, created_at) values (?, ?, ?, ?, ?, ?)",
         )
-        .bind(OWNER)
+        .bind(&owner)
         .bind(&key.key)
         .bind(&key.payload)
         .bind(first)
@@ -234,14 +239,15 @@ async fn accept(
     })
 }
 
-/// The jobs that a key or a client's own name stands for already.
+/// The jobs that a key or a client's own id stands for already.
 async fn known(
     change: &mut Change<'_>,
+    owner: &str,
     jobs: &[NewJob],
     key: Option<&RequestKey>,
 ) -> Result<Option<Vec<Job>>> {
     if let Some(key) = key
-        && let Some(keys) = keyed(change.sql(), OWNER, key).await?
+        && let Some(keys) = keyed(change.sql(), owner, key).await?
         && let Some(old) = remaining(change.sql(), keys).await?
     {
         return Ok(Some(old));
@@ -249,27 +255,28 @@ async fn known(
     let mut old = vec![];
     for new in jobs {
         let Some(id) = new.id else { continue };
-        let found: Option<(i64, Option<String>)> =
-            sqlx::query_as("select id, payload from job where uuid = ?")
+        let found: Option<(i64, String, Option<String>)> =
+            sqlx::query_as("select id, owner, payload from job where uuid = ?")
                 .bind(id.0.to_string())
                 .fetch_optional(change.sql())
                 .await?;
         match found {
-            Some((key, Some(payload))) if payload == new.payload && jobs.len() == 1 => {
+            Some((key, theirs, Some(payload)))
+                if theirs == owner && payload == new.payload && jobs.len() == 1 =>
+            {
                 old.push(read(change.sql(), key).await?);
             }
             Some(_) => return Err(StoreError::IdConflict(id)),
-            None if was_deleted(change.sql(), id).await? => {
-                return Err(StoreError::Deleted(id));
-            }
-            None => {}
+            None => match owner_of_deleted(change.sql(), id).await? {
+                Some(theirs) if theirs == owner => return Err(StoreError::Deleted(id)),
+                // another owner's id: whether that job is still there is not told
+                Some(_) => return Err(StoreError::IdConflict(id)),
+                None => {}
+            },
         }
     }
     Ok((!old.is_empty()).then_some(old))
 }
-
-/// Without tokens there is one owner.
-pub const OWNER: &str = "local";
 
 /// Commits submissions until the store is dropped.
 pub(super) async fn commit_submissions(
@@ -323,7 +330,7 @@ async fn remaining(
     for key in keys {
         match find(connection, key).await? {
             Some(job) => jobs.push(job),
-            None => deleted = deleted_name(connection, key).await?.or(deleted),
+            None => deleted = deleted_id(connection, key).await?.or(deleted),
         }
     }
     match (jobs.is_empty(), deleted) {
@@ -333,28 +340,13 @@ async fn remaining(
     }
 }
 
-pub(super) async fn was_deleted(
-    connection: &mut sqlx::SqliteConnection,
-    id: JobId,
-) -> Result<bool> {
-    Ok(
-        sqlx::query_scalar("select exists (select 1 from deleted_job where uuid = ?)")
-            .bind(id.0.to_string())
-            .fetch_one(connection)
-            .await?,
-    )
-}
-
-async fn deleted_name(connection: &mut sqlx::SqliteConnection, key: i64) -> Result<Option<JobId>> {
-    let uuid: Option<String> = sqlx::query_scalar("select uuid from deleted_job where id = ?")
-        .bind(key)
-        .fetch_optional(connection)
-        .await?;
-    Ok(uuid.and_then(|text| text.parse().ok()).map(JobId))
-}
-
 /// Inserts a job: waiting, or answered at once by an earlier result, or joined to a twin.
-async fn insert(change: &mut Change<'_>, new: &NewJob, max_queued: u32) -> Result<i64> {
+async fn insert(
+    change: &mut Change<'_>,
+    owner: &str,
+    new: &NewJob,
+    max_queued: u32,
+) -> Result<i64> {
     let answer = match new.cache {
         Cache::Use => twins::earlier(change, &new.input_hash).await?,
         Cache::Refresh | Cache::Off => None,
@@ -400,7 +392,7 @@ async fn insert(change: &mut Change<'_>, new: &NewJob, max_queued: u32) -> Resul
     .bind(new.limits.timeout_s)
     .bind(new.limits.queue_ttl_s)
     .bind(expires_at.micros())
-    .bind(OWNER)
+    .bind(owner)
     .fetch_one(change.sql())
     .await?;
     write_labels(change, key, now, &new.labels).await?;

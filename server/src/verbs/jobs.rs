@@ -22,7 +22,7 @@ const FILTERS: &str = "status, owner, label.{key}, name, input_hash, created_aft
 
 /// The job as it is now.
 pub async fn get(service: &Service, id: JobId) -> Result<Job, ApiError> {
-    match service.store.job(id).await? {
+    match service.store.job(service.sees(), id).await? {
         Some(job) => Ok(job),
         None => Err(absent(service, id).await?),
     }
@@ -30,14 +30,14 @@ pub async fn get(service: &Service, id: JobId) -> Result<Job, ApiError> {
 
 /// The job with what there is of its result, as of one moment.
 pub(super) async fn snapshot(service: &Service, id: JobId) -> Result<Snapshot, ApiError> {
-    match service.store.snapshot(id).await? {
+    match service.store.snapshot(service.sees(), id).await? {
         Some(found) => Ok(found),
         None => Err(absent(service, id).await?),
     }
 }
 
 async fn absent(service: &Service, id: JobId) -> Result<ApiError, ApiError> {
-    Ok(match service.store.was_deleted(id).await? {
+    Ok(match service.store.was_deleted(service.sees(), id).await? {
         true => ApiError::Deleted(id),
         false => ApiError::NotFound(format!("there is no job {id}")),
     })
@@ -90,7 +90,7 @@ pub async fn list(
     // One more than asked for tells whether there is another page.
     let jobs = service
         .store
-        .jobs(filter, order, cursor, page_size + 1)
+        .jobs(service.sees(), filter, order, cursor, page_size + 1)
         .await?;
     let mut jobs = jobs;
     let more = jobs.len() as i64 > page_size;
@@ -115,7 +115,10 @@ pub async fn count(
     filter: &Filter,
     group_by: Option<GroupBy>,
 ) -> Result<Count, ApiError> {
-    let groups = service.store.count(filter, group_by).await?;
+    let groups = service
+        .store
+        .count(service.sees(), filter, group_by)
+        .await?;
     let total = groups.iter().map(|(_, jobs)| jobs).sum();
     let groups = match group_by {
         Some(_) => groups.into_iter().collect(),
@@ -141,7 +144,11 @@ pub async fn update(
     }
     let service = service.clone();
     detached(async move {
-        match service.store.edit(id, &edit, version).await? {
+        match service
+            .store
+            .edit(service.sees(), id, &edit, version)
+            .await?
+        {
             Some(Ok(job)) => {
                 service.queue.announce(&[job.key]);
                 Ok(job)
@@ -185,7 +192,7 @@ pub async fn delete(service: &Arc<Service>, id: JobId) -> Result<(), ApiError> {
     let job = get(service, id).await?;
     let service = service.clone();
     detached(async move {
-        match service.store.delete(job.key).await? {
+        match service.store.delete(service.sees(), job.key).await? {
             Deletion::Deleted => {
                 service.queue.announce(&[job.key]);
                 Ok(())
@@ -218,7 +225,7 @@ pub async fn cancel_many(service: &Arc<Service>, filter: Filter) -> Result<Many,
 /// Deletes all jobs of a filter that have ended.
 pub async fn delete_many(service: &Arc<Service>, filter: Filter) -> Result<Many, ApiError> {
     for_each(service, filter, |service: Arc<Service>, key| async move {
-        let deleted = service.store.delete(key).await? == Deletion::Deleted;
+        let deleted = service.store.delete(service.sees(), key).await? == Deletion::Deleted;
         if deleted {
             service.queue.announce(&[key]);
         }
@@ -243,7 +250,10 @@ async fn for_each<F: Future<Output = Result<bool, ApiError>> + Send>(
         let last = service.store.last_key().await?;
         let (mut after, mut many) = (0, Many::default());
         loop {
-            let keys = service.store.keys(&filter, after, last, AT_ONCE).await?;
+            let keys = service
+                .store
+                .keys(service.sees(), &filter, after, last, AT_ONCE)
+                .await?;
             let Some(end) = keys.last() else {
                 return Ok(many);
             };

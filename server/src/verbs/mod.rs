@@ -15,6 +15,7 @@ use std::{path::PathBuf, sync::Arc};
 use tokio::sync::Semaphore;
 
 use crate::{
+    caller::{Caller, Owners},
     config::Config,
     error::ApiError,
     queue::Queue,
@@ -54,6 +55,16 @@ impl Service {
             max_mesh_bytes: config.max_mesh_bytes,
             data: config.data.clone(),
         }
+    }
+
+    /// Whose jobs are seen: everybody's, as long as callers are not told apart.
+    pub fn sees(&self) -> Owners<'_> {
+        Owners::All
+    }
+
+    /// The owner of what is handed in.
+    pub fn owner(&self) -> String {
+        Caller::local().owner().into()
     }
 
     /// An error once the service is about to stop.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::{Service, detached};
-use crate::{error::ApiError, formats::Format, store::OWNER};
+use crate::{caller, error::ApiError, formats::Format};
 
 /// How the queue stands.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -130,9 +130,9 @@ pub struct Caller {
 
 /// Who asks: without tokens everybody is one owner, who may do everything.
 pub fn caller() -> Caller {
-    let scopes = ["read", "submit", "cancel", "admin"];
+    let local = caller::Caller::local();
     Caller {
-        owner: OWNER.into(),
-        scopes: scopes.into_iter().map(Into::into).collect(),
+        owner: local.owner().into(),
+        scopes: local.scopes().map(<&str>::from).map(Into::into).collect(),
     }
 }

@@ -79,7 +79,10 @@ pub async fn create(
         // before it is looked at in depth: what was accepted once need not be acceptable now
         if let Some(id) = prepared.id
             && !prepared.payload.is_empty()
-            && let Some(old) = service.store.replay_named(id, &prepared.payload).await?
+            && let Some(old) = service
+                .store
+                .replay_named(&service.owner(), id, &prepared.payload)
+                .await?
         {
             return only(vec![old], true);
         }
@@ -289,7 +292,9 @@ async fn replayed(
     key: Option<&RequestKey>,
 ) -> Result<Option<Vec<Job>>, ApiError> {
     match key {
-        Some(key) if !key.payload.is_empty() => Ok(service.store.replay(key).await?),
+        Some(key) if !key.payload.is_empty() => {
+            Ok(service.store.replay(&service.owner(), key).await?)
+        }
         _ => Ok(None),
     }
 }
@@ -354,6 +359,7 @@ async fn hand_in(
     let limit = service.max_queued;
     let hash = jobs.iter().find_map(|job| job.mesh.clone());
     let submission = Submission {
+        owner: service.owner(),
         jobs,
         key,
         max_queued: limit,

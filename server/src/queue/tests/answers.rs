@@ -19,10 +19,10 @@ async fn an_earlier_result_answers_at_once_and_survives_its_source() {
     let part = |key| rig.store.piece(key, "fields", 0);
     let bytes = part(source.key).await.unwrap().unwrap();
     assert_eq!(cached.result_key, source.key);
-    rig.store.delete(source.key).await.unwrap();
+    rig.store.delete(Owners::All, source.key).await.unwrap();
     assert_eq!(part(cached.result_key).await.unwrap(), Some(bytes));
     // and goes with the last that serves it
-    rig.store.delete(cached.key).await.unwrap();
+    rig.store.delete(Owners::All, cached.key).await.unwrap();
     assert_eq!(part(cached.result_key).await.unwrap(), None);
     let fresh = rig.submit_as(same()).await;
     assert_eq!(fresh.cached_from, None);
@@ -62,7 +62,7 @@ async fn a_twin_ends_as_its_source_ends() {
         (done.status, done.cached_from, done.attempt),
         (Status::Succeeded, Some(source.id), 1)
     );
-    let twin = rig.store.job(twin.id).await.unwrap().unwrap();
+    let twin = rig.store.job(Owners::All, twin.id).await.unwrap().unwrap();
     assert_eq!(twin.result_key, source.key);
 }
 
@@ -76,13 +76,23 @@ async fn canceling_one_of_two_twins_leaves_the_other() {
     // the twin alone
     rig.queue.cancel(first.key).await.unwrap();
     assert_eq!(rig.until_done(&first).await.status, Status::Canceled);
-    let source_now = rig.store.job(source.id).await.unwrap().unwrap();
+    let source_now = rig
+        .store
+        .job(Owners::All, source.id)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!(source_now.status, Status::Running);
     // the source: the other twin takes its place
     rig.queue.cancel(source.key).await.unwrap();
     assert_eq!(rig.until_done(&source).await.status, Status::Canceled);
     rig.until(&second, |event| event.seq == 2).await;
-    let second_now = rig.store.job(second.id).await.unwrap().unwrap();
+    let second_now = rig
+        .store
+        .job(Owners::All, second.id)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!(
         (
             second_now.status,
@@ -119,7 +129,12 @@ async fn twins_count_as_waiting_and_one_that_is_to_go_first_goes_alone() {
     for job in [&source, &other] {
         assert_eq!(rig.until_done(job).await.status, Status::Succeeded);
     }
-    let source = rig.store.job(source.id).await.unwrap().unwrap();
+    let source = rig
+        .store
+        .job(Owners::All, source.id)
+        .await
+        .unwrap()
+        .unwrap();
     assert!(source.cached_from.is_some());
     assert_eq!(rig.store.waiting(), 0);
 }
@@ -149,7 +164,12 @@ async fn who_is_answered_beside_a_submit_is_told_of_it() {
     let submission = submission(vec![new(0)], None);
     let accepted = rig.store.submit(submission, true).await.unwrap();
     assert!(accepted.changed.contains(&waiting.key), "{accepted:?}");
-    let answered = rig.store.job(waiting.id).await.unwrap().unwrap();
+    let answered = rig
+        .store
+        .job(Owners::All, waiting.id)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!(
         (answered.status, answered.cached_from),
         (Status::Succeeded, Some(source.id))
@@ -166,7 +186,7 @@ async fn a_source_that_is_to_go_later_leaves_its_place_to_its_first_twin() {
     let other = rig.submit_as(same()).await;
     let source = rig.put_at(&source, -1).await;
     assert_eq!(source.queue.unwrap().position, 2);
-    let found = async |job: &Job| rig.store.job(job.id).await.unwrap().unwrap();
+    let found = async |job: &Job| rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
     assert_eq!(found(&twin).await.queue.unwrap().position, 1);
     assert_eq!(found(&other).await.twin_of, Some(twin.key));
     assert_eq!(rig.store.waiting(), 3);
@@ -188,7 +208,7 @@ async fn a_poison_job_takes_the_process_down_three_times_and_not_once_more_for_a
         rig.store.requeue_interrupted().await.unwrap();
     }
     for job in [&poison, &twin] {
-        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        let job = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
         assert_eq!(
             (job.status, job.reason),
             (Status::Failed, Some(Reason::WorkerLost))
@@ -208,7 +228,7 @@ async fn a_source_that_is_put_back_leaves_its_place_to_a_twin_that_goes_first() 
     let between = rig.submit().await;
     rig.store.requeue_interrupted().await.unwrap();
     let place = async |job: &Job| {
-        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        let job = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
         job.queue.unwrap().position
     };
     assert_eq!((place(&twin).await, place(&between).await), (1, 2));
@@ -230,7 +250,7 @@ async fn whose_turn_it_is_joins_a_job_that_runs_on_the_same_input() {
     assert_eq!(claim.job.key, before.key);
     assert!(rig.store.claim_next().await.unwrap().0.is_none());
     for job in [&first, &twin] {
-        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        let job = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
         assert_eq!(job.twin_of, Some(before.key));
     }
     assert_eq!(rig.store.waiting(), 2);
@@ -245,7 +265,7 @@ async fn whose_turn_it_is_joins_a_job_that_runs_on_the_same_input() {
         .finish(before.key, 1, &ending, last, None)
         .await
         .unwrap();
-    let first = rig.store.job(first.id).await.unwrap().unwrap();
+    let first = rig.store.job(Owners::All, first.id).await.unwrap().unwrap();
     assert_eq!(first.cached_from, Some(before.id));
     assert_eq!(rig.store.waiting(), 0);
 }

@@ -42,7 +42,7 @@ async fn a_job_that_waits_too_long_fails_with_a_reason_of_its_own() {
         (Status::Failed, Some(Reason::QueueExpired), 0)
     );
     assert_eq!(rig.store.waiting(), 0);
-    let busy = rig.store.job(busy.id).await.unwrap().unwrap();
+    let busy = rig.store.job(Owners::All, busy.id).await.unwrap().unwrap();
     assert_eq!(busy.status, Status::Running);
 }
 
@@ -78,7 +78,7 @@ async fn a_paused_queue_starts_nothing_until_it_is_resumed_also_after_a_restart(
         folder,
     };
     tokio::time::sleep(Duration::from_millis(100)).await;
-    let waiting = rig.store.job(job.id).await.unwrap().unwrap();
+    let waiting = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
     assert_eq!(waiting.status, Status::Queued);
     rig.queue.resume().await.unwrap();
     assert_eq!(rig.until_done(&job).await.status, Status::Succeeded);
@@ -91,15 +91,22 @@ async fn the_line_in_memory_is_the_queue_on_the_disk() {
     for priority in [0, 3, 0, -2, 3] {
         rig.submit_as(new(priority)).await;
     }
-    let moved = rig.store.jobs(&all, Order::NEWEST_FIRST, None, 10);
+    let moved = rig
+        .store
+        .jobs(Owners::All, &all, Order::NEWEST_FIRST, None, 10);
     let moved = moved.await.unwrap();
     let edit = Edit {
         priority: Some(9),
         ..Edit::default()
     };
-    rig.store.edit(moved[1].id, &edit, None).await.unwrap();
+    rig.store
+        .edit(Owners::All, moved[1].id, &edit, None)
+        .await
+        .unwrap();
     rig.queue.cancel(moved[2].key).await.unwrap();
-    let jobs = rig.store.jobs(&all, Order::NEWEST_FIRST, None, 10);
+    let jobs = rig
+        .store
+        .jobs(Owners::All, &all, Order::NEWEST_FIRST, None, 10);
     let mut places: Vec<(i64, JobId)> = (jobs.await.unwrap().into_iter())
         .filter_map(|job| Some((job.queue?.position, job.id)))
         .collect();
@@ -126,7 +133,7 @@ async fn a_job_and_its_twin_may_have_waited_too_long_at_the_same_moment() {
     tokio::time::sleep(Duration::from_millis(100)).await;
     rig.store.expire_queued(Time::now()).await.unwrap();
     for job in &jobs {
-        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        let job = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
         assert_eq!(job.reason, Some(Reason::QueueExpired));
     }
     assert_eq!(rig.store.waiting(), 0);

@@ -17,12 +17,16 @@ use solver::{
 
 use super::*;
 use crate::{
+    caller::Owners,
     digest,
     event::{Event, Payload},
     fake,
     job::{Cache, JobId, Limits, Reason, ResultAvailable, Waiting},
     store::{Edit, Filter, GroupBy, NewJob, Order, RequestKey, StoreError},
 };
+
+/// Whose jobs they are.
+const OWNER: &str = "ada";
 
 struct Rig {
     store: Arc<Store>,
@@ -67,6 +71,7 @@ impl Rig {
 
     async fn submit_as(&self, new: NewJob) -> Job {
         let submission = Submission {
+            owner: OWNER.into(),
             jobs: vec![new],
             key: None,
             max_queued: 10,
@@ -86,7 +91,11 @@ impl Rig {
             priority: Some(priority),
             ..Edit::default()
         };
-        let edited = self.store.edit(job.id, &edit, None).await.unwrap();
+        let edited = self
+            .store
+            .edit(Owners::All, job.id, &edit, None)
+            .await
+            .unwrap();
         edited.unwrap().unwrap()
     }
 
@@ -147,6 +156,7 @@ fn submission(jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
         payload: jobs[0].payload.clone(),
     });
     Submission {
+        owner: OWNER.into(),
         jobs,
         key,
         max_queued: 1000,

@@ -19,7 +19,12 @@ async fn a_job_runs_to_its_end_and_its_result_is_stored() {
             .unwrap()
             .is_some()
     );
-    let mut snapshot = rig.store.snapshot(job.id).await.unwrap().unwrap();
+    let mut snapshot = rig
+        .store
+        .snapshot(Owners::All, job.id)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!(snapshot.profiled_boundaries().await.unwrap(), ["top"]);
 }
 
@@ -174,7 +179,10 @@ async fn a_deaf_solver_delays_only_its_slot_and_not_the_cancel() {
     // The slot comes back, and the late result changes nothing.
     let next = rig.submit().await;
     assert_eq!(rig.until_done(&next).await.status, Status::Succeeded);
-    assert_eq!(rig.store.job(job.id).await.unwrap().unwrap(), done);
+    assert_eq!(
+        rig.store.job(Owners::All, job.id).await.unwrap().unwrap(),
+        done
+    );
 }
 
 #[tokio::test]
@@ -198,7 +206,7 @@ async fn a_drain_puts_a_running_job_back_without_using_up_a_start() {
     let job = rig.submit().await;
     rig.until_at_work(&job).await;
     rig.queue.drain().await;
-    let drained = rig.store.job(job.id).await.unwrap().unwrap();
+    let drained = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
     assert_eq!(
         (drained.status, drained.attempt, drained.max_attempts),
         (Status::Queued, 1, 4)
@@ -219,7 +227,7 @@ async fn a_job_that_could_not_be_put_back_is_not_canceled() {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
     assert_eq!(rig.store.requeue_interrupted().await.unwrap(), 1);
-    let job = rig.store.job(job.id).await.unwrap().unwrap();
+    let job = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
     assert_eq!((job.status, job.attempt), (Status::Queued, 1));
 }
 
@@ -358,7 +366,7 @@ async fn what_many_quick_steps_have_found_is_not_written_after_each() {
     rig.queue.start();
     let job = rig.submit().await;
     let found = loop {
-        let job = rig.store.job(job.id).await.unwrap().unwrap();
+        let job = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
         if job.result_available == ResultAvailable::Partial {
             break job;
         }
@@ -374,7 +382,12 @@ async fn what_many_quick_steps_have_found_is_not_written_after_each() {
         (done.status, done.result_available),
         (Status::Canceled, ResultAvailable::Partial)
     );
-    let mut kept = rig.store.snapshot(job.id).await.unwrap().unwrap();
+    let mut kept = rig
+        .store
+        .snapshot(Owners::All, job.id)
+        .await
+        .unwrap()
+        .unwrap();
     assert!(kept.part("summary").await.unwrap().is_some());
     assert!(
         kept.part("history").await.unwrap().is_none(),

@@ -22,7 +22,7 @@ async fn one_key_is_one_job_however_many_ask_at_once() {
         .await
         .unwrap();
     rig.store
-        .delete(rig.store.last_key().await.unwrap())
+        .delete(Owners::All, rig.store.last_key().await.unwrap())
         .await
         .unwrap();
     let gone = rig.queue.submit(submission(vec![new(0)], Some("k")));
@@ -58,7 +58,7 @@ async fn one_that_is_refused_undoes_nothing_of_those_in_the_same_commit() {
     assert!(again.replayed && again.jobs[0].id == id);
     assert_eq!(rig.store.waiting(), 4);
     let all = Filter::default();
-    let by_status = rig.store.count(&all, Some(GroupBy::Status));
+    let by_status = rig.store.count(Owners::All, &all, Some(GroupBy::Status));
     assert_eq!(by_status.await.unwrap(), [("queued".to_string(), 4)]);
 }
 
@@ -71,12 +71,18 @@ async fn a_key_stands_for_what_is_left_of_its_jobs() {
     for job in &accepted.jobs {
         rig.until_done(job).await;
     }
-    rig.store.delete(accepted.jobs[0].key).await.unwrap();
+    rig.store
+        .delete(Owners::All, accepted.jobs[0].key)
+        .await
+        .unwrap();
     let again = rig.queue.submit(two.clone()).await.unwrap();
     assert!(again.replayed);
     assert_eq!(again.jobs.len(), 1);
     assert_eq!(again.jobs[0].id, accepted.jobs[1].id);
-    rig.store.delete(accepted.jobs[1].key).await.unwrap();
+    rig.store
+        .delete(Owners::All, accepted.jobs[1].key)
+        .await
+        .unwrap();
     let gone = rig.queue.submit(two.clone()).await;
     assert!(matches!(gone, Err(StoreError::Deleted(_))));
     // forgotten with the names of its jobs

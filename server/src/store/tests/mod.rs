@@ -1,10 +1,16 @@
 //! The store by itself.
 #![allow(clippy::unwrap_used)]
 
+mod owners;
+mod plans;
+
 use sqlx::migrate::Migrator;
 
 use super::*;
-use crate::job::{Limits, Status};
+use crate::{
+    caller::Owners,
+    job::{Cache, Limits, Status},
+};
 
 impl Store {
     /// Makes the disk full after so many more pages, until that is found out: the connection that has met it is
@@ -25,6 +31,38 @@ impl Store {
             .await
             .unwrap();
         pages < 1_000_000
+    }
+}
+
+/// A job with an input of its own, which answers nobody else.
+fn new(input: &str) -> NewJob {
+    NewJob {
+        id: None,
+        name: None,
+        labels: Default::default(),
+        priority: 0,
+        limits: Limits::default(),
+        cache: Cache::Off,
+        parent: None,
+        title: None,
+        input_hash: format!("sha256:{input}"),
+        problem: "{}".into(),
+        mesh: None,
+        payload: "payload".into(),
+    }
+}
+
+/// What this owner hands in.
+fn by(owner: &str, jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
+    let key = key.map(|key| RequestKey {
+        key: key.into(),
+        payload: "request".into(),
+    });
+    Submission {
+        owner: owner.into(),
+        jobs,
+        key,
+        max_queued: 1_000_000,
     }
 }
 
@@ -64,7 +102,7 @@ async fn an_older_store_is_brought_up_to_date_with_all_that_is_in_it() {
         labels: vec![("a".into(), "b".into())],
         ..Filter::default()
     };
-    let jobs = store.jobs(&labeled, Order::NEWEST_FIRST, None, 10);
+    let jobs = store.jobs(Owners::All, &labeled, Order::NEWEST_FIRST, None, 10);
     let jobs = jobs.await.unwrap();
     assert_eq!(jobs.len(), 1, "found by its label");
     assert_eq!(
@@ -72,7 +110,11 @@ async fn an_older_store_is_brought_up_to_date_with_all_that_is_in_it() {
         (Status::Succeeded, Limits::default())
     );
     let key = jobs[0].result_key;
-    let mut found = store.snapshot(jobs[0].id).await.unwrap().unwrap();
+    let mut found = store
+        .snapshot(Owners::All, jobs[0].id)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!(found.part("fields").await.unwrap().unwrap(), b"{}");
     let info = found.part_info("fields").await.unwrap().unwrap();
     drop(found);
@@ -88,25 +130,11 @@ async fn an_older_store_is_brought_up_to_date_with_all_that_is_in_it() {
     );
     assert!(store.claim_next().await.unwrap().0.is_some());
     // what an older program has found answers nobody
-    assert_eq!(store.delete(key).await.unwrap(), Deletion::Deleted);
+    assert_eq!(
+        store.delete(Owners::All, key).await.unwrap(),
+        Deletion::Deleted
+    );
     assert_eq!(store.piece(key, "fields", 0).await.unwrap(), None);
-}
-
-/// What every submit, start and tick of the clock asks looks at as many rows as it gives, however many jobs
-/// there are.
-#[tokio::test]
-async fn the_questions_of_the_queue_are_answered_by_indexes() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = Store::open(folder.path()).await.unwrap();
-    for question in [jobs::NEXT, jobs::LATE, twins::EARLIER, twins::UNDER_WAY] {
-        let plan = sqlx::AssertSqlSafe(format!("explain query plan {question}"));
-        let plan: Vec<(i64, i64, i64, String)> =
-            sqlx::query_as(plan).fetch_all(&store.reader).await.unwrap();
-        let steps: Vec<&str> = plan.iter().map(|(.., step)| step.as_str()).collect();
-        assert!(steps[0].contains("INDEX job_"), "{question}: {steps:?}");
-        let sorts = |step: &&str| step.contains("TEMP B-TREE");
-        assert!(!steps.iter().any(sorts), "{question}: {steps:?}");
-    }
 }
 
 /// SQLite ends a transaction by itself when the disk is full, and the driver does not notice.
@@ -115,23 +143,13 @@ async fn a_full_disk_refuses_and_does_not_end_the_writing_for_ever() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     store.bound(4).await;
-    let submission = |problem: &str| Submission {
-        jobs: vec![NewJob {
-            id: None,
+    let submission = |problem: &str| {
+        let job = NewJob {
             name: Some("x".repeat(1000)),
-            labels: Default::default(),
-            priority: 0,
-            limits: Limits::default(),
-            cache: crate::job::Cache::Off,
-            parent: None,
-            title: None,
-            input_hash: format!("sha256:{}", problem.len()),
             problem: problem.into(),
-            mesh: None,
-            payload: String::new(),
-        }],
-        key: None,
-        max_queued: 1_000_000,
+            ..new(&problem.len().to_string())
+        };
+        by("ada", vec![job], None)
     };
     let mut accepted = 0;
     let refused = loop {

@@ -1,0 +1,261 @@
+//! Two owners: each sees only what is their own, and whoever sees everybody's sees both.
+
+use super::*;
+use crate::job::{Job, JobId};
+
+const ADA: Owners<'static> = Owners::Only("ada");
+const BOB: Owners<'static> = Owners::Only("bob");
+
+struct Two {
+    _folder: tempfile::TempDir,
+    store: Arc<Store>,
+    ada: Job,
+    bob: Job,
+}
+
+/// A job of each, alike in all but the owner: handed in under the same key, with the same name and label.
+async fn two_owners() -> Two {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let submit = async |owner| {
+        let job = NewJob {
+            id: Some(JobId::new()),
+            name: Some("beam".into()),
+            labels: [("part".to_string(), "rail".to_string())].into(),
+            ..new("1")
+        };
+        let submission = by(owner, vec![job], Some("key"));
+        let accepted = store.submit(submission, false).await.unwrap();
+        assert!(!accepted.replayed, "the key of another is no key of mine");
+        accepted.jobs.into_iter().next().unwrap()
+    };
+    let (ada, bob) = (submit("ada").await, submit("bob").await);
+    assert_eq!((ada.owner.as_str(), bob.owner.as_str()), ("ada", "bob"));
+    Two {
+        _folder: folder,
+        store,
+        ada,
+        bob,
+    }
+}
+
+/// Runs all that wait, and has them succeed.
+async fn run_all(store: &Store) {
+    let ending = Ending {
+        status: Status::Succeeded,
+        reason: None,
+        failure: None,
+        result: crate::job::ResultAvailable::Final,
+    };
+    while let Some(Claim { job, .. }) = store.claim_next().await.unwrap().0 {
+        let finished = store.finish(job.key, job.attempt, &ending, LastWords::default(), None);
+        finished.await.unwrap().unwrap();
+    }
+}
+
+#[tokio::test]
+async fn a_job_is_found_by_its_owner_and_by_who_sees_all() {
+    let Two {
+        store, ada, bob, ..
+    } = two_owners().await;
+    for (owners, sees_ada, sees_bob) in [
+        (ADA, true, false),
+        (BOB, false, true),
+        (Owners::All, true, true),
+    ] {
+        for (job, sees) in [(&ada, sees_ada), (&bob, sees_bob)] {
+            let found = store.job(owners, job.id).await.unwrap();
+            assert_eq!(
+                found.map(|job| job.id),
+                sees.then_some(job.id),
+                "{owners:?}"
+            );
+            let found = store.snapshot(owners, job.id).await.unwrap();
+            assert_eq!(found.is_some(), sees, "{owners:?}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn lists_counts_and_keys_hold_what_the_owner_sees() {
+    let Two {
+        store, ada, bob, ..
+    } = two_owners().await;
+    run_all(&store).await;
+    let all = Filter::default();
+    let filters = [
+        all.clone(),
+        Filter {
+            statuses: vec![Status::Succeeded],
+            ..all.clone()
+        },
+        Filter {
+            statuses: vec![Status::Queued, Status::Succeeded],
+            ..all.clone()
+        },
+        Filter {
+            labels: vec![("part".into(), "rail".into())],
+            ..all.clone()
+        },
+        Filter {
+            name: Some("beam".into()),
+            ..all.clone()
+        },
+        Filter {
+            input_hash: Some(ada.input_hash.clone()),
+            ..all.clone()
+        },
+        Filter {
+            finished_after: Some(ada.created_at),
+            ..all.clone()
+        },
+    ];
+    for (owners, expected) in [
+        (ADA, vec![ada.key]),
+        (BOB, vec![bob.key]),
+        (Owners::All, vec![ada.key, bob.key]),
+    ] {
+        for filter in &filters {
+            for by in [OrderBy::CreatedAt, OrderBy::FinishedAt] {
+                let order = Order {
+                    by,
+                    descending: false,
+                };
+                let listed = store.jobs(owners, filter, order, None, 10).await.unwrap();
+                let listed: Vec<i64> = listed.iter().map(|job| job.key).collect();
+                assert_eq!(listed, expected, "{owners:?} {filter:?} {order:?}");
+            }
+            let keys = store.keys(owners, filter, 0, bob.key, 10).await.unwrap();
+            assert_eq!(keys, expected, "{owners:?} {filter:?}");
+            let counted = store.count(owners, filter, None).await.unwrap();
+            assert_eq!(
+                counted[0].1 as usize,
+                expected.len(),
+                "{owners:?} {filter:?}"
+            );
+        }
+    }
+    let counted = store.count(ADA, &all, Some(GroupBy::Owner)).await.unwrap();
+    assert_eq!(counted, [("ada".to_string(), 1)]);
+    // who asks for another's jobs finds none
+    let bobs = Filter {
+        owner: Some("bob".into()),
+        ..all
+    };
+    assert!(
+        store
+            .jobs(ADA, &bobs, Order::NEWEST_FIRST, None, 10)
+            .await
+            .unwrap()
+            .is_empty()
+    );
+    assert!(store.count(ADA, &bobs, None).await.unwrap().is_empty());
+    assert!(
+        store
+            .keys(ADA, &bobs, 0, bob.key, 10)
+            .await
+            .unwrap()
+            .is_empty()
+    );
+    assert_eq!(
+        store.keys(BOB, &bobs, 0, bob.key, 10).await.unwrap(),
+        [bob.key]
+    );
+}
+
+#[tokio::test]
+async fn a_request_key_stands_for_the_jobs_of_who_used_it() {
+    let Two {
+        store, ada, bob, ..
+    } = two_owners().await;
+    let key = by("", vec![], Some("key")).key.unwrap();
+    for (owner, job) in [("ada", &ada), ("bob", &bob)] {
+        let replayed = store.replay(owner, &key).await.unwrap().unwrap();
+        assert_eq!(replayed[0].id, job.id);
+        let again = by(owner, vec![new("1")], Some("key"));
+        let again = store.submit(again, false).await.unwrap();
+        assert!(again.replayed && again.jobs[0].id == job.id);
+    }
+    assert!(store.replay("eve", &key).await.unwrap().is_none());
+}
+
+#[tokio::test]
+async fn an_id_of_another_owner_is_refused_and_shows_nothing() {
+    let Two { store, ada, .. } = two_owners().await;
+    let job = |id| NewJob {
+        id: Some(id),
+        ..new("1")
+    };
+    let submit = async |owner| {
+        store
+            .submit(by(owner, vec![job(ada.id)], None), false)
+            .await
+    };
+    assert!(submit("ada").await.unwrap().replayed);
+    let replayed = async |owner| store.replay_named(owner, ada.id, "payload").await.unwrap();
+    assert_eq!(replayed("ada").await.unwrap().id, ada.id);
+    assert!(replayed("bob").await.is_none());
+    // the same answer whether that job is there, or was deleted
+    let refused = submit("bob").await;
+    assert!(
+        matches!(refused, Err(StoreError::IdConflict(id)) if id == ada.id),
+        "{refused:?}"
+    );
+    run_all(&store).await;
+    store.delete(ADA, ada.key).await.unwrap();
+    let refused = submit("bob").await;
+    assert!(
+        matches!(refused, Err(StoreError::IdConflict(id)) if id == ada.id),
+        "{refused:?}"
+    );
+    let gone = submit("ada").await;
+    assert!(
+        matches!(gone, Err(StoreError::Deleted(id)) if id == ada.id),
+        "{gone:?}"
+    );
+}
+
+#[tokio::test]
+async fn nobody_changes_or_deletes_a_job_of_another() {
+    let Two {
+        store, ada, bob, ..
+    } = two_owners().await;
+    let edit = Edit {
+        pinned: Some(true),
+        ..Edit::default()
+    };
+    assert!(
+        store
+            .edit(BOB, ada.id, &edit, None)
+            .await
+            .unwrap()
+            .is_none()
+    );
+    let edited = store.edit(ADA, ada.id, &edit, None).await.unwrap();
+    let edited = edited.unwrap().unwrap();
+    assert!(
+        edited.pinned && edited.version == ada.version + 1,
+        "by its owner, and once"
+    );
+    assert!(
+        store
+            .edit(Owners::All, bob.id, &edit, None)
+            .await
+            .unwrap()
+            .is_some()
+    );
+    run_all(&store).await;
+    assert_eq!(store.delete(BOB, ada.key).await.unwrap(), Deletion::Unknown);
+    assert_eq!(store.delete(ADA, ada.key).await.unwrap(), Deletion::Deleted);
+    assert_eq!(
+        store.delete(Owners::All, bob.key).await.unwrap(),
+        Deletion::Deleted
+    );
+    for (owners, knows) in [(ADA, true), (BOB, false), (Owners::All, true)] {
+        assert_eq!(
+            store.was_deleted(owners, ada.id).await.unwrap(),
+            knows,
+            "{owners:?}"
+        );
+    }
+}

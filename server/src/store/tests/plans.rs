@@ -1,0 +1,64 @@
+//! Questions that are asked often, or of very many jobs, are answered by indexes.
+
+use super::*;
+
+/// The steps by which the database would answer.
+async fn plan(store: &Store, question: &str) -> Vec<String> {
+    let plan = sqlx::AssertSqlSafe(format!("explain query plan {question}"));
+    let plan: Vec<(i64, i64, i64, String)> =
+        sqlx::query_as(plan).fetch_all(&store.reader).await.unwrap();
+    plan.into_iter().map(|(.., step)| step).collect()
+}
+
+fn sorts(steps: &[String]) -> bool {
+    steps.iter().any(|step| step.contains("TEMP B-TREE"))
+}
+
+/// What every submit, start and tick of the clock asks looks at as many rows as it gives, however many jobs
+/// there are.
+#[tokio::test]
+async fn the_questions_of_the_queue_are_answered_by_indexes() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for question in [jobs::NEXT, jobs::LATE, twins::EARLIER, twins::UNDER_WAY] {
+        let steps = plan(&store, question).await;
+        assert!(steps[0].contains("INDEX job_"), "{question}: {steps:?}");
+        assert!(!sorts(&steps), "{question}: {steps:?}");
+    }
+}
+
+/// A page of one owner's jobs costs no look at those of others, nor a sort; counts and bulk changes look at that
+/// owner's jobs alone.
+#[tokio::test]
+async fn lists_of_one_owner_are_answered_by_indexes() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let mine = Filter {
+        owner: Some("ada".into()),
+        ..Filter::default()
+    };
+    for by in [OrderBy::CreatedAt, OrderBy::FinishedAt] {
+        for descending in [true, false] {
+            let order = Order { by, descending };
+            for cursor in [None, Some(Cursor { micros: 1, key: 1 })] {
+                let leads = list::leads(&mine, order);
+                let question = list::page_of_jobs(&mine, &leads, order, cursor, 50);
+                let steps = plan(&store, question.sql().as_str()).await;
+                assert!(
+                    steps[0].contains("SEARCH job USING INDEX job_by_owner"),
+                    "{steps:?}"
+                );
+                assert!(!sorts(&steps), "{steps:?}");
+            }
+        }
+    }
+    let counted = list::counted(&mine, Some(GroupBy::Status));
+    let steps = plan(&store, counted.sql().as_str()).await;
+    assert!(steps[0].contains("job_by_owner"), "{steps:?}");
+    let keys = list::keys_of_jobs(&mine, 0, 1000, 100);
+    let steps = plan(&store, keys.sql().as_str()).await;
+    assert!(
+        steps[0].contains("COVERING INDEX job_by_owner"),
+        "{steps:?}"
+    );
+}
