@@ -17,7 +17,6 @@ pub mod violations;
 
 // Solve one problem and measure it; fingerprints of problem and result; the formats of a result.
 pub mod digest;
-pub mod finite;
 pub mod formats;
 pub mod run;
 

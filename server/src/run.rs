@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use solver::{
     error::SolveError,
+    finite::is_finite,
     mesh::{External, Mesh},
     problem::Problem,
     solution::{
@@ -15,7 +16,7 @@ use solver::{
     },
 };
 
-use crate::{digest, finite};
+use crate::digest;
 
 /// What a solved problem is stored, served and written as.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -102,7 +103,7 @@ pub fn run(
             Progress::Iteration(row) => {
                 row.wall_s = watch.elapsed_s();
                 // JSON has no word for it, and to go on is pointless.
-                broken |= !finite::iteration(row);
+                broken |= !is_finite(row);
             }
             Progress::Warning(_) | Progress::Step(_) | Progress::Pulse => {}
         }
@@ -138,7 +139,7 @@ fn document(
     timings: Timings,
 ) -> Result<Document, SolveError> {
     let non_finite = SolveError::NonFinite { phase: "recover" };
-    if !finite::solution(&solution) {
+    if !solution.is_finite() {
         return Err(non_finite);
     }
     let non_finite = |_| non_finite.clone();
@@ -262,6 +263,34 @@ mod tests {
         assert!(stamps.is_sorted() && stamps[0] > 0.0);
         assert_eq!(document.summary.timings.len(), 8);
         assert_eq!(document.summary.timings["parse"], 0.5);
+    }
+
+    #[test]
+    fn one_bad_number_anywhere_is_found() {
+        assert!(fake::solution().is_finite());
+        for spoil in [
+            |s: &mut Solution| s.summary.energy = f64::NAN,
+            |s: &mut Solution| s.summary.contraction = Some(f64::NAN),
+            |s: &mut Solution| s.history[0].residual = f64::INFINITY,
+            |s: &mut Solution| s.fields.ux[0] = f64::NAN,
+            |s: &mut Solution| s.fields.gauss.x.push(f64::NAN),
+            |s: &mut Solution| {
+                s.profiles
+                    .values_mut()
+                    .for_each(|p| p.gap[1] = f64::NEG_INFINITY)
+            },
+            // no part of the document, and yet it is served
+            |s: &mut Solution| {
+                s.friction_profiles = s.profiles.clone();
+                s.friction_profiles
+                    .values_mut()
+                    .for_each(|p| p.gap[1] = f64::NAN)
+            },
+        ] {
+            let mut spoiled = fake::solution();
+            spoil(&mut spoiled);
+            assert!(!spoiled.is_finite());
+        }
     }
 
     #[test]

@@ -2,10 +2,12 @@
 //! Oden and Pires (A.C. Bolt, MSc thesis, University of Cape Town, 1983).
 //!
 //! A library of pure functions: no clock, thread, file or network; the same problem gives the same
-//! bits. Reading and writing of any format is the business of the crate `files`. From the ground up; each room uses only rooms in the groups above it.
+//! bits. Reading and writing of any format is the business of the crate `files`. From the ground up; each
+//! room uses only rooms in the groups above it.
 
-// What is asked and answered, as plain data; violations and errors.
+// What is asked and answered, as plain data; violations and errors; numbers that are none.
 pub mod error;
+pub mod finite;
 pub mod problem;
 pub mod solution;
 

@@ -10,7 +10,7 @@ pub(super) const ALIGNED: f64 = 1e-9;
 pub(super) const AXIS: f64 = 1e-12;
 
 /// More violations than this are counted, not listed: nobody reads them, and the answer stays small.
-const MOST_LISTED: usize = 100;
+pub(super) const MOST_LISTED: usize = 100;
 
 /// Violations and warnings, gathered by every check.
 #[derive(Default)]

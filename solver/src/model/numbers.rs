@@ -1,8 +1,9 @@
 //! Numbers by themselves: finite, and in their range.
 
-use super::findings::Findings;
+use super::findings::{Findings, MOST_LISTED};
 use crate::element::{Element, Family};
 use crate::error::escape;
+use crate::finite::not_finite;
 use crate::mesh::Mesh;
 use crate::problem::{
     Algorithm, Analysis, Condition, Friction, FrictionPoints, History, Measure, NormalOf, Problem,
@@ -12,34 +13,7 @@ use crate::problem::{
 impl Findings {
     /// JSON has no other numbers, but protobuf has.
     pub(super) fn finite(&mut self, problem: &Problem) {
-        // serde_json writes a number that is not finite as null, and we never write null otherwise
-        fn walk(value: &serde_json::Value, pointer: &mut String, found: &mut Vec<String>) {
-            let length = pointer.len();
-            match value {
-                serde_json::Value::Null => found.push(pointer.clone()),
-                serde_json::Value::Array(items) => {
-                    for (i, item) in items.iter().enumerate() {
-                        pointer.push_str(&format!("/{i}"));
-                        walk(item, pointer, found);
-                        pointer.truncate(length);
-                    }
-                }
-                serde_json::Value::Object(fields) => {
-                    for (name, item) in fields {
-                        pointer.push('/');
-                        pointer.push_str(&escape(name));
-                        walk(item, pointer, found);
-                        pointer.truncate(length);
-                    }
-                }
-                _ => {}
-            }
-        }
-        let mut found = Vec::new();
-        if let Ok(value) = serde_json::to_value(problem) {
-            walk(&value, &mut String::new(), &mut found);
-        }
-        for pointer in found {
+        for pointer in not_finite(problem, MOST_LISTED) {
             self.say(
                 pointer,
                 "not_finite",

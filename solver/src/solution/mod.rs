@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
 use crate::element::Element;
+use crate::finite::is_finite;
 use crate::problem::NormalOf;
 
 /// A solved problem, converged or not.
@@ -34,6 +35,15 @@ pub struct Solution {
     pub steps: Vec<StepSolution>,
     /// Displacements and stresses.
     pub fields: Fields,
+}
+
+impl Solution {
+    /// Whether every number of it is finite, also where it is no part of the document.
+    pub fn is_finite(&self) -> bool {
+        is_finite(self)
+            && is_finite(&self.friction_profiles)
+            && self.steps.iter().all(|s| is_finite(&s.friction_profiles))
+    }
 }
 
 /// The end of one load step.
