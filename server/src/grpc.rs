@@ -21,10 +21,14 @@ use crate::{
     store::{GroupBy, Order, PIECE_BYTES},
     verbs::{
         Service,
+        envelope::Draft,
+        fields, history,
         jobs::{self, MAX_PAGE_SIZE, Many, PAGE_SIZE},
-        meshes, problems, queue,
-        results::{self, Points},
-        submit::{self, Changes, Draft, Handed},
+        meshes, problems,
+        profiles::{self, Points},
+        queue, results,
+        retry::{self, Changes},
+        submit::{self, Handed},
         watch::{self, Until},
     },
     violations,
@@ -106,8 +110,7 @@ impl JobService for Grpc {
     ) -> Reply<pb::ValidateProblemResponse> {
         let message = request.into_inner().problem.unwrap_or_default(); // which lacks everything, and is told so
         let read = || {
-            problem_from_pb(message)
-                .map_err(|violations| problems::prefixed(problems::AT, violations))
+            problem_from_pb(message).map_err(|found| violations::prefixed(violations::AT, found))
         };
         let problem = self.service.work(read).await?;
         let judged = problems::validate(&self.service, problem).await?;
@@ -310,7 +313,7 @@ impl JobService for Grpc {
                 None => return Err(bad("points", text, Points::EXPECTED).into()),
             },
         };
-        let profile = results::profile(&self.service, id(&name)?, &boundary, step, points).await?;
+        let profile = profiles::profile(&self.service, id(&name)?, &boundary, step, points).await?;
         Ok(Response::new(profile.into()))
     }
 
@@ -327,7 +330,7 @@ impl JobService for Grpc {
             return Err(bad("max_points", few, "a whole number, 2 or more").into());
         }
         let most = max_points.map(|most| most as usize);
-        let mut rows = results::history(&self.service, id(&name)?, most).await?;
+        let mut rows = history::history(&self.service, id(&name)?, most).await?;
         rows.retain(|row| row.k > after);
         let more = rows.len() > MAX_ROWS;
         rows.truncate(MAX_ROWS);
@@ -357,13 +360,13 @@ impl JobService for Grpc {
             Err(_) => return Err(bad("format", format, "a value of the enum FieldFormat").into()),
         };
         let (pieces, total_bytes, sha256) = if format == Format::Json {
-            let fields = results::fields(&self.service, id).await?;
+            let fields = fields::fields(&self.service, id).await?;
             let info = fields.info.clone();
             beyond(offset, info.bytes)?;
             let pieces = fields.bytes(&self.service, offset, info.bytes).boxed();
             (pieces, info.bytes, info.digest)
         } else {
-            let bytes = results::converted_fields(&self.service, id, format).await?;
+            let bytes = fields::converted_fields(&self.service, id, format).await?;
             let total = bytes.len() as u64;
             beyond(offset, total)?;
             let digest = Sha256::digest(&bytes).to_vec();
@@ -414,7 +417,7 @@ impl JobService for Grpc {
             queue_ttl_s,
             priority,
         };
-        let handed = submit::retry(&self.service, id(&name)?, changes, request_id).await?;
+        let handed = retry::retry(&self.service, id(&name)?, changes, request_id).await?;
         let response = Response::new(handed.accepted.into());
         Ok(noting_replay(response, handed.replayed))
     }

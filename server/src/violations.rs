@@ -42,6 +42,20 @@ impl Extend<Violation> for Violations {
     }
 }
 
+/// Where requests carry the problem; pointers start there.
+pub const AT: &str = "/problem";
+
+/// Moves violations to where their subject stands in a request.
+pub fn prefixed(prefix: &str, violations: Vec<Violation>) -> Vec<Violation> {
+    violations
+        .into_iter()
+        .map(|v| Violation {
+            pointer: format!("{prefix}{}", v.pointer),
+            ..v
+        })
+        .collect()
+}
+
 /// A name from a request as messages quote it: it may be as long as the request.
 pub fn name(text: &str) -> String {
     shortened(text, 80)

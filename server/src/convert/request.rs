@@ -11,9 +11,10 @@ use crate::{
     store::{Edit, Filter},
     time::Time,
     verbs::{
-        jobs, problems,
-        submit::{Draft, Envelope},
+        envelope::{Draft, Envelope},
+        jobs,
     },
+    violations,
 };
 
 /// A job as it is handed in. Pointers go into the request.
@@ -56,7 +57,7 @@ pub fn draft(request: pb::CreateJobRequest) -> Draft {
         cache,
     };
     let problem = problem_from_pb(problem.unwrap_or_default()); // which lacks everything, and is told so
-    let problem = problem.map_err(|found| problems::prefixed(problems::AT, found));
+    let problem = problem.map_err(|found| violations::prefixed(violations::AT, found));
     let problem = match problem {
         Ok(problem) if violations.is_empty() => Ok(problem),
         Ok(_) => Err(violations),

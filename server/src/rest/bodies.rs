@@ -19,10 +19,11 @@ use crate::{
     job::{Cache, Limits},
     store::Edit,
     verbs::{
-        problems::{AT, prefixed},
-        submit::{Changes, Draft, Envelope, MOST_JOBS},
+        envelope::{Draft, Envelope},
+        retry::Changes,
+        submit::MOST_JOBS,
     },
-    violations::{self, Violations},
+    violations::{self, AT, Violations, prefixed},
 };
 
 /// A body that hands in a job; for its schema only, since it is read by hand: what is wrong with the

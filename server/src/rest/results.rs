@@ -15,7 +15,11 @@ use super::{
 use crate::{
     error::ApiError,
     formats::{self, Format},
-    verbs::results::{self, JobResult, Points},
+    verbs::{
+        fields, history,
+        profiles::{self, Points},
+        results::{self, JobResult},
+    },
     violations,
 };
 
@@ -40,7 +44,7 @@ pub(super) async fn history(
     let format = choose(Format::OF_TABLES, params.one("format"), &headers)?;
     let most = params.number("max_points", 2..=i64::from(u32::MAX), POINTS)?;
     let most = most.and_then(|most| usize::try_from(most).ok());
-    let rows = results::history(&rest.service, path.id, most).await?;
+    let rows = history::history(&rest.service, path.id, most).await?;
     let bytes = rest.service.work(move || formats::history(&rows, format));
     let bytes = bytes.await?.map_err(ApiError::internal)?;
     data::whole(&headers, format, format!("{}.history", path.id), bytes)
@@ -57,7 +61,7 @@ pub(super) async fn profile(
     let step = params.one("step");
     let points = params.word("points", Points::parse, Points::EXPECTED)?;
     let points = points.unwrap_or(Points::Nodes);
-    let profile = results::profile(&rest.service, path.id, &path.boundary, step, points).await?;
+    let profile = profiles::profile(&rest.service, path.id, &path.boundary, step, points).await?;
     let bytes = rest
         .service
         .work(move || formats::profile(&profile, format));
@@ -76,11 +80,11 @@ pub(super) async fn fields(
     let format = choose(Format::OF_FIELDS, params.one("format"), &headers)?;
     let name = format!("{}.fields", path.id);
     if format != Format::Json {
-        let bytes = results::converted_fields(&rest.service, path.id, format).await?;
+        let bytes = fields::converted_fields(&rest.service, path.id, format).await?;
         return data::whole(&headers, format, name, bytes);
     }
     // as they are stored, so they are passed on
-    let fields = results::fields(&rest.service, path.id).await?;
+    let fields = fields::fields(&rest.service, path.id).await?;
     let file = data::File {
         format,
         name,

@@ -22,7 +22,8 @@ use crate::{
     job::{Job, JobId},
     verbs::{
         problems,
-        submit::{self as verbs, Changes, Handed},
+        retry::{self, Changes},
+        submit::{self as verbs, Handed},
         watch::{self, MAX_WAIT_S, Until},
     },
 };
@@ -78,7 +79,7 @@ pub(super) async fn retry(
         false => bodies::retry(&json_text(&headers, body, rest.service.max_body_bytes).await?)?,
         true => Changes::default(), // nothing was sent
     };
-    let handed = verbs::retry(&rest.service, path.id, changes, key).await?;
+    let handed = retry::retry(&rest.service, path.id, changes, key).await?;
     answer(&rest, &headers, handed, false).await
 }
 

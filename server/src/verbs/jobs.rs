@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use schemars::JsonSchema;
 use solver::problem::Problem;
 
-use super::{Service, detached, page, submit};
+use super::{Service, envelope, page, service::detached};
 use crate::{
     error::ApiError,
     job::{Job, JobId},
@@ -136,9 +136,9 @@ pub async fn update(
 ) -> Result<Job, ApiError> {
     let mut violations = Violations::default();
     let name = edit.name.iter().flatten().next();
-    violations.extend(name.and_then(|name| submit::name_violation(name)));
-    violations.extend(edit.priority.and_then(submit::priority_violation));
-    violations.extend(edit.labels.iter().flat_map(submit::label_violations));
+    violations.extend(name.and_then(|name| envelope::name_violation(name)));
+    violations.extend(edit.priority.and_then(envelope::priority_violation));
+    violations.extend(edit.labels.iter().flat_map(envelope::label_violations));
     if !violations.is_empty() {
         return Err(ApiError::InvalidProblem(violations.into_vec()));
     }

@@ -14,7 +14,7 @@ use solver::{error::Violation, mesh::Mesh};
 use tokio::io::{AsyncReadExt, AsyncSeekExt, AsyncWriteExt};
 use tracing::info;
 
-use super::{Service, detached, page};
+use super::{Service, page, service::detached};
 use crate::{
     digest,
     error::ApiError,
@@ -222,7 +222,7 @@ pub async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mesh), Api
 /// What is said where a problem names a mesh that is not there.
 pub fn missing(hash: &str) -> Violation {
     Violation {
-        pointer: format!("{}/mesh/stored", super::problems::AT),
+        pointer: format!("{}/mesh/stored", violations::AT),
         reason: "unknown_mesh".to_owned(),
         got: violations::name(hash).to_owned(),
         expected: "the hash of a mesh that this service has stored".to_owned(),

@@ -1,183 +1,23 @@
 //! What the service does, each verb once, whatever the protocol. The skins only translate.
 
+mod service;
+
+pub mod envelope;
+pub mod problems;
+
+mod admission;
+pub mod page;
+
+pub mod fields;
+pub mod history;
 pub mod jobs;
 pub mod meshes;
-pub mod page;
 pub mod plots;
-pub mod problems;
+pub mod profiles;
 pub mod queue;
 pub mod results;
+pub mod retry;
 pub mod submit;
 pub mod watch;
 
-use std::{path::PathBuf, sync::Arc};
-
-use tokio::sync::Semaphore;
-
-use crate::{
-    caller::{Caller, Owners},
-    config::Config,
-    error::ApiError,
-    queue::Queue,
-    store::{Store, StoreError},
-};
-
-/// What every verb works with.
-#[derive(Debug)]
-pub struct Service {
-    /// What is durable.
-    pub store: Arc<Store>,
-    /// Who solves.
-    pub queue: Arc<Queue>,
-    /// Bounds the problems read and checked, and the results converted, at the same time: that is
-    /// work, and the cores are few.
-    checks: Arc<Semaphore>,
-    max_queued: u32,
-    memory_budget_bytes: u64,
-    /// Largest body of a request over REST.
-    pub max_body_bytes: usize,
-    /// Largest mesh file.
-    pub max_mesh_bytes: usize,
-    /// Where uploads lie until they are read.
-    data: PathBuf,
-}
-
-impl Service {
-    /// The verbs' common ground.
-    pub fn new(config: &Config, store: Arc<Store>, queue: Arc<Queue>) -> Service {
-        Service {
-            store,
-            queue,
-            checks: Arc::new(Semaphore::new(2)),
-            max_queued: config.max_queued,
-            memory_budget_bytes: config.memory.bytes(),
-            max_body_bytes: config.max_body_bytes,
-            max_mesh_bytes: config.max_mesh_bytes,
-            data: config.data.clone(),
-        }
-    }
-
-    /// Whose jobs are seen: everybody's, as long as callers are not told apart.
-    pub fn sees(&self) -> Owners<'_> {
-        Owners::All
-    }
-
-    /// The owner of what is handed in.
-    pub fn owner(&self) -> String {
-        Caller::local().owner().into()
-    }
-
-    /// An error once the service is about to stop.
-    pub fn accepting(&self) -> Result<(), ApiError> {
-        if self.queue.stopping().is_cancelled() {
-            Err(ApiError::Draining)
-        } else {
-            Ok(())
-        }
-    }
-
-    /// Does what takes as long as the client makes it (reading, meshing, hashing a problem) on a
-    /// blocking thread, a few at a time: the async threads stay free for everybody else. The place
-    /// is held by the work, not by the request: who hangs up does not make room before it is done.
-    pub async fn work<T: Send + 'static>(
-        &self,
-        work: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<T, ApiError> {
-        self.work_on(async { Ok(()) }, |()| work()).await
-    }
-
-    /// The same on something large that is loaded first: who has no place yet holds none of it.
-    pub async fn work_on<L: Send + 'static, T: Send + 'static>(
-        &self,
-        load: impl Future<Output = Result<L, ApiError>>,
-        work: impl FnOnce(L) -> T + Send + 'static,
-    ) -> Result<T, ApiError> {
-        let place = self.checks.clone().acquire_owned().await;
-        let place = place.map_err(ApiError::internal)?;
-        let loaded = load.await?;
-        let working = tokio::task::spawn_blocking(move || {
-            let _place = place;
-            work(loaded)
-        });
-        working.await.map_err(ApiError::internal)
-    }
-}
-
-/// Runs a mutation detached from the request: a client that hangs up in the middle must not keep
-/// a committed job from being announced.
-async fn detached<T: Send + 'static>(
-    work: impl Future<Output = Result<T, ApiError>> + Send + 'static,
-) -> Result<T, ApiError> {
-    tokio::spawn(work)
-        .await
-        .unwrap_or_else(|panic| Err(ApiError::internal(panic)))
-}
-
-impl From<StoreError> for ApiError {
-    fn from(error: StoreError) -> Self {
-        match error {
-            StoreError::Full => ApiError::StorageFull,
-            StoreError::Busy => ApiError::RateLimited,
-            StoreError::KeyReuse => ApiError::KeyReuse,
-            StoreError::IdConflict(id) => ApiError::IdConflict(id),
-            StoreError::Deleted(id) => ApiError::Deleted(id),
-            other => ApiError::internal(other),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use std::{sync::mpsc, time::Duration};
-
-    use super::*;
-    use crate::{config::MemoryBudget, fake};
-
-    async fn service(folder: &tempfile::TempDir) -> Service {
-        let config = Config {
-            listen: ([127, 0, 0, 1], 0).into(),
-            data: folder.path().to_path_buf(),
-            workers: 1,
-            max_queued: 10,
-            memory: MemoryBudget::default(),
-            max_body_bytes: 1 << 20,
-            max_mesh_bytes: 1 << 20,
-            grace_s: 1,
-        };
-        let store = Store::open(folder.path()).await.unwrap();
-        let queue = Queue::new(store.clone(), fake::solve, 1);
-        Service::new(&config, store, queue)
-    }
-
-    /// On the one thread of this test: work that held it would wait for a word that cannot come.
-    #[tokio::test]
-    async fn work_leaves_the_async_threads_to_the_others() {
-        let folder = tempfile::tempdir().unwrap();
-        let service = service(&folder).await;
-        let (say, heard) = mpsc::channel();
-        let work = service.work(move || heard.recv_timeout(Duration::from_secs(10)));
-        let (worked, said) = tokio::join!(work, async { say.send(7) });
-        said.unwrap();
-        assert_eq!(worked.unwrap(), Ok(7));
-    }
-
-    #[tokio::test]
-    async fn who_hangs_up_makes_no_room_before_the_work_is_done() {
-        let folder = tempfile::tempdir().unwrap();
-        let service = service(&folder).await;
-        let (say, heard) = mpsc::channel::<()>();
-        let (start, started) = tokio::sync::oneshot::channel();
-        let work = service.work(move || {
-            let _ = start.send(());
-            heard.recv()
-        });
-        tokio::select! {
-            _ = work => unreachable!("it waits for a word"),
-            _ = started => {} // and the request is dropped
-        }
-        assert_eq!(service.checks.available_permits(), 1);
-        drop(say);
-        service.checks.acquire_many(2).await.unwrap().forget();
-    }
-}
+pub use service::Service;

@@ -10,10 +10,7 @@ use solver::{
     solution::{ContactProfile, Fields, Iteration},
 };
 
-use super::{
-    Service, jobs,
-    results::{self, StoredHistory},
-};
+use super::{Service, history::StoredHistory, jobs, results};
 use crate::{
     error::ApiError,
     job::{Job, JobId},

@@ -9,6 +9,7 @@ use crate::{
     digest,
     error::{ApiError, count, size},
     mesh::MeshInfo,
+    violations::{AT, prefixed},
 };
 
 /// What there is to say about a problem.
@@ -25,9 +26,6 @@ pub struct Judgement {
     /// Its fingerprint; absent when it could not be read.
     pub input_hash: Option<String>,
 }
-
-/// Where requests carry the problem; pointers start there.
-pub const AT: &str = "/problem";
 
 /// Judges a problem and stores nothing. An invalid one is an answer too, not an error.
 pub async fn validate(
@@ -156,15 +154,4 @@ fn check(
 ) -> Result<Vec<Warning>, Vec<Violation>> {
     let external = files::external_mesh(problem, stored.map(|(_, mesh)| mesh));
     solver::check(problem, external).map_err(|violations| prefixed(AT, violations))
-}
-
-/// Moves violations to where their subject stands in a request.
-pub fn prefixed(prefix: &str, violations: Vec<Violation>) -> Vec<Violation> {
-    violations
-        .into_iter()
-        .map(|v| Violation {
-            pointer: format!("{prefix}{}", v.pointer),
-            ..v
-        })
-        .collect()
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::{Service, detached};
+use super::{Service, service::detached};
 use crate::{caller, error::ApiError, formats::Format};
 
 /// How the queue stands.

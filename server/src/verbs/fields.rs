@@ -1,0 +1,78 @@
+//! Mesh, displacements and stresses: as they are stored, or in another format.
+
+use std::sync::Arc;
+
+use async_stream::try_stream;
+use futures_util::Stream;
+use solver::solution::Fields;
+
+use super::{
+    Service,
+    results::{nothing_of, with_result},
+};
+use crate::{
+    error::ApiError,
+    formats::{self, Format},
+    job::JobId,
+    store::{PIECE_BYTES, PartInfo},
+};
+
+/// The fields of a job as they are stored: JSON, of known length and fingerprint, in pieces.
+#[derive(Debug)]
+pub struct StoredFields {
+    /// Length and fingerprint.
+    pub info: PartInfo,
+    result_key: i64,
+}
+
+/// The fields at all nodes as they are stored.
+pub async fn fields(service: &Service, id: JobId) -> Result<StoredFields, ApiError> {
+    let mut found = with_result(service, id).await?;
+    let result_key = found.job.result_key;
+    match found.part_info("fields").await? {
+        Some(info) => Ok(StoredFields { info, result_key }),
+        None => Err(nothing_of(&found.job)),
+    }
+}
+
+impl StoredFields {
+    /// The bytes from `start` to before `end`, piece by piece: they may be many.
+    pub fn bytes(
+        &self,
+        service: &Arc<Service>,
+        start: u64,
+        end: u64,
+    ) -> impl Stream<Item = Result<Vec<u8>, ApiError>> + Send + use<> {
+        let (service, key) = (service.clone(), self.result_key);
+        const PIECE: u64 = PIECE_BYTES as u64;
+        try_stream! {
+            for piece in start / PIECE..end.div_ceil(PIECE) {
+                let found = service.store.piece(key, "fields", piece as i64).await?;
+                let mut bytes = found.ok_or_else(|| ApiError::internal("a piece of a result is missing"))?;
+                let first = piece * PIECE;
+                bytes.truncate(end.saturating_sub(first) as usize);
+                let skipped = start.saturating_sub(first) as usize;
+                yield bytes.split_off(skipped.min(bytes.len()));
+            }
+        }
+    }
+}
+
+/// The same in another format, at once.
+pub async fn converted_fields(
+    service: &Service,
+    id: JobId,
+    format: Format,
+) -> Result<Vec<u8>, ApiError> {
+    let load = async {
+        let mut found = with_result(service, id).await?;
+        let fields = found.part("fields").await?;
+        fields.ok_or_else(|| nothing_of(&found.job))
+    };
+    let written = service.work_on(load, move |stored| {
+        let fields: Fields = serde_json::from_slice(&stored).map_err(|error| error.to_string())?;
+        drop(stored); // they may be large
+        formats::fields(&fields, format)
+    });
+    written.await?.map_err(ApiError::internal)
+}

@@ -1,0 +1,125 @@
+//! Columns along a contact boundary.
+
+use solver::solution::ContactProfile;
+
+use super::{
+    Service,
+    results::{StepResult, with_result},
+};
+use crate::{
+    error::ApiError,
+    job::JobId,
+    store::{ProfilePoints, Snapshot},
+    violations,
+};
+
+/// Where a profile has its values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Points {
+    /// At the nodes of the boundary.
+    Nodes,
+    /// Where friction acts, which is what forces and peaks are made of.
+    Friction,
+    /// At so many places, equally spaced in arc length, the ends among them.
+    Spaced(usize),
+}
+
+impl Points {
+    /// What can be said.
+    pub const EXPECTED: &str = "nodes, friction, or a whole number from 2 to 100000";
+
+    /// Reads `nodes`, `friction` or a number.
+    pub fn parse(text: &str) -> Option<Points> {
+        match text {
+            "nodes" => Some(Points::Nodes),
+            "friction" => Some(Points::Friction),
+            _ => {
+                let count = text.parse().ok().filter(|n| (2..=100_000).contains(n));
+                count.map(Points::Spaced)
+            }
+        }
+    }
+}
+
+/// The profile of one contact boundary: at the end, or at the end of a load step, by its name or its
+/// number from 0.
+pub async fn profile(
+    service: &Service,
+    id: JobId,
+    boundary: &str,
+    step: Option<&str>,
+    points: Points,
+) -> Result<ContactProfile, ApiError> {
+    let mut found = with_result(service, id).await?;
+    let step = match step {
+        None => None,
+        Some(wanted) => Some(step_number(&steps(&mut found).await?, wanted, id)?),
+    };
+    let (here, friction) = match points {
+        Points::Nodes => (ProfilePoints::Nodes, false),
+        Points::Friction => (ProfilePoints::Friction, false),
+        Points::Spaced(_) => (ProfilePoints::Nodes, true),
+    };
+    let nodes = found.profile(boundary, here, step).await?;
+    let friction = match friction {
+        true => {
+            found
+                .profile(boundary, ProfilePoints::Friction, step)
+                .await?
+        }
+        false => None,
+    };
+    let Some(bytes) = nodes else {
+        let known = found.profiled_boundaries().await?;
+        if known.iter().any(|name| name == boundary) {
+            return Err(ApiError::NotFound(format!(
+                "{id} was solved before profiles at friction points were kept; try points=nodes"
+            )));
+        }
+        return Err(ApiError::NotFound(format!(
+            "{id} has no contact boundary {:?}; it has: {}",
+            violations::name(boundary),
+            known.join(", ")
+        )));
+    };
+    drop(found);
+    let read = |bytes: &[u8]| serde_json::from_slice(bytes).map_err(ApiError::internal);
+    let Points::Spaced(count) = points else {
+        return read(&bytes);
+    };
+    let sampling = service.work(move || {
+        let nodes = read(&bytes)?;
+        let friction = friction.map_or(Ok(ContactProfile::default()), |bytes| read(&bytes))?;
+        Ok(solver::solution::sample(&nodes, &friction, count))
+    });
+    sampling.await?
+}
+
+fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, ApiError> {
+    let named = steps.iter().position(|step| step.name == wanted);
+    let numbered = wanted.parse().ok().filter(|n| *n < steps.len());
+    named.or(numbered).ok_or_else(|| {
+        if steps.is_empty() {
+            return ApiError::NotFound(format!("{id} has no load steps; leave `step` out"));
+        }
+        let names: Vec<_> = steps
+            .iter()
+            .take(20)
+            .map(|step| step.name.as_str())
+            .collect();
+        ApiError::NotFound(format!(
+            "{id} has no load step {:?}; it has {} (by name, or by number from 0): {}",
+            violations::name(wanted),
+            steps.len(),
+            names.join(", ")
+        ))
+    })
+}
+
+/// The load steps of a result.
+async fn steps(found: &mut Snapshot) -> Result<Vec<StepResult>, ApiError> {
+    let bytes = found.part("steps").await?;
+    bytes.map_or(Ok(vec![]), |bytes| {
+        serde_json::from_slice(&bytes).map_err(ApiError::internal)
+    })
+}

@@ -1,0 +1,95 @@
+//! A job that has ended, tried again.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+use solver::problem::Problem;
+
+use super::{
+    Service,
+    admission::{admit, checked_key, hand_in, prepare, replayed},
+    envelope::Envelope,
+    jobs,
+    service::detached,
+    submit::{Handed, only},
+};
+use crate::{
+    digest,
+    error::ApiError,
+    job::{Cache, Job, JobId, Limits},
+    store::{Accepted, NewJob, RequestKey},
+};
+
+/// What is changed of a job that is tried again; what is absent stays.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Changes {
+    /// Seconds from a start to the end.
+    pub timeout_s: Option<f64>,
+    /// Seconds that it may wait for a start.
+    pub queue_ttl_s: Option<f64>,
+    /// Higher first.
+    pub priority: Option<i32>,
+}
+
+/// Tries a job that has ended again: the same problem and envelope as a new job, solved anew.
+pub async fn retry(
+    service: &Arc<Service>,
+    id: JobId,
+    changes: Changes,
+    key: Option<String>,
+) -> Result<Handed<Job>, ApiError> {
+    service.accepting()?;
+    let key = key.map(checked_key).transpose()?;
+    let service = service.clone();
+    detached(async move {
+        let key = match key {
+            None => None,
+            Some(key) => {
+                let payload =
+                    digest::of_json(&("retry", id, changes)).map_err(ApiError::internal)?;
+                Some(RequestKey { key, payload })
+            }
+        };
+        if let Some(old) = replayed(&service, key.as_ref()).await? {
+            return only(old, true);
+        }
+        let job = jobs::get(&service, id).await?;
+        if !job.status.is_terminal() {
+            return Err(ApiError::JobActive(job.status.as_str()));
+        }
+        let stored = service.store.problem(job.key).await?;
+        let (title, problem) = stored.ok_or(ApiError::Deleted(id))?;
+        let Job {
+            name,
+            labels,
+            priority,
+            limits,
+            cache,
+            ..
+        } = job;
+        let envelope = Envelope {
+            name,
+            labels,
+            priority: changes.priority.unwrap_or(priority),
+            limits: Limits {
+                timeout_s: changes.timeout_s.unwrap_or(limits.timeout_s),
+                queue_ttl_s: changes.queue_ttl_s.unwrap_or(limits.queue_ttl_s),
+            },
+            // who kept its result to itself means that still
+            cache: match cache {
+                Cache::Off => Cache::Off,
+                Cache::Use | Cache::Refresh => Cache::Refresh,
+            },
+        };
+        let problem = service.work(move || solver::parse(&problem)).await?;
+        let problem = problem.map(|problem| Problem { title, ..problem });
+        let prepared = prepare(&service, (envelope, problem), None).await?;
+        let new = NewJob {
+            parent: Some(id),
+            ..admit(&service, prepared).await?
+        };
+        let Accepted { jobs, replayed, .. } = hand_in(&service, vec![new], key).await?;
+        only(jobs, replayed)
+    })
+    .await
+}
