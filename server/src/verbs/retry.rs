@@ -81,7 +81,7 @@ pub async fn retry(
                 Cache::Use | Cache::Refresh => Cache::Refresh,
             },
         };
-        let problem = service.work(move || solver::parse(&problem)).await?;
+        let problem = service.work(move || files::parse(&problem)).await?;
         let problem = problem.map(|problem| Problem { title, ..problem });
         let prepared = prepare(&service, (envelope, problem), None).await?;
         let new = NewJob {
