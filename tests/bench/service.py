@@ -3,7 +3,7 @@
     service.py [JOBS]
 
 JOBS (1,000,000 when absent) is how many jobs the lists are read from; what they show is compared with plain
-SQL over the same rows. `cargo build --release --workspace`
+SQL over the same rows. `cargo build --release`
 comes first: requests are sent by `target/release/load`.
 """
 
@@ -254,7 +254,7 @@ def lists():
 
 
 def main():
-    check(LOAD.exists(), "%s is missing: cargo build --release --workspace" % LOAD)
+    check(LOAD.exists(), "%s is missing: cargo build --release" % LOAD)
     with tempfile.TemporaryDirectory() as folder:
         commits(folder)
     with Server() as server:

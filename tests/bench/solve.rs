@@ -1,4 +1,4 @@
-//! How long a solution takes, and where the time goes: `cargo bench -p signorini-solver`.
+//! How long a solution takes, and where the time goes: `cargo bench --bench solve`.
 //!
 //! Prints the tables of `docs/performance.md`. CPU seconds of this thread, so that a busy machine
 //! does not spoil them. A harness of our own: the phases are known to the observer only, and no
