@@ -9,7 +9,11 @@ use tokio::{
 };
 use tracing::warn;
 
-use super::{Pauses, Queue, Running, Why};
+use super::{
+    backoff::Pauses,
+    running::{Running, Why},
+    state::Queue,
+};
 use crate::{
     event::Payload,
     job::{Job, Progress},
@@ -88,7 +92,7 @@ async fn written(
             Err(cause) => cause,
         };
         warn!(job.id = %job.id, %cause, "events of job {} could not be stored yet: {cause}", job.id);
-        if !pauses.next(queue).await {
+        if !pauses.next(&queue.stopping).await {
             return false;
         }
     }

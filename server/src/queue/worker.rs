@@ -13,8 +13,10 @@ use tracing::{error, info, warn};
 use uuid::Uuid;
 
 use super::{
-    Pauses, Queue, Running, Why,
+    backoff::Pauses,
     recorder::{self, Line},
+    running::{Running, Why},
+    state::Queue,
 };
 use crate::{
     event::Payload,
@@ -299,7 +301,7 @@ async fn end(queue: &Queue, job: &Job, ending: Ending, last: LastWords, parts: O
     let mut pauses = Pauses::default();
     while let Err(cause) = try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
         warn!(job.id = %job.id, %cause, "job {} could not be ended yet: {cause}", job.id);
-        if !pauses.next(queue).await {
+        if !pauses.next(&queue.stopping).await {
             return;
         }
     }

@@ -4,7 +4,7 @@
 use sqlx::{Sqlite, SqliteConnection, Transaction};
 use tokio::sync::MutexGuard;
 
-use super::{Result, Store, line::Move};
+use super::{database::Store, error::Result, line::Move};
 
 /// An open transaction.
 pub(super) struct Change<'a> {

@@ -2,7 +2,7 @@
 
 use sqlx::SqliteConnection;
 
-use super::{Result, Store, results, rows::find};
+use super::{database::Store, error::Result, results, rows::find};
 use crate::{caller::Owners, job::JobId, time::Time};
 
 /// A deleted job's name answers *gone* for so long, then *unknown*.

@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::{
-    Result, Store,
+    database::Store,
+    error::Result,
+    labels,
     line::Move,
     rows::{named, read},
-    submit, twins,
+    twins,
 };
 use crate::{
     caller::Owners,
@@ -68,7 +70,7 @@ impl Store {
                     .bind(key)
                     .execute(change.sql())
                     .await?;
-                submit::write_labels(&mut change, key, job.created_at, labels).await?;
+                labels::write(&mut change, key, job.created_at, labels).await?;
             }
             if job.waits_in_line() && priority != job.priority {
                 let left = job.priority;

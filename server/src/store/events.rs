@@ -2,12 +2,25 @@
 
 use sqlx::{Row, SqliteConnection};
 
-use super::{Result, Store, StoreError, jobs::is_current};
+use super::{
+    database::Store,
+    error::{Result, StoreError},
+    rows::is_current,
+};
 use crate::{
     event::{Event, Payload},
     job::Progress,
     time::Time,
 };
+
+/// The last that a solver has said, with what it amounts to.
+#[derive(Clone, Debug, Default)]
+pub struct LastWords {
+    /// Events not yet written.
+    pub lines: Vec<(Time, Payload)>,
+    /// How far it has come.
+    pub progress: Progress,
+}
 
 impl Store {
     /// Appends to the story of this start of a job, with the progress that it amounts to; false when the

@@ -1,4 +1,4 @@
-//! Jobs by name, and lists of them: filters, pages, counts.
+//! Lists of jobs: pages, counts, keys.
 //!
 //! A page costs as many rows as it shows, not as many as there are. Each filter has an index in the order of
 //! the list. One filter leads, and the others are checked on the rows that it finds: one that leaves few jobs,
@@ -8,104 +8,15 @@
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
 use super::{
-    Result, Store,
-    rows::{from_row, named},
+    database::Store,
+    error::Result,
+    filter::{Cursor, Filter, GroupBy, Order, OrderBy},
+    rows::from_row,
 };
 use crate::{
     caller::Owners,
-    job::{Job, JobId, Status},
-    time::Time,
+    job::{Job, Status},
 };
-
-/// Which jobs; what is absent leaves none out.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Filter {
-    /// Of one of these statuses.
-    pub statuses: Vec<Status>,
-    /// Of this owner.
-    pub owner: Option<String>,
-    /// With all of these labels.
-    pub labels: Vec<(String, String)>,
-    /// Of exactly this name.
-    pub name: Option<String>,
-    /// With this input.
-    pub input_hash: Option<String>,
-    /// Accepted at this time or later.
-    pub created_after: Option<Time>,
-    /// Accepted before this time.
-    pub created_before: Option<Time>,
-    /// Ended at this time or later.
-    pub finished_after: Option<Time>,
-    /// Ended before this time.
-    pub finished_before: Option<Time>,
-}
-
-impl Filter {
-    /// Labels that a filter may name.
-    pub const MOST_LABELS: usize = 64;
-
-    /// The same filter with each status and label once.
-    pub fn tidied(mut self) -> Self {
-        self.statuses.sort_unstable_by_key(|status| status.as_str());
-        self.statuses.dedup();
-        self.labels.sort_unstable();
-        self.labels.dedup();
-        self
-    }
-
-    /// The same filter on the jobs of these owners; none if it asks for the jobs of another.
-    fn among(&self, owners: Owners<'_>) -> Option<Self> {
-        let mut filter = self.clone();
-        if let Owners::Only(owner) = owners {
-            let asked = filter.owner.get_or_insert_with(|| owner.to_owned());
-            if asked != owner {
-                return None;
-            }
-        }
-        Some(filter)
-    }
-
-    /// Leaves no job out.
-    pub fn is_empty(&self) -> bool {
-        *self == Filter::default()
-    }
-}
-
-/// The order of a list; of equal times the order of arrival decides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Order {
-    /// By which time.
-    pub by: OrderBy,
-    /// Latest first.
-    pub descending: bool,
-}
-
-/// The time that orders a list.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OrderBy {
-    /// When they were accepted.
-    CreatedAt,
-    /// When they ended; jobs that have not are left out.
-    FinishedAt,
-}
-
-/// The last job of a page, after which the next one begins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Cursor {
-    /// Its time in the list's order, in microseconds.
-    pub micros: i64,
-    /// Its number.
-    pub key: i64,
-}
-
-/// What jobs are counted by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GroupBy {
-    /// Their status.
-    Status,
-    /// Their owner.
-    Owner,
-}
 
 /// What finds the rows of a list.
 #[derive(Clone, Copy)]
@@ -125,37 +36,6 @@ pub(super) enum Lead<'a> {
 const FEW: i64 = 1000;
 
 impl Store {
-    /// The job of that public id, with its place in the queue.
-    pub async fn job(&self, owners: Owners<'_>, id: JobId) -> Result<Option<Job>> {
-        let mut connection = self.reader.acquire().await?;
-        let Some(mut job) = named(&mut connection, owners, id).await? else {
-            return Ok(None);
-        };
-        self.place(&mut connection, std::slice::from_mut(&mut job))
-            .await?;
-        Ok(Some(job))
-    }
-
-    /// The title of a job, and its problem as JSON without it.
-    pub async fn problem(&self, key: i64) -> Result<Option<(Option<String>, String)>> {
-        Ok(sqlx::query_as(
-            "select job.title, problem.body from job join problem on problem.input_hash = job.input_hash
-             where job.id = ?",
-        )
-        .bind(key)
-        .fetch_optional(&self.reader)
-        .await?)
-    }
-
-    /// Whether the job is terminal, and its `done` so among its events; `None` when it is no longer there.
-    pub async fn has_ended(&self, key: i64) -> Result<Option<bool>> {
-        let status: Option<String> = sqlx::query_scalar("select status from job where id = ?")
-            .bind(key)
-            .fetch_optional(&self.reader)
-            .await?;
-        Ok(status.map(|word| Status::parse(&word).is_some_and(Status::is_terminal)))
-    }
-
     /// At most `limit` jobs of a list, after `cursor`.
     pub async fn jobs(
         &self,
@@ -211,12 +91,6 @@ impl Store {
         };
         let mut query = keys_of_jobs(filter, after, up_to, limit);
         Ok(query.build_query_scalar().fetch_all(&self.lists).await?)
-    }
-
-    /// The number of the job that came last; 0 when there is none.
-    pub async fn last_key(&self) -> Result<i64> {
-        let last = sqlx::query_scalar("select coalesce(max(id), 0) from job");
-        Ok(last.fetch_one(&self.reader).await?)
     }
 }
 
@@ -275,60 +149,6 @@ pub(super) fn keys_of_jobs(
     times(&mut query, filter, "job.created_at", None);
     query.push(" order by id limit ").push_bind(limit);
     query
-}
-
-impl OrderBy {
-    fn column(self) -> &'static str {
-        match self {
-            OrderBy::CreatedAt => "created_at",
-            OrderBy::FinishedAt => "finished_at",
-        }
-    }
-}
-
-impl Order {
-    /// What can be said.
-    pub const EXPECTED: &str = "created_at or finished_at, then desc (the default) or asc";
-
-    /// Reads `created_at`, `created_at asc`, `finished_at desc`, ….
-    pub fn parse(text: &str) -> Option<Order> {
-        let (by, direction) = text.split_once(' ').unwrap_or((text, "desc"));
-        let by = match by {
-            "created_at" => OrderBy::CreatedAt,
-            "finished_at" => OrderBy::FinishedAt,
-            _ => return None,
-        };
-        let descending = match direction {
-            "desc" => true,
-            "asc" => false,
-            _ => return None,
-        };
-        Some(Order { by, descending })
-    }
-
-    /// Newest first.
-    pub const NEWEST_FIRST: Order = Order {
-        by: OrderBy::CreatedAt,
-        descending: true,
-    };
-
-    fn direction(self) -> &'static str {
-        if self.descending { "desc" } else { "asc" }
-    }
-}
-
-impl GroupBy {
-    /// What can be said.
-    pub const EXPECTED: &str = "status or owner";
-
-    /// Reads the word.
-    pub fn parse(word: &str) -> Option<GroupBy> {
-        match word {
-            "status" => Some(GroupBy::Status),
-            "owner" => Some(GroupBy::Owner),
-            _ => None,
-        }
-    }
 }
 
 /// A filter that leaves few jobs, if there is one and there is a choice.

@@ -1,6 +1,9 @@
 //! Stored meshes.
 
-use super::{Result, Store, StoreError};
+use super::{
+    database::Store,
+    error::{Result, StoreError},
+};
 use crate::mesh::MeshInfo;
 
 /// What removing a mesh did.

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use uuid::Uuid;
 
-use super::{Result, Store, StoreError, results::running};
+use super::error::{Result, StoreError};
 use crate::{
     caller::Owners,
-    job::{Cache, Job, JobId, Limits, QueuePosition, Reason, ResultAvailable, Status, Waiting},
+    job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status},
     time::Time,
 };
 
@@ -44,60 +44,20 @@ pub(super) async fn named(
     Ok(job.filter(|job| owners.include(&job.owner)))
 }
 
-impl Store {
-    /// As `place`, where the work is done already, and an answer without places is better than none.
-    pub async fn try_to_place(&self, jobs: &mut [Job]) {
-        if jobs.iter().all(|job| job.status != Status::Queued) {
-            return;
-        }
-        let placed = async {
-            let mut connection = self.reader.acquire().await?;
-            self.place(&mut connection, jobs).await
-        };
-        if let Err(cause) = placed.await {
-            tracing::warn!(%cause, "places could not be told: {cause}");
-        }
-    }
+/// Where a running job keeps what it has found so far.
+pub(super) fn running(key: i64) -> i64 {
+    -key
+}
 
-    /// Fills in the places of those that are queued. A job that another one will answer is where that one
-    /// is, and has come as far.
-    pub(super) async fn place(
-        &self,
-        connection: &mut SqliteConnection,
-        jobs: &mut [Job],
-    ) -> Result<()> {
-        for job in jobs.iter_mut().filter(|job| job.status == Status::Queued) {
-            let position = |priority, key| {
-                let ahead = self.line().ahead(priority, key)? as i64;
-                Some((ahead + 1, ahead))
-            };
-            let Some(source) = job.twin_of else {
-                let reason = match self.is_paused() {
-                    true => Waiting::Paused,
-                    false => Waiting::WorkersBusy,
-                };
-                // none: it left the line since it was read
-                job.queue =
-                    position(job.priority, job.key).map(|(position, ahead)| QueuePosition {
-                        position,
-                        ahead,
-                        reason,
-                    });
-                continue;
-            };
-            let Some(source) = find(connection, source).await? else {
-                continue; // it ended, and was deleted, since this job was read
-            };
-            let (position, ahead) = position(source.priority, source.key).unwrap_or_default();
-            job.progress = source.progress;
-            job.queue = Some(QueuePosition {
-                position,
-                ahead,
-                reason: Waiting::Joined,
-            });
-        }
-        Ok(())
-    }
+/// Whether this start of the job still has the word.
+pub(super) async fn is_current(tx: &mut SqliteConnection, key: i64, attempt: i32) -> Result<bool> {
+    Ok(sqlx::query_scalar(
+        "select exists (select 1 from job where id = ? and status = 'running' and attempt = ?)",
+    )
+    .bind(key)
+    .bind(attempt)
+    .fetch_one(tx)
+    .await?)
 }
 
 pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {

@@ -2,18 +2,19 @@
 
 use std::sync::atomic::Ordering;
 
-use sqlx::SqlitePool;
-
-use super::{Result, Store};
-
-/// Whether the queue was paused when the store was last open.
-pub(super) async fn was_paused(reader: &SqlitePool) -> Result<bool> {
-    let paused =
-        sqlx::query_scalar("select exists (select 1 from setting where name = 'queue_paused')");
-    Ok(paused.fetch_one(reader).await?)
-}
+use super::{database::Store, error::Result};
 
 impl Store {
+    /// Reads what was set when the store was last open.
+    pub(super) async fn read_settings(&self) -> Result<()> {
+        let paused: bool =
+            sqlx::query_scalar("select exists (select 1 from setting where name = 'queue_paused')")
+                .fetch_one(&self.reader)
+                .await?;
+        self.paused.store(paused, Ordering::Relaxed);
+        Ok(())
+    }
+
     /// Whether the queue is paused.
     pub fn is_paused(&self) -> bool {
         self.paused.load(Ordering::Relaxed)

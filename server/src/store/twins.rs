@@ -2,12 +2,12 @@
 //! whose twins they are until then.
 
 use super::{
-    Result,
     change::Change,
-    jobs::{self, Ending},
+    error::Result,
+    life::{self, Ending},
     line::Move,
     rows::{from_row, read},
-    submit::NewJob,
+    submission::NewJob,
 };
 use crate::job::{Job, Reason, Status};
 
@@ -157,7 +157,7 @@ fn is_shared(status: Status, reason: Option<Reason>) -> bool {
 
 /// Answers a queued job with the end of another one of the same input: it runs, and has ended.
 pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> Result<()> {
-    let job = jobs::start(change, job).await?;
+    let job = life::start(change, job).await?;
     sqlx::query(
         "update job set cached_from = ?, twin_of = null,
                         result_job = (select coalesce(result_job, id) from job where id = ?) where id = ?",
@@ -173,7 +173,7 @@ pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> 
         failure: source.failure.clone(),
         result: source.result_available,
     };
-    jobs::close(change, &job, &ending).await
+    life::close(change, &job, &ending).await
 }
 
 /// A twin that is to run before its source waits for it no longer.

@@ -63,7 +63,9 @@ pub(super) async fn replayed(
     key: Option<&RequestKey>,
 ) -> Result<Option<Vec<Job>>, ApiError> {
     match key {
-        Some(key) if !key.payload.is_empty() => Ok(service.store.replay(&service.owner(), key).await?),
+        Some(key) if !key.payload.is_empty() => {
+            Ok(service.store.replay(&service.owner(), key).await?)
+        }
         _ => Ok(None),
     }
 }

@@ -51,7 +51,10 @@ pub async fn create(
         // before it is looked at in depth: what was accepted once need not be acceptable now
         if let Some(id) = prepared.id
             && !prepared.payload.is_empty()
-            && let Some(old) = service.store.replay_named(&service.owner(), id, &prepared.payload).await?
+            && let Some(old) = service
+                .store
+                .replay_named(&service.owner(), id, &prepared.payload)
+                .await?
         {
             return only(vec![old], true);
         }

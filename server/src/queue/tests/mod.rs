@@ -6,7 +6,10 @@ mod line;
 mod starts;
 mod submits;
 
-use std::time::Instant;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use solver::{
     error::SolveError,
@@ -15,14 +18,19 @@ use solver::{
     solution::{Observer, Outcome, Progress, Solution},
 };
 
-use super::*;
+use super::{cancel::COOPERATION, running::Why, *};
 use crate::{
     caller::Owners,
     digest,
     event::{Event, Payload},
     fake,
-    job::{Cache, JobId, Limits, Reason, ResultAvailable, Waiting},
-    store::{Edit, Filter, GroupBy, NewJob, Order, RequestKey, StoreError},
+    job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status, Waiting},
+    run::Solve,
+    store::{
+        Accepted, CancelOutcome, Edit, Ending, Filter, GroupBy, LastWords, NewJob, Order,
+        RequestKey, Store, StoreError, Submission,
+    },
+    time::Time,
 };
 
 /// Whose jobs they are.

@@ -4,7 +4,7 @@
 mod owners;
 mod plans;
 
-use sqlx::migrate::Migrator;
+use sqlx::{SqlitePool, migrate::Migrator, sqlite::SqliteConnectOptions};
 
 use super::*;
 use crate::{

@@ -56,7 +56,10 @@ async fn run_all(store: &Store) {
 #[tokio::test]
 async fn a_job_is_found_by_its_owner_and_by_who_sees_all() {
     let Two {
-        store, ada, bob, ..
+        _folder,
+        store,
+        ada,
+        bob,
     } = two_owners().await;
     for (owners, sees_ada, sees_bob) in [
         (ADA, true, false),
@@ -79,7 +82,10 @@ async fn a_job_is_found_by_its_owner_and_by_who_sees_all() {
 #[tokio::test]
 async fn lists_counts_and_keys_hold_what_the_owner_sees() {
     let Two {
-        store, ada, bob, ..
+        _folder,
+        store,
+        ada,
+        bob,
     } = two_owners().await;
     run_all(&store).await;
     let all = Filter::default();
@@ -166,7 +172,10 @@ async fn lists_counts_and_keys_hold_what_the_owner_sees() {
 #[tokio::test]
 async fn a_request_key_stands_for_the_jobs_of_who_used_it() {
     let Two {
-        store, ada, bob, ..
+        _folder,
+        store,
+        ada,
+        bob,
     } = two_owners().await;
     let key = by("", vec![], Some("key")).key.unwrap();
     for (owner, job) in [("ada", &ada), ("bob", &bob)] {
@@ -181,7 +190,12 @@ async fn a_request_key_stands_for_the_jobs_of_who_used_it() {
 
 #[tokio::test]
 async fn an_id_of_another_owner_is_refused_and_shows_nothing() {
-    let Two { store, ada, .. } = two_owners().await;
+    let Two {
+        _folder,
+        store,
+        ada,
+        ..
+    } = two_owners().await;
     let job = |id| NewJob {
         id: Some(id),
         ..new("1")
@@ -218,7 +232,10 @@ async fn an_id_of_another_owner_is_refused_and_shows_nothing() {
 #[tokio::test]
 async fn nobody_changes_or_deletes_a_job_of_another() {
     let Two {
-        store, ada, bob, ..
+        _folder,
+        store,
+        ada,
+        bob,
     } = two_owners().await;
     let edit = Edit {
         pinned: Some(true),

@@ -20,7 +20,7 @@ fn sorts(steps: &[String]) -> bool {
 async fn the_questions_of_the_queue_are_answered_by_indexes() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
-    for question in [jobs::NEXT, jobs::LATE, twins::EARLIER, twins::UNDER_WAY] {
+    for question in [claim::NEXT, end::LATE, twins::EARLIER, twins::UNDER_WAY] {
         let steps = plan(&store, question).await;
         assert!(steps[0].contains("INDEX job_"), "{question}: {steps:?}");
         assert!(!sorts(&steps), "{question}: {steps:?}");

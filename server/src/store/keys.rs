@@ -1,0 +1,148 @@
+//! What was handed in before: under a request key, or under an id that the client made. Both belong to their owner.
+
+use std::ops::Range;
+
+use sqlx::SqliteConnection;
+
+use super::{
+    change::Change,
+    database::Store,
+    delete::{deleted_id, owner_of_deleted},
+    error::{Result, StoreError},
+    rows::{find, read},
+    submission::{NewJob, RequestKey},
+};
+use crate::{
+    caller::Owners,
+    job::{Job, JobId},
+    time::Time,
+};
+
+impl Store {
+    /// The jobs of a key that this owner has used before.
+    pub async fn replay(&self, owner: &str, key: &RequestKey) -> Result<Option<Vec<Job>>> {
+        let mut connection = self.reader.acquire().await?;
+        let Some(keys) = keyed(&mut connection, owner, key).await? else {
+            return Ok(None);
+        };
+        let Some(mut jobs) = remaining(&mut connection, keys).await? else {
+            return Ok(None);
+        };
+        self.place(&mut connection, &mut jobs).await?;
+        Ok(Some(jobs))
+    }
+
+    /// The job of an id that the client made, if this owner handed it in with that payload.
+    pub async fn replay_named(&self, owner: &str, id: JobId, payload: &str) -> Result<Option<Job>> {
+        let same: Option<i64> =
+            sqlx::query_scalar("select id from job where uuid = ? and payload = ?")
+                .bind(id.0.to_string())
+                .bind(payload)
+                .fetch_optional(&self.reader)
+                .await?;
+        match same {
+            Some(_) => self.job(Owners::Only(owner), id).await,
+            None => Ok(None),
+        }
+    }
+}
+
+/// The jobs that a key or a client's own id stands for already.
+pub(super) async fn known(
+    change: &mut Change<'_>,
+    owner: &str,
+    jobs: &[NewJob],
+    key: Option<&RequestKey>,
+) -> Result<Option<Vec<Job>>> {
+    if let Some(key) = key
+        && let Some(keys) = keyed(change.sql(), owner, key).await?
+        && let Some(old) = remaining(change.sql(), keys).await?
+    {
+        return Ok(Some(old));
+    }
+    let mut old = vec![];
+    for new in jobs {
+        let Some(id) = new.id else { continue };
+        let found: Option<(i64, String, Option<String>)> =
+            sqlx::query_as("select id, owner, payload from job where uuid = ?")
+                .bind(id.0.to_string())
+                .fetch_optional(change.sql())
+                .await?;
+        match found {
+            Some((key, theirs, Some(payload)))
+                if theirs == owner && payload == new.payload && jobs.len() == 1 =>
+            {
+                old.push(read(change.sql(), key).await?);
+            }
+            Some(_) => return Err(StoreError::IdConflict(id)),
+            None => match owner_of_deleted(change.sql(), id).await? {
+                Some(theirs) if theirs == owner => return Err(StoreError::Deleted(id)),
+                // another owner's id: whether that job is still there is not told
+                Some(_) => return Err(StoreError::IdConflict(id)),
+                None => {}
+            },
+        }
+    }
+    Ok((!old.is_empty()).then_some(old))
+}
+
+/// Notes that these jobs, numbered without a gap, were accepted under a key.
+pub(super) async fn remember(
+    change: &mut Change<'_>,
+    owner: &str,
+    key: &RequestKey,
+    jobs: &[i64],
+) -> Result<()> {
+    sqlx::query(
+        "insert or replace into request_key (owner, key, payload, first_job, jobs, created_at) values (?, ?, ?, ?, ?, ?)",
+    )
+    .bind(owner)
+    .bind(&key.key)
+    .bind(&key.payload)
+    .bind(jobs.first())
+    .bind(jobs.len() as i64)
+    .bind(Time::now().micros())
+    .execute(change.sql())
+    .await?;
+    Ok(())
+}
+
+/// The keys of the jobs that a request key stands for.
+async fn keyed(
+    connection: &mut SqliteConnection,
+    owner: &str,
+    key: &RequestKey,
+) -> Result<Option<Range<i64>>> {
+    let found: Option<(String, i64, i64)> = sqlx::query_as(
+        "select payload, first_job, jobs from request_key where owner = ? and key = ?",
+    )
+    .bind(owner)
+    .bind(&key.key)
+    .fetch_optional(connection)
+    .await?;
+    match found {
+        None => Ok(None),
+        Some((payload, first, jobs)) if payload == key.payload => Ok(Some(first..first + jobs)),
+        Some(_) => Err(StoreError::KeyReuse),
+    }
+}
+
+/// The jobs of a key that are still there. A key whose jobs were all deleted says so as long as that is
+/// remembered; then it stands for nothing any more.
+async fn remaining(
+    connection: &mut SqliteConnection,
+    keys: Range<i64>,
+) -> Result<Option<Vec<Job>>> {
+    let (mut jobs, mut deleted) = (vec![], None);
+    for key in keys {
+        match find(connection, key).await? {
+            Some(job) => jobs.push(job),
+            None => deleted = deleted_id(connection, key).await?.or(deleted),
+        }
+    }
+    match (jobs.is_empty(), deleted) {
+        (false, _) => Ok(Some(jobs)),
+        (true, Some(id)) => Err(StoreError::Deleted(id)),
+        (true, None) => Ok(None),
+    }
+}

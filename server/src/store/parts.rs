@@ -1,0 +1,130 @@
+//! A result as named parts, each in pieces: what is written and what is served.
+
+use std::collections::BTreeMap;
+
+use serde_json::json;
+use sha2::{Digest, Sha256};
+use solver::solution::ContactProfile;
+
+use crate::run::Document;
+
+/// Bytes of one piece of a stored result or mesh; larger rows make SQLite chain pages and readers hold more.
+pub const PIECE_BYTES: usize = 256 << 10;
+/// Pieces per transaction: 1 MiB holds the single writer for some ten milliseconds, so that a
+/// cancel or a submit beside a large result still answers at once.
+pub const PIECES_PER_COMMIT: usize = 4;
+
+/// A document as it is stored: name, JSON and SHA-256 of each part.
+#[derive(Debug)]
+pub struct Parts(pub(super) Vec<Part>);
+
+#[derive(Debug)]
+pub(super) struct Part {
+    pub(super) name: String,
+    pub(super) body: Vec<u8>,
+    pub(super) digest: Vec<u8>,
+}
+
+impl Parts {
+    /// Cuts a document into the parts that routes serve.
+    pub fn of(document: &Document) -> serde_json::Result<Parts> {
+        let mut parts = vec![
+            (
+                "summary".to_string(),
+                serde_json::to_vec(&document.summary)?,
+            ),
+            (
+                "history".to_string(),
+                serde_json::to_vec(&document.history)?,
+            ),
+        ];
+        // the rows of a step are among the history's; its profiles are served one by one
+        let steps: Vec<_> = document
+            .steps
+            .iter()
+            .map(|step| json!({"name": step.name, "summary": step.summary}))
+            .collect();
+        parts.push(("steps".to_string(), serde_json::to_vec(&steps)?));
+        let mut add = |points, step, profiles: &BTreeMap<String, ContactProfile>| {
+            for (boundary, profile) in profiles {
+                let name = profile_part(boundary, points, step);
+                parts.push((name, serde_json::to_vec(profile)?));
+            }
+            Ok::<_, serde_json::Error>(())
+        };
+        for (number, step) in document.steps.iter().enumerate() {
+            add(ProfilePoints::Nodes, Some(number), &step.profiles)?;
+            add(
+                ProfilePoints::Friction,
+                Some(number),
+                &step.friction_profiles,
+            )?;
+        }
+        add(ProfilePoints::Nodes, None, &document.profiles)?;
+        add(ProfilePoints::Friction, None, &document.friction_profiles)?;
+        if !document.fields.x.is_empty() {
+            parts.push(("fields".to_string(), serde_json::to_vec(&document.fields)?));
+        }
+        let hashed = |(name, body): (String, Vec<u8>)| Part {
+            digest: Sha256::digest(&body).to_vec(),
+            name,
+            body,
+        };
+        Ok(Parts(parts.into_iter().map(hashed).collect()))
+    }
+
+    /// All of them together.
+    pub fn bytes(&self) -> usize {
+        self.0.iter().map(|part| part.body.len()).sum()
+    }
+
+    /// All pieces, in groups that are written together.
+    pub(super) fn groups(&self) -> Vec<Vec<Piece<'_>>> {
+        let mut groups: Vec<Vec<Piece<'_>>> = vec![vec![]];
+        let mut bytes = 0;
+        for part in &self.0 {
+            for (number, body) in (0..).zip(part.body.chunks(PIECE_BYTES)) {
+                if bytes + body.len() > PIECES_PER_COMMIT * PIECE_BYTES {
+                    groups.push(vec![]);
+                    bytes = 0;
+                }
+                bytes += body.len();
+                if let Some(group) = groups.last_mut() {
+                    group.push(Piece {
+                        name: &part.name,
+                        number,
+                        body,
+                    });
+                }
+            }
+        }
+        groups
+    }
+}
+
+pub(super) struct Piece<'a> {
+    pub(super) name: &'a str,
+    pub(super) number: i64,
+    pub(super) body: &'a [u8],
+}
+
+/// Where a stored profile has its values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProfilePoints {
+    /// At the nodes of the boundary.
+    Nodes,
+    /// Where friction acts.
+    Friction,
+}
+
+/// The part that holds the profile of a boundary, at the end or at the end of a load step.
+pub(super) fn profile_part(boundary: &str, points: ProfilePoints, step: Option<usize>) -> String {
+    let kind = match points {
+        ProfilePoints::Nodes => "profile",
+        ProfilePoints::Friction => "friction",
+    };
+    match step {
+        None => format!("{kind}/{boundary}"),
+        Some(number) => format!("step/{number}/{kind}/{boundary}"),
+    }
+}
