@@ -2,17 +2,30 @@
 
 use std::collections::BTreeSet;
 
+use schemars::JsonSchema;
+use serde::Serialize;
 use strum::VariantArray;
 
 /// What a caller may do.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, strum::IntoStaticStr, strum::VariantArray,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    JsonSchema,
+    strum::IntoStaticStr,
+    strum::VariantArray,
 )]
+#[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Scope {
-    /// Look at jobs, results and meshes.
+    /// Get and list jobs, results and meshes.
     Read,
-    /// Hand in jobs and meshes.
+    /// Submit jobs, upload meshes.
     Submit,
     /// Cancel and delete them.
     Cancel,
@@ -21,22 +34,29 @@ pub enum Scope {
 }
 
 /// Who asks: every verb takes one.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Caller {
+    /// The owner of the jobs that this caller submits.
     owner: String,
+    /// What this caller may do.
     scopes: BTreeSet<Scope>,
 }
 
 impl Caller {
-    /// Everybody, as long as nobody is told apart: one owner, who may do everything.
-    pub fn local() -> Caller {
+    /// Who is known by that name, and may do this.
+    pub fn new(owner: impl Into<String>, scopes: impl IntoIterator<Item = Scope>) -> Caller {
         Caller {
-            owner: "local".into(),
-            scopes: Scope::VARIANTS.iter().copied().collect(),
+            owner: owner.into(),
+            scopes: scopes.into_iter().collect(),
         }
     }
 
-    /// The owner of what this caller hands in.
+    /// Everybody, as long as nobody is told apart: one owner, who may do everything.
+    pub fn local() -> Caller {
+        Caller::new("local", Scope::VARIANTS.iter().copied())
+    }
+
+    /// The owner of what this caller submits.
     pub fn owner(&self) -> &str {
         &self.owner
     }
@@ -82,11 +102,7 @@ mod tests {
     fn who_is_no_administrator_sees_only_what_is_their_own() {
         let local = Caller::local();
         assert_eq!(local.sees(), Owners::All);
-        let scopes = BTreeSet::from([Scope::Read, Scope::Submit]);
-        let ada = Caller {
-            owner: "ada".into(),
-            scopes,
-        };
+        let ada = Caller::new("ada", [Scope::Read, Scope::Submit]);
         assert_eq!(ada.sees(), Owners::Only("ada"));
         assert!(ada.sees().include("ada") && !ada.sees().include("bob"));
         assert!(local.sees().include("bob"));

@@ -36,14 +36,14 @@ pub enum ApiError {
         /// What was sent.
         got: String,
         /// What would have been right.
-        expected: &'static str,
+        expected: String,
     },
     /// A page token that this service did not make for this list.
     #[error("the page token does not belong to this list; start again without one")]
     BadPageToken,
     /// Something for many jobs, without saying for which.
     #[error("say for which jobs: at least one of {0}")]
-    MissingFilter(&'static str),
+    MissingFilter(String),
     /// No such thing.
     #[error("{0}")]
     NotFound(String),

@@ -10,9 +10,10 @@ pub mod job;
 pub mod mesh;
 pub mod time;
 
-// What a request can be told went wrong, and what can be set.
+// What a request can be told went wrong, what it may say beside its body, and what can be set.
 pub mod config;
 pub mod error;
+pub mod parameters;
 pub mod violations;
 
 // Solve one problem and measure it; fingerprints of problem and result; the formats of a result.

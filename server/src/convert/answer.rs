@@ -14,6 +14,7 @@ use solver::{
 };
 
 use crate::{
+    caller::Caller,
     event::{Event, Payload},
     job::{Failure, Job, Progress, QueuePosition, Reason, ResultAvailable, Status},
     mesh::{BoundaryInfo, MeshInfo},
@@ -21,9 +22,10 @@ use crate::{
     run::{Summary, phase_name},
     time::Time,
     verbs::{
+        info::{Info, ServiceLimits},
         jobs::Cancellation,
-        problems::Judgement,
-        queue::{Caller, Info, QueueState, ServiceLimits},
+        problems::Validation,
+        queue::QueueState,
         results::{JobResult, StepResult},
     },
 };
@@ -187,8 +189,12 @@ impl From<Info> for pb::ServerInfo {
 }
 
 impl From<Caller> for pb::Caller {
-    fn from(Caller { owner, scopes }: Caller) -> Self {
-        pb::Caller { owner, scopes }
+    fn from(caller: Caller) -> Self {
+        let scopes = caller.scopes().map(<&str>::from);
+        pb::Caller {
+            owner: caller.owner().to_owned(),
+            scopes: scopes.map(str::to_owned).collect(),
+        }
     }
 }
 
@@ -339,17 +345,17 @@ impl From<Violation> for pb::Violation {
 }
 
 /// What there is to say about a problem.
-pub fn judgement(judgement: Judgement) -> pb::ValidateProblemResponse {
+pub fn validation(validation: Validation) -> pb::ValidateProblemResponse {
     pb::ValidateProblemResponse {
-        valid: judgement.valid,
-        violations: judgement.violations.into_iter().map(Into::into).collect(),
-        warnings: judgement.warnings.into_iter().map(Into::into).collect(),
-        estimate: judgement.estimate.map(|estimate| pb::Estimate {
+        valid: validation.valid,
+        violations: validation.violations.into_iter().map(Into::into).collect(),
+        warnings: validation.warnings.into_iter().map(Into::into).collect(),
+        estimate: validation.estimate.map(|estimate| pb::Estimate {
             dofs: estimate.dofs,
             memory_bytes: estimate.memory_bytes,
             run_s: estimate.run_s,
         }),
-        input_hash: judgement.input_hash,
+        input_hash: validation.input_hash,
     }
 }
 

@@ -6,7 +6,7 @@ mod message;
 mod problem;
 mod request;
 
-pub use answer::{judgement, pb_status, status};
+pub use answer::{pb_status, status, validation};
 pub use message::problem_to_pb;
 pub use problem::problem_from_pb;
-pub use request::{bad, draft, edit, filter};
+pub use request::{bad, edit, filter, job_request};

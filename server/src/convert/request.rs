@@ -11,14 +11,14 @@ use crate::{
     store::{Edit, Filter},
     time::Time,
     verbs::{
-        envelope::{Draft, Envelope},
-        jobs,
+        envelope::{Envelope, JobRequest},
+        filters::{self, CREATED_AFTER, CREATED_BEFORE, FINISHED_AFTER, FINISHED_BEFORE, STATUS},
     },
     violations,
 };
 
-/// A job as it is handed in. Pointers go into the request.
-pub fn draft(request: pb::CreateJobRequest) -> Draft {
+/// A job as it is asked for. Pointers go into the request.
+pub fn job_request(request: pb::CreateJobRequest) -> JobRequest {
     let pb::CreateJobRequest {
         problem,
         name,
@@ -63,7 +63,7 @@ pub fn draft(request: pb::CreateJobRequest) -> Draft {
         Ok(_) => Err(violations),
         Err(found) => Err(found.into_iter().chain(violations).collect()),
     };
-    (envelope, problem)
+    JobRequest { envelope, problem }
 }
 
 /// Which jobs.
@@ -80,18 +80,18 @@ pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
         finished_before,
     } = message.unwrap_or_default();
     let read = |number| {
-        status(number).ok_or_else(|| bad("status", number, "a value of the enum other than 0"))
+        status(number).ok_or_else(|| bad(STATUS.name, number, "a value of the enum other than 0"))
     };
-    jobs::checked(Filter {
+    filters::checked(Filter {
         statuses: numbers.into_iter().map(read).collect::<Result<_, _>>()?,
         owner,
         labels: labels.into_iter().collect(),
         name,
         input_hash,
-        created_after: time("created_after", created_after)?,
-        created_before: time("created_before", created_before)?,
-        finished_after: time("finished_after", finished_after)?,
-        finished_before: time("finished_before", finished_before)?,
+        created_after: time(CREATED_AFTER.name, created_after)?,
+        created_before: time(CREATED_BEFORE.name, created_before)?,
+        finished_after: time(FINISHED_AFTER.name, finished_after)?,
+        finished_before: time(FINISHED_BEFORE.name, finished_before)?,
     })
 }
 
@@ -147,10 +147,10 @@ pub fn edit(request: pb::UpdateJobRequest) -> Result<Edit, ApiError> {
 }
 
 /// A field with a value that it cannot have.
-pub fn bad(name: &'static str, got: impl ToString, expected: &'static str) -> ApiError {
+pub fn bad(name: &'static str, got: impl ToString, expected: impl Into<String>) -> ApiError {
     ApiError::BadParameter {
         name,
         got: got.to_string(),
-        expected,
+        expected: expected.into(),
     }
 }

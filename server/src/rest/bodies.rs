@@ -19,14 +19,14 @@ use crate::{
     job::{Cache, Limits},
     store::Edit,
     verbs::{
-        envelope::{Draft, Envelope},
+        envelope::{Envelope, JobRequest},
         retry::Changes,
-        submit::MOST_JOBS,
+        submit::MAX_BATCH,
     },
     violations::{self, AT, Violations, prefixed},
 };
 
-/// A body that hands in a job; for its schema only, since it is read by hand: what is wrong with the
+/// A body that submits a job; for its schema only, since it is read by hand: what is wrong with the
 /// problem comes together with what is wrong around it.
 #[derive(JsonSchema)]
 #[schemars(deny_unknown_fields)]
@@ -123,10 +123,13 @@ type Read<T> = Result<T, Vec<Violation>>;
 
 /// A body `{problem, name, labels, priority, limits, cache}`. The problem's text goes to the solver's own
 /// strict parser; what is wrong with it comes together with what is wrong around it.
-pub(super) fn submission(text: &str) -> Result<Draft, ApiError> {
+pub(super) fn submission(text: &str) -> Result<JobRequest, ApiError> {
     let mut body = Body::open(text, "an object with the field problem")?;
     if let Some(violation) = body.unwrapped() {
-        return Ok((Envelope::default(), Err(vec![violation])));
+        return Ok(JobRequest {
+            envelope: Envelope::default(),
+            problem: Err(vec![violation]),
+        });
     }
     let problem = body.problem();
     let envelope = Envelope {
@@ -139,11 +142,14 @@ pub(super) fn submission(text: &str) -> Result<Draft, ApiError> {
             .unwrap_or_default(),
     };
     let known = "problem, name, labels, priority, limits, cache";
-    Ok((envelope, body.close(known, problem)))
+    Ok(JobRequest {
+        envelope,
+        problem: body.close(known, problem),
+    })
 }
 
 /// A body `{jobs: […]}`, each as a submission of its own.
-pub(super) fn batch(text: &str) -> Result<Read<Vec<Draft>>, ApiError> {
+pub(super) fn batch(text: &str) -> Result<Read<Vec<JobRequest>>, ApiError> {
     let mut body = Body::open(text, "an object with the field jobs")?;
     let some = "1 … 1000 submissions";
     let hint = "Send {\"jobs\": [{\"problem\": {…}}, …]}.";
@@ -154,22 +160,22 @@ pub(super) fn batch(text: &str) -> Result<Read<Vec<Draft>>, ApiError> {
         }
         texts
     });
-    let mut drafts = vec![];
+    let mut requests = vec![];
     // one more than there may be: the verb says that they are too many
-    for (n, text) in texts.iter().flatten().take(MOST_JOBS + 1).enumerate() {
+    for (n, text) in texts.iter().flatten().take(MAX_BATCH + 1).enumerate() {
         let at = format!("/jobs/{n}");
         match submission(text.get()) {
-            Ok((envelope, problem)) => {
-                if let Err(found) = &problem {
+            Ok(request) => {
+                if let Err(found) = &request.problem {
                     body.violations.extend(prefixed(&at, found.clone()));
                 }
-                drafts.push((envelope, problem));
+                requests.push(request);
             }
             Err(ApiError::InvalidProblem(found)) => body.violations.extend(prefixed(&at, found)),
             Err(other) => return Err(other),
         }
     }
-    Ok(body.close("jobs", Some(drafts)))
+    Ok(body.close("jobs", Some(requests)))
 }
 
 /// A body `{name, labels, priority, pinned}`: what is absent stays, and a name or labels of null are taken away.
@@ -373,7 +379,7 @@ mod tests {
     fn pointers(text: &str) -> Vec<String> {
         submission(text)
             .unwrap()
-            .1
+            .problem
             .unwrap_err()
             .into_iter()
             .map(|v| v.pointer)
@@ -404,7 +410,7 @@ mod tests {
         };
         for (told, mut described) in [
             (
-                submission(OTHER).unwrap().1.unwrap_err(),
+                submission(OTHER).unwrap().problem.unwrap_err(),
                 described::<Submission>(),
             ),
             (
@@ -438,7 +444,7 @@ mod tests {
     fn a_bare_problem_is_told_once_to_be_wrapped() {
         let text = serde_json::to_string(&crate::fake::problem()).unwrap();
         let by_both = [
-            submission(&text).unwrap().1.unwrap_err(),
+            submission(&text).unwrap().problem.unwrap_err(),
             bare_problem(&text).unwrap().unwrap_err(),
         ];
         for violations in by_both {
@@ -453,7 +459,7 @@ mod tests {
         let text = format!("{{\"problem\": {{}}, {}}}", names.join(", "));
         assert_eq!(pointers(&text).len(), 100);
         let text = format!("{{\"problem\": {{}}, \"{}\": 1}}", "x".repeat(1 << 20));
-        let violations = submission(&text).unwrap().1.unwrap_err();
+        let violations = submission(&text).unwrap().problem.unwrap_err();
         let longest = violations.iter().map(|v| v.pointer.len().max(v.got.len()));
         assert!(longest.max() < Some(100));
     }

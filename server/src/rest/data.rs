@@ -4,14 +4,64 @@ use std::ops::Range;
 
 use axum::{
     body::{Body, Bytes},
-    http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
+    http::{HeaderName, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use base64::{Engine, engine::general_purpose::STANDARD};
 use sha2::{Digest, Sha256};
 
-use super::request::versions;
-use crate::{digest::hex, error::ApiError, formats::Format};
+use super::{
+    headers::{Tags, header as described, like, text},
+    takes::{Sent, Takes},
+};
+use crate::{digest::hex, error::ApiError, formats::Format, parameters::Description};
+
+/// What part of a file is asked for.
+pub(super) const PART: PartOf = PartOf;
+
+/// The headers that ask for a part of a file, or only for one that is not known yet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PartOf;
+
+/// What of a file is asked for, and what is known of it; as it was sent.
+#[derive(Debug, Default)]
+pub(super) struct Part {
+    known: Option<Tags>,
+    range: Option<String>,
+    if_range: Option<String>,
+}
+
+impl Takes for PartOf {
+    type Value = Part;
+
+    fn described(&self) -> Vec<Description> {
+        vec![
+            described("If-None-Match", text(), "The ETag of a file that is known"),
+            described(
+                "Range",
+                like("^bytes=([0-9]{1,6}-[0-9]{0,6}|-[0-9]{1,6})$"),
+                "bytes=FIRST-LAST: a part of the file",
+            ),
+            described(
+                "If-Range",
+                text(),
+                "The ETag of the file that the part belongs to; if it is another one, the whole file is sent",
+            ),
+        ]
+    }
+
+    fn take(&self, sent: &Sent<'_>) -> Result<Part, ApiError> {
+        let text = |name: HeaderName| {
+            let value = sent.headers.get(name)?.to_str().ok()?;
+            Some(value.trim().to_owned())
+        };
+        Ok(Part {
+            known: Tags::of(sent.headers, header::IF_NONE_MATCH.as_str()),
+            range: text(header::RANGE),
+            if_range: text(header::IF_RANGE),
+        })
+    }
+}
 
 /// What a file is, before its bytes are looked at.
 pub(super) struct File {
@@ -25,7 +75,7 @@ pub(super) struct File {
 
 /// Answers with bytes that are there.
 pub(super) fn whole(
-    headers: &HeaderMap,
+    part: &Part,
     format: Format,
     name: String,
     bytes: Vec<u8>,
@@ -37,7 +87,7 @@ pub(super) fn whole(
         digest: Sha256::digest(&bytes).to_vec(),
     };
     let bytes = Bytes::from(bytes);
-    answer(headers, &file, |range| {
+    answer(part, &file, |range| {
         Body::from(bytes.slice(range.start as usize..range.end as usize))
     })
 }
@@ -45,7 +95,7 @@ pub(super) fn whole(
 /// Answers with a file or a range of it, or with the word that the client has it already. `body` gives the
 /// bytes of a range.
 pub(super) fn answer(
-    headers: &HeaderMap,
+    part: &Part,
     file: &File,
     body: impl FnOnce(Range<u64>) -> Body,
 ) -> Result<Response, ApiError> {
@@ -59,10 +109,10 @@ pub(super) fn answer(
         (HeaderName::from_static("repr-digest"), digest.clone()),
         (header::ACCEPT_RANGES, "bytes".to_owned()),
     ];
-    if versions(headers, header::IF_NONE_MATCH).is_some_and(|tags| tags.contain(&tag)) {
+    if part.known.as_ref().is_some_and(|tags| tags.contain(&tag)) {
         return Ok(with(StatusCode::NOT_MODIFIED.into_response(), known));
     }
-    let range = match asked_range(headers, &tag, file.bytes) {
+    let range = match asked_range(part, &tag, file.bytes) {
         Asked::All => None,
         Asked::Part(range) => Some(range),
         Asked::Nothing => return Err(ApiError::RangeNotSatisfiable(file.bytes)),
@@ -128,13 +178,12 @@ enum Asked {
 
 /// The one range of a request, unless it holds for another version of the file. Several ranges, and what
 /// is not understood, are answered with everything, as RFC 9110 has it.
-fn asked_range(headers: &HeaderMap, tag: &str, length: u64) -> Asked {
-    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    if text(header::IF_RANGE).is_some_and(|condition| condition.trim() != tag) {
+fn asked_range(part: &Part, tag: &str, length: u64) -> Asked {
+    if part.if_range.as_ref().is_some_and(|of| of != tag) {
         return Asked::All;
     }
-    let Some(range) = text(header::RANGE).and_then(|range| range.trim().strip_prefix("bytes="))
-    else {
+    let range = part.range.as_deref();
+    let Some(range) = range.and_then(|range| range.strip_prefix("bytes=")) else {
         return Asked::All;
     };
     let Some((first, last)) = range.split_once('-') else {
@@ -164,9 +213,12 @@ mod tests {
     use super::*;
 
     fn asked(range: &str) -> Asked {
-        let mut headers = HeaderMap::new();
-        headers.insert("range", range.parse().unwrap());
-        asked_range(&headers, "\"t\"", 10)
+        let range = Some(range.to_owned());
+        let part = Part {
+            range,
+            ..Part::default()
+        };
+        asked_range(&part, "\"t\"", 10)
     }
 
     #[test]
@@ -191,18 +243,22 @@ mod tests {
 
     #[test]
     fn a_range_of_another_version_is_not_mixed_with_this_one() {
-        let mut headers = HeaderMap::new();
-        headers.insert("range", "bytes=2-3".parse().unwrap());
-        headers.insert("if-range", "\"other\"".parse().unwrap());
-        assert_eq!(asked_range(&headers, "\"t\"", 10), Asked::All);
-        headers.insert("if-range", "\"t\"".parse().unwrap());
-        assert_eq!(asked_range(&headers, "\"t\"", 10), Asked::Part(2..4));
+        let asked = |of: &str| {
+            let part = Part {
+                range: Some("bytes=2-3".into()),
+                if_range: Some(of.into()),
+                known: None,
+            };
+            asked_range(&part, "\"t\"", 10)
+        };
+        assert_eq!(asked("\"other\""), Asked::All);
+        assert_eq!(asked("\"t\""), Asked::Part(2..4));
     }
 
     #[test]
     fn a_file_has_a_plain_name_whatever_the_boundary_is_called() {
         let name = "job_1.profile.a\"; b/\r\nñ".to_owned();
-        let response = whole(&HeaderMap::new(), Format::Csv, name, vec![]).unwrap();
+        let response = whole(&Part::default(), Format::Csv, name, vec![]).unwrap();
         let headers = response.headers();
         assert_eq!(
             headers["content-disposition"],

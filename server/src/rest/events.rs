@@ -1,66 +1,56 @@
 //! `/v1/jobs/{id}/events`: replayed and then live, as server-sent events or as JSON Lines.
 
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 
 use axum::{
     body::Body,
-    extract::{RawQuery, State},
     http::{HeaderMap, StatusCode, header},
     response::{
         IntoResponse, Response,
         sse::{self, KeepAlive, Sse},
     },
 };
-use futures_util::{StreamExt, TryStreamExt};
+use futures_util::{Stream, StreamExt, TryStreamExt};
 
 use super::{
-    Rest,
-    request::{JobPath, Params, accepted, wants, weight},
+    accept::{accepted, wants, weight},
+    call::Call,
 };
 use crate::{
     error::ApiError,
     event::Event,
-    job::Job,
-    verbs::{Service, jobs, watch as verbs},
+    job::JobId,
+    parameters::{Parameter, Whole},
+    verbs::watch::{AFTER_SEQ, watch},
     violations,
 };
 
-/// Tells proxies and clients that the line still stands.
+/// Tells proxies and clients that the connection is alive.
 const PING: Duration = Duration::from_secs(15);
 /// Server-sent events.
 const SSE: &str = "text/event-stream";
 /// A JSON object per line, by its names.
 const LINES: [&str; 2] = ["application/jsonl", "application/x-ndjson"];
 
-pub(super) async fn watch(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    path: JobPath,
+/// A browser reconnects to the same address, and this is what it knows better.
+pub(super) const LAST_EVENT_ID: Parameter<Whole> = Parameter {
+    name: "Last-Event-ID",
+    meaning: "The same; it takes precedence",
+    values: AFTER_SEQ.values,
+};
+
+pub(super) async fn events(
+    call: Call,
+    id: JobId,
+    asked: Option<i64>,
+    seen: Option<i64>,
 ) -> Result<Response, ApiError> {
-    const SEQ: &str = "a whole number, 0 or more";
-    let params = Params::parse(query.as_deref(), &["after_seq"])?;
-    let asked = params.number("after_seq", 0..=i64::MAX, SEQ)?;
-    // The header wins: a browser reconnects to the same address, and knows better than that.
-    let seen = match headers.get("last-event-id") {
-        Some(value) => {
-            let text = String::from_utf8_lossy(value.as_bytes());
-            let seq = text.trim().parse::<i64>().ok().filter(|seq| *seq >= 0);
-            let bad = ApiError::BadParameter {
-                name: "Last-Event-ID",
-                got: text.to_string(),
-                expected: SEQ,
-            };
-            Some(seq.ok_or(bad)?)
-        }
-        None => None,
-    };
     let after = seen.or(asked).unwrap_or(0);
-    let job = jobs::get(&rest.service, path.id).await?;
-    if verbs::is_silent(&rest.service, &job, after).await? {
+    let events = watch(&call.service, &call.caller, id, after).await?;
+    let Some(events) = events else {
         return Ok(StatusCode::NO_CONTENT.into_response());
-    }
-    let accepted = accepted(&headers);
+    };
+    let accepted = accepted(&call.headers);
     let some = |media: &str| weight(&accepted, media).0 > 0.0;
     if !accepted.is_empty()
         && ![SSE, LINES[0], LINES[1], "application/json"]
@@ -72,55 +62,64 @@ pub(super) async fn watch(
             available: format!("{SSE}, {}", LINES[0]),
         });
     }
-    Ok(wanted(&headers, &rest.service, &job, after)
-        .unwrap_or_else(|| stream(&rest.service, &job, after)))
+    Ok(write(
+        events,
+        wanted(&call.headers).unwrap_or(Encoding::Stream),
+    ))
 }
 
-/// The events of a job after number `after`, if the client wants these rather than JSON.
-pub(super) fn wanted(
-    headers: &HeaderMap,
-    service: &Arc<Service>,
-    job: &Job,
-    after: i64,
-) -> Option<Response> {
+/// How events are written.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Encoding {
+    /// As server-sent events.
+    Stream,
+    /// A line each.
+    Lines,
+}
+
+/// How the client wants the events of a job, if it wants these rather than JSON.
+pub(super) fn wanted(headers: &HeaderMap) -> Option<Encoding> {
     if wants(headers, &[SSE]) {
-        return Some(stream(service, job, after));
+        return Some(Encoding::Stream);
     }
-    wants(headers, &LINES).then(|| lines(service, job, after))
+    wants(headers, &LINES).then_some(Encoding::Lines)
 }
 
-/// As server-sent events.
-fn stream(service: &Arc<Service>, job: &Job, after: i64) -> Response {
-    // An error just ends the stream: without `done` the client knows that there is more to come.
-    let events = verbs::watch(service.clone(), (job.id, job.key), after)
-        .map(|event| event.and_then(|event| told(&event)))
-        .inspect_err(|error| tracing::debug!(%error, "event stream ended: {error}"))
-        .take_while(|event| std::future::ready(event.is_ok()));
-    Sse::new(events)
-        .keep_alive(KeepAlive::new().interval(PING).text("ping"))
-        .into_response()
+/// Events as they come. An error just ends the stream: without `done` the client knows that there is more.
+pub(super) fn write(
+    events: impl Stream<Item = Result<Event, ApiError>> + Send + 'static,
+    encoding: Encoding,
+) -> Response {
+    let events = events.inspect_err(|error| tracing::debug!(%error, "event stream ended: {error}"));
+    match encoding {
+        Encoding::Stream => {
+            let events = events.map(|event| event.and_then(|event| message(&event)));
+            let events = events.take_while(|event| std::future::ready(event.is_ok()));
+            let keep_alive = KeepAlive::new().interval(PING).text("ping");
+            Sse::new(events).keep_alive(keep_alive).into_response()
+        }
+        Encoding::Lines => {
+            let lines = events.map(|event| event.and_then(|event| line(&event)));
+            let lines = lines.take_while(|line| std::future::ready(line.is_ok()));
+            let headers = [
+                (header::CONTENT_TYPE, LINES[0]),
+                (header::CACHE_CONTROL, "no-cache"),
+            ];
+            (headers, Body::from_stream(lines)).into_response()
+        }
+    }
 }
 
-/// A line each.
-fn lines(service: &Arc<Service>, job: &Job, after: i64) -> Response {
-    let lines = verbs::watch(service.clone(), (job.id, job.key), after)
-        .map(|event| {
-            let mut line = serde_json::to_vec(&event?).map_err(ApiError::internal)?;
-            line.push(b'\n');
-            Ok::<_, ApiError>(line)
-        })
-        .take_while(|line| std::future::ready(line.is_ok()));
-    let headers = [
-        (header::CONTENT_TYPE, LINES[0]),
-        (header::CACHE_CONTROL, "no-cache"),
-    ];
-    (headers, Body::from_stream(lines)).into_response()
-}
-
-fn told(event: &Event) -> Result<sse::Event, ApiError> {
+fn message(event: &Event) -> Result<sse::Event, ApiError> {
     let data = serde_json::to_string(event).map_err(ApiError::internal)?;
     Ok(sse::Event::default()
         .id(event.seq.to_string())
         .event(event.payload.kind())
         .data(data))
+}
+
+fn line(event: &Event) -> Result<Vec<u8>, ApiError> {
+    let mut line = serde_json::to_vec(event).map_err(ApiError::internal)?;
+    line.push(b'\n');
+    Ok(line)
 }

@@ -1,67 +1,69 @@
-//! The query parameters of lists of jobs.
+//! The filters of lists of jobs, read from a query.
 
-use super::request::{ANY_LABEL, Params};
+use super::takes::{Sent, Takes};
 use crate::{
     error::ApiError,
-    job::Status,
-    store::{Filter, GroupBy, Order},
-    verbs::jobs as verbs,
+    parameters::{Description, Parameter, Text},
+    store::Filter,
+    verbs::filters::{
+        self, CREATED_AFTER, CREATED_BEFORE, FINISHED_AFTER, FINISHED_BEFORE, INPUT_HASH, LABEL,
+        NAME, OWNER, STATUS,
+    },
 };
 
-/// The parameters that filter.
-pub(super) const FILTERS: [&str; 9] = [
-    "status",
-    "owner",
-    ANY_LABEL,
-    "name",
-    "input_hash",
-    "created_after",
-    "created_before",
-    "finished_after",
-    "finished_before",
-];
+/// All filters; none leaves no job out.
+pub(super) const FILTERS: Filters = Filters;
 
-/// A query with filters, and with `more` parameters.
-pub(super) fn parse(
-    query: Option<&str>,
-    more: &[&'static str],
-) -> Result<(Filter, Params), ApiError> {
-    let known: Vec<&'static str> = FILTERS.iter().chain(more).copied().collect();
-    let params = Params::parse(query, &known)?;
-    let status = |word: &str| {
-        Status::parse(word).ok_or(ApiError::BadParameter {
-            name: "status",
-            got: word.into(),
-            expected: "queued, running, succeeded, failed or canceled",
+/// The filters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Filters;
+
+impl Takes for Filters {
+    type Value = Filter;
+
+    fn described(&self) -> Vec<Description> {
+        filters::describe().into()
+    }
+
+    fn take(&self, sent: &Sent<'_>) -> Result<Filter, ApiError> {
+        let statuses = sent.all(STATUS.name).flat_map(|list| list.split(','));
+        let text = |filter: Parameter<Text>| sent.one(filter.name).map(str::to_owned);
+        filters::checked(Filter {
+            statuses: statuses
+                .map(|word| STATUS.read(word))
+                .collect::<Result<_, _>>()?,
+            owner: text(OWNER),
+            labels: sent.keyed(LABEL.name).collect(),
+            name: text(NAME),
+            input_hash: text(INPUT_HASH),
+            created_after: CREATED_AFTER.take(sent)?,
+            created_before: CREATED_BEFORE.take(sent)?,
+            finished_after: FINISHED_AFTER.take(sent)?,
+            finished_before: FINISHED_BEFORE.take(sent)?,
         })
-    };
-    let statuses = params
-        .all("status")
-        .flat_map(|list| list.split(','))
-        .map(status)
-        .collect::<Result<Vec<_>, _>>()?;
-    let filter = Filter {
-        statuses,
-        owner: params.one("owner").map(str::to_owned),
-        labels: params.labels().collect(),
-        name: params.one("name").map(str::to_owned),
-        input_hash: params.one("input_hash").map(str::to_owned),
-        created_after: params.time("created_after")?,
-        created_before: params.time("created_before")?,
-        finished_after: params.time("finished_after")?,
-        finished_before: params.time("finished_before")?,
-    };
-    Ok((verbs::checked(filter)?, params))
+    }
 }
 
-/// The `order_by` of a list.
-pub(super) fn order(params: &Params) -> Result<Order, ApiError> {
-    let expected = Order::EXPECTED;
-    let order = params.word("order_by", Order::parse, expected)?;
-    Ok(order.unwrap_or(Order::NEWEST_FIRST))
-}
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use axum::http::HeaderMap;
 
-/// The `group_by` of a count.
-pub(super) fn group_by(params: &Params) -> Result<Option<GroupBy>, ApiError> {
-    params.word("group_by", GroupBy::parse, GroupBy::EXPECTED)
+    use super::*;
+
+    #[test]
+    fn every_filter_that_is_described_is_read() {
+        let headers = HeaderMap::new();
+        for filter in filters::describe() {
+            let name = filter.name.replace("{key}", "a");
+            let found = ["queued", "2026-01-31T12:00:00Z"]
+                .into_iter()
+                .find_map(|value| {
+                    let query = format!("{name}={value}");
+                    let sent = Sent::new(vec![], Some(&query), &headers);
+                    FILTERS.take(&sent).ok()
+                });
+            assert_ne!(found.unwrap(), Filter::default(), "{name}");
+        }
+    }
 }

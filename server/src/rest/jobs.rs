@@ -2,54 +2,52 @@
 
 use axum::{
     Json,
-    body::Body,
-    extract::{RawQuery, State},
-    http::{HeaderMap, StatusCode, header},
+    http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
 use schemars::JsonSchema;
 use serde::Serialize;
 use solver::problem::Problem;
 
-use super::{
-    Rest,
-    bodies::edit,
-    filters,
-    request::{JobPath, Params, Tags, json_text, versions},
-};
+use super::{bodies::edit, call::Call, headers::Tags};
 use crate::{
     error::ApiError,
-    job::Job,
+    job::{Job, JobId},
+    parameters::Values,
+    store::{Filter, GroupBy, Order},
     verbs::{
-        jobs::{self as verbs, Cancellation, Count, MAX_PAGE_SIZE, Many, PAGE_SIZE},
-        watch::{self, Until},
+        jobs::{self as verbs, Cancellation, Count, Many},
+        page::Paging,
+        watch::{self, UNTIL, Until, WAIT},
     },
 };
 
 pub(super) async fn get(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    path: JobPath,
+    call: Call,
+    id: JobId,
+    wait_s: Option<f64>,
+    until: Option<Until>,
+    seen: Option<Tags>,
 ) -> Result<Response, ApiError> {
-    let params = Params::parse(query.as_deref(), &["wait", "until"])?;
-    let wait_s = params.wait_s("wait")?;
-    let terminal = |word: &str| (word == "terminal").then_some(Until::Terminal);
-    let until = params.word("until", terminal, "terminal")?;
     if let (Some(_), None) = (until, wait_s) {
         return Err(ApiError::BadParameter {
-            name: "until",
+            name: UNTIL.name,
             got: "no wait beside it".into(),
-            expected: "wait=0…60 with it",
+            expected: format!("{} beside it: {}", WAIT.name, WAIT.values.expected()),
         });
     }
-    let seen = versions(&headers, header::IF_NONE_MATCH);
-    let mut job = verbs::get(&rest.service, path.id).await?;
-    if let Some(wait_s) = wait_s {
-        let known = seen.as_ref().and_then(Tags::version);
-        let until = until.unwrap_or(known.map_or(Until::News, Until::Changed));
-        (job, _) = watch::wait(&rest.service, path.id, until, wait_s).await?;
-    }
+    let Call {
+        service, caller, ..
+    } = &call;
+    let job = match wait_s {
+        None => verbs::get(service, caller, id).await?,
+        Some(wait_s) => {
+            let known = seen.as_ref().and_then(Tags::version);
+            let until = until.unwrap_or(known.map_or(Until::NextChange, Until::Changed));
+            let (job, _) = watch::wait(service, caller, id, until, wait_s).await?;
+            job
+        }
+    };
     let tag = tag(&job);
     if seen.is_some_and(|seen| seen.contain(&tag)) {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
@@ -66,104 +64,75 @@ pub(super) struct List {
 }
 
 pub(super) async fn list(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
+    call: Call,
+    filter: Filter,
+    size: Option<i64>,
+    token: Option<String>,
+    order: Option<Order>,
 ) -> Result<Json<List>, ApiError> {
-    let more = ["page_size", "page_token", "order_by"];
-    let (filter, params) = filters::parse(query.as_deref(), &more)?;
-    let order = filters::order(&params)?;
-    let page_size = params.number(
-        "page_size",
-        1..=MAX_PAGE_SIZE,
-        "a whole number from 1 to 1000",
-    )?;
-    let page_size = page_size.unwrap_or(PAGE_SIZE);
-    let token = params.one("page_token").filter(|token| !token.is_empty());
-    let page = verbs::list(&rest.service, &filter, order, page_size, token).await?;
+    let paging = Paging { size, token };
+    let page = verbs::list(&call.service, &call.caller, &filter, order, &paging).await?;
     Ok(Json(List {
-        jobs: page.jobs,
+        jobs: page.items,
         next_page_token: page.next,
     }))
 }
 
 pub(super) async fn count(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
+    call: Call,
+    filter: Filter,
+    group_by: Option<GroupBy>,
 ) -> Result<Json<Count>, ApiError> {
-    let (filter, params) = filters::parse(query.as_deref(), &["group_by"])?;
-    let group_by = filters::group_by(&params)?;
-    Ok(Json(verbs::count(&rest.service, &filter, group_by).await?))
+    let count = verbs::count(&call.service, &call.caller, &filter, group_by).await?;
+    Ok(Json(count))
 }
 
-pub(super) async fn problem(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    path: JobPath,
-) -> Result<Json<Problem>, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    Ok(Json(verbs::problem(&rest.service, path.id).await?))
+pub(super) async fn problem(call: Call, id: JobId) -> Result<Json<Problem>, ApiError> {
+    Ok(Json(verbs::problem(&call.service, &call.caller, id).await?))
 }
 
 pub(super) async fn update(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    path: JobPath,
-    body: Body,
+    mut call: Call,
+    id: JobId,
+    meant_for: Option<Tags>,
 ) -> Result<Response, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    let text = json_text(&headers, body, rest.service.max_body_bytes).await?;
-    let edit = edit(&text)?;
-    let version = match versions(&headers, header::IF_MATCH) {
+    let edit = edit(&call.json().await?)?;
+    let Call {
+        service, caller, ..
+    } = &call;
+    let version = match meant_for {
         None => None,
         Some(tags) if tags.any() => None,
         Some(tags) => {
-            let job = verbs::get(&rest.service, path.id).await?;
+            let job = verbs::get(service, caller, id).await?;
             // no job is of version −1
             let same = tags.contain_strongly(&tag(&job));
             Some(if same { job.version } else { -1 })
         }
     };
-    Ok(one(
-        &verbs::update(&rest.service, path.id, edit, version).await?
-    ))
+    let job = verbs::update(service, caller, id, edit, version).await?;
+    Ok(one(&job))
 }
 
-pub(super) async fn cancel(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    path: JobPath,
-) -> Result<Response, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    let (outcome, job) = verbs::cancel(&rest.service, path.id).await?;
+pub(super) async fn cancel(call: Call, id: JobId) -> Result<Response, ApiError> {
+    let (outcome, job) = verbs::cancel(&call.service, &call.caller, id).await?;
     let tag = [(header::ETAG, tag(&job))];
     Ok((tag, Json(Canceled { outcome, job })).into_response())
 }
 
-pub(super) async fn delete(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    path: JobPath,
-) -> Result<StatusCode, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    verbs::delete(&rest.service, path.id).await?;
+pub(super) async fn delete(call: Call, id: JobId) -> Result<StatusCode, ApiError> {
+    verbs::delete(&call.service, &call.caller, id).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
-pub(super) async fn cancel_many(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-) -> Result<Json<Many>, ApiError> {
-    let (filter, _) = filters::parse(query.as_deref(), &[])?;
-    Ok(Json(verbs::cancel_many(&rest.service, filter).await?))
+pub(super) async fn cancel_many(call: Call, filter: Filter) -> Result<Json<Many>, ApiError> {
+    let many = verbs::cancel_many(&call.service, &call.caller, filter).await?;
+    Ok(Json(many))
 }
 
-pub(super) async fn delete_many(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-) -> Result<Json<Many>, ApiError> {
-    let (filter, _) = filters::parse(query.as_deref(), &[])?;
-    Ok(Json(verbs::delete_many(&rest.service, filter).await?))
+pub(super) async fn delete_many(call: Call, filter: Filter) -> Result<Json<Many>, ApiError> {
+    let many = verbs::delete_many(&call.service, &call.caller, filter).await?;
+    Ok(Json(many))
 }
 
 /// One job with its version as entity tag.

@@ -3,7 +3,6 @@
 
 use std::{collections::BTreeMap, sync::LazyLock};
 
-use axum::{Json, extract::RawQuery};
 use schemars::{
     SchemaGenerator,
     generate::{Contract, SchemaSettings},
@@ -11,25 +10,16 @@ use schemars::{
 use serde_json::{Map, Value, json};
 use solver::error::Violation;
 
-use super::{
-    operations::{self, Answer, Content, Operation, Parameter},
-    request::Params,
-};
+use super::operations::{self, Answer, Content, Operation};
 use crate::{
     catalog::{Code, Kind},
-    error::ApiError,
+    parameters::{Description, Place},
 };
 
 /// The document; it does not change while the service runs.
 pub fn openapi() -> &'static Value {
     static DOCUMENT: LazyLock<Value> = LazyLock::new(document);
     &DOCUMENT
-}
-
-/// The API over REST.
-pub(super) async fn serve(RawQuery(query): RawQuery) -> Result<Json<&'static Value>, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    Ok(Json(openapi()))
 }
 
 /// Media type of errors, RFC 9457.
@@ -96,12 +86,7 @@ impl Schemas {
             "tags": [operation.group],
             "responses": {},
         });
-        let in_path = operation.variables().map(|name| {
-            let (schema, meaning) = operations::variable(operation.path, name);
-            json!({ "name": name, "in": "path", "required": true, "schema": schema, "description": meaning })
-        });
-        let others = operation.parameters.iter().map(parameter);
-        let parameters: Vec<Value> = in_path.chain(others).collect();
+        let parameters: Vec<Value> = operation.parameters.iter().map(parameter).collect();
         if !parameters.is_empty() {
             described["parameters"] = json!(parameters);
         }
@@ -128,7 +113,7 @@ impl Schemas {
             described["content"] = content(&mut self.answers, &answer.content, None);
         }
         for (header, always) in &answer.headers {
-            let Parameter {
+            let Description {
                 schema, meaning, ..
             } = header;
             described["headers"][header.name] =
@@ -165,13 +150,18 @@ impl Schemas {
     }
 }
 
-fn parameter(parameter: &Parameter) -> Value {
-    json!({
+fn parameter(parameter: &Description) -> Value {
+    let place: &str = parameter.place.into();
+    let mut described = json!({
         "name": parameter.name,
-        "in": parameter.place,
+        "in": place,
         "schema": parameter.schema,
         "description": parameter.meaning,
-    })
+    });
+    if parameter.place == Place::Path {
+        described["required"] = json!(true);
+    }
+    described
 }
 
 fn content(generator: &mut SchemaGenerator, body: &Content, example: Option<&Value>) -> Value {
@@ -227,6 +217,7 @@ fn error_schema(violation: &Value) -> Value {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::error::ApiError;
 
     fn names(schema: &Value, of: &str) -> Vec<String> {
         let fields = schema[of].as_object().into_iter().flatten();

@@ -1,43 +1,37 @@
 //! `/v1/jobs/{id}/plots/{plot}.svg`.
 
 use axum::{
-    extract::{RawQuery, State},
     http::{HeaderName, header},
     response::IntoResponse,
 };
-use files::plot::{Plot, Style};
+use files::plot::{Plot, Stress, Style, Theme};
 
-use super::{
-    Rest,
-    request::{JobPath, Params},
+use super::call::Call;
+use crate::{
+    error::ApiError,
+    job::JobId,
+    verbs::plots::{self as verbs, STRESS, THEME},
 };
-use crate::{error::ApiError, verbs::plots, violations};
 
 pub(super) async fn plot(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    path: JobPath,
+    call: Call,
+    id: JobId,
+    plot: Plot,
+    theme: Option<Theme>,
+    stress: Option<Stress>,
 ) -> Result<impl IntoResponse, ApiError> {
-    let plot: Option<Plot> = path
-        .plot
-        .strip_suffix(".svg")
-        .and_then(|name| name.parse().ok());
-    let Some(plot) = plot else {
-        return Err(ApiError::NotFound(format!(
-            "there is no plot {:?}; there are: mesh.svg, deformed.svg, profile.svg, convergence.svg",
-            violations::name(&path.plot)
-        )));
-    };
-    let known: &[&str] = match plot {
-        Plot::Deformed => &["theme", "stress"],
-        _ => &["theme"],
-    };
-    let params = Params::parse(query.as_deref(), known)?;
+    // it would have no effect on the others
+    if stress.is_some() && plot != Plot::Deformed {
+        return Err(ApiError::UnknownParameter {
+            name: STRESS.name.into(),
+            known: THEME.name.into(),
+        });
+    }
     let style = Style {
-        theme: choice(&params, "theme", "light or dark")?,
-        stress: choice(&params, "stress", "von_mises, xx, yy, zz or xy")?,
+        theme: theme.unwrap_or_default(),
+        stress: stress.unwrap_or_default(),
     };
-    let svg = plots::plot(&rest.service, path.id, plot, style).await?;
+    let svg = verbs::plot(&call.service, &call.caller, id, plot, style).await?;
     Ok((HEADERS, svg))
 }
 
@@ -49,19 +43,3 @@ const HEADERS: [(HeaderName, &str); 2] = [
         "default-src 'none'; style-src 'unsafe-inline'",
     ),
 ];
-
-/// One of the words that a type knows; its default when nothing was said.
-fn choice<T: std::str::FromStr + Default>(
-    params: &Params,
-    name: &'static str,
-    expected: &'static str,
-) -> Result<T, ApiError> {
-    let Some(text) = params.one(name) else {
-        return Ok(T::default());
-    };
-    text.parse().map_err(|_| ApiError::BadParameter {
-        name,
-        got: text.into(),
-        expected,
-    })
-}

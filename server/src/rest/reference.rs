@@ -1,9 +1,12 @@
-//! `docs/api.md`: the list of operations for people, with the tests that hold each to its word.
+//! `docs/api.md`: the list of operations for people.
 
 use std::fmt::Write;
 
-use super::operations::{self, Operation, Parameter};
-use crate::catalog::{Code, grpc_code_name};
+use super::operations::{self, Operation};
+use crate::{
+    catalog::{Code, grpc_code_name},
+    parameters::{Description, Place},
+};
 
 /// The whole page.
 pub fn reference() -> String {
@@ -49,13 +52,15 @@ fn section(out: &mut String, operation: &Operation) {
     if !operation.rpcs.is_empty() {
         let _ = writeln!(out, "- gRPC: {}", rpcs(operation));
     }
-    for Parameter {
+    let named = |parameter: &&Description| parameter.place != Place::Path;
+    for Description {
         place,
         name,
         meaning,
         ..
-    } in &operation.parameters
+    } in operation.parameters.iter().filter(named)
     {
+        let place: &str = place.into();
         let _ = writeln!(out, "- {place} `{name}`: {meaning}");
     }
     for answer in &operation.answers {
@@ -77,17 +82,11 @@ fn section(out: &mut String, operation: &Operation) {
         .map(|kind| format!("{} `{}`", kind.status.unwrap_or_default(), kind.code))
         .collect();
     let _ = writeln!(out, "- errors: {}", codes.join(", "));
-    let tests: Vec<String> = operation
-        .tests
-        .iter()
-        .map(|test| format!("`{test}`"))
-        .collect();
-    let _ = writeln!(out, "- tests: {}", tests.join(", "));
 }
 
 fn errors(out: &mut String) {
-    *out += "\n## Errors\n\n`signorini explain CODE` and `GET /v1/errors/{code}` say what each means. Those without a status \
-             are what jobs fail of.\n\n| code | HTTP | gRPC | title |\n|---|---|---|---|\n";
+    *out += "\n## Errors\n\n`signorini explain CODE` and `GET /v1/errors/{code}` explain each. Those without a status \
+             are reasons why jobs fail.\n\n| code | HTTP | gRPC | title |\n|---|---|---|---|\n";
     for kind in Code::ALL.map(Code::kind) {
         let status = kind
             .status

@@ -2,78 +2,56 @@
 
 use axum::{
     Json,
-    extract::{RawQuery, State},
-    http::{HeaderMap, StatusCode, header},
+    http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
 use serde_json::Value;
 
-use super::{
-    Rest,
-    request::{Params, TextPath, wants},
-};
+use super::{accept::wants, call::Call};
 use crate::{
+    caller::Caller,
     catalog::{Code, Kind},
     error::ApiError,
-    verbs::queue::{self as verbs, Caller, Info, QueueState},
-    violations,
+    parameters::{Variable, Words},
+    verbs::{
+        info::{self as about, Info},
+        queue::{self as verbs, QueueState},
+    },
 };
 
-pub(super) async fn queue(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-) -> Result<Json<QueueState>, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    Ok(Json(verbs::state(&rest.service)))
+pub(super) async fn queue(call: Call) -> Result<Json<QueueState>, ApiError> {
+    Ok(Json(verbs::state(&call.service, &call.caller)))
 }
 
-pub(super) async fn pause(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-) -> Result<Json<QueueState>, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    Ok(Json(verbs::pause(&rest.service).await?))
+pub(super) async fn pause(call: Call) -> Result<Json<QueueState>, ApiError> {
+    Ok(Json(verbs::pause(&call.service, &call.caller).await?))
 }
 
-pub(super) async fn resume(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-) -> Result<Json<QueueState>, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    Ok(Json(verbs::resume(&rest.service).await?))
+pub(super) async fn resume(call: Call) -> Result<Json<QueueState>, ApiError> {
+    Ok(Json(verbs::resume(&call.service, &call.caller).await?))
 }
 
-pub(super) async fn info(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-) -> Result<Json<Info>, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    Ok(Json(verbs::info(&rest.service)))
+pub(super) async fn info(call: Call) -> Result<Json<Info>, ApiError> {
+    Ok(Json(about::info(&call.service, &call.caller)))
 }
 
-pub(super) async fn me(RawQuery(query): RawQuery) -> Result<Json<Caller>, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    Ok(Json(verbs::caller()))
+pub(super) async fn me(call: Call) -> Result<Json<Caller>, ApiError> {
+    Ok(Json(call.caller))
 }
+
+/// A kind of error in a path.
+pub(super) const CODE: Variable<Words<Code>> = Variable {
+    name: "code",
+    kind: "error",
+    meaning: "The kind of error",
+    values: Words(|| Code::ALL.map(|code| (code.kind().code, code)).into()),
+};
 
 /// What a kind of error means: for programs, or as a page for people.
-pub(super) async fn error(
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    TextPath(code): TextPath,
-) -> Result<Response, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    let Some(found) = Code::parse(&code) else {
-        let known: Vec<&str> = Code::ALL.iter().map(|code| code.kind().code).collect();
-        return Err(ApiError::NotFound(format!(
-            "there is no error {:?}; there are: {}",
-            violations::name(&code),
-            known.join(", ")
-        )));
-    };
-    let kind = found.kind();
+pub(super) async fn error(call: Call, code: Code) -> Result<Response, ApiError> {
+    let kind = code.kind();
     let vary = [(header::VARY, "Accept")];
-    if wants(&headers, &["text/html"]) {
+    if wants(&call.headers, &["text/html"]) {
         let html = [
             (header::CONTENT_TYPE, "text/html; charset=utf-8"),
             (
@@ -109,28 +87,29 @@ fn page(kind: &Kind) -> String {
 }
 
 /// The JSON Schema of a problem.
-pub(super) async fn schema(RawQuery(query): RawQuery) -> Result<Json<Value>, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
+pub(super) async fn schema(_: Call) -> Result<Json<Value>, ApiError> {
     Ok(Json(files::schema()))
 }
 
+/// The API over REST.
+pub(super) async fn openapi(call: Call) -> Result<Json<&'static Value>, ApiError> {
+    Ok(Json((call.openapi)()))
+}
+
 /// The API over gRPC.
-pub(super) async fn proto(RawQuery(query): RawQuery) -> Result<impl IntoResponse, ApiError> {
+pub(super) async fn proto(_: Call) -> Result<impl IntoResponse, ApiError> {
     const TEXT: &str = include_str!("../../../proto/signorini/v1/signorini.proto");
-    Params::parse(query.as_deref(), &[])?;
     Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], TEXT))
 }
 
 /// The process is alive.
-pub(super) async fn livez() -> &'static str {
-    "ok\n"
+pub(super) async fn livez(_: Call) -> Result<&'static str, ApiError> {
+    Ok("ok\n")
 }
 
 /// The service takes jobs.
-pub(super) async fn readyz(
-    State(rest): State<Rest>,
-) -> Result<(StatusCode, &'static str), ApiError> {
-    rest.service.accepting()?;
-    rest.service.store.ping().await?;
+pub(super) async fn readyz(call: Call) -> Result<(StatusCode, &'static str), ApiError> {
+    call.service.accepting()?;
+    call.service.store.ping().await?;
     Ok((StatusCode::OK, "ok\n"))
 }

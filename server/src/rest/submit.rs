@@ -2,108 +2,104 @@
 
 use axum::{
     Json,
-    body::{Body, HttpBody},
-    extract::{RawQuery, State},
-    http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
+    http::{HeaderName, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    Rest,
-    bodies::{self, bare_problem, batch, submission},
+    bodies::{self, bare_problem, submission},
+    call::Call,
     events,
     jobs::{one, tag},
-    request::{JobPath, Params, idempotency_key, json_text, preferred_wait_s},
 };
 use crate::{
     error::ApiError,
     job::{Job, JobId},
     verbs::{
-        problems,
-        retry::{self, Changes},
-        submit::{self as verbs, Handed},
-        watch::{self, MAX_WAIT_S, Until},
+        key::Key,
+        problems::{self, Validation},
+        retry::{self as again, Changes},
+        submit::{self as verbs, Submitted},
+        watch::{self, Until},
     },
 };
 
-/// Seconds after which to look again for a job that was accepted.
-const LOOK_AGAIN_S: u64 = 1;
+/// Seconds after which to poll a job that was accepted.
+const POLL_AFTER_S: u64 = 1;
 
 pub(super) async fn create(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    body: Body,
+    call: Call,
+    key: Option<Key>,
+    wait_s: Option<u64>,
 ) -> Result<Response, ApiError> {
-    hand_in(rest, query, headers, body, None).await
+    submit(call, None, key, wait_s).await
 }
 
 pub(super) async fn put(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    path: JobPath,
-    body: Body,
+    call: Call,
+    id: JobId,
+    key: Option<Key>,
+    wait_s: Option<u64>,
 ) -> Result<Response, ApiError> {
-    hand_in(rest, query, headers, body, Some(path.id)).await
+    submit(call, Some(id), key, wait_s).await
 }
 
-async fn hand_in(
-    rest: Rest,
-    query: Option<String>,
-    headers: HeaderMap,
-    body: Body,
+async fn submit(
+    mut call: Call,
     id: Option<JobId>,
+    key: Option<Key>,
+    wait_s: Option<u64>,
 ) -> Result<Response, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    rest.service.accepting()?;
-    let key = idempotency_key(&headers)?;
-    let text = json_text(&headers, body, rest.service.max_body_bytes).await?;
-    let draft = rest.service.work(move || submission(&text)).await??;
-    let handed = verbs::create(&rest.service, draft, id, key).await?;
-    answer(&rest, &headers, handed, id.is_some()).await
+    call.service.accepting()?;
+    let text = call.json().await?;
+    let request = call.service.work(move || submission(&text)).await??;
+    let submitted = verbs::create(&call.service, &call.caller, request, id, key).await?;
+    answer(call, submitted, wait_s, id.is_some()).await
 }
 
 pub(super) async fn retry(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    path: JobPath,
-    body: Body,
+    mut call: Call,
+    id: JobId,
+    key: Option<Key>,
+    wait_s: Option<u64>,
 ) -> Result<Response, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    let key = idempotency_key(&headers)?;
-    let changes = match body.is_end_stream() {
-        false => bodies::retry(&json_text(&headers, body, rest.service.max_body_bytes).await?)?,
-        true => Changes::default(), // nothing was sent
+    let changes = match call.has_body() {
+        true => bodies::retry(&call.json().await?)?,
+        false => Changes::default(),
     };
-    let handed = retry::retry(&rest.service, path.id, changes, key).await?;
-    answer(&rest, &headers, handed, false).await
+    let submitted = again::retry(&call.service, &call.caller, id, changes, key).await?;
+    answer(call, submitted, wait_s, false).await
 }
 
 /// The job: at once, or when it is done, or as a stream of its events.
 async fn answer(
-    rest: &Rest,
-    headers: &HeaderMap,
-    handed: Handed<Job>,
+    call: Call,
+    submitted: Submitted<Job>,
+    wait_s: Option<u64>,
     named: bool,
 ) -> Result<Response, ApiError> {
-    let Handed {
+    let Call {
+        service, caller, ..
+    } = &call;
+    let Submitted {
         accepted: mut job,
         replayed,
-    } = handed;
-    if let Some(mut response) = events::wanted(headers, &rest.service, &job, 0) {
+    } = submitted;
+    if let Some(encoding) = events::wanted(&call.headers)
+        && let Some(events) = watch::watch(service, caller, job.id, 0).await?
+    {
+        let mut response = events::write(events, encoding);
         *response.status_mut() = StatusCode::ACCEPTED;
         set(&mut response, header::LOCATION, location(&job));
         set(&mut response, header::ETAG, tag(&job));
         note_replay(&mut response, replayed);
         return Ok(response);
     }
-    let wait_s = preferred_wait_s(headers).map(|seconds| seconds.min(MAX_WAIT_S as u64));
     if let Some(wait_s) = wait_s {
-        (job, _) = watch::wait(&rest.service, job.id, Until::Terminal, wait_s as f64).await?;
+        let ended = watch::wait(service, caller, job.id, Until::Terminal, wait_s as f64);
+        (job, _) = ended.await?;
     }
     let done = wait_s.is_some() && job.status.is_terminal();
     let status = match (named && replayed, done) {
@@ -120,7 +116,7 @@ async fn answer(
             set(&mut response, name, format!("wait={wait_s}"));
         }
         _ if status == StatusCode::ACCEPTED => {
-            set(&mut response, header::RETRY_AFTER, LOOK_AGAIN_S.to_string());
+            set(&mut response, header::RETRY_AFTER, POLL_AFTER_S.to_string());
         }
         _ => {}
     }
@@ -150,34 +146,24 @@ pub(super) struct Batch {
     jobs: Vec<Job>,
 }
 
-pub(super) async fn create_batch(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    body: Body,
-) -> Result<Response, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    rest.service.accepting()?;
-    let key = idempotency_key(&headers)?;
-    let text = json_text(&headers, body, rest.service.max_body_bytes).await?;
-    let drafts = rest.service.work(move || batch(&text)).await??;
-    let drafts = drafts.map_err(ApiError::InvalidProblem)?;
-    let Handed { accepted, replayed } = verbs::create_batch(&rest.service, drafts, key).await?;
-    let batch = Batch { jobs: accepted };
+pub(super) async fn create_batch(mut call: Call, key: Option<Key>) -> Result<Response, ApiError> {
+    call.service.accepting()?;
+    let text = call.json().await?;
+    let requests = call.service.work(move || bodies::batch(&text)).await??;
+    let requests = requests.map_err(ApiError::InvalidProblem)?;
+    let submitted = verbs::create_batch(&call.service, &call.caller, requests, key).await?;
+    let batch = Batch {
+        jobs: submitted.accepted,
+    };
     let mut response = (StatusCode::ACCEPTED, Json(batch)).into_response();
-    set(&mut response, header::RETRY_AFTER, LOOK_AGAIN_S.to_string());
-    note_replay(&mut response, replayed);
+    set(&mut response, header::RETRY_AFTER, POLL_AFTER_S.to_string());
+    note_replay(&mut response, submitted.replayed);
     Ok(response)
 }
 
-pub(super) async fn validate(
-    State(rest): State<Rest>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    body: Body,
-) -> Result<Json<problems::Judgement>, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    let text = json_text(&headers, body, rest.service.max_body_bytes).await?;
-    let problem = rest.service.work(move || bare_problem(&text)).await??;
-    Ok(Json(problems::validate(&rest.service, problem).await?))
+pub(super) async fn validate(mut call: Call) -> Result<Json<Validation>, ApiError> {
+    let text = call.json().await?;
+    let problem = call.service.work(move || bare_problem(&text)).await??;
+    let validation = problems::validate(&call.service, &call.caller, problem).await?;
+    Ok(Json(validation))
 }

@@ -93,7 +93,8 @@ pub enum GroupBy {
 }
 
 impl OrderBy {
-    pub(super) fn column(self) -> &'static str {
+    /// Its name, here and outside.
+    pub fn column(self) -> &'static str {
         match self {
             OrderBy::CreatedAt => "created_at",
             OrderBy::FinishedAt => "finished_at",
@@ -102,46 +103,14 @@ impl OrderBy {
 }
 
 impl Order {
-    /// What can be said.
-    pub const EXPECTED: &str = "created_at or finished_at, then desc (the default) or asc";
-
-    /// Reads `created_at`, `created_at asc`, `finished_at desc`, ….
-    pub fn parse(text: &str) -> Option<Order> {
-        let (by, direction) = text.split_once(' ').unwrap_or((text, "desc"));
-        let by = match by {
-            "created_at" => OrderBy::CreatedAt,
-            "finished_at" => OrderBy::FinishedAt,
-            _ => return None,
-        };
-        let descending = match direction {
-            "desc" => true,
-            "asc" => false,
-            _ => return None,
-        };
-        Some(Order { by, descending })
-    }
-
     /// Newest first.
     pub const NEWEST_FIRST: Order = Order {
         by: OrderBy::CreatedAt,
         descending: true,
     };
 
-    pub(super) fn direction(self) -> &'static str {
+    /// `desc` or `asc`.
+    pub fn direction(self) -> &'static str {
         if self.descending { "desc" } else { "asc" }
-    }
-}
-
-impl GroupBy {
-    /// What can be said.
-    pub const EXPECTED: &str = "status or owner";
-
-    /// Reads the word.
-    pub fn parse(word: &str) -> Option<GroupBy> {
-        match word {
-            "status" => Some(GroupBy::Status),
-            "owner" => Some(GroupBy::Owner),
-            _ => None,
-        }
     }
 }

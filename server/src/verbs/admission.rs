@@ -1,26 +1,22 @@
-//! How a job that was read becomes one that is queued: fingerprinted, checked in depth, handed to the queue.
-
-use std::sync::Arc;
+//! How a job that was read becomes one that is queued: fingerprinted, checked in depth, stored.
 
 use solver::{error::Violation, problem::Problem};
 use tracing::info;
 
 use super::{
     Service,
-    envelope::{Draft, Envelope},
+    envelope::{Envelope, JobRequest},
     meshes,
     problems::{self, Admitted},
 };
 use crate::{
+    caller::Caller,
     digest,
     error::ApiError,
     job::{Job, JobId},
     store::{Accepted, NewJob, RequestKey, StoreError, Submission},
-    violations::{Violations, shortened},
+    violations::Violations,
 };
-
-/// Longest key of a request, in characters.
-const MOST_KEY: usize = 255;
 
 /// A job that was read, but not yet checked in depth.
 pub(super) struct Prepared {
@@ -28,13 +24,14 @@ pub(super) struct Prepared {
     problem: Result<Problem, Vec<Violation>>,
     violations: Violations,
     pub(super) id: Option<JobId>,
-    /// Fingerprint of all that was handed in.
+    /// Fingerprint of all that was submitted.
     pub(super) payload: String,
 }
 
+/// Takes the fingerprint of a job.
 pub(super) async fn prepare(
     service: &Service,
-    (envelope, problem): Draft,
+    JobRequest { envelope, problem }: JobRequest,
     id: Option<JobId>,
 ) -> Result<Prepared, ApiError> {
     let violations = envelope.violations();
@@ -57,19 +54,21 @@ pub(super) async fn prepare(
         .await?
 }
 
-/// The jobs of a key that was used before, for the same request.
+/// The jobs of a key that this caller used before, for the same request.
 pub(super) async fn replayed(
     service: &Service,
+    caller: &Caller,
     key: Option<&RequestKey>,
 ) -> Result<Option<Vec<Job>>, ApiError> {
     match key {
         Some(key) if !key.payload.is_empty() => {
-            Ok(service.store.replay(&service.owner(), key).await?)
+            Ok(service.store.replay(caller.owner(), key).await?)
         }
         _ => Ok(None),
     }
 }
 
+/// Checks a job in depth.
 pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJob, ApiError> {
     let Prepared {
         envelope,
@@ -122,15 +121,17 @@ pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJo
     }
 }
 
-pub(super) async fn hand_in(
-    service: &Arc<Service>,
+/// Stores jobs in the queue of their owner, the caller; all or none.
+pub(super) async fn enqueue(
+    service: &Service,
+    caller: &Caller,
     jobs: Vec<NewJob>,
     key: Option<RequestKey>,
 ) -> Result<Accepted, ApiError> {
     let limit = service.max_queued;
     let hash = jobs.iter().find_map(|job| job.mesh.clone());
     let submission = Submission {
-        owner: service.owner(),
+        owner: caller.owner().to_owned(),
         jobs,
         key,
         max_queued: limit,
@@ -148,17 +149,4 @@ pub(super) async fn hand_in(
         info!(job.id = %job.id, job.input_hash, "job {} accepted", job.id);
     }
     Ok(accepted)
-}
-
-pub(super) fn checked_key(key: String) -> Result<String, ApiError> {
-    let length = key.chars().count();
-    if (1..=MOST_KEY).contains(&length) && !key.chars().any(char::is_control) {
-        Ok(key)
-    } else {
-        Err(ApiError::BadParameter {
-            name: "Idempotency-Key",
-            got: shortened(&key, 80),
-            expected: "1 … 255 characters, none of them a control character",
-        })
-    }
 }

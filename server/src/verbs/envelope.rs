@@ -1,4 +1,4 @@
-//! What is handed in beside a problem, and what is wrong with it.
+//! What is submitted beside a problem, and what is wrong with it.
 
 use std::collections::BTreeMap;
 
@@ -14,11 +14,11 @@ use crate::{
 };
 
 /// Longest time that a job may run, in seconds: a week.
-const MOST_TIMEOUT_S: f64 = 7.0 * 86_400.0;
+const MAX_TIMEOUT_S: f64 = 7.0 * 86_400.0;
 /// Longest time that it may wait: thirty days.
-const MOST_QUEUE_TTL_S: f64 = 30.0 * 86_400.0;
+const MAX_QUEUE_TTL_S: f64 = 30.0 * 86_400.0;
 
-/// What a client hands in beside the problem.
+/// What a client submits beside the problem.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Envelope {
     /// A name for people.
@@ -33,8 +33,14 @@ pub struct Envelope {
     pub cache: Cache,
 }
 
-/// A job as it is handed in: the problem, or what is wrong with it.
-pub type Draft = (Envelope, Result<Problem, Vec<Violation>>);
+/// A job as it is asked for.
+#[derive(Clone, Debug)]
+pub struct JobRequest {
+    /// What comes beside the problem.
+    pub envelope: Envelope,
+    /// The problem, or all that is wrong with it.
+    pub problem: Result<Problem, Vec<Violation>>,
+}
 
 impl Envelope {
     /// What is out of bounds.
@@ -48,8 +54,8 @@ impl Envelope {
             queue_ttl_s,
         } = self.limits;
         for (name, seconds, most) in [
-            ("timeout_s", timeout_s, MOST_TIMEOUT_S),
-            ("queue_ttl_s", queue_ttl_s, MOST_QUEUE_TTL_S),
+            ("timeout_s", timeout_s, MAX_TIMEOUT_S),
+            ("queue_ttl_s", queue_ttl_s, MAX_QUEUE_TTL_S),
         ] {
             if !(seconds > 0.0 && seconds <= most) {
                 found.add(Violation {

@@ -8,9 +8,10 @@ use solver::solution::Fields;
 
 use super::{
     Service,
-    results::{nothing_of, with_result},
+    results::{no_result, with_result},
 };
 use crate::{
+    caller::Caller,
     error::ApiError,
     formats::{self, Format},
     job::JobId,
@@ -26,12 +27,16 @@ pub struct StoredFields {
 }
 
 /// The fields at all nodes as they are stored.
-pub async fn fields(service: &Service, id: JobId) -> Result<StoredFields, ApiError> {
-    let mut found = with_result(service, id).await?;
+pub async fn fields(
+    service: &Service,
+    caller: &Caller,
+    id: JobId,
+) -> Result<StoredFields, ApiError> {
+    let mut found = with_result(service, caller, id).await?;
     let result_key = found.job.result_key;
     match found.part_info("fields").await? {
         Some(info) => Ok(StoredFields { info, result_key }),
-        None => Err(nothing_of(&found.job)),
+        None => Err(no_result(&found.job)),
     }
 }
 
@@ -61,13 +66,14 @@ impl StoredFields {
 /// The same in another format, at once.
 pub async fn converted_fields(
     service: &Service,
+    caller: &Caller,
     id: JobId,
     format: Format,
 ) -> Result<Vec<u8>, ApiError> {
     let load = async {
-        let mut found = with_result(service, id).await?;
+        let mut found = with_result(service, caller, id).await?;
         let fields = found.part("fields").await?;
-        fields.ok_or_else(|| nothing_of(&found.job))
+        fields.ok_or_else(|| no_result(&found.job))
     };
     let written = service.work_on(load, move |stored| {
         let fields: Fields = serde_json::from_slice(&stored).map_err(|error| error.to_string())?;

@@ -4,26 +4,36 @@ use solver::solution::Iteration;
 
 use super::{Service, jobs};
 use crate::{
+    caller::Caller,
     error::ApiError,
     event::Payload,
     job::{JobId, ResultAvailable},
+    parameters::{Parameter, Whole},
     store::Snapshot,
 };
 
+/// How many rows to give; the first and the last one are always among them.
+pub const MAX_POINTS: Parameter<Whole> = Parameter {
+    name: "max_points",
+    meaning: "At most so many rows; the first and the last are kept",
+    values: Whole(2..=i64::MAX),
+};
+
 /// The rows of the last start of a job, at most so many of them: those of its result, or as long as
-/// there is none those that its watchers were told.
+/// there is none those of its events.
 pub async fn history(
     service: &Service,
+    caller: &Caller,
     id: JobId,
-    max_points: Option<usize>,
+    max_points: Option<i64>,
 ) -> Result<Vec<Iteration>, ApiError> {
     let load = async {
-        let mut found = jobs::snapshot(service, id).await?;
+        let mut found = jobs::snapshot(service, caller, id).await?;
         StoredHistory::load(service, &mut found).await
     };
     let mut rows = service.work_on(load, StoredHistory::read).await??;
     if let Some(most) = max_points {
-        thin(&mut rows, most);
+        downsample(&mut rows, usize::try_from(most).unwrap_or(usize::MAX));
     }
     Ok(rows)
 }
@@ -32,8 +42,8 @@ pub async fn history(
 pub(super) enum StoredHistory {
     /// With the result.
     Whole(Vec<u8>),
-    /// Row by row, as it was told.
-    Told(Vec<String>),
+    /// Row by row, as events.
+    Events(Vec<String>),
 }
 
 impl StoredHistory {
@@ -42,7 +52,7 @@ impl StoredHistory {
         found: &mut Snapshot,
     ) -> Result<StoredHistory, ApiError> {
         let job = &found.job;
-        // of a job that runs, its watchers were told more than its finished load steps hold
+        // of a job that runs there are more events than its finished load steps hold
         if job.status.is_terminal() && job.result_available != ResultAvailable::None {
             let whole = found.part("history").await?;
             if let Some(whole) = whole {
@@ -50,14 +60,14 @@ impl StoredHistory {
             }
         }
         let job = &found.job;
-        let told = service.store.iterations(job.key, job.attempt).await?;
-        Ok(StoredHistory::Told(told))
+        let lines = service.store.iterations(job.key, job.attempt).await?;
+        Ok(StoredHistory::Events(lines))
     }
 
     pub(super) fn read(self) -> Result<Vec<Iteration>, ApiError> {
         let rows = match self {
             StoredHistory::Whole(bytes) => serde_json::from_slice(&bytes),
-            StoredHistory::Told(lines) => lines.iter().map(|line| row(line)).collect(),
+            StoredHistory::Events(lines) => lines.iter().map(|line| row(line)).collect(),
         };
         rows.map_err(ApiError::internal)
     }
@@ -74,7 +84,7 @@ fn row(line: &str) -> serde_json::Result<Iteration> {
 }
 
 /// Leaves at most `most` rows (2 or more), evenly spread, the first and the last among them.
-fn thin(rows: &mut Vec<Iteration>, most: usize) {
+fn downsample(rows: &mut Vec<Iteration>, most: usize) {
     let count = rows.len();
     if count <= most || most < 2 {
         return;
@@ -102,7 +112,7 @@ mod tests {
             for most in 2..45 {
                 let all: Vec<u32> = (1..=count).collect();
                 let mut rows: Vec<_> = all.iter().map(|k| fake::iteration(*k)).collect();
-                thin(&mut rows, most);
+                downsample(&mut rows, most);
                 let kept: Vec<u32> = rows.iter().map(|row| row.k).collect();
                 assert_eq!(kept.len(), most.min(all.len()), "{count} {most}");
                 assert_eq!((kept.first(), kept.last()), (all.first(), all.last()));
@@ -112,9 +122,9 @@ mod tests {
     }
 
     #[test]
-    fn a_told_iteration_is_the_row_itself() {
-        let told = Payload::Iteration(fake::iteration(3));
-        let line = serde_json::to_string(&told).unwrap();
+    fn the_event_of_an_iteration_holds_the_row_itself() {
+        let event = Payload::Iteration(fake::iteration(3));
+        let line = serde_json::to_string(&event).unwrap();
         assert_eq!(row(&line).unwrap(), fake::iteration(3));
         assert!(row(r#"{"type":"stage","stage":"mesh"}"#).is_err());
     }

@@ -14,19 +14,56 @@ use solver::{error::Violation, mesh::Mesh};
 use tokio::io::{AsyncReadExt, AsyncSeekExt, AsyncWriteExt};
 use tracing::info;
 
-use super::{Service, page, service::detached};
+use super::{
+    Service,
+    page::{Page, Paging},
+    service::detached,
+};
 use crate::{
+    caller::Caller,
     digest,
     error::ApiError,
     mesh::MeshInfo,
+    parameters::{Values, Variable},
     store::{Cursor, PIECE_BYTES, PIECES_PER_COMMIT, Removal, StoredMesh},
     violations,
 };
+
+/// A stored mesh in a path.
+pub const HASH: Variable<Hashes> = Variable {
+    name: "hash",
+    kind: "mesh",
+    meaning: "The mesh",
+    values: Hashes,
+};
+
+/// The names of meshes: the hashes of their files.
+#[derive(Clone, Copy, Debug)]
+pub struct Hashes;
+
+impl Values for Hashes {
+    type Value = String;
+
+    fn schema(&self) -> serde_json::Value {
+        serde_json::json!({ "type": "string", "pattern": "^sha256:[0-9a-f]{64}$" })
+    }
+
+    fn expected(&self) -> String {
+        "sha256: and 64 digits from 0 to f, in lower case".into()
+    }
+
+    fn read(&self, text: &str) -> Option<String> {
+        let digits = text.strip_prefix("sha256:")?;
+        let digit = |byte: u8| matches!(byte, b'0'..=b'9' | b'a'..=b'f');
+        (digits.len() == 64 && digits.bytes().all(digit)).then(|| text.to_owned())
+    }
+}
 
 /// Stores a mesh file that arrives in pieces, and says whether it is new. The file streams to the disk
 /// and from there through the reader: only the parsed mesh is ever in memory.
 pub async fn upload(
     service: &Arc<Service>,
+    _caller: &Caller,
     mut pieces: impl Stream<Item = Result<impl AsRef<[u8]>, ApiError>> + Unpin,
 ) -> Result<(MeshInfo, bool), ApiError> {
     service.accepting()?;
@@ -140,8 +177,8 @@ fn unwritten(error: std::io::Error) -> ApiError {
     }
 }
 
-/// What is said of a mesh.
-pub async fn get(service: &Service, hash: &str) -> Result<MeshInfo, ApiError> {
+/// A stored mesh, without its nodes and elements.
+pub async fn get(service: &Service, _caller: &Caller, hash: &str) -> Result<MeshInfo, ApiError> {
     let found = service.store.mesh(hash).await?;
     found.ok_or_else(|| unknown(hash))
 }
@@ -150,43 +187,28 @@ fn unknown(hash: &str) -> ApiError {
     ApiError::NotFound(format!("there is no mesh {:?}", violations::name(hash)))
 }
 
-/// A page of meshes, newest first.
-#[derive(Debug)]
-pub struct Page {
-    /// The meshes.
-    pub meshes: Vec<MeshInfo>,
-    /// Where the next page begins; none after the last.
-    pub next: Option<String>,
-}
-
 /// The one list of meshes that there is, for its page tokens.
 const LIST: &str = "meshes";
 
 /// Lists meshes, newest first.
 pub async fn list(
     service: &Service,
-    page_size: i64,
-    page_token: Option<&str>,
-) -> Result<Page, ApiError> {
-    let before = page_token
-        .map(|token| page::cursor(token, LIST).ok_or(ApiError::BadPageToken))
-        .transpose()?;
-    let before = before.map(|cursor| cursor.key);
-    let mut meshes = service.store.meshes(before, page_size + 1).await?;
-    let more = meshes.len() as i64 > page_size;
-    meshes.truncate(page_size as usize);
-    let last = meshes.last().filter(|_| more);
-    let after = |mesh: &StoredMesh| Cursor {
+    _caller: &Caller,
+    paging: &Paging,
+) -> Result<Page<MeshInfo>, ApiError> {
+    let before = paging.cursor(LIST)?.map(|cursor| cursor.key);
+    let meshes = service.store.meshes(before, paging.limit()).await?;
+    let at = |mesh: &StoredMesh| Cursor {
         micros: mesh.info.created_at.micros(),
         key: mesh.key,
     };
-    let next = last.map(|mesh| page::token(after(mesh), LIST));
-    let meshes = meshes.into_iter().map(|mesh| mesh.info).collect();
-    Ok(Page { meshes, next })
+    let Page { items, next } = paging.page(LIST, meshes, at);
+    let items = items.into_iter().map(|mesh| mesh.info).collect();
+    Ok(Page { items, next })
 }
 
 /// Removes a mesh that no waiting or running job needs.
-pub async fn delete(service: &Arc<Service>, hash: &str) -> Result<(), ApiError> {
+pub async fn delete(service: &Arc<Service>, _caller: &Caller, hash: &str) -> Result<(), ApiError> {
     let (service, hash) = (service.clone(), hash.to_owned());
     detached(async move {
         match service.store.remove_mesh(&hash).await? {
@@ -199,8 +221,8 @@ pub async fn delete(service: &Arc<Service>, hash: &str) -> Result<(), ApiError> 
 }
 
 /// The mesh that a problem names, or the violation that there is none.
-pub async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mesh), ApiError> {
-    // who has no place yet holds no mesh
+pub(super) async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mesh), ApiError> {
+    // who waits for a thread holds no mesh yet
     let load = async {
         let found = match service.store.mesh(hash).await? {
             Some(info) => service
@@ -220,7 +242,7 @@ pub async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mesh), Api
 }
 
 /// What is said where a problem names a mesh that is not there.
-pub fn missing(hash: &str) -> Violation {
+pub(super) fn missing(hash: &str) -> Violation {
     Violation {
         pointer: format!("{}/mesh/stored", violations::AT),
         reason: "unknown_mesh".to_owned(),

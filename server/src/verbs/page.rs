@@ -1,21 +1,92 @@
-//! Page tokens: where a list goes on. Opaque to clients, and of no use for another list.
+//! Lists in pages, and their tokens: where a list goes on. A token is opaque to clients, and of no use for another
+//! list.
 
 use sha2::{Digest, Sha256};
 
 use crate::{
     digest::hex,
+    error::ApiError,
     job::Job,
+    parameters::{Parameter, Text, Whole},
     store::{Cursor, Filter, Order, OrderBy},
 };
 
+/// How much of a list is asked for.
+pub const PAGE_SIZE: Parameter<Whole> = Parameter {
+    name: "page_size",
+    meaning: "Most on a page; absent: 50",
+    values: Whole(1..=MAX_PAGE_SIZE),
+};
+/// Most on a page.
+pub const MAX_PAGE_SIZE: i64 = 1000;
+const DEFAULT_PAGE_SIZE: i64 = 50;
+
+/// Which page of a list is asked for.
+pub const PAGE_TOKEN: Parameter<Text> = Parameter {
+    name: "page_token",
+    meaning: "The next_page_token of the page before",
+    values: Text,
+};
+
+/// What part of a list is asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Paging {
+    /// Most on the page.
+    pub size: Option<i64>,
+    /// Where it begins; absent or empty: at the start of the list.
+    pub token: Option<String>,
+}
+
+/// A part of a list.
+#[derive(Debug)]
+pub struct Page<T> {
+    /// What is on it.
+    pub items: Vec<T>,
+    /// Where the next page begins; none after the last.
+    pub next: Option<String>,
+}
+
+impl Paging {
+    /// Where the page of this list begins.
+    pub(super) fn cursor(&self, list: &str) -> Result<Option<Cursor>, ApiError> {
+        let token = self.token.as_deref().filter(|token| !token.is_empty());
+        token
+            .map(|token| cursor(token, list).ok_or(ApiError::BadPageToken))
+            .transpose()
+    }
+
+    /// How many to ask the store for: one more than the page holds tells whether there is another.
+    pub(super) fn limit(&self) -> i64 {
+        self.size() + 1
+    }
+
+    /// The page of this list, of so many found. `at` gives the place of one in the list.
+    pub(super) fn page<T>(
+        &self,
+        list: &str,
+        mut found: Vec<T>,
+        at: impl Fn(&T) -> Cursor,
+    ) -> Page<T> {
+        let more = found.len() as i64 > self.size();
+        found.truncate(self.size() as usize);
+        let last = found.last().filter(|_| more);
+        let next = last.map(|last| token(at(last), list));
+        Page { items: found, next }
+    }
+
+    fn size(&self) -> i64 {
+        self.size.unwrap_or(DEFAULT_PAGE_SIZE)
+    }
+}
+
 /// What tells a list of jobs from others: its filters and its order, whatever the order of statuses and labels.
-pub fn list_of_jobs(filter: &Filter, order: Order) -> String {
+pub(super) fn list_of_jobs(filter: &Filter, order: Order) -> String {
     let filter = filter.clone().tidied();
     format!("jobs {filter:?} {order:?}")
 }
 
 /// The place right after a job in a list of that order.
-pub fn after(job: &Job, order: Order) -> Cursor {
+pub(super) fn after(job: &Job, order: Order) -> Cursor {
     let time = match order.by {
         OrderBy::CreatedAt => Some(job.created_at),
         OrderBy::FinishedAt => job.finished_at,
@@ -27,13 +98,13 @@ pub fn after(job: &Job, order: Order) -> Cursor {
 }
 
 /// The token for what comes after the cursor in this list.
-pub fn token(cursor: Cursor, list: &str) -> String {
+fn token(cursor: Cursor, list: &str) -> String {
     let Cursor { micros, key } = cursor;
     format!("{micros:016x}{key:016x}{}", seal(cursor, list))
 }
 
 /// Reads a token for this list; none if it is not one.
-pub fn cursor(token: &str, list: &str) -> Option<Cursor> {
+fn cursor(token: &str, list: &str) -> Option<Cursor> {
     let (micros, rest) = token.split_at_checked(16)?;
     let (key, _) = rest.split_at_checked(16)?;
     let cursor = Cursor {

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use files::plot::{self, Parts, Plot, Style};
+use files::plot::{self, Parts, Plot, Stress, Style, Theme};
 use serde::de::DeserializeOwned;
 use solver::{
     mesh::Mesh,
@@ -12,24 +12,64 @@ use solver::{
 
 use super::{Service, history::StoredHistory, jobs, results};
 use crate::{
+    caller::Caller,
     error::ApiError,
     job::{Job, JobId},
+    parameters::{Parameter, Variable, Words},
     store::ProfilePoints,
+};
+
+/// A figure in a path.
+pub const PLOT: Variable<Words<Plot>> = Variable {
+    name: "plot",
+    kind: "plot",
+    meaning: "Which figure",
+    values: Words(|| {
+        vec![
+            ("mesh.svg", Plot::Mesh),
+            ("deformed.svg", Plot::Deformed),
+            ("profile.svg", Plot::Profile),
+            ("convergence.svg", Plot::Convergence),
+        ]
+    }),
+};
+
+/// The colours of a figure.
+pub const THEME: Parameter<Words<Theme>> = Parameter {
+    name: "theme",
+    meaning: "Its colours; absent: light",
+    values: Words(|| vec![("light", Theme::Light), ("dark", Theme::Dark)]),
+};
+
+/// The stress that a deformed body is coloured by.
+pub const STRESS: Parameter<Words<Stress>> = Parameter {
+    name: "stress",
+    meaning: "What colours deformed.svg, and only that; absent: von_mises",
+    values: Words(|| {
+        vec![
+            ("von_mises", Stress::VonMises),
+            ("xx", Stress::Xx),
+            ("yy", Stress::Yy),
+            ("zz", Stress::Zz),
+            ("xy", Stress::Xy),
+        ]
+    }),
 };
 
 /// One figure as SVG, drawn from what the store keeps. Only the parts that it needs are read.
 pub async fn plot(
     service: &Arc<Service>,
+    caller: &Caller,
     id: JobId,
     plot: Plot,
     style: Style,
 ) -> Result<String, ApiError> {
-    // who has no place yet holds nothing
+    // who waits for a thread holds nothing yet
     let load = async {
         let mut found = match plot {
             // of the problem and of the iteration alone: there while the job waits or runs
-            Plot::Mesh | Plot::Convergence => jobs::snapshot(service, id).await?,
-            Plot::Profile | Plot::Deformed => results::with_result(service, id).await?,
+            Plot::Mesh | Plot::Convergence => jobs::snapshot(service, caller, id).await?,
+            Plot::Profile | Plot::Deformed => results::with_result(service, caller, id).await?,
         };
         let mut columns: Vec<(String, Vec<u8>)> = vec![];
         if matches!(plot, Plot::Profile | Plot::Deformed) {
@@ -49,7 +89,7 @@ pub async fn plot(
         let job = found.job.clone();
         drop(found);
         if plot == Plot::Deformed && fields.is_none() {
-            return Err(results::nothing_of(&job));
+            return Err(results::no_result(&job));
         }
         let store = &service.store;
         let stored = store.problem(job.key).await?;
@@ -78,7 +118,7 @@ pub async fn plot(
         }
         let history: Vec<Iteration> = history.map_or(Ok(vec![]), StoredHistory::read)?;
         if plot == Plot::Convergence && history.is_empty() {
-            return Err(results::nothing_of(&job));
+            return Err(results::no_result(&job));
         }
         let fields = fields.map_or(Ok(Fields::default()), |bytes| read(&bytes))?;
         let stored: Option<Mesh> = stored

@@ -1,4 +1,4 @@
-//! Judging a problem before it becomes a job.
+//! Checking a problem before it becomes a job.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -6,15 +6,16 @@ use solver::{Estimate, error::Violation, mesh::Mesh, problem::Problem, solution:
 
 use super::{Service, meshes};
 use crate::{
+    caller::Caller,
     digest,
     error::{ApiError, count, size},
     mesh::MeshInfo,
     violations::{AT, prefixed},
 };
 
-/// What there is to say about a problem.
+/// What was found when a problem was checked.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct Judgement {
+pub struct Validation {
     /// It would be accepted.
     pub valid: bool,
     /// Everything that is wrong with it.
@@ -27,29 +28,30 @@ pub struct Judgement {
     pub input_hash: Option<String>,
 }
 
-/// Judges a problem and stores nothing. An invalid one is an answer too, not an error.
+/// Checks a problem and stores nothing. That it is invalid is an answer, not an error.
 pub async fn validate(
     service: &Service,
+    _caller: &Caller,
     problem: Result<Problem, Vec<Violation>>,
-) -> Result<Judgement, ApiError> {
+) -> Result<Validation, ApiError> {
     let problem = match problem {
         Ok(problem) => problem,
-        Err(violations) => return Ok(Judgement::unread(violations)),
+        Err(violations) => return Ok(Validation::unread(violations)),
     };
     let budget_bytes = service.memory_budget_bytes;
     let stored = match stored(service, &problem).await {
         Err(ApiError::InvalidProblem(violations)) => {
-            return Ok(Judgement::unread(violations));
+            return Ok(Validation::unread(violations));
         }
         stored => stored?,
     };
-    let judge = move || {
+    let check = move || {
         let estimate = estimate(&problem, stored.as_ref());
-        let judged = match estimate.memory_bytes > budget_bytes {
+        let checked = match estimate.memory_bytes > budget_bytes {
             true => Err(vec![too_large(&estimate, budget_bytes)]),
             false => check(&problem, stored),
         };
-        let (warnings, violations) = match judged {
+        let (warnings, violations) = match checked {
             Ok(warnings) => (warnings, vec![]),
             Err(violations) => (vec![], violations),
         };
@@ -57,7 +59,7 @@ pub async fn validate(
             pointer: format!("{AT}{}", warning.pointer),
             ..warning
         };
-        Judgement {
+        Validation {
             valid: violations.is_empty(),
             violations,
             warnings: warnings.into_iter().map(at).collect(),
@@ -65,12 +67,12 @@ pub async fn validate(
             input_hash: digest::input_hash(&problem).ok(),
         }
     };
-    service.work(judge).await
+    service.work(check).await
 }
 
-impl Judgement {
-    fn unread(violations: Vec<Violation>) -> Judgement {
-        Judgement {
+impl Validation {
+    fn unread(violations: Vec<Violation>) -> Validation {
+        Validation {
             valid: false,
             violations,
             warnings: vec![],
@@ -92,9 +94,9 @@ fn too_large(estimate: &Estimate, budget_bytes: u64) -> Violation {
     }
 }
 
-/// A problem that was found good, as it is stored.
+/// A problem that was found valid, as it is stored.
 #[derive(Debug)]
-pub struct Admitted {
+pub(super) struct Admitted {
     /// The title, which is the job's.
     pub title: Option<String>,
     /// Fingerprint of the rest.
@@ -116,8 +118,8 @@ async fn stored(
     }
 }
 
-/// Admits a problem that is affordable and means something.
-pub async fn admit(service: &Service, mut problem: Problem) -> Result<Admitted, ApiError> {
+/// Admits a problem that is valid and within the memory budget.
+pub(super) async fn admit(service: &Service, mut problem: Problem) -> Result<Admitted, ApiError> {
     let budget_bytes = service.memory_budget_bytes;
     let stored = stored(service, &problem).await?;
     let admit = move || {

@@ -1,5 +1,6 @@
 //! Columns along a contact boundary.
 
+use serde_json::json;
 use solver::solution::ContactProfile;
 
 use super::{
@@ -7,16 +8,19 @@ use super::{
     results::{StepResult, with_result},
 };
 use crate::{
+    caller::Caller,
     error::ApiError,
     job::JobId,
+    parameters::{Parameter, Text, Values, Variable, Whole},
     store::{ProfilePoints, Snapshot},
     violations,
 };
 
 /// Where a profile has its values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Points {
     /// At the nodes of the boundary.
+    #[default]
     Nodes,
     /// Where friction acts, which is what forces and peaks are made of.
     Friction,
@@ -24,18 +28,56 @@ pub enum Points {
     Spaced(usize),
 }
 
-impl Points {
-    /// What can be said.
-    pub const EXPECTED: &str = "nodes, friction, or a whole number from 2 to 100000";
+/// A contact boundary in a path.
+pub const BOUNDARY: Variable<Text> = Variable {
+    name: "boundary",
+    kind: "boundary",
+    meaning: "Name of a contact boundary",
+    values: Text,
+};
 
-    /// Reads `nodes`, `friction` or a number.
-    pub fn parse(text: &str) -> Option<Points> {
+/// A load step.
+pub const STEP: Parameter<Text> = Parameter {
+    name: "step",
+    meaning: "A load step, by its name or its number from 0; absent: the last",
+    values: Text,
+};
+
+/// Where the values are wanted.
+pub const POINTS: Parameter<Places> = Parameter {
+    name: "points",
+    meaning: "Where: at the nodes, where friction acts, or at so many evenly spaced places; absent: nodes",
+    values: Places {
+        spaced: Whole(2..=100_000),
+    },
+};
+
+/// The places that can be asked for.
+#[derive(Clone, Debug)]
+pub struct Places {
+    /// How many evenly spaced ones.
+    pub spaced: Whole,
+}
+
+impl Values for Places {
+    type Value = Points;
+
+    fn schema(&self) -> serde_json::Value {
+        let words = json!({ "type": "string", "enum": ["nodes", "friction"] });
+        json!({ "anyOf": [words, self.spaced.schema()] })
+    }
+
+    fn expected(&self) -> String {
+        format!("nodes, friction, or {}", self.spaced.expected())
+    }
+
+    fn read(&self, text: &str) -> Option<Points> {
         match text {
             "nodes" => Some(Points::Nodes),
             "friction" => Some(Points::Friction),
-            _ => {
-                let count = text.parse().ok().filter(|n| (2..=100_000).contains(n));
-                count.map(Points::Spaced)
+            count => {
+                let count = self.spaced.read(count)?;
+                Some(Points::Spaced(usize::try_from(count).ok()?))
             }
         }
     }
@@ -45,12 +87,13 @@ impl Points {
 /// number from 0.
 pub async fn profile(
     service: &Service,
+    caller: &Caller,
     id: JobId,
     boundary: &str,
     step: Option<&str>,
     points: Points,
 ) -> Result<ContactProfile, ApiError> {
-    let mut found = with_result(service, id).await?;
+    let mut found = with_result(service, caller, id).await?;
     let step = match step {
         None => None,
         Some(wanted) => Some(step_number(&steps(&mut found).await?, wanted, id)?),

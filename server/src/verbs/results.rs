@@ -5,13 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use super::{Service, jobs};
 use crate::{
+    caller::Caller,
     error::ApiError,
     job::{Job, JobId, ResultAvailable},
     run::Summary,
     store::Snapshot,
 };
 
-/// What is said of one load step.
+/// The summary of one load step.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct StepResult {
     /// Its name in the problem, or its number from 0.
@@ -34,9 +35,9 @@ pub struct JobResult {
 }
 
 /// The scalars of a job that has some.
-pub async fn result(service: &Service, id: JobId) -> Result<JobResult, ApiError> {
+pub async fn result(service: &Service, caller: &Caller, id: JobId) -> Result<JobResult, ApiError> {
     let load = async {
-        let mut found = with_result(service, id).await?;
+        let mut found = with_result(service, caller, id).await?;
         let summary = found.part("summary").await?;
         let summary = summary.ok_or_else(|| ApiError::internal(format!("{id} has no summary")))?;
         let steps = found.part("steps").await?;
@@ -54,17 +55,21 @@ pub async fn result(service: &Service, id: JobId) -> Result<JobResult, ApiError>
 }
 
 /// The job, if it has something to show: at its end, or of finished load steps while it runs.
-pub(super) async fn with_result(service: &Service, id: JobId) -> Result<Snapshot, ApiError> {
-    let found = jobs::snapshot(service, id).await?;
+pub(super) async fn with_result(
+    service: &Service,
+    caller: &Caller,
+    id: JobId,
+) -> Result<Snapshot, ApiError> {
+    let found = jobs::snapshot(service, caller, id).await?;
     match found.job.result_available {
         ResultAvailable::Partial | ResultAvailable::Final => Ok(found),
-        ResultAvailable::None => Err(nothing_of(&found.job)),
+        ResultAvailable::None => Err(no_result(&found.job)),
     }
 }
 
 /// There is nothing to show: not yet, or not any more. A job that was canceled, or still runs, has history and
 /// profiles, but no fields.
-pub(super) fn nothing_of(job: &Job) -> ApiError {
+pub(super) fn no_result(job: &Job) -> ApiError {
     match job.status.is_terminal() {
         true => ApiError::NoResult(job.status.as_str()),
         false => ApiError::ResultNotReady(job.status.as_str()),

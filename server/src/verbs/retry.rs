@@ -7,13 +7,15 @@ use solver::problem::Problem;
 
 use super::{
     Service,
-    admission::{admit, checked_key, hand_in, prepare, replayed},
-    envelope::Envelope,
+    admission::{admit, enqueue, prepare, replayed},
+    envelope::{Envelope, JobRequest},
     jobs,
+    key::Key,
     service::detached,
-    submit::{Handed, only},
+    submit::{Submitted, only},
 };
 use crate::{
+    caller::Caller,
     digest,
     error::ApiError,
     job::{Cache, Job, JobId, Limits},
@@ -31,29 +33,29 @@ pub struct Changes {
     pub priority: Option<i32>,
 }
 
-/// Tries a job that has ended again: the same problem and envelope as a new job, solved anew.
+/// Submits the problem of a job that has ended again, with the same envelope, as a new job that is solved anew.
 pub async fn retry(
     service: &Arc<Service>,
+    caller: &Caller,
     id: JobId,
     changes: Changes,
-    key: Option<String>,
-) -> Result<Handed<Job>, ApiError> {
+    key: Option<Key>,
+) -> Result<Submitted<Job>, ApiError> {
     service.accepting()?;
-    let key = key.map(checked_key).transpose()?;
-    let service = service.clone();
+    let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
         let key = match key {
             None => None,
-            Some(key) => {
+            Some(Key(key)) => {
                 let payload =
                     digest::of_json(&("retry", id, changes)).map_err(ApiError::internal)?;
                 Some(RequestKey { key, payload })
             }
         };
-        if let Some(old) = replayed(&service, key.as_ref()).await? {
+        if let Some(old) = replayed(&service, &caller, key.as_ref()).await? {
             return only(old, true);
         }
-        let job = jobs::get(&service, id).await?;
+        let job = jobs::get(&service, &caller, id).await?;
         if !job.status.is_terminal() {
             return Err(ApiError::JobActive(job.status.as_str()));
         }
@@ -83,12 +85,13 @@ pub async fn retry(
         };
         let problem = service.work(move || files::parse(&problem)).await?;
         let problem = problem.map(|problem| Problem { title, ..problem });
-        let prepared = prepare(&service, (envelope, problem), None).await?;
+        let request = JobRequest { envelope, problem };
+        let prepared = prepare(&service, request, None).await?;
         let new = NewJob {
             parent: Some(id),
             ..admit(&service, prepared).await?
         };
-        let Accepted { jobs, replayed, .. } = hand_in(&service, vec![new], key).await?;
+        let Accepted { jobs, replayed, .. } = enqueue(&service, &caller, vec![new], key).await?;
         only(jobs, replayed)
     })
     .await

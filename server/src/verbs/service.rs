@@ -5,7 +5,6 @@ use std::{path::PathBuf, sync::Arc};
 use tokio::sync::Semaphore;
 
 use crate::{
-    caller::{Caller, Owners},
     config::Config,
     error::ApiError,
     queue::Queue,
@@ -47,16 +46,6 @@ impl Service {
             max_mesh_bytes: config.max_mesh_bytes,
             data: config.data.clone(),
         }
-    }
-
-    /// Whose jobs are seen: everybody's, as long as callers are not told apart.
-    pub fn sees(&self) -> Owners<'_> {
-        Owners::All
-    }
-
-    /// The owner of what is handed in.
-    pub fn owner(&self) -> String {
-        Caller::local().owner().into()
     }
 
     /// An error once the service is about to stop.
@@ -123,30 +112,13 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::{sync::mpsc, time::Duration};
 
-    use super::*;
-    use crate::{config::MemoryBudget, fake};
-
-    async fn service(folder: &tempfile::TempDir) -> Service {
-        let config = Config {
-            listen: ([127, 0, 0, 1], 0).into(),
-            data: folder.path().to_path_buf(),
-            workers: 1,
-            max_queued: 10,
-            memory: MemoryBudget::default(),
-            max_body_bytes: 1 << 20,
-            max_mesh_bytes: 1 << 20,
-            grace_s: 1,
-        };
-        let store = Store::open(folder.path()).await.unwrap();
-        let queue = Queue::new(store.clone(), fake::solve, 1);
-        Service::new(&config, store, queue)
-    }
+    use crate::verbs::tests::service;
 
     /// On the one thread of this test: work that held it would wait for a word that cannot come.
     #[tokio::test]
     async fn work_leaves_the_async_threads_to_the_others() {
         let folder = tempfile::tempdir().unwrap();
-        let service = service(&folder).await;
+        let service = service(folder.path()).await;
         let (say, heard) = mpsc::channel();
         let work = service.work(move || heard.recv_timeout(Duration::from_secs(10)));
         let (worked, said) = tokio::join!(work, async { say.send(7) });
@@ -157,7 +129,7 @@ mod tests {
     #[tokio::test]
     async fn who_hangs_up_makes_no_room_before_the_work_is_done() {
         let folder = tempfile::tempdir().unwrap();
-        let service = service(&folder).await;
+        let service = service(folder.path()).await;
         let (say, heard) = mpsc::channel::<()>();
         let (start, started) = tokio::sync::oneshot::channel();
         let work = service.work(move || {

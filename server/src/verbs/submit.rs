@@ -1,4 +1,4 @@
-//! Handing in jobs: one, one with a name of the client's, many at once.
+//! Submitting jobs: one, one with an id that the client made, many at once.
 
 use std::sync::Arc;
 
@@ -7,11 +7,13 @@ use solver::error::Violation;
 
 use super::{
     Service,
-    admission::{admit, checked_key, hand_in, prepare, replayed},
-    envelope::Draft,
+    admission::{admit, enqueue, prepare, replayed},
+    envelope::JobRequest,
+    key::Key,
     service::detached,
 };
 use crate::{
+    caller::Caller,
     digest,
     error::ApiError,
     job::{Job, JobId},
@@ -19,47 +21,48 @@ use crate::{
     violations::{Violations, prefixed},
 };
 
-/// Most jobs that are handed in together.
-pub const MOST_JOBS: usize = 1000;
-/// What became of it.
+/// Most jobs of a batch.
+pub const MAX_BATCH: usize = 1000;
+
+/// What became of a submission.
 #[derive(Debug)]
-pub struct Handed<T> {
+pub struct Submitted<T> {
     /// The job or jobs.
     pub accepted: T,
-    /// They were there already, by the key or by the name.
+    /// They were there already, by the key or by the id.
     pub replayed: bool,
 }
 
 /// Accepts a job. It is durable when this returns. Violations of envelope and problem come together. With
-/// a key, or a name of its own, the same request gives the same job, however often it is made.
+/// a key, or an id of the client's, the same request gives the same job, however often it is made.
 pub async fn create(
     service: &Arc<Service>,
-    draft: Draft,
+    caller: &Caller,
+    request: JobRequest,
     id: Option<JobId>,
-    key: Option<String>,
-) -> Result<Handed<Job>, ApiError> {
+    key: Option<Key>,
+) -> Result<Submitted<Job>, ApiError> {
     service.accepting()?;
-    let key = key.map(checked_key).transpose()?;
-    let service = service.clone();
+    let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
-        let prepared = prepare(&service, draft, id).await?;
+        let prepared = prepare(&service, request, id).await?;
         let payload = prepared.payload.clone();
-        let key = key.map(|key| RequestKey { key, payload });
-        if let Some(old) = replayed(&service, key.as_ref()).await? {
+        let key = key.map(|Key(key)| RequestKey { key, payload });
+        if let Some(old) = replayed(&service, &caller, key.as_ref()).await? {
             return only(old, true);
         }
         // before it is looked at in depth: what was accepted once need not be acceptable now
         if let Some(id) = prepared.id
             && !prepared.payload.is_empty()
-            && let Some(old) = service
-                .store
-                .replay_named(&service.owner(), id, &prepared.payload)
-                .await?
         {
-            return only(vec![old], true);
+            let owner = caller.owner();
+            let named = service.store.replay_named(owner, id, &prepared.payload);
+            if let Some(old) = named.await? {
+                return only(vec![old], true);
+            }
         }
         let new = admit(&service, prepared).await?;
-        let Accepted { jobs, replayed, .. } = hand_in(&service, vec![new], key).await?;
+        let Accepted { jobs, replayed, .. } = enqueue(&service, &caller, vec![new], key).await?;
         only(jobs, replayed)
     })
     .await
@@ -68,41 +71,41 @@ pub async fn create(
 /// Accepts all of these jobs or none. Violations of all come together, with pointers `/jobs/{n}/…`.
 pub async fn create_batch(
     service: &Arc<Service>,
-    drafts: Vec<Draft>,
-    key: Option<String>,
-) -> Result<Handed<Vec<Job>>, ApiError> {
+    caller: &Caller,
+    requests: Vec<JobRequest>,
+    key: Option<Key>,
+) -> Result<Submitted<Vec<Job>>, ApiError> {
     service.accepting()?;
-    let key = key.map(checked_key).transpose()?;
-    if drafts.is_empty() || drafts.len() > MOST_JOBS {
+    if requests.is_empty() || requests.len() > MAX_BATCH {
         return Err(ApiError::InvalidProblem(vec![Violation {
             pointer: "/jobs".into(),
             reason: "out_of_range".into(),
-            got: format!("{} jobs", drafts.len()),
-            expected: "1 … 1000 jobs".into(),
-            hint: match drafts.is_empty() {
+            got: format!("{} jobs", requests.len()),
+            expected: format!("1 … {MAX_BATCH} jobs"),
+            hint: match requests.is_empty() {
                 true => "Send {\"jobs\": [{\"problem\": {…}}, …]}.".into(),
-                false => "Hand them in in several batches.".into(),
+                false => "Submit them in several batches.".into(),
             },
         }]));
     }
-    let service = service.clone();
+    let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
-        let prepared = each(drafts, |draft| prepare(&service, draft, None)).await?;
+        let prepared = each(requests, |request| prepare(&service, request, None)).await?;
         let key = match key {
             None => None,
-            Some(key) => {
+            Some(Key(key)) => {
                 let payloads: Vec<&str> = prepared.iter().map(|job| job.payload.as_str()).collect();
                 let payload = digest::of_json(&("batch", payloads)).map_err(ApiError::internal)?;
                 Some(RequestKey { key, payload })
             }
         };
-        if let Some(accepted) = replayed(&service, key.as_ref()).await? {
+        if let Some(accepted) = replayed(&service, &caller, key.as_ref()).await? {
             let replayed = true;
-            return Ok(Handed { accepted, replayed });
+            return Ok(Submitted { accepted, replayed });
         }
         let jobs = each(prepared, |prepared| admit(&service, prepared)).await?;
-        let Accepted { jobs, replayed, .. } = hand_in(&service, jobs, key).await?;
-        Ok(Handed {
+        let Accepted { jobs, replayed, .. } = enqueue(&service, &caller, jobs, key).await?;
+        Ok(Submitted {
             accepted: jobs,
             replayed,
         })
@@ -111,14 +114,14 @@ pub async fn create_batch(
 }
 
 /// The one job of a submission of one.
-pub(super) fn only(jobs: Vec<Job>, replayed: bool) -> Result<Handed<Job>, ApiError> {
+pub(super) fn only(jobs: Vec<Job>, replayed: bool) -> Result<Submitted<Job>, ApiError> {
     let accepted = jobs.into_iter().next();
     let accepted =
         accepted.ok_or_else(|| ApiError::internal("a job was accepted, but not given"))?;
-    Ok(Handed { accepted, replayed })
+    Ok(Submitted { accepted, replayed })
 }
 
-/// Does the same with each of many, a few at a time, in order; of those that are invalid all are told.
+/// Does the same with each of many, a few at a time, in order; all that is wrong with any of them comes together.
 async fn each<A, B, F: Future<Output = Result<B, ApiError>>>(
     many: Vec<A>,
     work: impl Fn(A) -> F,

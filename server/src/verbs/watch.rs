@@ -8,13 +8,36 @@ use tokio::time::{Instant, timeout_at};
 
 use super::{Service, jobs};
 use crate::{
+    caller::Caller,
     error::ApiError,
     event::{Event, Payload},
     job::{Job, JobId},
+    parameters::{Parameter, Seconds, Whole, Words},
 };
 
+/// How long to wait for a job.
+pub const WAIT: Parameter<Seconds> = Parameter {
+    name: "wait",
+    meaning: "Seconds to wait until the version differs from If-None-Match, else from now",
+    values: Seconds(0.0..=MAX_WAIT_S),
+};
 /// Longest time that a request may wait for a job, in seconds.
 pub const MAX_WAIT_S: f64 = 60.0;
+
+/// What to wait for.
+pub const UNTIL: Parameter<Words<Until>> = Parameter {
+    name: "until",
+    meaning: "Wait until the job has ended",
+    values: Words(|| vec![("terminal", Until::Terminal)]),
+};
+
+/// Where a stream of events begins.
+pub const AFTER_SEQ: Parameter<Whole> = Parameter {
+    name: "after_seq",
+    meaning: "Number of the last event that was seen; absent: 0, which is all events",
+    values: Whole(0..=i64::MAX),
+};
+
 /// Events read at a time by a watcher.
 const EVENTS_PER_READ: i64 = 256;
 
@@ -26,29 +49,30 @@ pub enum Until {
     /// Its version is another than this one.
     Changed(i64),
     /// Its version is another than when it was asked for; or it has ended: a client that knows no version
-    /// waits for news of its job, and there will be none.
-    News,
+    /// waits for a change of its job, and there will be none.
+    NextChange,
 }
 
 /// The job when that has come to pass, or as it is after `seconds` or when the service stops; and whether
 /// it has.
 pub async fn wait(
     service: &Service,
+    caller: &Caller,
     id: JobId,
     until: Until,
     seconds: f64,
 ) -> Result<(Job, bool), ApiError> {
     let end = Instant::now() + Duration::from_secs_f64(seconds.clamp(0.0, MAX_WAIT_S));
-    let at_arrival = jobs::get(service, id).await?;
+    let at_arrival = jobs::get(service, caller, id).await?;
     let mut news = service.queue.subscribe(at_arrival.key);
     loop {
         // Read after subscribing: a change in between is not overlooked.
-        let job = jobs::get(service, id).await?;
+        let job = jobs::get(service, caller, id).await?;
         let has_ended = job.status.is_terminal();
         let met = match until {
             Until::Terminal => has_ended,
             Until::Changed(version) => job.version != version,
-            Until::News => has_ended || job.version != at_arrival.version,
+            Until::NextChange => has_ended || job.version != at_arrival.version,
         };
         if met {
             return Ok((job, true));
@@ -61,9 +85,25 @@ pub async fn wait(
 }
 
 /// Stored events after number `after`, then live ones; ends after `done`, or with the job if `after`
-/// lies beyond that. When the service stops, or the job is deleted before, it ends with an error, so that
-/// nobody takes that for the end of the job.
-pub fn watch(
+/// lies beyond that. `None`: the job has ended, and nothing lies after that number. When the service stops, or
+/// the job is deleted before, the stream ends with an error, so that nobody takes that for the end of the job.
+pub async fn watch(
+    service: &Arc<Service>,
+    caller: &Caller,
+    id: JobId,
+    after: i64,
+) -> Result<Option<impl Stream<Item = Result<Event, ApiError>> + Send + use<>>, ApiError> {
+    let job = jobs::get(service, caller, id).await?;
+    if job.status.is_terminal() {
+        let next = service.store.events_after(job.key, after, 1).await?;
+        if next.is_empty() {
+            return Ok(None);
+        }
+    }
+    Ok(Some(follow(service.clone(), (id, job.key), after)))
+}
+
+fn follow(
     service: Arc<Service>,
     (id, key): (JobId, i64),
     after: i64,
@@ -105,14 +145,4 @@ pub fn watch(
             }
         }
     }
-}
-
-/// Whether a finished job has nothing to tell after number `after`.
-pub async fn is_silent(service: &Service, job: &Job, after: i64) -> Result<bool, ApiError> {
-    Ok(job.status.is_terminal()
-        && service
-            .store
-            .events_after(job.key, after, 1)
-            .await?
-            .is_empty())
 }

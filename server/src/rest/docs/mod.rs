@@ -1,63 +1,64 @@
 //! `/docs`: Swagger UI showing `/openapi.json`. It is compiled in, so the page works without a network.
 
 use axum::{
-    extract::RawQuery,
     http::{HeaderName, header},
     response::IntoResponse,
 };
 
-use super::request::{Params, TextPath};
-use crate::{error::ApiError, violations};
+use super::call::Call;
+use crate::{
+    error::ApiError,
+    parameters::{Variable, Words},
+};
 
 const PAGE: &str = include_str!("index.html");
 
-/// Name, type and content of what the page loads; `build.rs` takes the parts of Swagger UI out of its archive.
-const FILES: [(&str, &str, &str); 4] = [
-    (
-        "swagger-ui.css",
-        "text/css; charset=utf-8",
-        include_str!(concat!(env!("OUT_DIR"), "/swagger-ui.css")),
-    ),
-    (
-        "swagger-ui-bundle.js",
-        "text/javascript; charset=utf-8",
-        include_str!(concat!(env!("OUT_DIR"), "/swagger-ui-bundle.js")),
-    ),
-    (
-        "start.js",
-        "text/javascript; charset=utf-8",
-        include_str!("start.js"),
-    ),
-    // Swagger UI is under the Apache licence, which wants to come with it.
-    (
-        "license.txt",
-        "text/plain; charset=utf-8",
-        include_str!(concat!(env!("OUT_DIR"), "/swagger-ui-license.txt")),
-    ),
-];
+/// Type and content of a file that the page loads.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct File {
+    kind: &'static str,
+    content: &'static str,
+}
 
-/// Their names.
-pub(super) const NAMES: [&str; 4] = [FILES[0].0, FILES[1].0, FILES[2].0, FILES[3].0];
+/// Such a file in a path. `build.rs` takes the parts of Swagger UI out of its archive.
+pub(super) const FILE: Variable<Words<File>> = Variable {
+    name: "file",
+    kind: "file of the page",
+    meaning: "What the page loads",
+    values: Words(|| {
+        let file = |name, kind, content| (name, File { kind, content });
+        vec![
+            file(
+                "swagger-ui.css",
+                "text/css; charset=utf-8",
+                include_str!(concat!(env!("OUT_DIR"), "/swagger-ui.css")),
+            ),
+            file(
+                "swagger-ui-bundle.js",
+                "text/javascript; charset=utf-8",
+                include_str!(concat!(env!("OUT_DIR"), "/swagger-ui-bundle.js")),
+            ),
+            file(
+                "start.js",
+                "text/javascript; charset=utf-8",
+                include_str!("start.js"),
+            ),
+            // Swagger UI is under the Apache licence, which wants to come with it.
+            file(
+                "license.txt",
+                "text/plain; charset=utf-8",
+                include_str!(concat!(env!("OUT_DIR"), "/swagger-ui-license.txt")),
+            ),
+        ]
+    }),
+};
 
-pub(super) async fn page(RawQuery(query): RawQuery) -> Result<impl IntoResponse, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
+pub(super) async fn page(_: Call) -> Result<impl IntoResponse, ApiError> {
     Ok((headers("text/html; charset=utf-8"), PAGE))
 }
 
-pub(super) async fn file(
-    RawQuery(query): RawQuery,
-    TextPath(name): TextPath,
-) -> Result<impl IntoResponse, ApiError> {
-    Params::parse(query.as_deref(), &[])?;
-    let found = FILES.iter().find(|(known, ..)| *known == name);
-    let Some((_, kind, content)) = found else {
-        return Err(ApiError::NotFound(format!(
-            "the page has no file {:?}; it has: {}",
-            violations::name(&name),
-            NAMES.join(", ")
-        )));
-    };
-    Ok((headers(kind), *content))
+pub(super) async fn file(_: Call, file: File) -> Result<impl IntoResponse, ApiError> {
+    Ok((headers(file.kind), file.content))
 }
 
 /// The page may load from here and ask here, and nothing else. Swagger UI sets styles of its elements, and

@@ -1,44 +1,44 @@
 //! Stored meshes.
 
 use super::{
-    Operation, delete, get, post,
-    shapes::{bytes, header, json, nothing, text},
+    content::{bytes, json, nothing},
+    headers::location,
+    operation::{Operation, delete, get, post},
 };
-use crate::{catalog::Code, mesh::MeshInfo, rest::meshes};
+use crate::{
+    catalog::Code,
+    mesh::MeshInfo,
+    rest::meshes,
+    verbs::{
+        meshes::HASH,
+        page::{PAGE_SIZE, PAGE_TOKEN},
+    },
+};
 
 pub(super) fn operations() -> Vec<Operation> {
-    let location = || header("Location", text(), "Where it is");
     vec![
-        post("/v1/meshes", meshes::upload)
+        post("/v1/meshes", (), meshes::upload)
             .rpcs(&["UploadMesh"])
-            .says("Stores a mesh file (Gmsh, Abaqus or CalculiX, inline JSON) once, under the hash of its content")
-            .takes(bytes("application/octet-stream"))
-            .answers(200, "What is said of a mesh that was known", json::<MeshInfo>())
-            .headed([location()])
-            .answers(201, "What is said of a new mesh", json::<MeshInfo>())
-            .headed([location()])
-            .fails(&[Code::MalformedJson, Code::InvalidProblem, Code::PayloadTooLarge, Code::Draining, Code::StorageFull])
-            .tested(&[
-                "service::meshes::what_gmsh_wrote_is_stored_and_solved",
-                "service::meshes::a_mesh_is_stored_once_and_told_apart_by_its_content",
-            ]),
-        get("/v1/meshes", meshes::list)
+            .summary("Stores a mesh file (Gmsh, Abaqus or CalculiX, inline JSON) once, under the hash of its content")
+            .body(bytes("application/octet-stream"))
+            .answers(200, "A mesh that was stored before", json::<MeshInfo>())
+            .with([location()])
+            .answers(201, "A new mesh", json::<MeshInfo>())
+            .with([location()])
+            .fails(&[Code::MalformedJson, Code::InvalidProblem, Code::PayloadTooLarge, Code::Draining, Code::StorageFull]),
+        get("/v1/meshes", (PAGE_SIZE, PAGE_TOKEN), meshes::list)
             .rpcs(&["ListMeshes"])
-            .says("Lists stored meshes, newest first")
-            .with(super::jobs::pages())
+            .summary("Lists stored meshes, newest first")
             .answers(200, "A page of meshes", json::<meshes::List>())
-            .fails(&[Code::BadPageToken])
-            .tested(&["service::meshes::a_mesh_is_stored_once_and_told_apart_by_its_content"]),
-        get("/v1/meshes/{hash}", meshes::get)
+            .fails(&[Code::BadPageToken]),
+        get("/v1/meshes/{hash}", (HASH,), meshes::get)
             .rpcs(&["GetMesh"])
-            .says("Tells of a stored mesh")
-            .answers(200, "What is said of it", json::<MeshInfo>())
-            .tested(&["service::meshes::a_mesh_is_stored_once_and_told_apart_by_its_content"]),
-        delete("/v1/meshes/{hash}", meshes::delete)
+            .summary("Returns the size, names and quality of a stored mesh")
+            .answers(200, "The mesh, without its nodes and elements", json::<MeshInfo>()),
+        delete("/v1/meshes/{hash}", (HASH,), meshes::delete)
             .rpcs(&["DeleteMesh"])
-            .says("Removes a stored mesh that no waiting or running job needs")
-            .answers(204, "It is gone", nothing())
-            .fails(&[Code::JobActive, Code::StorageFull])
-            .tested(&["service::meshes::a_mesh_is_kept_for_the_jobs_that_wait_for_it"]),
+            .summary("Deletes a stored mesh that no waiting or running job needs")
+            .answers(204, "It is deleted", nothing())
+            .fails(&[Code::JobActive, Code::StorageFull]),
     ]
 }

@@ -1,0 +1,57 @@
+//! The routes of gRPC: the service, its health, its description.
+
+use std::sync::Arc;
+
+use axum::{Router, middleware::map_response};
+use tonic::{Code, Status, service::Routes};
+use tonic_health::server::HealthReporter;
+
+use super::{messages::MAX_MESSAGE_BYTES, service::Grpc};
+use crate::{
+    error::ApiError,
+    pb::{self, job_service_server::JobServiceServer},
+    verbs::Service,
+};
+
+/// The gRPC routes, to share a port with REST, and the handle on what health reports.
+pub async fn router(
+    service: Arc<Service>,
+) -> Result<(Router, HealthReporter), tonic_reflection::server::Error> {
+    let reflection = || {
+        tonic_reflection::server::Builder::configure()
+            .register_encoded_file_descriptor_set(pb::DESCRIPTORS)
+            .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+    };
+    let (reporter, health) = tonic_health::server::health_reporter();
+    reporter.set_serving::<JobServiceServer<Grpc>>().await;
+    let jobs =
+        JobServiceServer::new(Grpc::new(service)).max_decoding_message_size(MAX_MESSAGE_BYTES);
+    let routes = Routes::new(jobs)
+        .add_service(health)
+        .add_service(reflection().build_v1()?)
+        .add_service(reflection().build_v1alpha()?);
+    let router = routes.into_axum_router();
+    Ok((router.layer(map_response(too_large)), reporter))
+}
+
+/// tonic refuses a message over the limit before it reaches us, and without details. All that we refuse has
+/// some.
+async fn too_large(response: axum::response::Response) -> axum::response::Response {
+    let bare = Status::from_header_map(response.headers())
+        .is_some_and(|status| status.code() == Code::OutOfRange && status.details().is_empty());
+    match bare {
+        true => Status::from(ApiError::PayloadTooLarge {
+            limit_bytes: MAX_MESSAGE_BYTES,
+        })
+        .into_http(),
+        false => response,
+    }
+}
+
+/// Health turns to NOT_SERVING before the listener closes.
+pub async fn report_draining(reporter: &HealthReporter) {
+    reporter.set_not_serving::<JobServiceServer<Grpc>>().await;
+    reporter
+        .set_service_status("", tonic_health::ServingStatus::NotServing)
+        .await;
+}

@@ -1,0 +1,472 @@
+//! The rpcs, translated to verbs.
+
+use std::{pin::Pin, sync::Arc};
+
+use futures_util::{Stream, StreamExt};
+use prost::Message;
+use sha2::{Digest, Sha256};
+use tonic::{Request, Response, Status, Streaming};
+
+use super::messages::{
+    MAX_MESSAGE_BYTES, MAX_ROWS, asked, beyond, fitting, given, key, noting_replay, paging, points,
+};
+use crate::{
+    caller::Caller,
+    convert::{bad, edit, filter, job_request, problem_from_pb, problem_to_pb, validation},
+    error::ApiError,
+    event::Event,
+    formats::Format,
+    job::Job,
+    pb::{self, job_service_server::JobService},
+    store::PIECE_BYTES,
+    verbs::{
+        Service,
+        envelope::JobRequest,
+        fields,
+        history::{self, MAX_POINTS},
+        info,
+        jobs::{self, GROUP_BY, ID, Many, ORDER_BY},
+        meshes::{self, HASH},
+        page::Paging,
+        problems, profiles, queue, results,
+        retry::{self, Changes},
+        submit::{self, Submitted},
+        watch::{self, AFTER_SEQ, Until, WAIT},
+    },
+    violations,
+};
+
+/// The contract, translated to verbs.
+#[derive(Debug)]
+pub(super) struct Grpc {
+    service: Arc<Service>,
+}
+
+type Reply<T> = Result<Response<T>, Status>;
+
+#[tonic::async_trait]
+impl JobService for Grpc {
+    async fn validate_problem(
+        &self,
+        request: Request<pb::ValidateProblemRequest>,
+    ) -> Reply<pb::ValidateProblemResponse> {
+        let (caller, request) = asked(request)?;
+        let message = request.problem.unwrap_or_default(); // which lacks everything, and is told so
+        let read = || {
+            problem_from_pb(message).map_err(|found| violations::prefixed(violations::AT, found))
+        };
+        let problem = self.service.work(read).await?;
+        let found = problems::validate(&self.service, &caller, problem).await?;
+        Ok(Response::new(validation(found)))
+    }
+
+    async fn create_job(&self, request: Request<pb::CreateJobRequest>) -> Reply<pb::Job> {
+        let (caller, request) = asked(request)?;
+        let wait_s = request.wait.map(|seconds| WAIT.check(seconds));
+        let wait_s = wait_s.transpose()?;
+        let Submitted {
+            accepted: mut job,
+            replayed,
+        } = self.submit(&caller, request).await?;
+        if let Some(wait_s) = wait_s {
+            let ended = watch::wait(&self.service, &caller, job.id, Until::Terminal, wait_s);
+            (job, _) = ended.await?;
+        }
+        Ok(noting_replay(Response::new(job.into()), replayed))
+    }
+
+    type SubmitAndWatchStream = EventStream;
+
+    async fn submit_and_watch(&self, request: Request<pb::CreateJobRequest>) -> Reply<EventStream> {
+        let (caller, request) = asked(request)?;
+        if request.wait.is_some() {
+            let none = "none: the events tell when the job has ended";
+            return Err(bad(WAIT.name, "a time", none).into());
+        }
+        let submitted = self.submit(&caller, request).await?;
+        let id = submitted.accepted.id;
+        let events = watch::watch(&self.service, &caller, id, 0).await?;
+        Ok(noting_replay(
+            Response::new(messages(events)),
+            submitted.replayed,
+        ))
+    }
+
+    async fn batch_create_jobs(
+        &self,
+        request: Request<pb::BatchCreateJobsRequest>,
+    ) -> Reply<pb::BatchCreateJobsResponse> {
+        let (caller, pb::BatchCreateJobsRequest { jobs, request_id }) = asked(request)?;
+        let own = |job: &pb::CreateJobRequest| {
+            job.wait.is_some() || job.request_id.is_some() || job.job_id.is_some()
+        };
+        if let Some(n) = jobs.iter().position(own) {
+            let expected = "jobs without wait, request_id and job_id";
+            return Err(bad("jobs", format!("one, number {n}, with them"), expected).into());
+        }
+        let key = key(request_id)?;
+        let read = move || jobs.into_iter().map(job_request).collect();
+        let requests: Vec<JobRequest> = self.service.work(read).await?;
+        let submitted = submit::create_batch(&self.service, &caller, requests, key).await?;
+        let jobs = submitted.accepted.into_iter().map(Into::into).collect();
+        let response = Response::new(pb::BatchCreateJobsResponse { jobs });
+        Ok(noting_replay(response, submitted.replayed))
+    }
+
+    async fn get_job(&self, request: Request<pb::GetJobRequest>) -> Reply<pb::Job> {
+        let (caller, request) = asked(request)?;
+        let job = jobs::get(&self.service, &caller, ID.read(&request.id)?).await?;
+        Ok(Response::new(job.into()))
+    }
+
+    async fn get_job_problem(
+        &self,
+        request: Request<pb::GetJobProblemRequest>,
+    ) -> Reply<pb::Problem> {
+        let (caller, request) = asked(request)?;
+        let problem = jobs::problem(&self.service, &caller, ID.read(&request.id)?).await?;
+        let message = problem_to_pb(&problem);
+        if message.encoded_len() > MAX_MESSAGE_BYTES {
+            return Err(ApiError::AnswerTooLarge {
+                instead: "GET /v1/jobs/{id}/problem",
+            }
+            .into());
+        }
+        Ok(Response::new(message))
+    }
+
+    async fn list_jobs(
+        &self,
+        request: Request<pb::ListJobsRequest>,
+    ) -> Reply<pb::ListJobsResponse> {
+        let (caller, request) = asked(request)?;
+        let pb::ListJobsRequest {
+            filter: jobs,
+            page_size,
+            page_token,
+            order_by,
+        } = request;
+        let order = given(&ORDER_BY, &order_by)?;
+        let filter = filter(jobs)?;
+        let paging = paging(page_size, page_token)?;
+        let list = async |paging: &Paging| {
+            let page = jobs::list(&self.service, &caller, &filter, order, paging).await?;
+            let jobs: Vec<pb::Job> = page.items.into_iter().map(Into::into).collect();
+            Ok::<_, ApiError>((jobs, page.next))
+        };
+        let (mut jobs, mut next) = list(&paging).await?;
+        let fitting = fitting(&jobs);
+        if fitting < jobs.len() {
+            // a shorter page, whose token goes on where it ends
+            let size = Some(fitting as i64);
+            (jobs, next) = list(&Paging { size, ..paging }).await?;
+        }
+        Ok(Response::new(pb::ListJobsResponse {
+            jobs,
+            next_page_token: next.unwrap_or_default(),
+        }))
+    }
+
+    async fn count_jobs(
+        &self,
+        request: Request<pb::CountJobsRequest>,
+    ) -> Reply<pb::CountJobsResponse> {
+        let (caller, request) = asked(request)?;
+        let group_by = given(&GROUP_BY, &request.group_by)?;
+        let filter = filter(request.filter)?;
+        let count = jobs::count(&self.service, &caller, &filter, group_by).await?;
+        Ok(Response::new(pb::CountJobsResponse {
+            total: count.total,
+            groups: count.groups,
+        }))
+    }
+
+    async fn wait_job(&self, request: Request<pb::WaitJobRequest>) -> Reply<pb::WaitJobResponse> {
+        let (caller, request) = asked(request)?;
+        let (id, wait_s) = (ID.read(&request.id)?, WAIT.check(request.wait)?);
+        let until = match (request.until_terminal, request.version) {
+            (true, _) => Until::Terminal,
+            (false, Some(version)) => Until::Changed(version),
+            (false, None) => Until::NextChange,
+        };
+        let (job, met) = watch::wait(&self.service, &caller, id, until, wait_s).await?;
+        Ok(Response::new(pb::WaitJobResponse {
+            job: Some(job.into()),
+            met,
+        }))
+    }
+
+    type WatchJobStream = EventStream;
+
+    async fn watch_job(&self, request: Request<pb::WatchJobRequest>) -> Reply<EventStream> {
+        let (caller, request) = asked(request)?;
+        let (after, id) = (AFTER_SEQ.check(request.after_seq)?, ID.read(&request.id)?);
+        let events = watch::watch(&self.service, &caller, id, after).await?;
+        Ok(Response::new(messages(events)))
+    }
+
+    async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {
+        let (caller, request) = asked(request)?;
+        let result = results::result(&self.service, &caller, ID.read(&request.id)?).await?;
+        Ok(Response::new(result.into()))
+    }
+
+    async fn get_profile(
+        &self,
+        request: Request<pb::GetProfileRequest>,
+    ) -> Reply<pb::ContactProfile> {
+        let (caller, request) = asked(request)?;
+        let (id, boundary) = (ID.read(&request.id)?, &request.boundary);
+        let (step, points) = (request.step.as_deref(), points(request.points.as_deref())?);
+        let profile = profiles::profile(&self.service, &caller, id, boundary, step, points);
+        Ok(Response::new(profile.await?.into()))
+    }
+
+    async fn list_iterations(
+        &self,
+        request: Request<pb::ListIterationsRequest>,
+    ) -> Reply<pb::ListIterationsResponse> {
+        let (caller, request) = asked(request)?;
+        let max_points = request.max_points.map(|most| MAX_POINTS.check(most));
+        let (id, most) = (ID.read(&request.id)?, max_points.transpose()?);
+        let mut rows = history::history(&self.service, &caller, id, most).await?;
+        rows.retain(|row| row.k > request.after);
+        let more = rows.len() > MAX_ROWS;
+        rows.truncate(MAX_ROWS);
+        Ok(Response::new(pb::ListIterationsResponse {
+            iterations: rows.into_iter().map(Into::into).collect(),
+            more,
+        }))
+    }
+
+    type StreamResultStream =
+        Pin<Box<dyn Stream<Item = Result<pb::StreamResultResponse, Status>> + Send>>;
+
+    async fn stream_result(
+        &self,
+        request: Request<pb::StreamResultRequest>,
+    ) -> Reply<Self::StreamResultStream> {
+        let (caller, request) = asked(request)?;
+        let pb::StreamResultRequest { id, format, offset } = request;
+        let id = ID.read(&id)?;
+        let format = match pb::FieldFormat::try_from(format) {
+            Ok(pb::FieldFormat::Unspecified | pb::FieldFormat::Vtu) => Format::Vtu,
+            Ok(pb::FieldFormat::Npz) => Format::Npz,
+            Ok(pb::FieldFormat::Json) => Format::Json,
+            Err(_) => return Err(bad("format", format, "a value of the enum FieldFormat").into()),
+        };
+        let (pieces, total_bytes, sha256) = if format == Format::Json {
+            let fields = fields::fields(&self.service, &caller, id).await?;
+            let info = fields.info.clone();
+            beyond(offset, info.bytes)?;
+            let pieces = fields.bytes(&self.service, offset, info.bytes).boxed();
+            (pieces, info.bytes, info.digest)
+        } else {
+            let bytes = fields::converted_fields(&self.service, &caller, id, format).await?;
+            let total = bytes.len() as u64;
+            beyond(offset, total)?;
+            let digest = Sha256::digest(&bytes).to_vec();
+            let pieces = async_stream::stream! {
+                for piece in bytes[offset as usize..].chunks(PIECE_BYTES) {
+                    yield Ok(piece.to_vec());
+                }
+            };
+            (pieces.boxed(), total, digest)
+        };
+        let mut place = offset;
+        let chunks = pieces.map(move |piece| {
+            let data = piece?;
+            let offset = place;
+            place += data.len() as u64;
+            Ok(pb::StreamResultResponse {
+                data,
+                offset,
+                total_bytes,
+                sha256: sha256.clone(),
+            })
+        });
+        Ok(Response::new(chunks.boxed()))
+    }
+
+    async fn cancel_jobs(
+        &self,
+        request: Request<pb::CancelJobsRequest>,
+    ) -> Reply<pb::CancelJobsResponse> {
+        let (caller, request) = asked(request)?;
+        let many = jobs::cancel_many(&self.service, &caller, filter(request.filter)?);
+        let Many { matched, changed } = many.await?;
+        Ok(Response::new(pb::CancelJobsResponse { matched, changed }))
+    }
+
+    async fn retry_job(&self, request: Request<pb::RetryJobRequest>) -> Reply<pb::Job> {
+        let (caller, request) = asked(request)?;
+        let pb::RetryJobRequest {
+            id,
+            request_id,
+            limits,
+            priority,
+        } = request;
+        let pb::Limits {
+            timeout_s,
+            queue_ttl_s,
+        } = limits.unwrap_or_default();
+        let changes = Changes {
+            timeout_s,
+            queue_ttl_s,
+            priority,
+        };
+        let (id, key) = (ID.read(&id)?, key(request_id)?);
+        let submitted = retry::retry(&self.service, &caller, id, changes, key).await?;
+        let response = Response::new(submitted.accepted.into());
+        Ok(noting_replay(response, submitted.replayed))
+    }
+
+    async fn update_job(&self, request: Request<pb::UpdateJobRequest>) -> Reply<pb::Job> {
+        let (caller, request) = asked(request)?;
+        let (id, version) = (ID.read(&request.id)?, request.version);
+        let job = jobs::update(&self.service, &caller, id, edit(request)?, version).await?;
+        Ok(Response::new(job.into()))
+    }
+
+    async fn delete_job(
+        &self,
+        request: Request<pb::DeleteJobRequest>,
+    ) -> Reply<pb::DeleteJobResponse> {
+        let (caller, request) = asked(request)?;
+        jobs::delete(&self.service, &caller, ID.read(&request.id)?).await?;
+        Ok(Response::new(pb::DeleteJobResponse {}))
+    }
+
+    async fn delete_jobs(
+        &self,
+        request: Request<pb::DeleteJobsRequest>,
+    ) -> Reply<pb::DeleteJobsResponse> {
+        let (caller, request) = asked(request)?;
+        let many = jobs::delete_many(&self.service, &caller, filter(request.filter)?);
+        let Many { matched, changed } = many.await?;
+        Ok(Response::new(pb::DeleteJobsResponse { matched, changed }))
+    }
+
+    async fn get_server_info(
+        &self,
+        request: Request<pb::GetServerInfoRequest>,
+    ) -> Reply<pb::ServerInfo> {
+        let (caller, _) = asked(request)?;
+        Ok(Response::new(info::info(&self.service, &caller).into()))
+    }
+
+    async fn get_caller(&self, request: Request<pb::GetCallerRequest>) -> Reply<pb::Caller> {
+        let (caller, _) = asked(request)?;
+        Ok(Response::new(caller.into()))
+    }
+
+    async fn get_queue(&self, request: Request<pb::GetQueueRequest>) -> Reply<pb::QueueState> {
+        let (caller, _) = asked(request)?;
+        Ok(Response::new(queue::state(&self.service, &caller).into()))
+    }
+
+    async fn pause_queue(&self, request: Request<pb::PauseQueueRequest>) -> Reply<pb::QueueState> {
+        let (caller, _) = asked(request)?;
+        let state = queue::pause(&self.service, &caller).await?;
+        Ok(Response::new(state.into()))
+    }
+
+    async fn resume_queue(
+        &self,
+        request: Request<pb::ResumeQueueRequest>,
+    ) -> Reply<pb::QueueState> {
+        let (caller, _) = asked(request)?;
+        let state = queue::resume(&self.service, &caller).await?;
+        Ok(Response::new(state.into()))
+    }
+
+    async fn cancel_job(
+        &self,
+        request: Request<pb::CancelJobRequest>,
+    ) -> Reply<pb::CancelJobResponse> {
+        let (caller, request) = asked(request)?;
+        let (outcome, job) = jobs::cancel(&self.service, &caller, ID.read(&request.id)?).await?;
+        let outcome: pb::cancel_job_response::Outcome = outcome.into();
+        Ok(Response::new(pb::CancelJobResponse {
+            outcome: outcome.into(),
+            job: Some(job.into()),
+        }))
+    }
+
+    async fn upload_mesh(
+        &self,
+        request: Request<Streaming<pb::UploadMeshRequest>>,
+    ) -> Reply<pb::UploadMeshResponse> {
+        let (caller, stream) = asked(request)?;
+        let broken =
+            |status: Status| ApiError::MalformedJson(format!("the stream broke off: {status}"));
+        let pieces = stream.map(|piece| piece.map(|piece| piece.data).map_err(broken));
+        let (mesh, new) = meshes::upload(&self.service, &caller, pieces).await?;
+        Ok(Response::new(pb::UploadMeshResponse {
+            mesh: Some(mesh.into()),
+            known: !new,
+        }))
+    }
+
+    async fn get_mesh(&self, request: Request<pb::GetMeshRequest>) -> Reply<pb::MeshInfo> {
+        let (caller, request) = asked(request)?;
+        let mesh = meshes::get(&self.service, &caller, &HASH.read(&request.hash)?).await?;
+        Ok(Response::new(mesh.into()))
+    }
+
+    async fn list_meshes(
+        &self,
+        request: Request<pb::ListMeshesRequest>,
+    ) -> Reply<pb::ListMeshesResponse> {
+        let (caller, request) = asked(request)?;
+        let paging = paging(request.page_size, request.page_token)?;
+        let page = meshes::list(&self.service, &caller, &paging).await?;
+        Ok(Response::new(pb::ListMeshesResponse {
+            meshes: page.items.into_iter().map(Into::into).collect(),
+            next_page_token: page.next.unwrap_or_default(),
+        }))
+    }
+
+    async fn delete_mesh(
+        &self,
+        request: Request<pb::DeleteMeshRequest>,
+    ) -> Reply<pb::DeleteMeshResponse> {
+        let (caller, request) = asked(request)?;
+        meshes::delete(&self.service, &caller, &HASH.read(&request.hash)?).await?;
+        Ok(Response::new(pb::DeleteMeshResponse {}))
+    }
+}
+
+type EventStream = Pin<Box<dyn Stream<Item = Result<pb::Event, Status>> + Send>>;
+
+/// Events as messages; none are a stream that has ended.
+fn messages(
+    events: Option<impl Stream<Item = Result<Event, ApiError>> + Send + 'static>,
+) -> EventStream {
+    let events = futures_util::stream::iter(events).flatten();
+    events
+        .map(|event| event.map(Into::into).map_err(Into::into))
+        .boxed()
+}
+
+impl Grpc {
+    /// The contract on that service.
+    pub(super) fn new(service: Arc<Service>) -> Grpc {
+        Grpc { service }
+    }
+
+    async fn submit(
+        &self,
+        caller: &Caller,
+        request: pb::CreateJobRequest,
+    ) -> Result<Submitted<Job>, ApiError> {
+        let key = key(request.request_id.clone())?;
+        let id = request
+            .job_id
+            .as_deref()
+            .map(|id| ID.read(id))
+            .transpose()?;
+        let request = self.service.work(|| job_request(request)).await?;
+        submit::create(&self.service, caller, request, id, key).await
+    }
+}

@@ -1,0 +1,172 @@
+//! What the client wants to be answered with: `Accept`, and the parameter `format`.
+
+use axum::http::{HeaderMap, header};
+use serde_json::json;
+
+use super::takes::{Sent, Takes};
+use crate::{
+    error::ApiError,
+    formats::Format,
+    parameters::{Description, Place},
+    violations,
+};
+
+/// One of these formats: that of the parameter `format`, else that of `Accept`, else the first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FormatOf(pub(super) &'static [Format]);
+
+/// The parameter's name.
+const FORMAT: &str = "format";
+
+impl Takes for FormatOf {
+    type Value = Format;
+
+    fn described(&self) -> Vec<Description> {
+        let names: Vec<&str> = self.0.iter().map(|format| format.name()).collect();
+        vec![Description {
+            place: Place::Query,
+            name: FORMAT,
+            schema: json!({ "type": "string", "enum": names }),
+            meaning: "The format of the data; it takes precedence over Accept",
+            repeatable: false,
+        }]
+    }
+
+    fn take(&self, sent: &Sent<'_>) -> Result<Format, ApiError> {
+        choose(self.0, sent.one(FORMAT), sent.headers)
+    }
+}
+
+/// The format to answer in: the parameter overrides the header, the first is the default.
+fn choose(
+    formats: &[Format],
+    parameter: Option<&str>,
+    headers: &HeaderMap,
+) -> Result<Format, ApiError> {
+    let names: Vec<&str> = formats.iter().map(|format| format.name()).collect();
+    let none = |got: &str| ApiError::NotAcceptable {
+        got: violations::name(got),
+        available: names.join(", "),
+    };
+    if let Some(wanted) = parameter {
+        let named = formats.iter().find(|format| format.name() == wanted);
+        return named.copied().ok_or_else(|| none(wanted));
+    }
+    let accept = accepted(headers);
+    if accept.is_empty() {
+        return formats.first().copied().ok_or_else(|| none("anything"));
+    }
+    // Each range with its weight; the best wanted format wins, ours first among equals.
+    let mut best: Option<(f32, Format)> = None;
+    for format in formats {
+        let (weight, ..) = weight(&accept, format.media_type());
+        if weight > best.map_or(0.0, |(weight, _)| weight) {
+            best = Some((weight, *format));
+        }
+    }
+    best.map(|(_, format)| format)
+        .ok_or_else(|| none(&accept.join(", ")))
+}
+
+/// The media types that the client takes, as it says.
+pub(super) fn accepted(headers: &HeaderMap) -> Vec<&str> {
+    let values = headers.get_all(header::ACCEPT).iter();
+    values
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','))
+        .collect()
+}
+
+/// How much a media type is wanted: the weight of the most specific range that covers it; how specific that is;
+/// and where it stands, the first one highest.
+pub(super) fn weight(accepted: &[&str], media: &str) -> (f32, u8, isize) {
+    let group = media.split('/').next().unwrap_or_default();
+    let mut found = (0.0, 0, 0);
+    for (place, range) in (0..).zip(accepted) {
+        let mut parts = range.split(';').map(str::trim);
+        let name = parts.next().unwrap_or_default().to_ascii_lowercase();
+        let q = parts
+            .find_map(|part| part.strip_prefix("q=")?.parse().ok())
+            .unwrap_or(1.0);
+        let specific = match name.split_once('/') {
+            _ if name == media => 3,
+            Some((start, "*")) if start == group => 2,
+            Some(("*", "*")) => 1,
+            _ => continue,
+        };
+        if specific >= found.1 {
+            found = (q, specific, -place);
+        }
+    }
+    found
+}
+
+/// Whether the client wants one of these media types rather than JSON.
+pub(super) fn wants(headers: &HeaderMap, media: &[&str]) -> bool {
+    let accepted = accepted(headers);
+    let json = weight(&accepted, "application/json");
+    let mut weights = media.iter().map(|media| weight(&accepted, media));
+    weights.any(|weight| weight.0 > 0.0 && weight > json)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn what_a_client_wants_rather_than_json_goes_by_its_weights() {
+        let wants = |accept: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert("accept", accept.parse().unwrap());
+            wants(&headers, &["text/html"])
+        };
+        for html in [
+            "text/html",
+            "text/html,application/xhtml+xml,*/*;q=0.8",
+            "text/html, application/json",
+            "*/*, text/html",
+        ] {
+            assert!(wants(html), "{html}");
+        }
+        for json in [
+            "*/*",
+            "application/json, text/html",
+            "text/html;q=0.1, application/json",
+            "text/html;q=0, */*",
+            "image/png",
+        ] {
+            assert!(!wants(json), "{json}");
+        }
+    }
+
+    fn chosen(parameter: Option<&str>, accept: Option<&str>) -> Option<&'static str> {
+        let mut headers = HeaderMap::new();
+        if let Some(accept) = accept {
+            headers.insert("accept", accept.parse().unwrap());
+        }
+        choose(Format::OF_TABLES, parameter, &headers)
+            .ok()
+            .map(Format::name)
+    }
+
+    #[test]
+    fn the_parameter_overrides_the_header_and_json_is_the_default() {
+        assert_eq!(chosen(None, None), Some("json"));
+        assert_eq!(chosen(None, Some("text/csv")), Some("csv"));
+        assert_eq!(chosen(Some("json"), Some("text/csv")), Some("json"));
+        assert_eq!(chosen(None, Some("*/*")), Some("json"));
+        assert_eq!(
+            chosen(None, Some("text/*, application/json;q=0.5")),
+            Some("csv")
+        );
+        assert_eq!(
+            chosen(None, Some("text/*;q=0.1, application/x-npz")),
+            Some("npz")
+        );
+        assert_eq!(chosen(None, Some("application/json;q=0, */*")), Some("csv"));
+        assert_eq!(chosen(None, Some("image/png")), None);
+        assert_eq!(chosen(Some("xml"), None), None);
+        assert_eq!(chosen(Some("vtu"), None), None);
+    }
+}

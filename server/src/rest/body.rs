@@ -1,0 +1,84 @@
+//! Bodies of requests as bytes and as text.
+
+use std::time::Duration;
+
+use axum::{
+    body::{Body, BodyDataStream},
+    http::{HeaderMap, header},
+};
+use futures_util::StreamExt;
+
+use crate::error::ApiError;
+
+/// The body as text, if it says that it is JSON and is not too large.
+pub(super) async fn json_text(
+    headers: &HeaderMap,
+    body: Body,
+    limit_bytes: usize,
+) -> Result<String, ApiError> {
+    let content_type = headers
+        .get(header::CONTENT_TYPE)
+        .and_then(|value| value.to_str().ok())
+        .unwrap_or("nothing");
+    let essence = content_type
+        .split(';')
+        .next()
+        .unwrap_or_default()
+        .trim()
+        .to_ascii_lowercase();
+    // a patch format has a meaning of its own, which is not ours
+    let json = essence.starts_with("application/")
+        && essence.ends_with("+json")
+        && !essence.ends_with("-patch+json");
+    if essence != "application/json" && !json {
+        return Err(ApiError::UnsupportedMedia(content_type.into()));
+    }
+    if let Some(coding) = headers.get(header::CONTENT_ENCODING)
+        && coding.as_bytes() != b"identity"
+    {
+        let coding = String::from_utf8_lossy(coding.as_bytes());
+        return Err(ApiError::UnsupportedMedia(format!(
+            "a body coded as {coding}"
+        )));
+    }
+    let mut pieces = body.into_data_stream();
+    let length = declared_length(headers);
+    let mut bytes = Vec::new();
+    let mut too_large = length.is_some_and(|length| length > limit_bytes);
+    while !too_large && let Some(piece) = pieces.next().await {
+        let piece = piece
+            .map_err(|error| ApiError::MalformedJson(format!("the body broke off: {error}")))?;
+        too_large = bytes.len() + piece.len() > limit_bytes;
+        if !too_large {
+            bytes.extend_from_slice(&piece);
+        }
+    }
+    if too_large {
+        tokio::spawn(discard(pieces));
+        return Err(ApiError::PayloadTooLarge { limit_bytes });
+    }
+    String::from_utf8(bytes).map_err(|error| ApiError::MalformedJson(error.to_string()))
+}
+
+/// How long the body says that it is.
+pub(super) fn declared_length(headers: &HeaderMap) -> Option<usize> {
+    let value = headers.get(header::CONTENT_LENGTH)?;
+    value.to_str().ok()?.parse().ok()
+}
+
+/// Takes in, for a while, what nobody reads: many clients look at the answer only after they have
+/// sent everything, and see a broken connection if we hang up before.
+pub(super) async fn discard(mut pieces: BodyDataStream) {
+    const MOST_BYTES: usize = 256 << 20;
+    const LONGEST: Duration = Duration::from_secs(10);
+    let all = async {
+        let mut bytes = 0;
+        while let Some(Ok(piece)) = pieces.next().await {
+            bytes += piece.len();
+            if bytes > MOST_BYTES {
+                break;
+            }
+        }
+    };
+    let _ = tokio::time::timeout(LONGEST, all).await; // late or not, it is over
+}

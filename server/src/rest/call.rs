@@ -1,0 +1,113 @@
+//! A request on its way to its handler: its parameters are read and checked, then the handler runs.
+
+use std::sync::Arc;
+
+use axum::{
+    body::{Body, HttpBody},
+    extract::{Request, State},
+    http::HeaderMap,
+    response::{IntoResponse, Response},
+    routing::{MethodFilter, MethodRouter, on},
+};
+use serde_json::Value;
+
+use super::{
+    body,
+    takes::{Sent, Takes},
+};
+use crate::{caller::Caller, error::ApiError, verbs::Service};
+
+/// What all handlers work with.
+#[derive(Clone, Debug)]
+pub(super) struct Site {
+    pub(super) service: Arc<Service>,
+    /// The description of the API, which is made of all operations and served by one of them.
+    pub(super) openapi: fn() -> &'static Value,
+}
+
+/// A request without its parameters, which handlers receive beside it.
+pub(super) struct Call {
+    pub(super) service: Arc<Service>,
+    pub(super) caller: Caller,
+    pub(super) headers: HeaderMap,
+    pub(super) body: Body,
+    pub(super) openapi: fn() -> &'static Value,
+}
+
+impl Call {
+    /// The body as text, if it says that it is JSON and is not too large.
+    pub(super) async fn json(&mut self) -> Result<String, ApiError> {
+        let body = std::mem::take(&mut self.body);
+        body::json_text(&self.headers, body, self.service.max_body_bytes).await
+    }
+
+    /// Whether anything was sent as body.
+    pub(super) fn has_body(&self) -> bool {
+        !self.body.is_end_stream()
+    }
+}
+
+/// What does an operation: an async function of the call and of what the operation takes, in its order.
+pub(super) trait Handler<Values>: Clone + Send + Sync + 'static {
+    /// Does it.
+    fn handle(
+        &self,
+        call: Call,
+        values: Values,
+    ) -> impl Future<Output = Result<Response, ApiError>> + Send;
+}
+
+macro_rules! functions {
+    ($(($($T:ident)*))*) => {$(
+        #[allow(non_snake_case)]
+        impl<F, Answering, Answer, $($T: Send),*> Handler<($($T,)*)> for F
+        where
+            F: Fn(Call, $($T),*) -> Answering + Clone + Send + Sync + 'static,
+            Answering: Future<Output = Result<Answer, ApiError>> + Send,
+            Answer: IntoResponse,
+        {
+            async fn handle(&self, call: Call, ($($T,)*): ($($T,)*)) -> Result<Response, ApiError> {
+                Ok(self(call, $($T),*).await?.into_response())
+            }
+        }
+    )*};
+}
+functions!(() (A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E G));
+
+/// The route of an operation. A `strict` one refuses parameters that it does not know.
+pub(super) fn route<T, H>(
+    method: MethodFilter,
+    takes: T,
+    strict: bool,
+    handler: H,
+) -> MethodRouter<Site>
+where
+    T: Takes<Value: Send> + Send + Sync + 'static,
+    H: Handler<T::Value>,
+{
+    let described = takes.described();
+    let operation = Arc::new((takes, described));
+    on(method, move |State(site): State<Site>, request: Request| {
+        let (handler, operation) = (handler.clone(), operation.clone());
+        async move {
+            let (mut parts, body) = request.into_parts();
+            let variables = Sent::variables(&mut parts).await?;
+            let caller = parts.extensions.remove::<Caller>();
+            let caller = caller.ok_or_else(|| ApiError::internal("nobody said who asks"))?;
+            let sent = Sent::new(variables, parts.uri.query(), &parts.headers);
+            let (takes, described) = &*operation;
+            if strict {
+                sent.check(described)?;
+            }
+            let values = takes.take(&sent)?;
+            let call = Call {
+                service: site.service,
+                caller,
+                headers: parts.headers,
+                body,
+                openapi: site.openapi,
+            };
+            handler.handle(call, values).await
+        }
+    })
+}

@@ -1,0 +1,194 @@
+//! Headers of requests: parameters, and the conditions and preferences of HTTP.
+
+use axum::http::HeaderMap;
+use serde_json::{Value, json};
+
+use super::takes::{Sent, Takes};
+use crate::{
+    error::ApiError,
+    parameters::{Description, Parameter, Place, Values},
+    verbs::watch::MAX_WAIT_S,
+    violations,
+};
+
+/// A parameter that is sent as a header.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Header<V>(pub(super) Parameter<V>);
+
+impl<V: Values> Takes for Header<V> {
+    type Value = Option<V::Value>;
+
+    fn described(&self) -> Vec<Description> {
+        let Parameter {
+            name,
+            meaning,
+            values,
+        } = &self.0;
+        vec![header(name, values.schema(), meaning)]
+    }
+
+    fn take(&self, sent: &Sent<'_>) -> Result<Option<V::Value>, ApiError> {
+        let name = self.0.name;
+        let Some(value) = sent.headers.get(name) else {
+            return Ok(None);
+        };
+        let unreadable = |_| ApiError::BadParameter {
+            name,
+            got: violations::name(&String::from_utf8_lossy(value.as_bytes())),
+            expected: "printable ASCII".into(),
+        };
+        let text = value.to_str().map_err(unreadable)?;
+        self.0.read(text.trim()).map(Some)
+    }
+}
+
+/// A header as it is described, of a request or of an answer.
+pub(super) fn header(name: &'static str, schema: Value, meaning: &'static str) -> Description {
+    Description {
+        place: Place::Header,
+        name,
+        schema,
+        meaning,
+        repeatable: false,
+    }
+}
+
+/// Any text.
+pub(super) fn text() -> Value {
+    json!({ "type": "string" })
+}
+
+/// Usually so; what is otherwise is ignored, as HTTP has it of preferences and ranges.
+pub(super) fn like(pattern: &str) -> Value {
+    json!({ "type": "string", "anyOf": [{ "pattern": pattern }, {}] })
+}
+
+/// The job is answered only if it has changed.
+pub(super) const IF_NONE_MATCH: Condition = Condition {
+    name: "If-None-Match",
+    meaning: "The ETag that is known: 304 while it holds",
+};
+
+/// The change is made only if the job has not changed.
+pub(super) const IF_MATCH: Condition = Condition {
+    name: "If-Match",
+    meaning: "The ETag of the job that the change is meant for",
+};
+
+/// A header of entity tags.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Condition {
+    name: &'static str,
+    meaning: &'static str,
+}
+
+impl Takes for Condition {
+    type Value = Option<Tags>;
+
+    fn described(&self) -> Vec<Description> {
+        vec![header(self.name, text(), self.meaning)]
+    }
+
+    fn take(&self, sent: &Sent<'_>) -> Result<Option<Tags>, ApiError> {
+        Ok(Tags::of(sent.headers, self.name))
+    }
+}
+
+/// Entity tags of a conditional request; those that are not ours match nothing.
+#[derive(Debug)]
+pub(super) struct Tags(Vec<String>);
+
+impl Tags {
+    /// The tags of that header; none if it is absent.
+    pub(super) fn of(headers: &HeaderMap, name: &str) -> Option<Tags> {
+        headers.get(name)?;
+        let values = headers.get_all(name).iter();
+        let tags = values
+            .filter_map(|value| value.to_str().ok())
+            .flat_map(|value| value.split(','))
+            .map(|tag| tag.trim().to_owned());
+        Some(Tags(tags.collect()))
+    }
+
+    /// Whether this tag, with its quotes, is among them, as `If-None-Match` compares: weakly.
+    pub(super) fn contain(&self, tag: &str) -> bool {
+        let same = |own: &String| own == "*" || own.strip_prefix("W/").unwrap_or(own) == tag;
+        self.0.iter().any(same)
+    }
+
+    /// The same as `If-Match` compares: strongly.
+    pub(super) fn contain_strongly(&self, tag: &str) -> bool {
+        self.0.iter().any(|own| own == tag)
+    }
+
+    /// Whether anything matches.
+    pub(super) fn any(&self) -> bool {
+        self.0.iter().any(|own| own == "*")
+    }
+
+    /// The first number among them.
+    pub(super) fn version(&self) -> Option<i64> {
+        let number = |tag: &String| {
+            let tag = tag.strip_prefix("W/").unwrap_or(tag);
+            tag.trim_matches('"').parse().ok()
+        };
+        self.0.iter().find_map(number)
+    }
+}
+
+/// A wait for the end of a job that is submitted, in whole seconds (RFC 7240).
+pub(super) const PREFER: PreferWait = PreferWait;
+
+/// The `wait` of a `Prefer` header.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PreferWait;
+
+impl Takes for PreferWait {
+    /// At most what may be waited.
+    type Value = Option<u64>;
+
+    fn described(&self) -> Vec<Description> {
+        vec![header(
+            "Prefer",
+            like("^wait=([0-9]|[1-5][0-9]|60)$"),
+            "wait=0…60: answer with the terminal job if it ends within so many seconds",
+        )]
+    }
+
+    fn take(&self, sent: &Sent<'_>) -> Result<Option<u64>, ApiError> {
+        let wait_s = preferred_wait_s(sent.headers);
+        Ok(wait_s.map(|seconds| seconds.min(MAX_WAIT_S as u64)))
+    }
+}
+
+/// The first wait that makes sense.
+fn preferred_wait_s(headers: &HeaderMap) -> Option<u64> {
+    headers
+        .get_all("prefer")
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split([',', ';']))
+        .find_map(|preference| {
+            let (name, value) = preference.split_once('=')?;
+            if !name.trim().eq_ignore_ascii_case("wait") {
+                return None;
+            }
+            value.trim().trim_matches('"').parse().ok()
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_preference_for_waiting_is_found_among_others() {
+        let mut headers = HeaderMap::new();
+        assert_eq!(preferred_wait_s(&headers), None);
+        headers.insert("prefer", "respond-async, wait=10".parse().unwrap());
+        assert_eq!(preferred_wait_s(&headers), Some(10));
+        headers.insert("prefer", "wait=soon".parse().unwrap());
+        assert_eq!(preferred_wait_s(&headers), None);
+    }
+}

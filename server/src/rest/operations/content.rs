@@ -1,0 +1,75 @@
+//! What stands in bodies, in the words of JSON Schema.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde_json::{Value, json};
+
+use super::operation::{Content, SchemaOf};
+use crate::formats::Format;
+
+pub(super) fn nothing() -> Content {
+    vec![]
+}
+
+pub(super) fn json<T: JsonSchema>() -> Content {
+    vec![("application/json", SchemaGenerator::subschema_for::<T>)]
+}
+
+pub(super) fn bytes(media: &'static str) -> Content {
+    vec![(media, anything)]
+}
+
+/// A stream of server-sent events, the data of each a `T` as JSON. The schema is of one event: OpenAPI
+/// 3.1 has no word for the stream.
+pub(super) fn stream<T: JsonSchema>() -> Content {
+    vec![("text/event-stream", |generator| {
+        let data = generator.subschema_for::<T>();
+        json_schema!({
+            "type": "object",
+            "properties": {
+                "id": { "type": "string" },
+                "event": { "type": "string" },
+                "data": { "type": "string", "contentMediaType": "application/json", "contentSchema": data },
+            },
+            "required": ["id", "event", "data"],
+        })
+    })]
+}
+
+/// The same as JSON Lines.
+pub(super) fn lines() -> Content {
+    vec![("application/jsonl", anything)]
+}
+
+/// A problem, as it is read: JSON Schema of `files::schema`.
+pub(super) fn the_problem() -> Content {
+    vec![(
+        "application/json",
+        |_| json_schema!({ "$ref": "#/components/schemas/Problem" }),
+    )]
+}
+
+/// A body that submits a job, as an example.
+pub(super) fn submission() -> Value {
+    let problem = include_str!("../../../../examples/rectangular_punch.json");
+    let problem: Value = serde_json::from_str(problem).unwrap_or_default();
+    json!({ "problem": problem })
+}
+
+/// What JSON Schema has no word for.
+pub(super) fn anything(_: &mut SchemaGenerator) -> Schema {
+    Schema::default()
+}
+
+/// Data in each of the formats; `T` is their JSON.
+pub(super) fn data<T: JsonSchema>(formats: &[Format]) -> Content {
+    let schema = |format: &Format| -> SchemaOf {
+        match format {
+            Format::Json => SchemaGenerator::subschema_for::<T>,
+            _ => anything,
+        }
+    };
+    formats
+        .iter()
+        .map(|format| (format.media_type(), schema(format)))
+        .collect()
+}

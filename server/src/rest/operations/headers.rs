@@ -1,0 +1,43 @@
+//! Headers of answers.
+
+use serde_json::json;
+
+use crate::{
+    parameters::Description,
+    rest::headers::{header, text},
+};
+
+/// Where what was created is.
+pub(super) fn location() -> Description {
+    header("Location", text(), "The path of the resource")
+}
+
+/// The version of a job.
+pub(super) fn etag() -> Description {
+    header("ETag", text(), "The job's version, as a strong entity tag")
+}
+
+/// When to poll.
+pub(super) fn retry_after() -> Description {
+    let seconds = json!({ "type": "integer", "minimum": 0, "maximum": u32::MAX });
+    header("Retry-After", seconds, "Seconds after which to poll")
+}
+
+/// Whether the request had been made before.
+pub(super) fn replayed() -> Description {
+    let word = json!({ "type": "string", "enum": ["true"] });
+    header(
+        "Idempotency-Replayed",
+        word,
+        "The key or id was known: nothing new was submitted",
+    )
+}
+
+/// That the client's wish to wait was granted.
+pub(super) fn preference_applied() -> Description {
+    header(
+        "Preference-Applied",
+        text(),
+        "The preference that was applied: wait, in seconds",
+    )
+}

@@ -1,0 +1,220 @@
+//! One entry of the list: an operation with all that is said of it.
+
+use axum::routing::{MethodFilter, MethodRouter};
+use schemars::{Schema, SchemaGenerator};
+use serde_json::Value;
+
+use crate::{
+    catalog::Code,
+    parameters::{Description, Place},
+    rest::{
+        call::{Handler, Site, route},
+        takes::Takes,
+    },
+};
+
+/// One thing that can be asked of the service.
+pub(in crate::rest) struct Operation {
+    /// In capitals.
+    pub(in crate::rest) method: &'static str,
+    /// With its variables in braces.
+    pub(in crate::rest) path: &'static str,
+    pub(super) route: MethodRouter<Site>,
+    /// Name of its group.
+    pub(in crate::rest) group: &'static str,
+    /// The rpcs that do the same, the nearest one first; none: over REST only.
+    pub(in crate::rest) rpcs: &'static [&'static str],
+    /// Name of the operation: that of the first rpc, if there is one.
+    pub(in crate::rest) id: &'static str,
+    /// One line.
+    pub(in crate::rest) summary: &'static str,
+    /// Those that its handler receives.
+    pub(in crate::rest) parameters: Vec<Description>,
+    /// What is sent.
+    pub(in crate::rest) body: Option<Content>,
+    pub(in crate::rest) needs_body: bool,
+    /// Such a body.
+    pub(in crate::rest) example: Option<Value>,
+    /// What comes back when all is well.
+    pub(in crate::rest) answers: Vec<Answer>,
+    /// It refuses parameters that it does not know.
+    strict: bool,
+    errors: Vec<Code>,
+}
+
+/// An answer when all is well.
+pub(in crate::rest) struct Answer {
+    pub(in crate::rest) status: u16,
+    pub(in crate::rest) meaning: &'static str,
+    pub(in crate::rest) content: Content,
+    /// Each with whether it is always there.
+    pub(in crate::rest) headers: Vec<(Description, bool)>,
+}
+
+/// A body: its schema by media type.
+pub(in crate::rest) type Content = Vec<(&'static str, SchemaOf)>;
+
+/// The schema of a type, by way of the generator that collects the parts.
+pub(in crate::rest) type SchemaOf = fn(&mut SchemaGenerator) -> Schema;
+
+/// What `takes` reads the handler receives: a parameter that is not listed here cannot be asked for there.
+fn operation<T, H>(
+    (method, filter): (&'static str, MethodFilter),
+    path: &'static str,
+    takes: T,
+    strict: bool,
+    handler: H,
+) -> Operation
+where
+    T: Takes<Value: Send> + Send + Sync + 'static,
+    H: Handler<T::Value>,
+{
+    Operation {
+        method,
+        path,
+        parameters: takes.described(),
+        route: route(filter, takes, strict, handler),
+        group: "",
+        rpcs: &[],
+        id: "",
+        summary: "",
+        body: None,
+        needs_body: true,
+        example: None,
+        answers: vec![],
+        strict,
+        errors: vec![],
+    }
+}
+
+macro_rules! methods {
+    ($($name:ident $word:literal $filter:ident),*) => {
+        $(pub(super) fn $name<T, H>(path: &'static str, takes: T, handler: H) -> Operation
+        where
+            T: Takes<Value: Send> + Send + Sync + 'static,
+            H: Handler<T::Value>,
+        {
+            operation(($word, MethodFilter::$filter), path, takes, true, handler)
+        })*
+    };
+}
+methods!(get "GET" GET, post "POST" POST, put "PUT" PUT, patch "PATCH" PATCH, delete "DELETE" DELETE);
+
+/// A probe: whoever asks it may add parameters of their own.
+pub(super) fn probe<H: Handler<()>>(path: &'static str, handler: H) -> Operation {
+    operation(("GET", MethodFilter::GET), path, (), false, handler)
+}
+
+impl Operation {
+    /// The rpcs that do the same.
+    pub(super) fn rpcs(mut self, rpcs: &'static [&'static str]) -> Self {
+        self.rpcs = rpcs;
+        self.id = rpcs.first().copied().unwrap_or_default();
+        self
+    }
+
+    /// There is no such rpc; a name of its own.
+    pub(super) fn rest_only(mut self, id: &'static str) -> Self {
+        self.id = id;
+        self
+    }
+
+    /// Another route of an rpc, with a name of its own.
+    pub(super) fn named(mut self, id: &'static str) -> Self {
+        self.id = id;
+        self
+    }
+
+    /// What it does: one line, without a stop.
+    pub(super) fn summary(mut self, summary: &'static str) -> Self {
+        self.summary = summary;
+        self
+    }
+
+    /// What is sent to it.
+    pub(super) fn body(mut self, body: Content) -> Self {
+        self.body = Some(body);
+        self
+    }
+
+    /// A body that may also be left out.
+    pub(super) fn optional_body(self, body: Content) -> Self {
+        Operation {
+            needs_body: false,
+            ..self.body(body)
+        }
+    }
+
+    /// Such a body.
+    pub(super) fn example(mut self, body: Value) -> Self {
+        self.example = Some(body);
+        self
+    }
+
+    /// An answer when all is well.
+    pub(super) fn answers(mut self, status: u16, meaning: &'static str, content: Content) -> Self {
+        self.answers.push(Answer {
+            status,
+            meaning,
+            content,
+            headers: vec![],
+        });
+        self
+    }
+
+    /// Headers that the answer before always has.
+    pub(super) fn with(mut self, headers: impl IntoIterator<Item = Description>) -> Self {
+        if let Some(answer) = self.answers.last_mut() {
+            answer
+                .headers
+                .extend(headers.into_iter().map(|header| (header, true)));
+        }
+        self
+    }
+
+    /// A header that it has sometimes.
+    pub(super) fn sometimes_with(mut self, header: Description) -> Self {
+        if let Some(answer) = self.answers.last_mut() {
+            answer.headers.push((header, false));
+        }
+        self
+    }
+
+    /// Codes beside those that the shape of the operation implies.
+    pub(super) fn fails(mut self, codes: &[Code]) -> Self {
+        self.errors.extend(codes);
+        self
+    }
+
+    /// The codes of the errors that it can answer, each once.
+    pub(in crate::rest) fn errors(&self) -> Vec<Code> {
+        let mut codes = vec![Code::Internal, Code::RateLimited];
+        if self.strict {
+            codes.push(Code::UnknownParameter);
+        }
+        let in_path = |parameter: &Description| parameter.place == Place::Path;
+        if !self.parameters.iter().all(in_path) {
+            codes.push(Code::BadParameter);
+        }
+        if self.parameters.iter().any(in_path) {
+            codes.push(Code::NotFound);
+        }
+        if self.path.starts_with("/v1/jobs/{id}") {
+            codes.push(Code::Deleted);
+        }
+        let takes = |media| self.body.iter().flatten().any(|(name, _)| *name == media);
+        if takes("application/json") {
+            codes.extend([
+                Code::MalformedJson,
+                Code::UnsupportedMedia,
+                Code::PayloadTooLarge,
+            ]);
+        }
+        codes.extend(&self.errors);
+        // in the order of the catalogue, each once
+        Code::ALL
+            .into_iter()
+            .filter(|code| codes.contains(code))
+            .collect()
+    }
+}

@@ -1,0 +1,121 @@
+//! Which jobs: the filters of lists, counts, and of what is done to many. One list for both protocols.
+
+use serde_json::json;
+
+use crate::{
+    error::ApiError,
+    job::Status,
+    parameters::{Description, Parameter, Text, Times, Words},
+    store::Filter,
+};
+
+/// By status; several may be given.
+pub const STATUS: Parameter<Words<Status>> = Parameter {
+    name: "status",
+    meaning: "Only jobs of this status; several may be given",
+    values: Words(|| Status::ALL.map(|status| (status.as_str(), status)).into()),
+};
+
+/// By owner.
+pub const OWNER: Parameter<Text> = Parameter {
+    name: "owner",
+    meaning: "Only jobs of this owner",
+    values: Text,
+};
+
+/// By label: `label.{key}` stands for any key.
+pub const LABEL: Parameter<Text> = Parameter {
+    name: "label.{key}",
+    meaning: "label.KEY=VALUE: only jobs with this label; several may be given",
+    values: Text,
+};
+
+/// By name.
+pub const NAME: Parameter<Text> = Parameter {
+    name: "name",
+    meaning: "Only jobs of this name",
+    values: Text,
+};
+
+/// By the fingerprint of the problem.
+pub const INPUT_HASH: Parameter<Text> = Parameter {
+    name: "input_hash",
+    meaning: "Only jobs with this input",
+    values: Text,
+};
+
+/// By the time of acceptance, from.
+pub const CREATED_AFTER: Parameter<Times> = Parameter {
+    name: "created_after",
+    meaning: "Only jobs accepted at this time or later",
+    values: Times,
+};
+
+/// By the time of acceptance, to.
+pub const CREATED_BEFORE: Parameter<Times> = Parameter {
+    name: "created_before",
+    meaning: "Only jobs accepted earlier",
+    values: Times,
+};
+
+/// By the time of the end, from.
+pub const FINISHED_AFTER: Parameter<Times> = Parameter {
+    name: "finished_after",
+    meaning: "Only jobs that ended at this time or later",
+    values: Times,
+};
+
+/// By the time of the end, to.
+pub const FINISHED_BEFORE: Parameter<Times> = Parameter {
+    name: "finished_before",
+    meaning: "Only jobs that ended earlier",
+    values: Times,
+};
+
+/// All of them, as they are described.
+pub fn describe() -> [Description; 9] {
+    [
+        STATUS.describe_several(),
+        OWNER.describe(),
+        labels(),
+        NAME.describe(),
+        INPUT_HASH.describe(),
+        CREATED_AFTER.describe(),
+        CREATED_BEFORE.describe(),
+        FINISHED_AFTER.describe(),
+        FINISHED_BEFORE.describe(),
+    ]
+}
+
+/// OpenAPI has labels as the members of an object, which are parameters each (style form, exploded: the
+/// default). Their values have no type: in a query all are text.
+fn labels() -> Description {
+    let keys = json!({ "^label\\.": {} });
+    Description {
+        schema: json!({ "type": "object", "patternProperties": keys, "additionalProperties": false }),
+        ..LABEL.describe_several()
+    }
+}
+
+/// A filter that can be asked for, each status and label once.
+pub fn checked(filter: Filter) -> Result<Filter, ApiError> {
+    let filter = filter.tidied();
+    if filter.labels.len() > Filter::MOST_LABELS {
+        return Err(ApiError::BadParameter {
+            name: "labels",
+            got: format!("{} labels", filter.labels.len()),
+            expected: format!("at most {} labels", Filter::MOST_LABELS),
+        });
+    }
+    Ok(filter)
+}
+
+/// A filter that leaves some jobs out, for what is done to many: nobody does it to all by accident.
+pub(super) fn required(filter: Filter) -> Result<Filter, ApiError> {
+    match filter.is_empty() {
+        true => Err(ApiError::MissingFilter(
+            describe().map(|filter| filter.name).join(", "),
+        )),
+        false => Ok(filter),
+    }
+}

@@ -1,0 +1,67 @@
+//! What this service is, and its limits.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{Service, page::MAX_PAGE_SIZE, submit::MAX_BATCH, watch::MAX_WAIT_S};
+use crate::{caller::Caller, formats::Format};
+
+/// What this service is.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Info {
+    /// Its name.
+    pub name: String,
+    /// Of the program, and so of the solver.
+    pub version: String,
+    /// Of the API.
+    pub api_version: String,
+    /// Jobs that can run at the same time.
+    pub workers: u32,
+    /// What it takes at most.
+    pub limits: ServiceLimits,
+    /// What rows (profiles, history) are served as, the default first.
+    pub table_formats: Vec<String>,
+    /// What fields are served as, the default first.
+    pub field_formats: Vec<String>,
+}
+
+/// What the service takes at most.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ServiceLimits {
+    /// Bytes of a request over REST.
+    pub max_body_bytes: u64,
+    /// Bytes of a mesh file.
+    pub max_mesh_bytes: u64,
+    /// Bytes of memory that one job may need, by the estimate.
+    pub memory_budget_bytes: u64,
+    /// Jobs that may wait.
+    pub max_queued: u32,
+    /// Jobs of a batch.
+    pub max_batch: u32,
+    /// Jobs of a page.
+    pub max_page_size: u32,
+    /// Seconds that a request may wait for a job.
+    pub max_wait_s: f64,
+}
+
+/// What this service is.
+pub fn info(service: &Service, _caller: &Caller) -> Info {
+    let names = |formats: &[Format]| formats.iter().map(|f| f.name().to_owned()).collect();
+    Info {
+        name: "signorini".into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        api_version: "v1".into(),
+        workers: service.queue.state().workers.into(),
+        limits: ServiceLimits {
+            max_body_bytes: service.max_body_bytes as u64,
+            max_mesh_bytes: service.max_mesh_bytes as u64,
+            memory_budget_bytes: service.memory_budget_bytes,
+            max_queued: service.max_queued,
+            max_batch: MAX_BATCH as u32,
+            max_page_size: MAX_PAGE_SIZE as u32,
+            max_wait_s: MAX_WAIT_S,
+        },
+        table_formats: names(Format::OF_TABLES),
+        field_formats: names(Format::OF_FIELDS),
+    }
+}

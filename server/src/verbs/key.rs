@@ -1,0 +1,42 @@
+//! The client's key for a request that it may repeat.
+
+use crate::parameters::{Parameter, Values};
+
+/// The key; over gRPC the field `request_id`.
+pub const IDEMPOTENCY_KEY: Parameter<Keys> = Parameter {
+    name: "Idempotency-Key",
+    meaning: "The client's key for this request: sent again, it is answered with the job that it created",
+    values: Keys,
+};
+
+/// A key that was checked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Key(pub(super) String);
+
+/// The keys that there may be.
+#[derive(Clone, Copy, Debug)]
+pub struct Keys;
+
+/// Characters of the longest key.
+const MAX_LENGTH: usize = 255;
+
+impl Values for Keys {
+    type Value = Key;
+
+    /// As a header of HTTP can have them, without blanks around.
+    fn schema(&self) -> serde_json::Value {
+        let inner = MAX_LENGTH - 2;
+        let pattern = format!("^[!-~]([ -~]{{0,{inner}}}[!-~])?$");
+        serde_json::json!({ "type": "string", "pattern": pattern })
+    }
+
+    fn expected(&self) -> String {
+        format!("1 … {MAX_LENGTH} characters, none of them a control character")
+    }
+
+    fn read(&self, text: &str) -> Option<Key> {
+        let fits = (1..=MAX_LENGTH).contains(&text.chars().count());
+        let plain = !text.chars().any(char::is_control);
+        (fits && plain).then(|| Key(text.to_owned()))
+    }
+}

@@ -1,0 +1,183 @@
+//! Two callers on one service: each finds only their own jobs, whatever they ask.
+#![allow(clippy::unwrap_used)]
+
+use std::{path::Path, sync::Arc};
+
+use futures_util::StreamExt;
+
+use super::{
+    Service,
+    envelope::{Envelope, JobRequest},
+    fields, history, jobs,
+    key::IDEMPOTENCY_KEY,
+    page::Paging,
+    plots,
+    profiles::{self, Points},
+    results, retry, submit,
+    watch::{self, Until},
+};
+use crate::{
+    caller::{Caller, Scope},
+    config::{Config, MemoryBudget},
+    error::ApiError,
+    fake,
+    formats::Format,
+    job::{Cache, Job, JobId, Status},
+    queue::Queue,
+    store::{Edit, Filter, GroupBy, Store},
+};
+
+/// A service whose queue has not been started.
+pub(super) async fn service(folder: &Path) -> Arc<Service> {
+    let config = Config {
+        listen: ([127, 0, 0, 1], 0).into(),
+        data: folder.to_path_buf(),
+        workers: 1,
+        max_queued: 10,
+        memory: MemoryBudget::default(),
+        max_body_bytes: 1 << 20,
+        max_mesh_bytes: 1 << 20,
+        grace_s: 1,
+    };
+    let store = Store::open(folder).await.unwrap();
+    let queue = Queue::new(store.clone(), fake::solve, 1);
+    Arc::new(Service::new(&config, store, queue))
+}
+
+/// Who may do everything with what is their own.
+fn caller(owner: &str) -> Caller {
+    Caller::new(owner, [Scope::Read, Scope::Submit, Scope::Cancel])
+}
+
+fn request() -> JobRequest {
+    let envelope = Envelope {
+        cache: Cache::Off,
+        ..Envelope::default()
+    };
+    JobRequest {
+        envelope,
+        problem: Ok(fake::problem()),
+    }
+}
+
+async fn create(service: &Arc<Service>, caller: &Caller, id: Option<JobId>) -> Job {
+    let submitted = submit::create(service, caller, request(), id, None).await;
+    submitted.unwrap().accepted
+}
+
+/// That there is nothing of this kind, for this caller.
+fn unknown<T>(verb: &str, answer: Result<T, ApiError>) {
+    assert!(matches!(answer, Err(ApiError::NotFound(_))), "{verb}");
+}
+
+#[tokio::test]
+async fn a_job_of_another_is_not_found_by_any_verb() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = &service(folder.path()).await;
+    service.queue.start();
+    let (ada, bob) = (&caller("ada"), &caller("bob"));
+    let id = create(service, ada, None).await.id;
+    let ended = watch::wait(service, ada, id, Until::Terminal, 60.0).await;
+    assert_eq!(ended.unwrap().0.status, Status::Succeeded);
+
+    unknown("get", jobs::get(service, bob, id).await);
+    unknown("problem", jobs::problem(service, bob, id).await);
+    let wait = watch::wait(service, bob, id, Until::Terminal, 0.0);
+    unknown("wait", wait.await);
+    unknown("watch", watch::watch(service, bob, id, 0).await);
+    unknown("result", results::result(service, bob, id).await);
+    unknown("history", history::history(service, bob, id, None).await);
+    let profile = profiles::profile(service, bob, id, "top", None, Points::Nodes);
+    unknown("profile", profile.await);
+    unknown("fields", fields::fields(service, bob, id).await);
+    let npz = fields::converted_fields(service, bob, id, Format::Npz);
+    unknown("fields", npz.await);
+    let plot = plots::plot(
+        service,
+        bob,
+        id,
+        files::plot::Plot::Mesh,
+        Default::default(),
+    );
+    unknown("plot", plot.await);
+    let edit = Edit {
+        pinned: Some(true),
+        ..Edit::default()
+    };
+    unknown("update", jobs::update(service, bob, id, edit, None).await);
+    unknown("cancel", jobs::cancel(service, bob, id).await);
+    let again = retry::retry(service, bob, id, Default::default(), None);
+    unknown("retry", again.await);
+    unknown("delete", jobs::delete(service, bob, id).await);
+
+    // and is there for its owner all the same
+    let job = jobs::get(service, ada, id).await.unwrap();
+    assert_eq!((job.owner.as_str(), job.pinned), ("ada", false));
+    let events = watch::watch(service, ada, id, 0).await.unwrap().unwrap();
+    assert!(events.count().await > 2);
+    assert!(results::result(service, ada, id).await.is_ok());
+    jobs::delete(service, ada, id).await.unwrap();
+    let gone = jobs::get(service, ada, id).await;
+    assert!(matches!(gone, Err(ApiError::Deleted(_))));
+    unknown("a deleted one", jobs::get(service, bob, id).await);
+}
+
+#[tokio::test]
+async fn what_is_done_to_many_jobs_is_done_to_those_that_the_caller_sees() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = &service(folder.path()).await;
+    let (ada, bob, admin) = (&caller("ada"), &caller("bob"), &Caller::local());
+    for caller in [ada, ada, bob] {
+        create(service, caller, None).await;
+    }
+    let all = &Filter::default();
+    for (caller, own) in [(ada, 2), (bob, 1), (admin, 3)] {
+        let page = jobs::list(service, caller, all, None, &Paging::default()).await;
+        assert_eq!(page.unwrap().items.len(), own);
+        let count = jobs::count(service, caller, all, Some(GroupBy::Owner)).await;
+        assert_eq!(count.unwrap().total, own as i64);
+    }
+    let of_ada = Filter {
+        owner: Some("ada".into()),
+        ..Filter::default()
+    };
+    let page = jobs::list(service, bob, &of_ada, None, &Paging::default()).await;
+    assert_eq!(page.unwrap().items.len(), 0);
+    let queued = Filter {
+        statuses: vec![Status::Queued],
+        ..Filter::default()
+    };
+    let canceled = jobs::cancel_many(service, bob, of_ada.clone()).await;
+    assert_eq!(canceled.unwrap().matched, 0);
+    let canceled = jobs::cancel_many(service, bob, queued.clone()).await;
+    assert_eq!(canceled.unwrap().changed, 1);
+    let canceled = jobs::cancel_many(service, admin, queued).await;
+    assert_eq!(canceled.unwrap().changed, 2);
+    let deleted = jobs::delete_many(service, bob, of_ada.clone()).await;
+    assert_eq!(deleted.unwrap().matched, 0);
+    let deleted = jobs::delete_many(service, ada, of_ada).await;
+    assert_eq!(deleted.unwrap().changed, 2);
+    let left = jobs::count(service, admin, all, None).await.unwrap();
+    assert_eq!(left.total, 1);
+}
+
+#[tokio::test]
+async fn keys_and_ids_belong_to_who_made_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = &service(folder.path()).await;
+    let (ada, bob) = (&caller("ada"), &caller("bob"));
+    let key = || Some(IDEMPOTENCY_KEY.read("k").unwrap());
+    let mut ids = vec![];
+    for caller in [ada, bob, ada] {
+        let submitted = submit::create(service, caller, request(), None, key()).await;
+        ids.push(submitted.unwrap().accepted.id);
+    }
+    assert_eq!(ids[0], ids[2]);
+    assert_ne!(ids[0], ids[1]);
+
+    let id = JobId::new();
+    create(service, ada, Some(id)).await;
+    assert_eq!(create(service, ada, Some(id)).await.id, id);
+    let theirs = submit::create(service, bob, request(), Some(id), None).await;
+    assert!(matches!(theirs, Err(ApiError::IdConflict(_))));
+}
