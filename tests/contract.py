@@ -8,6 +8,8 @@ up the queue, runs against the second. The jobs whose events are asked for have 
 end would be waited for (tests/service reads those).
 """
 
+# Operations: GetOpenApi
+
 import concurrent.futures
 import json
 import os

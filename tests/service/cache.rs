@@ -13,6 +13,7 @@ use crate::{
     server,
 };
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn the_same_input_is_answered_from_the_first_result() {
     let server = server().await;
@@ -85,6 +86,7 @@ async fn the_same_input_is_answered_from_the_first_result() {
     }
 }
 
+/// Operations: CreateJob, CancelJob
 #[tokio::test]
 async fn two_of_the_same_input_are_solved_once_and_canceled_apart() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "2"]).await;

@@ -10,6 +10,7 @@ use suite::{
 
 use crate::{SIGNORINI, server};
 
+/// Operations: CancelJob
 #[tokio::test]
 async fn a_queued_job_is_canceled_at_once_and_never_runs() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
@@ -32,6 +33,7 @@ async fn a_queued_job_is_canceled_at_once_and_never_runs() {
 }
 
 /// In every phase, the factorisation that cannot be interrupted among them.
+/// Operations: CancelJob
 #[tokio::test]
 async fn a_running_large_job_is_canceled_within_half_a_second_in_any_phase() {
     let server = Server::start_alone(SIGNORINI, &[]).await;
@@ -62,6 +64,7 @@ async fn a_running_large_job_is_canceled_within_half_a_second_in_any_phase() {
     }
 }
 
+/// Operations: CancelJob, WatchJob
 #[tokio::test]
 async fn a_canceled_job_has_one_end_and_the_next_job_runs() {
     let server = Server::start(SIGNORINI, &["--workers", "1"]).await;
@@ -83,6 +86,7 @@ async fn a_canceled_job_has_one_end_and_the_next_job_runs() {
     assert_eq!(events.last().unwrap()["type"], "done");
 }
 
+/// Operations: CancelJob
 #[tokio::test]
 async fn a_finished_job_is_not_touched() {
     let server = server().await;

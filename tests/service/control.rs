@@ -11,6 +11,7 @@ use tonic::Code;
 
 use crate::{SIGNORINI, grpc::connect, server};
 
+/// Operations: RetryJob
 #[tokio::test]
 async fn a_job_that_has_ended_is_tried_again_as_a_new_one() {
     let server = server().await;
@@ -59,6 +60,7 @@ async fn a_job_that_has_ended_is_tried_again_as_a_new_one() {
     assert_eq!(third.parent.as_deref(), Some(id));
 }
 
+/// Operations: RetryJob
 #[tokio::test]
 async fn a_job_that_ran_out_of_time_is_given_more() {
     let server = server().await;
@@ -113,6 +115,7 @@ async fn a_job_that_ran_out_of_time_is_given_more() {
     server.cancel(&third.id).await;
 }
 
+/// Operations: RetryJob, DeleteJob
 #[tokio::test]
 async fn a_job_that_waits_or_runs_is_neither_retried_nor_deleted() {
     let server = Server::start(SIGNORINI, &["--workers", "1"]).await;
@@ -145,6 +148,7 @@ async fn a_job_that_waits_or_runs_is_neither_retried_nor_deleted() {
     server.cancel(&running).await;
 }
 
+/// Operations: DeleteJob
 #[tokio::test]
 async fn a_deleted_job_is_gone_with_all_that_belonged_to_it() {
     let server = server().await;
@@ -186,6 +190,7 @@ async fn a_deleted_job_is_gone_with_all_that_belonged_to_it() {
     assert!(refused.message().starts_with("deleted"), "{refused}");
 }
 
+/// Operations: UpdateJob
 #[tokio::test]
 async fn name_labels_priority_and_pin_are_changed_if_the_version_is_the_one_that_was_seen() {
     let server = server().await;
@@ -262,6 +267,7 @@ async fn name_labels_priority_and_pin_are_changed_if_the_version_is_the_one_that
     );
 }
 
+/// Operations: CancelJobs, DeleteJobs
 #[tokio::test]
 async fn many_jobs_are_canceled_and_deleted_by_a_filter_and_not_without_one() {
     let server = Server::start(SIGNORINI, &["--workers", "1"]).await;
@@ -318,6 +324,7 @@ async fn many_jobs_are_canceled_and_deleted_by_a_filter_and_not_without_one() {
     server.cancel(&front).await;
 }
 
+/// Operations: GetQueue, PauseQueue, ResumeQueue
 #[tokio::test]
 async fn a_paused_queue_accepts_and_does_not_start() {
     let mut server = server().await;
@@ -369,6 +376,7 @@ async fn a_paused_queue_accepts_and_does_not_start() {
     assert_eq!(act(&server, "resume").await["paused"], false);
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn time_limits_end_a_job_with_reasons_of_their_own() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;

@@ -19,6 +19,7 @@ fn references<'a>(value: &'a Value, found: &mut Vec<&'a str>) {
     }
 }
 
+/// Operations: GetOpenApi, GetProblemSchema
 #[tokio::test]
 async fn the_description_is_whole_and_says_what_each_error_is() {
     let document = server().await.json("/openapi.json").await;
@@ -57,6 +58,7 @@ fn filled(path: &str) -> String {
         .replace("{plot}", "deformed.svg")
 }
 
+/// Operations: GetOpenApi
 #[tokio::test]
 async fn every_route_is_there_and_knows_the_parameters_that_are_described() {
     let server = server().await;
@@ -88,6 +90,7 @@ async fn every_route_is_there_and_knows_the_parameters_that_are_described() {
     }
 }
 
+/// Operations: GetDocs, GetDocsFile
 #[tokio::test]
 async fn the_page_of_the_api_loads_from_here_and_from_nowhere_else() {
     let server = server().await;
@@ -109,6 +112,7 @@ async fn the_page_of_the_api_loads_from_here_and_from_nowhere_else() {
     }
 }
 
+/// Operations: GetProto
 #[tokio::test]
 async fn the_contract_of_grpc_is_served_as_it_was_written() {
     let served = server().await.get("/proto/signorini.proto").send().await;
@@ -117,6 +121,7 @@ async fn the_contract_of_grpc_is_served_as_it_was_written() {
     assert_eq!(served, written);
 }
 
+/// Operations: GetError
 #[tokio::test]
 async fn every_error_has_its_page_for_programs_and_for_people() {
     let server = server().await;

@@ -32,6 +32,7 @@ async fn refused(request: RequestBuilder) -> (StatusCode, Value) {
     (status, document)
 }
 
+/// Operations: GetJob, WatchJob, GetResult
 #[tokio::test]
 async fn unknown_things_are_not_found() {
     let server = server().await;
@@ -76,6 +77,7 @@ async fn a_wrong_method_is_told_the_right_ones() {
     }
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn a_body_that_is_no_json_is_told_apart_from_a_wrong_one() {
     let server = server().await;
@@ -122,6 +124,7 @@ async fn a_body_that_is_no_json_is_told_apart_from_a_wrong_one() {
     }
 }
 
+/// Operations: ListJobs
 #[tokio::test]
 async fn parameters_are_known_and_make_sense() {
     let server = server().await;
@@ -142,6 +145,7 @@ async fn parameters_are_known_and_make_sense() {
     }
 }
 
+/// Operations: Live, Ready, GetProblemSchema
 #[tokio::test]
 async fn the_probes_and_the_schema_answer() {
     let server = server().await;

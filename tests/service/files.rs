@@ -9,6 +9,7 @@ use tonic::Code;
 
 use crate::{grpc::connect, server};
 
+/// Operations: StreamResult
 #[tokio::test]
 async fn fields_are_fetched_in_ranges_that_make_up_the_whole() {
     let server = server().await;
@@ -101,6 +102,7 @@ async fn fields_are_fetched_in_ranges_that_make_up_the_whole() {
     }
 }
 
+/// Operations: ListIterations, GetProfile
 #[tokio::test]
 async fn tables_have_tags_and_ranges_too() {
     let server = server().await;

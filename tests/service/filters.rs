@@ -31,6 +31,7 @@ async fn listed(server: &Server, query: &str) -> Vec<String> {
     }
 }
 
+/// Operations: ListJobs, CountJobs
 #[tokio::test]
 async fn every_filter_finds_its_jobs_alone_and_with_others() {
     let server = server().await;
@@ -95,6 +96,7 @@ async fn every_filter_finds_its_jobs_alone_and_with_others() {
     );
 }
 
+/// Operations: ListJobs
 #[tokio::test]
 async fn lists_go_by_the_time_that_is_asked_for_in_both_directions() {
     let server = Server::start(SIGNORINI, &["--workers", "1"]).await;

@@ -24,6 +24,7 @@ pub(crate) fn message(text: &str) -> pb::Problem {
     problem_to_pb(&files::parse(text).unwrap())
 }
 
+/// Operations: CreateJob, GetJob, ListJobs, WatchJob, CancelJob, GetResult, GetProfile
 #[tokio::test]
 async fn a_job_goes_all_the_way_over_grpc() {
     let server = server().await;
@@ -109,6 +110,7 @@ async fn a_job_goes_all_the_way_over_grpc() {
     );
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn who_waits_over_grpc_gets_the_terminal_job() {
     let server = server().await;
@@ -135,6 +137,7 @@ async fn who_waits_over_grpc_gets_the_terminal_job() {
     assert_eq!(refused.code(), Code::InvalidArgument);
 }
 
+/// Operations: CreateJob, GetJob
 #[tokio::test]
 async fn errors_carry_codes_and_details() {
     let server = server().await;
@@ -221,6 +224,7 @@ async fn errors_carry_codes_and_details() {
 }
 
 /// What REST has accepted and gives in one piece may be too much for a message.
+/// Operations: ListJobs, GetJobProblem
 #[tokio::test]
 async fn no_answer_is_larger_than_a_message_may_be() {
     use prost::Message;
@@ -264,6 +268,7 @@ async fn no_answer_is_larger_than_a_message_may_be() {
     assert_eq!(details.error_info().unwrap().reason, "payload-too-large");
 }
 
+/// Operations: WatchJob
 #[tokio::test]
 async fn a_stream_over_grpc_ends_unavailable_when_the_service_stops() {
     let mut server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;

@@ -25,6 +25,7 @@ fn grpc_body(name: &str) -> pb::CreateJobRequest {
     }
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn a_key_answers_with_the_same_job_as_it_is_now() {
     let server = server().await;
@@ -82,6 +83,7 @@ async fn a_key_answers_with_the_same_job_as_it_is_now() {
 }
 
 /// A thousand answers, fifty jobs.
+/// Operations: CreateJob
 #[tokio::test]
 async fn many_clients_with_the_same_key_at_once_make_one_job() {
     let server = server().await;
@@ -106,6 +108,7 @@ async fn many_clients_with_the_same_key_at_once_make_one_job() {
     assert_eq!(server.json("/v1/jobs/count").await["total"], 50);
 }
 
+/// Operations: PutJob
 #[tokio::test]
 async fn a_job_may_have_a_name_of_the_clients_own() {
     let server = server().await;
@@ -147,6 +150,7 @@ async fn a_job_may_have_a_name_of_the_clients_own() {
     assert_eq!(status, StatusCode::GONE, "a name is not given twice");
 }
 
+/// Operations: BatchCreateJobs
 #[tokio::test]
 async fn a_batch_is_accepted_whole_or_not_at_all() {
     let server = server().await;

@@ -11,6 +11,7 @@ use suite::{
 
 use crate::{SIGNORINI, server};
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn a_body_over_the_limit_is_refused() {
     let server = server().await;
@@ -49,6 +50,7 @@ fn faulty(supports: usize) -> Value {
     json!({ "problem": problem })
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn bodies_that_take_long_to_explain_do_not_hold_up_the_others() {
     let server = Server::start_alone(SIGNORINI, &[]).await;
@@ -82,6 +84,7 @@ async fn bodies_that_take_long_to_explain_do_not_hold_up_the_others() {
     assert!(longest < Duration::from_secs(1), "{longest:?}");
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn a_problem_over_the_memory_budget_is_refused_with_the_figures() {
     let server = Server::start(SIGNORINI, &["--memory-budget-bytes", "1000000000"]).await;
@@ -119,6 +122,7 @@ async fn a_problem_over_the_memory_budget_is_refused_with_the_figures() {
     assert_eq!(response.status(), StatusCode::PAYLOAD_TOO_LARGE);
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn a_full_queue_refuses_jobs_and_nothing_else() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1", "--max-queued", "2"]).await;
@@ -138,6 +142,7 @@ async fn a_full_queue_refuses_jobs_and_nothing_else() {
     server.submit(&example_json("sheet")).await; // there is room again
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn two_large_jobs_run_at_once_and_a_third_waits() {
     let server = Server::start_alone(SIGNORINI, &[]).await;

@@ -6,6 +6,7 @@ use suite::{example_json, harness::large};
 
 use crate::{SIGNORINI, server};
 
+/// Operations: ListJobs
 #[tokio::test]
 async fn pages_hold_every_job_once_newest_first() {
     let server = server().await;
@@ -33,6 +34,7 @@ async fn pages_hold_every_job_once_newest_first() {
     assert_eq!(seen, ids);
 }
 
+/// Operations: ListJobs
 #[tokio::test]
 async fn jobs_are_found_by_status_and_know_their_place() {
     let server = suite::harness::Server::start_alone(SIGNORINI, &["--workers", "1"]).await;

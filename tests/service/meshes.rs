@@ -35,6 +35,7 @@ async fn solved(server: &Server, problem: &Value) -> Value {
 
 /// Every family that Gmsh wrote, in each form of its format, solves through REST; the four forms of a
 /// mesh give one answer.
+/// Operations: UploadMesh, CreateJob
 #[tokio::test]
 async fn what_gmsh_wrote_is_stored_and_solved() {
     let server = server().await;
@@ -59,6 +60,7 @@ async fn what_gmsh_wrote_is_stored_and_solved() {
     }
 }
 
+/// Operations: UploadMesh, ListMeshes, GetMesh
 #[tokio::test]
 async fn a_mesh_is_stored_once_and_told_apart_by_its_content() {
     let server = server().await;
@@ -109,6 +111,7 @@ async fn a_mesh_is_stored_once_and_told_apart_by_its_content() {
     }
 }
 
+/// Operations: UploadMesh
 #[tokio::test]
 async fn what_is_no_mesh_is_refused_with_its_line() {
     let server = server().await;
@@ -156,6 +159,7 @@ async fn what_is_no_mesh_is_refused_with_its_line() {
     );
 }
 
+/// Operations: UploadMesh
 #[tokio::test]
 async fn too_large_a_mesh_is_refused_whether_it_says_its_size_or_not() {
     let server = Server::start(SIGNORINI, &["--max-mesh-bytes", "10000"]).await;
@@ -170,6 +174,7 @@ async fn too_large_a_mesh_is_refused_whether_it_says_its_size_or_not() {
 }
 
 /// A mesh stays as long as a job needs it, also over a crash, and what an upload left is cleared.
+/// Operations: DeleteMesh
 #[tokio::test]
 async fn a_mesh_is_kept_for_the_jobs_that_wait_for_it() {
     let mut server = server().await;
@@ -194,6 +199,7 @@ async fn a_mesh_is_kept_for_the_jobs_that_wait_for_it() {
     assert_eq!(response.status(), StatusCode::NO_CONTENT);
 }
 
+/// Operations: UploadMesh, ListMeshes, GetMesh, DeleteMesh
 #[tokio::test]
 async fn grpc_stores_and_tells_the_same() {
     let server = server().await;
@@ -325,6 +331,7 @@ fn gmsh_grid(columns: usize, rows: usize) -> Vec<u8> {
 
 /// A million nodes, over REST and over gRPC: the server grows by no more than twice the parsed mesh
 /// (positions, node numbers, and 4 bytes for each element of a group), and a job on it is a small message.
+/// Operations: UploadMesh
 #[tokio::test]
 async fn a_mesh_of_a_million_nodes_streams_through() {
     let bytes = gmsh_grid(580, 575);

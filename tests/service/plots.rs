@@ -11,6 +11,7 @@ use crate::{SIGNORINI, server};
 
 const PLOTS: [&str; 4] = ["mesh", "deformed", "profile", "convergence"];
 
+/// Operations: GetPlot
 #[tokio::test]
 async fn every_plot_of_a_result_is_an_svg_in_both_themes() {
     let server = server().await;
@@ -36,6 +37,7 @@ async fn every_plot_of_a_result_is_an_svg_in_both_themes() {
     assert!(normal.text().await.unwrap().contains("σ_yy [MPa]"));
 }
 
+/// Operations: GetPlot
 #[tokio::test]
 async fn a_plot_or_a_theme_that_is_not_known_is_refused_with_what_is() {
     let server = server().await;
@@ -63,6 +65,7 @@ async fn a_plot_or_a_theme_that_is_not_known_is_refused_with_what_is() {
     }
 }
 
+/// Operations: GetPlot
 #[tokio::test]
 async fn what_a_result_does_not_have_is_not_drawn() {
     let server = server().await;
@@ -85,6 +88,7 @@ async fn what_a_result_does_not_have_is_not_drawn() {
     assert_eq!(deformed.status(), StatusCode::OK);
 }
 
+/// Operations: GetPlot
 #[tokio::test]
 async fn a_plot_is_there_as_soon_as_what_it_shows() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
@@ -118,6 +122,7 @@ async fn a_plot_is_there_as_soon_as_what_it_shows() {
     server.cancel(&running).await;
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn a_unit_of_more_than_twenty_characters_is_refused() {
     let server = server().await;

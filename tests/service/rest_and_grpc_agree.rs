@@ -20,6 +20,7 @@ const EXAMPLES: [&str; 5] = [
     "sheet",
 ];
 
+/// Operations: CreateJob, GetResult
 #[tokio::test]
 async fn rest_grpc_and_the_command_line_find_the_same_bits() {
     let server = server().await;
@@ -84,6 +85,7 @@ async fn rest_grpc_and_the_command_line_find_the_same_bits() {
     }
 }
 
+/// Operations: GetJob
 #[tokio::test]
 async fn both_protocols_say_the_same_of_a_job_that_failed() {
     let server = server().await;
@@ -119,6 +121,7 @@ async fn both_protocols_say_the_same_of_a_job_that_failed() {
     );
 }
 
+/// Operations: WatchJob, GetProfile
 #[tokio::test]
 async fn both_protocols_tell_the_same_story_of_one_job() {
     let server = server().await;
@@ -185,6 +188,7 @@ async fn both_protocols_tell_the_same_story_of_one_job() {
 }
 
 /// Load steps: indented, then dragged, by the incremental law; the second solution asked for.
+/// Operations: GetResult, GetProfile
 #[tokio::test]
 async fn both_protocols_serve_every_load_step() {
     let server = server().await;

@@ -141,6 +141,7 @@ async fn a_port_in_use_is_refused_in_one_line() {
     );
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn an_accepted_job_survives_a_crash_right_after_the_answer() {
     let mut server = Server::start(SIGNORINI, &[]).await;

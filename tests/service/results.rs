@@ -10,6 +10,7 @@ use suite::{
 
 use crate::{SIGNORINI, server};
 
+/// Operations: GetResult, GetProfile, StreamResult
 #[tokio::test]
 async fn a_result_has_its_summary_profiles_and_fields() {
     let server = server().await;
@@ -102,6 +103,7 @@ async fn a_result_has_its_summary_profiles_and_fields() {
     );
 }
 
+/// Operations: ListIterations, GetProfile, StreamResult
 #[tokio::test]
 async fn every_format_has_its_type_its_name_and_its_first_bytes() {
     let server = server().await;
@@ -147,6 +149,7 @@ async fn every_format_has_its_type_its_name_and_its_first_bytes() {
     }
 }
 
+/// Operations: ListIterations
 #[tokio::test]
 async fn a_history_has_the_rows_that_were_told_and_no_more_than_asked_for() {
     let server = server().await;
@@ -182,6 +185,7 @@ async fn a_history_has_the_rows_that_were_told_and_no_more_than_asked_for() {
     }
 }
 
+/// Operations: ListIterations
 #[tokio::test]
 async fn a_job_without_a_result_has_the_history_that_was_told_so_far() {
     let server = suite::harness::Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
@@ -198,6 +202,7 @@ async fn a_job_without_a_result_has_the_history_that_was_told_so_far() {
     assert!(kept.as_array().unwrap().len() >= so_far.as_array().unwrap().len());
 }
 
+/// Operations: ListIterations, GetProfile, StreamResult
 #[tokio::test]
 async fn what_is_not_there_is_said_with_what_is() {
     let server = server().await;
@@ -225,6 +230,7 @@ async fn what_is_not_there_is_said_with_what_is() {
     }
 }
 
+/// Operations: GetResult
 #[tokio::test]
 async fn a_result_is_not_there_before_the_end_nor_after_an_end_without_one() {
     let server = suite::harness::Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
@@ -253,6 +259,7 @@ async fn a_result_is_not_there_before_the_end_nor_after_an_end_without_one() {
 }
 
 /// Names and numbers of load steps mean the same one.
+/// Operations: GetResult, GetProfile
 #[tokio::test]
 async fn load_steps_without_names_are_numbered_from_0() {
     let server = server().await;
@@ -283,6 +290,7 @@ async fn load_steps_without_names_are_numbered_from_0() {
 }
 
 /// Load steps: while the second runs, what the first has found is there.
+/// Operations: GetResult
 #[tokio::test]
 async fn finished_load_steps_of_a_running_job_are_served() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
@@ -338,6 +346,7 @@ async fn finished_load_steps_of_a_running_job_are_served() {
     assert_eq!(result["result_available"], "partial");
 }
 
+/// Operations: GetProfile
 #[tokio::test]
 async fn a_profile_is_given_at_nodes_at_friction_points_or_at_any_number_of_places() {
     let server = server().await;

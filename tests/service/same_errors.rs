@@ -24,6 +24,7 @@ fn refused<T>(answer: Result<Response<T>, Status>) -> (String, String) {
     (code.to_owned(), text.to_owned())
 }
 
+/// Operations: CreateJob, BatchCreateJobs, GetJob, GetJobProblem, WatchJob, WaitJob, GetResult, ListIterations, StreamResult, GetProfile, CancelJob, RetryJob, DeleteJob, UpdateJob, ListJobs, CountJobs, CancelJobs, DeleteJobs, GetMesh, DeleteMesh
 #[tokio::test]
 async fn what_one_protocol_refuses_the_other_refuses_alike() {
     let server = server().await;
@@ -265,6 +266,7 @@ async fn what_one_protocol_refuses_the_other_refuses_alike() {
     );
 }
 
+/// Operations: GetServerInfo, GetCaller, GetQueue, CountJobs, ListJobs, GetJobProblem, ListIterations
 #[tokio::test]
 async fn what_both_protocols_answer_about_the_service_is_the_same() {
     let server = server().await;

@@ -6,6 +6,7 @@ use suite::example_json;
 
 use crate::server;
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn a_submitted_job_is_accepted_with_its_address_and_version() {
     let server = server().await;
@@ -34,6 +35,7 @@ async fn a_submitted_job_is_accepted_with_its_address_and_version() {
     assert!(job["input_hash"].as_str().unwrap().starts_with("sha256:"));
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn who_prefers_to_wait_gets_the_terminal_job() {
     let server = server().await;
@@ -55,6 +57,7 @@ async fn who_prefers_to_wait_gets_the_terminal_job() {
     );
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn who_waits_too_short_gets_the_job_as_it_is() {
     let server = server().await;
@@ -71,6 +74,7 @@ async fn who_waits_too_short_gets_the_job_as_it_is() {
     assert!(response.headers().contains_key("retry-after"));
 }
 
+/// Operations: CreateJob, GetResult
 #[tokio::test]
 async fn the_same_problem_has_the_same_hash_and_digest_whatever_its_title() {
     let server = server().await;
@@ -89,6 +93,7 @@ async fn the_same_problem_has_the_same_hash_and_digest_whatever_its_title() {
     assert_eq!(digest(&first).await, digest(&second).await);
 }
 
+/// Operations: CreateJob, GetResult
 #[tokio::test]
 async fn a_problem_that_does_not_converge_fails_and_keeps_its_state() {
     let server = server().await;
@@ -117,6 +122,7 @@ async fn a_problem_that_does_not_converge_fails_and_keeps_its_state() {
     );
 }
 
+/// Operations: CreateJob
 #[tokio::test]
 async fn everything_wrong_with_a_job_is_said_at_once() {
     let server = server().await;

@@ -6,6 +6,7 @@ use suite::example_json;
 
 use crate::server;
 
+/// Operations: ValidateProblem
 #[tokio::test]
 async fn a_good_problem_is_valid_and_has_a_price() {
     let server = server().await;
@@ -36,6 +37,7 @@ async fn a_good_problem_is_valid_and_has_a_price() {
     );
 }
 
+/// Operations: ValidateProblem
 #[tokio::test]
 async fn a_bad_problem_is_an_answer_and_not_an_error() {
     let server = server().await;
@@ -67,6 +69,7 @@ async fn a_bad_problem_is_an_answer_and_not_an_error() {
     );
 }
 
+/// Operations: ValidateProblem
 #[tokio::test]
 async fn a_body_without_a_problem_is_told_so() {
     let server = server().await;

@@ -16,6 +16,7 @@ use crate::{
     server,
 };
 
+/// Operations: GetJob
 #[tokio::test]
 async fn a_client_that_has_the_job_already_is_told_so() {
     let server = server().await;
@@ -42,6 +43,7 @@ async fn a_client_that_has_the_job_already_is_told_so() {
     assert_eq!(get("\"x\"").await.status(), StatusCode::OK);
 }
 
+/// Operations: GetJob, WaitJob
 #[tokio::test]
 async fn a_long_poll_returns_with_the_next_version_or_at_its_limit() {
     let server = Server::start(SIGNORINI, &[]).await;
@@ -114,6 +116,7 @@ async fn a_long_poll_returns_with_the_next_version_or_at_its_limit() {
     }
 }
 
+/// Operations: CreateJob, SubmitAndWatch
 #[tokio::test]
 async fn a_job_is_handed_in_and_followed_in_one_request() {
     let server = server().await;
@@ -158,6 +161,7 @@ async fn a_job_is_handed_in_and_followed_in_one_request() {
     assert!(seqs.len() > 3 && seqs.iter().copied().eq(1..=seqs.len() as i64));
 }
 
+/// Operations: WatchJob, CreateJob
 #[tokio::test]
 async fn events_come_as_lines_to_who_prefers_lines() {
     let server = server().await;

@@ -9,6 +9,7 @@ use suite::{
 
 use crate::{SIGNORINI, server};
 
+/// Operations: WatchJob
 #[tokio::test]
 async fn the_story_of_a_job_is_told_in_order_and_can_be_told_again() {
     let server = server().await;
@@ -47,6 +48,7 @@ async fn the_story_of_a_job_is_told_in_order_and_can_be_told_again() {
     assert_eq!(*done, server.job(&id).await);
 }
 
+/// Operations: WatchJob
 #[tokio::test]
 async fn a_stream_goes_on_where_it_was_left() {
     let server = server().await;
@@ -77,6 +79,7 @@ async fn a_stream_goes_on_where_it_was_left() {
 }
 
 /// Over both protocols: the client that lost count is not left waiting for ever.
+/// Operations: WatchJob
 #[tokio::test]
 async fn a_stream_from_beyond_the_last_event_ends_with_the_job() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
@@ -96,6 +99,7 @@ async fn a_stream_from_beyond_the_last_event_ends_with_the_job() {
     server.cancel(&front).await;
 }
 
+/// Operations: WatchJob
 #[tokio::test]
 async fn closing_a_stream_does_not_cancel_the_job() {
     let server = server().await;
@@ -108,6 +112,7 @@ async fn closing_a_stream_does_not_cancel_the_job() {
 
 /// The client hangs up after each event and comes back with the number of the last; meanwhile the
 /// service is killed before the job starts, killed in mid-job, and stopped in mid-job.
+/// Operations: WatchJob
 #[tokio::test]
 async fn a_client_that_reconnects_after_each_event_gets_every_event_exactly_once() {
     let mut server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;

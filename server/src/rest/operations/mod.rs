@@ -59,7 +59,7 @@ pub(super) fn routes() -> Router<Site> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::collections::BTreeSet;
+    use std::{collections::BTreeSet, fs, path::Path};
 
     use prost::Message;
 
@@ -162,5 +162,42 @@ mod tests {
                 assert!(names.insert((place, *name)), "{path}: {place} {name}");
             }
         }
+    }
+
+    /// The operations that tests say they hold to their word: a line `/// Operations: CreateJob, GetJob` above a
+    /// test, or such a line behind `#` in a script.
+    fn tested() -> BTreeSet<String> {
+        let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests");
+        let mut found = BTreeSet::new();
+        for (folder, ending, mark) in [("service", "rs", "///"), ("", "py", "#")] {
+            for file in fs::read_dir(tests.join(folder)).unwrap() {
+                let path = file.unwrap().path();
+                if path.extension().is_none_or(|other| other != ending) {
+                    continue;
+                }
+                let start = format!("{mark} Operations: ");
+                let text = fs::read_to_string(&path).unwrap();
+                let mut lines = text.lines().peekable();
+                while let Some(line) = lines.next() {
+                    let Some(names) = line.strip_prefix(&start) else {
+                        continue;
+                    };
+                    let of_a_test = lines.peek().is_some_and(|next| next.contains("test"));
+                    assert!(ending != "rs" || of_a_test, "{}: {line}", path.display());
+                    found.extend(names.split(", ").map(str::to_owned));
+                }
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn every_operation_has_a_test_that_names_it() {
+        let mut known = BTreeSet::new();
+        for operation in all() {
+            known.insert(operation.id.to_owned());
+            known.extend(operation.rpcs.iter().map(|rpc| rpc.to_string()));
+        }
+        assert_eq!(tested(), known);
     }
 }
