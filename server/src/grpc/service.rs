@@ -21,11 +21,13 @@ use crate::{
     store::PIECE_BYTES,
     verbs::{
         Service,
+        bulk::{self, Many},
         envelope::JobRequest,
         fields,
         history::{self, MAX_POINTS},
         info,
-        jobs::{self, GROUP_BY, ID, Many, ORDER_BY},
+        jobs::{self, ID},
+        lists::{self, GROUP_BY, ORDER_BY},
         meshes::{self, HASH},
         page::Paging,
         problems, profiles, queue, results,
@@ -150,7 +152,7 @@ impl JobService for Grpc {
         let filter = filter(jobs)?;
         let paging = paging(page_size, page_token)?;
         let list = async |paging: &Paging| {
-            let page = jobs::list(&self.service, &caller, &filter, order, paging).await?;
+            let page = lists::list(&self.service, &caller, &filter, order, paging).await?;
             let jobs: Vec<pb::Job> = page.items.into_iter().map(Into::into).collect();
             Ok::<_, ApiError>((jobs, page.next))
         };
@@ -174,7 +176,7 @@ impl JobService for Grpc {
         let (caller, request) = asked(request)?;
         let group_by = given(&GROUP_BY, &request.group_by)?;
         let filter = filter(request.filter)?;
-        let count = jobs::count(&self.service, &caller, &filter, group_by).await?;
+        let count = lists::count(&self.service, &caller, &filter, group_by).await?;
         Ok(Response::new(pb::CountJobsResponse {
             total: count.total,
             groups: count.groups,
@@ -293,7 +295,7 @@ impl JobService for Grpc {
         request: Request<pb::CancelJobsRequest>,
     ) -> Reply<pb::CancelJobsResponse> {
         let (caller, request) = asked(request)?;
-        let many = jobs::cancel_many(&self.service, &caller, filter(request.filter)?);
+        let many = bulk::cancel_many(&self.service, &caller, filter(request.filter)?);
         let Many { matched, changed } = many.await?;
         Ok(Response::new(pb::CancelJobsResponse { matched, changed }))
     }
@@ -342,7 +344,7 @@ impl JobService for Grpc {
         request: Request<pb::DeleteJobsRequest>,
     ) -> Reply<pb::DeleteJobsResponse> {
         let (caller, request) = asked(request)?;
-        let many = jobs::delete_many(&self.service, &caller, filter(request.filter)?);
+        let many = bulk::delete_many(&self.service, &caller, filter(request.filter)?);
         let Many { matched, changed } = many.await?;
         Ok(Response::new(pb::DeleteJobsResponse { matched, changed }))
     }

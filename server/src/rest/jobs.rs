@@ -16,7 +16,9 @@ use crate::{
     parameters::Values,
     store::{Filter, GroupBy, Order},
     verbs::{
-        jobs::{self as verbs, Cancellation, Count, Many},
+        bulk::{self, Many},
+        jobs::{self as verbs, Cancellation},
+        lists::{self, Count},
         page::Paging,
         watch::{self, UNTIL, Until, WAIT},
     },
@@ -71,7 +73,7 @@ pub(super) async fn list(
     order: Option<Order>,
 ) -> Result<Json<List>, ApiError> {
     let paging = Paging { size, token };
-    let page = verbs::list(&call.service, &call.caller, &filter, order, &paging).await?;
+    let page = lists::list(&call.service, &call.caller, &filter, order, &paging).await?;
     Ok(Json(List {
         jobs: page.items,
         next_page_token: page.next,
@@ -83,7 +85,7 @@ pub(super) async fn count(
     filter: Filter,
     group_by: Option<GroupBy>,
 ) -> Result<Json<Count>, ApiError> {
-    let count = verbs::count(&call.service, &call.caller, &filter, group_by).await?;
+    let count = lists::count(&call.service, &call.caller, &filter, group_by).await?;
     Ok(Json(count))
 }
 
@@ -126,12 +128,12 @@ pub(super) async fn delete(call: Call, id: JobId) -> Result<StatusCode, ApiError
 }
 
 pub(super) async fn cancel_many(call: Call, filter: Filter) -> Result<Json<Many>, ApiError> {
-    let many = verbs::cancel_many(&call.service, &call.caller, filter).await?;
+    let many = bulk::cancel_many(&call.service, &call.caller, filter).await?;
     Ok(Json(many))
 }
 
 pub(super) async fn delete_many(call: Call, filter: Filter) -> Result<Json<Many>, ApiError> {
-    let many = verbs::delete_many(&call.service, &call.caller, filter).await?;
+    let many = bulk::delete_many(&call.service, &call.caller, filter).await?;
     Ok(Json(many))
 }
 

@@ -4,10 +4,10 @@ use solver::{error::Violation, problem::Problem};
 use tracing::info;
 
 use super::{
-    Service,
     envelope::{Envelope, JobRequest},
     meshes,
     problems::{self, Admitted},
+    service::Service,
 };
 use crate::{
     caller::Caller,

@@ -7,8 +7,8 @@ use futures_util::Stream;
 use solver::solution::Fields;
 
 use super::{
-    Service,
     results::{no_result, with_result},
+    service::Service,
 };
 use crate::{
     caller::Caller,

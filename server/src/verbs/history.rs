@@ -2,7 +2,7 @@
 
 use solver::solution::Iteration;
 
-use super::{Service, jobs};
+use super::{jobs, service::Service};
 use crate::{
     caller::Caller,
     error::ApiError,

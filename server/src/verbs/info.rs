@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{Service, page::MAX_PAGE_SIZE, submit::MAX_BATCH, watch::MAX_WAIT_S};
+use super::{page::MAX_PAGE_SIZE, service::Service, submit::MAX_BATCH, watch::MAX_WAIT_S};
 use crate::{caller::Caller, formats::Format};
 
 /// What this service is.

@@ -1,22 +1,21 @@
-//! Submitted jobs: get, list, count, edit, cancel, delete; and the problem of one.
+//! One job: get, edit, cancel, delete; and its problem.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde_json::json;
 use solver::problem::Problem;
 
 use super::{
-    Service, envelope, filters,
-    page::{self, Page, Paging},
-    service::detached,
+    envelope,
+    service::{Service, detached},
 };
 use crate::{
     caller::Caller,
     error::ApiError,
     job::{Job, JobId},
-    parameters::{Parameter, Values, Variable, Words},
-    store::{CancelOutcome, Deletion, Edit, Filter, GroupBy, Order, OrderBy, Snapshot},
+    parameters::{Values, Variable},
+    store::{CancelOutcome, Deletion, Edit, Snapshot},
     violations::Violations,
 };
 
@@ -83,102 +82,6 @@ pub async fn problem(service: &Service, caller: &Caller, id: JobId) -> Result<Pr
     let read = service.work(move || serde_json::from_str(&body)).await?;
     let problem: Problem = read.map_err(ApiError::internal)?;
     Ok(Problem { title, ..problem })
-}
-
-/// The order of a list.
-pub const ORDER_BY: Parameter<Orders> = Parameter {
-    name: "order_by",
-    meaning: "Sorts by this time; by finished_at only jobs that have ended are listed",
-    values: Orders,
-};
-
-/// The orders that there are.
-#[derive(Clone, Copy, Debug)]
-pub struct Orders;
-
-impl Orders {
-    /// All orders, each with its word.
-    fn words() -> impl Iterator<Item = (String, Order)> {
-        let times = [OrderBy::CreatedAt, OrderBy::FinishedAt].into_iter();
-        let both = |by| [true, false].map(|descending| Order { by, descending });
-        times.flat_map(both).map(|order| {
-            let word = format!("{} {}", order.by.column(), order.direction());
-            (word, order)
-        })
-    }
-}
-
-impl Values for Orders {
-    type Value = Order;
-
-    fn schema(&self) -> serde_json::Value {
-        let short = [OrderBy::CreatedAt, OrderBy::FinishedAt].map(|by| by.column().to_owned());
-        let words: Vec<String> = short
-            .into_iter()
-            .chain(Orders::words().map(|(word, _)| word))
-            .collect();
-        json!({ "type": "string", "enum": words })
-    }
-
-    fn expected(&self) -> String {
-        "created_at or finished_at, then desc (the default) or asc".into()
-    }
-
-    fn read(&self, text: &str) -> Option<Order> {
-        let whole = match text.contains(' ') {
-            true => text.to_owned(),
-            false => format!("{text} desc"),
-        };
-        Orders::words().find_map(|(word, order)| (word == whole).then_some(order))
-    }
-}
-
-/// Lists jobs; newest first, unless another order is asked for.
-pub async fn list(
-    service: &Service,
-    caller: &Caller,
-    filter: &Filter,
-    order: Option<Order>,
-    paging: &Paging,
-) -> Result<Page<Job>, ApiError> {
-    let order = order.unwrap_or(Order::NEWEST_FIRST);
-    let list = page::list_of_jobs(filter, order);
-    let (store, cursor) = (&service.store, paging.cursor(&list)?);
-    let jobs = store.jobs(caller.sees(), filter, order, cursor, paging.limit());
-    Ok(paging.page(&list, jobs.await?, |job| page::after(job, order)))
-}
-
-/// What jobs are counted by.
-pub const GROUP_BY: Parameter<Words<GroupBy>> = Parameter {
-    name: "group_by",
-    meaning: "Counts each of these on its own, too",
-    values: Words(|| vec![("status", GroupBy::Status), ("owner", GroupBy::Owner)]),
-};
-
-/// How many jobs there are, and in groups how many of each.
-#[derive(Clone, Debug, serde::Serialize, JsonSchema)]
-pub struct Count {
-    /// All that match the filters.
-    pub total: i64,
-    /// By the group's name; empty when no groups were asked for.
-    pub groups: BTreeMap<String, i64>,
-}
-
-/// Counts jobs.
-pub async fn count(
-    service: &Service,
-    caller: &Caller,
-    filter: &Filter,
-    group_by: Option<GroupBy>,
-) -> Result<Count, ApiError> {
-    let store = &service.store;
-    let groups = store.count(caller.sees(), filter, group_by).await?;
-    let total = groups.iter().map(|(_, jobs)| jobs).sum();
-    let groups = match group_by {
-        Some(_) => groups.into_iter().collect(),
-        None => BTreeMap::new(),
-    };
-    Ok(Count { total, groups })
 }
 
 /// Changes what may be changed of a job, if it is still of that version.
@@ -258,91 +161,4 @@ pub async fn delete(service: &Arc<Service>, caller: &Caller, id: JobId) -> Resul
         }
     })
     .await
-}
-
-/// What was done to many jobs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, JsonSchema)]
-pub struct Many {
-    /// Jobs that match the filters.
-    pub matched: u64,
-    /// Those of them that changed.
-    pub changed: u64,
-}
-
-/// Asks all jobs that match a filter to stop; later jobs are not affected.
-pub async fn cancel_many(
-    service: &Arc<Service>,
-    caller: &Caller,
-    filter: Filter,
-) -> Result<Many, ApiError> {
-    for_each(service, caller, filter, Action::Cancel).await
-}
-
-/// Deletes all jobs that match a filter and have ended.
-pub async fn delete_many(
-    service: &Arc<Service>,
-    caller: &Caller,
-    filter: Filter,
-) -> Result<Many, ApiError> {
-    for_each(service, caller, filter, Action::Delete).await
-}
-
-/// What is done to each of many jobs.
-#[derive(Clone, Copy, Debug)]
-enum Action {
-    Cancel,
-    Delete,
-}
-
-/// Does the same to every job that matches a filter, each in a transaction of its own: nobody else waits for all
-/// of them. A client that hangs up changes nothing.
-async fn for_each(
-    service: &Arc<Service>,
-    caller: &Caller,
-    filter: Filter,
-    action: Action,
-) -> Result<Many, ApiError> {
-    const AT_ONCE: i64 = 1000;
-    let filter = filters::required(filter)?;
-    let (service, caller) = (service.clone(), caller.clone());
-    detached(async move {
-        let store = &service.store;
-        let last = store.last_key().await?;
-        let (mut after, mut many) = (0, Many::default());
-        loop {
-            let keys = store.keys(caller.sees(), &filter, after, last, AT_ONCE);
-            let keys = keys.await?;
-            let Some(end) = keys.last() else {
-                return Ok(many);
-            };
-            after = *end;
-            for key in keys {
-                many.matched += 1;
-                many.changed += u64::from(act(&service, &caller, key, action).await?);
-            }
-        }
-    })
-    .await
-}
-
-/// Whether that changed the job.
-async fn act(
-    service: &Service,
-    caller: &Caller,
-    key: i64,
-    action: Action,
-) -> Result<bool, ApiError> {
-    match action {
-        Action::Cancel => {
-            let outcome = service.queue.cancel(key).await?;
-            Ok(outcome != CancelOutcome::AlreadyTerminal)
-        }
-        Action::Delete => {
-            let deleted = service.store.delete(caller.sees(), key).await? == Deletion::Deleted;
-            if deleted {
-                service.queue.announce(&[key]);
-            }
-            Ok(deleted)
-        }
-    }
 }

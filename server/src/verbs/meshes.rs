@@ -15,9 +15,8 @@ use tokio::io::{AsyncReadExt, AsyncSeekExt, AsyncWriteExt};
 use tracing::info;
 
 use super::{
-    Service,
     page::{Page, Paging},
-    service::detached,
+    service::{Service, detached},
 };
 use crate::{
     caller::Caller,

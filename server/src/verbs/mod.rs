@@ -17,7 +17,9 @@ pub mod problems;
 mod admission;
 
 // Jobs: submitted, looked after, watched.
+pub mod bulk;
 pub mod jobs;
+pub mod lists;
 pub mod retry;
 pub mod submit;
 pub mod watch;

@@ -10,7 +10,7 @@ use solver::{
     solution::{ContactProfile, Fields, Iteration},
 };
 
-use super::{Service, history::StoredHistory, jobs, results};
+use super::{history::StoredHistory, jobs, results, service::Service};
 use crate::{
     caller::Caller,
     error::ApiError,

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use solver::{Estimate, error::Violation, mesh::Mesh, problem::Problem, solution::Warning};
 
-use super::{Service, meshes};
+use super::{meshes, service::Service};
 use crate::{
     caller::Caller,
     digest,

@@ -4,8 +4,8 @@ use serde_json::json;
 use solver::solution::ContactProfile;
 
 use super::{
-    Service,
     results::{StepResult, with_result},
+    service::Service,
 };
 use crate::{
     caller::Caller,

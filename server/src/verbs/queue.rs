@@ -5,7 +5,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{Service, service::detached};
+use super::service::{Service, detached};
 use crate::{caller::Caller, error::ApiError};
 
 /// The state of the queue.

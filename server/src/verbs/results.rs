@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Service, jobs};
+use super::{jobs, service::Service};
 use crate::{
     caller::Caller,
     error::ApiError,

@@ -6,12 +6,11 @@ use serde::Serialize;
 use solver::problem::Problem;
 
 use super::{
-    Service,
     admission::{admit, enqueue, prepare, replayed},
     envelope::{Envelope, JobRequest},
     jobs,
     key::Key,
-    service::detached,
+    service::{Service, detached},
     submit::{Submitted, only},
 };
 use crate::{

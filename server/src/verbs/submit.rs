@@ -6,11 +6,10 @@ use futures_util::{StreamExt, TryStreamExt};
 use solver::error::Violation;
 
 use super::{
-    Service,
     admission::{admit, enqueue, prepare, replayed},
     envelope::JobRequest,
     key::Key,
-    service::detached,
+    service::{Service, detached},
 };
 use crate::{
     caller::Caller,

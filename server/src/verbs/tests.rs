@@ -6,14 +6,17 @@ use std::{path::Path, sync::Arc};
 use futures_util::StreamExt;
 
 use super::{
-    Service,
+    bulk,
     envelope::{Envelope, JobRequest},
     fields, history, jobs,
     key::IDEMPOTENCY_KEY,
+    lists,
     page::Paging,
     plots,
     profiles::{self, Points},
-    results, retry, submit,
+    results, retry,
+    service::Service,
+    submit,
     watch::{self, Until},
 };
 use crate::{
@@ -132,32 +135,32 @@ async fn what_is_done_to_many_jobs_is_done_to_those_that_the_caller_sees() {
     }
     let all = &Filter::default();
     for (caller, own) in [(ada, 2), (bob, 1), (admin, 3)] {
-        let page = jobs::list(service, caller, all, None, &Paging::default()).await;
+        let page = lists::list(service, caller, all, None, &Paging::default()).await;
         assert_eq!(page.unwrap().items.len(), own);
-        let count = jobs::count(service, caller, all, Some(GroupBy::Owner)).await;
+        let count = lists::count(service, caller, all, Some(GroupBy::Owner)).await;
         assert_eq!(count.unwrap().total, own as i64);
     }
     let of_ada = Filter {
         owner: Some("ada".into()),
         ..Filter::default()
     };
-    let page = jobs::list(service, bob, &of_ada, None, &Paging::default()).await;
+    let page = lists::list(service, bob, &of_ada, None, &Paging::default()).await;
     assert_eq!(page.unwrap().items.len(), 0);
     let queued = Filter {
         statuses: vec![Status::Queued],
         ..Filter::default()
     };
-    let canceled = jobs::cancel_many(service, bob, of_ada.clone()).await;
+    let canceled = bulk::cancel_many(service, bob, of_ada.clone()).await;
     assert_eq!(canceled.unwrap().matched, 0);
-    let canceled = jobs::cancel_many(service, bob, queued.clone()).await;
+    let canceled = bulk::cancel_many(service, bob, queued.clone()).await;
     assert_eq!(canceled.unwrap().changed, 1);
-    let canceled = jobs::cancel_many(service, admin, queued).await;
+    let canceled = bulk::cancel_many(service, admin, queued).await;
     assert_eq!(canceled.unwrap().changed, 2);
-    let deleted = jobs::delete_many(service, bob, of_ada.clone()).await;
+    let deleted = bulk::delete_many(service, bob, of_ada.clone()).await;
     assert_eq!(deleted.unwrap().matched, 0);
-    let deleted = jobs::delete_many(service, ada, of_ada).await;
+    let deleted = bulk::delete_many(service, ada, of_ada).await;
     assert_eq!(deleted.unwrap().changed, 2);
-    let left = jobs::count(service, admin, all, None).await.unwrap();
+    let left = lists::count(service, admin, all, None).await.unwrap();
     assert_eq!(left.total, 1);
 }
 

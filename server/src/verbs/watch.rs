@@ -6,7 +6,7 @@ use async_stream::try_stream;
 use futures_util::Stream;
 use tokio::time::{Instant, timeout_at};
 
-use super::{Service, jobs};
+use super::{jobs, service::Service};
 use crate::{
     caller::Caller,
     error::ApiError,

@@ -17,8 +17,10 @@ use crate::{
         jobs, submit,
     },
     verbs::{
-        jobs::{Count, GROUP_BY, ID, Many, ORDER_BY},
+        bulk::Many,
+        jobs::ID,
         key::{IDEMPOTENCY_KEY, Keys},
+        lists::{Count, GROUP_BY, ORDER_BY},
         page::{PAGE_SIZE, PAGE_TOKEN},
         watch::{AFTER_SEQ, UNTIL, WAIT},
     },

@@ -1,0 +1,102 @@
+//! What is done to all jobs that match a filter: canceled, deleted.
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+
+use super::{
+    filters,
+    service::{Service, detached},
+};
+use crate::{
+    caller::Caller,
+    error::ApiError,
+    store::{CancelOutcome, Deletion, Filter},
+};
+
+/// What was done to many jobs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, JsonSchema)]
+pub struct Many {
+    /// Jobs that match the filters.
+    pub matched: u64,
+    /// Those of them that changed.
+    pub changed: u64,
+}
+
+/// Asks all jobs that match a filter to stop; later jobs are not affected.
+pub async fn cancel_many(
+    service: &Arc<Service>,
+    caller: &Caller,
+    filter: Filter,
+) -> Result<Many, ApiError> {
+    for_each(service, caller, filter, Action::Cancel).await
+}
+
+/// Deletes all jobs that match a filter and have ended.
+pub async fn delete_many(
+    service: &Arc<Service>,
+    caller: &Caller,
+    filter: Filter,
+) -> Result<Many, ApiError> {
+    for_each(service, caller, filter, Action::Delete).await
+}
+
+/// What is done to each of many jobs.
+#[derive(Clone, Copy, Debug)]
+enum Action {
+    Cancel,
+    Delete,
+}
+
+/// Does the same to every job that matches a filter, each in a transaction of its own: nobody else waits for all
+/// of them. A client that hangs up changes nothing.
+async fn for_each(
+    service: &Arc<Service>,
+    caller: &Caller,
+    filter: Filter,
+    action: Action,
+) -> Result<Many, ApiError> {
+    const AT_ONCE: i64 = 1000;
+    let filter = filters::required(filter)?;
+    let (service, caller) = (service.clone(), caller.clone());
+    detached(async move {
+        let store = &service.store;
+        let last = store.last_key().await?;
+        let (mut after, mut many) = (0, Many::default());
+        loop {
+            let keys = store.keys(caller.sees(), &filter, after, last, AT_ONCE);
+            let keys = keys.await?;
+            let Some(end) = keys.last() else {
+                return Ok(many);
+            };
+            after = *end;
+            for key in keys {
+                many.matched += 1;
+                many.changed += u64::from(act(&service, &caller, key, action).await?);
+            }
+        }
+    })
+    .await
+}
+
+/// Whether that changed the job.
+async fn act(
+    service: &Service,
+    caller: &Caller,
+    key: i64,
+    action: Action,
+) -> Result<bool, ApiError> {
+    match action {
+        Action::Cancel => {
+            let outcome = service.queue.cancel(key).await?;
+            Ok(outcome != CancelOutcome::AlreadyTerminal)
+        }
+        Action::Delete => {
+            let deleted = service.store.delete(caller.sees(), key).await? == Deletion::Deleted;
+            if deleted {
+                service.queue.announce(&[key]);
+            }
+            Ok(deleted)
+        }
+    }
+}

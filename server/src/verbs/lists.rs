@@ -1,0 +1,114 @@
+//! Lists of jobs, and how many there are.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde_json::json;
+
+use super::{
+    page::{self, Page, Paging},
+    service::Service,
+};
+use crate::{
+    caller::Caller,
+    error::ApiError,
+    job::Job,
+    parameters::{Parameter, Values, Words},
+    store::{Filter, GroupBy, Order, OrderBy},
+};
+
+/// The order of a list.
+pub const ORDER_BY: Parameter<Orders> = Parameter {
+    name: "order_by",
+    meaning: "Sorts by this time; by finished_at only jobs that have ended are listed",
+    values: Orders,
+};
+
+/// The orders that there are.
+#[derive(Clone, Copy, Debug)]
+pub struct Orders;
+
+impl Orders {
+    /// All orders, each with its word.
+    fn words() -> impl Iterator<Item = (String, Order)> {
+        let times = [OrderBy::CreatedAt, OrderBy::FinishedAt].into_iter();
+        let both = |by| [true, false].map(|descending| Order { by, descending });
+        times.flat_map(both).map(|order| {
+            let word = format!("{} {}", order.by.column(), order.direction());
+            (word, order)
+        })
+    }
+}
+
+impl Values for Orders {
+    type Value = Order;
+
+    fn schema(&self) -> serde_json::Value {
+        let short = [OrderBy::CreatedAt, OrderBy::FinishedAt].map(|by| by.column().to_owned());
+        let words: Vec<String> = short
+            .into_iter()
+            .chain(Orders::words().map(|(word, _)| word))
+            .collect();
+        json!({ "type": "string", "enum": words })
+    }
+
+    fn expected(&self) -> String {
+        "created_at or finished_at, then desc (the default) or asc".into()
+    }
+
+    fn read(&self, text: &str) -> Option<Order> {
+        let whole = match text.contains(' ') {
+            true => text.to_owned(),
+            false => format!("{text} desc"),
+        };
+        Orders::words().find_map(|(word, order)| (word == whole).then_some(order))
+    }
+}
+
+/// Lists jobs; newest first, unless another order is asked for.
+pub async fn list(
+    service: &Service,
+    caller: &Caller,
+    filter: &Filter,
+    order: Option<Order>,
+    paging: &Paging,
+) -> Result<Page<Job>, ApiError> {
+    let order = order.unwrap_or(Order::NEWEST_FIRST);
+    let list = page::list_of_jobs(filter, order);
+    let (store, cursor) = (&service.store, paging.cursor(&list)?);
+    let jobs = store.jobs(caller.sees(), filter, order, cursor, paging.limit());
+    Ok(paging.page(&list, jobs.await?, |job| page::after(job, order)))
+}
+
+/// What jobs are counted by.
+pub const GROUP_BY: Parameter<Words<GroupBy>> = Parameter {
+    name: "group_by",
+    meaning: "Counts each of these on its own, too",
+    values: Words(|| vec![("status", GroupBy::Status), ("owner", GroupBy::Owner)]),
+};
+
+/// How many jobs there are, and in groups how many of each.
+#[derive(Clone, Debug, serde::Serialize, JsonSchema)]
+pub struct Count {
+    /// All that match the filters.
+    pub total: i64,
+    /// By the group's name; empty when no groups were asked for.
+    pub groups: BTreeMap<String, i64>,
+}
+
+/// Counts jobs.
+pub async fn count(
+    service: &Service,
+    caller: &Caller,
+    filter: &Filter,
+    group_by: Option<GroupBy>,
+) -> Result<Count, ApiError> {
+    let store = &service.store;
+    let groups = store.count(caller.sees(), filter, group_by).await?;
+    let total = groups.iter().map(|(_, jobs)| jobs).sum();
+    let groups = match group_by {
+        Some(_) => groups.into_iter().collect(),
+        None => BTreeMap::new(),
+    };
+    Ok(Count { total, groups })
+}
