@@ -294,16 +294,22 @@ mod tests {
     }
 
     #[test]
-    fn the_same_problem_has_the_same_digest() {
-        let digest = |_| {
-            run(&fake::problem(), None, 0.0, fake::solve, &mut |_| {
-                ControlFlow::Continue(())
-            })
-            .unwrap()
-            .summary
-            .digest
+    fn the_same_problem_has_the_same_digest_and_another_one_another() {
+        let solved = |problem: &Problem| {
+            let go_on = &mut |_: Said<'_>| ControlFlow::Continue(());
+            let document = run(problem, None, 0.0, solver::solve_on, go_on).unwrap();
+            assert!(document.summary.solution.converged);
+            document.summary
         };
-        assert_eq!(digest(1), digest(2));
+        let problem = fake::problem();
+        let here = solved(&problem);
+        let there = std::thread::scope(|scope| scope.spawn(|| solved(&problem)).join().unwrap());
+        assert_eq!(here.digest, there.digest);
+        let mut deeper = problem.clone();
+        deeper.contacts[0].indentation *= 1.5;
+        let deeper = solved(&deeper);
+        assert!(deeper.solution.normal_force > here.solution.normal_force);
+        assert_ne!(here.digest, deeper.digest);
     }
 
     #[test]
