@@ -10,7 +10,7 @@ use uuid::Uuid;
 
 use crate::{
     catalog::{Code, Kind},
-    job::JobId,
+    job::{JobId, Status as JobStatus},
     violations::shortened,
 };
 
@@ -52,7 +52,7 @@ pub enum ApiError {
     Deleted(JobId),
     /// The job ended without a result.
     #[error("the job ended without a result (status {0})")]
-    NoResult(&'static str),
+    NoResult(JobStatus),
     /// The path exists, the method does not.
     #[error("this path does not know the method; the header Allow lists those it does")]
     MethodNotAllowed,
@@ -69,7 +69,7 @@ pub enum ApiError {
     UnsupportedMedia(String),
     /// The job has not ended.
     #[error("the job is {0}; cancel it, or wait for its end")]
-    JobActive(&'static str),
+    JobActive(JobStatus),
     /// The name belongs to a job with other content.
     #[error("{0} was handed in with other content; make a new id for another job")]
     IdConflict(JobId),
@@ -89,7 +89,7 @@ pub enum ApiError {
     MeshInUse,
     /// The job is not done.
     #[error("the job is {0}; its result comes when it is done")]
-    ResultNotReady(&'static str),
+    ResultNotReady(JobStatus),
     /// The body is too large.
     #[error("the body is larger than {limit_bytes} bytes")]
     PayloadTooLarge {

@@ -3,9 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use solver::solution::{Iteration, Phase, Warning};
+use strum::IntoStaticStr;
 
 use crate::{
-    job::{Job, Reason, Status},
+    job::{Job, Status},
     time::Time,
 };
 
@@ -24,8 +25,9 @@ pub struct Event {
 }
 
 /// What happened.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema, IntoStaticStr)]
 #[serde(tag = "type", rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Payload {
     /// The job changed its status, but is not at its end.
     Status {
@@ -54,13 +56,7 @@ pub enum Payload {
 impl Payload {
     /// The word in `type`.
     pub fn kind(&self) -> &'static str {
-        match self {
-            Payload::Status { .. } => "status",
-            Payload::Stage { .. } => "stage",
-            Payload::Iteration(_) => "iteration",
-            Payload::Warning(_) => "warning",
-            Payload::Done { .. } => "done",
-        }
+        self.into()
     }
 
     /// A change of status.
@@ -75,13 +71,14 @@ impl Payload {
     pub fn requeued(reason: Requeue) -> Self {
         Payload::Status {
             status: Status::Queued,
-            reason: Some(reason.as_str().into()),
+            reason: Some(<&str>::from(reason).into()),
         }
     }
 }
 
 /// Why a running job goes back to the queue.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Requeue {
     /// The process died under it.
     WorkerLost,
@@ -89,12 +86,27 @@ pub enum Requeue {
     Drain,
 }
 
-impl Requeue {
-    /// The word in the status event.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Requeue::WorkerLost => Reason::WorkerLost.as_str(),
-            Requeue::Drain => "drain",
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kind_of_an_event_is_its_type_in_json() {
+        for payload in [
+            Payload::requeued(Requeue::Drain),
+            Payload::Stage {
+                stage: Phase::Factor,
+            },
+            Payload::Iteration(crate::fake::iteration(1)),
+        ] {
+            let json = serde_json::to_value(&payload).unwrap_or_default();
+            assert_eq!(json["type"], payload.kind());
         }
+    }
+
+    #[test]
+    fn a_lost_worker_has_one_name() {
+        let (lost, failed) = (Requeue::WorkerLost, crate::job::Reason::WorkerLost);
+        assert_eq!(<&str>::from(lost), <&str>::from(failed));
     }
 }

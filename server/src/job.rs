@@ -4,9 +4,13 @@ use std::{borrow::Cow, collections::BTreeMap, fmt};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 use uuid::Uuid;
 
-use crate::{catalog::Code, time::Time};
+use crate::{
+    catalog::{Code, Kind},
+    time::Time,
+};
 
 /// A problem on its way through the service, as clients see it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -145,8 +149,22 @@ impl JsonSchema for JobId {
 }
 
 /// Where a job stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    Display,
+    IntoStaticStr,
+    EnumString,
+    VariantArray,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Status {
     /// Accepted and waiting.
     Queued,
@@ -161,33 +179,6 @@ pub enum Status {
 }
 
 impl Status {
-    /// All of them, in the order of a job's life.
-    pub const ALL: [Status; 5] = [
-        Status::Queued,
-        Status::Running,
-        Status::Succeeded,
-        Status::Failed,
-        Status::Canceled,
-    ];
-
-    /// The word used in JSON and in the store.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Status::Queued => "queued",
-            Status::Running => "running",
-            Status::Succeeded => "succeeded",
-            Status::Failed => "failed",
-            Status::Canceled => "canceled",
-        }
-    }
-
-    /// The status of that name.
-    pub fn parse(word: &str) -> Option<Self> {
-        Status::ALL
-            .into_iter()
-            .find(|status| status.as_str() == word)
-    }
-
     /// No move leads away from here.
     pub fn is_terminal(self) -> bool {
         matches!(self, Status::Succeeded | Status::Failed | Status::Canceled)
@@ -211,8 +202,21 @@ impl Status {
 }
 
 /// Why a job failed or was canceled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+    EnumString,
+    VariantArray,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Reason {
     /// `max_iterations` reached.
     NotConverged,
@@ -239,21 +243,6 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// All of them.
-    pub const ALL: [Reason; 11] = [
-        Reason::NotConverged,
-        Reason::ContactCycling,
-        Reason::FalseConvergence,
-        Reason::SingularSystem,
-        Reason::NonFinite,
-        Reason::TimedOut,
-        Reason::QueueExpired,
-        Reason::ResourceExhausted,
-        Reason::WorkerLost,
-        Reason::Internal,
-        Reason::UserCancel,
-    ];
-
     /// A property of the problem: whoever solves it again ends the same way.
     pub fn belongs_to_the_problem(self) -> bool {
         match self {
@@ -270,37 +259,44 @@ impl Reason {
             | Reason::UserCancel => false,
         }
     }
+}
 
-    /// The word used in JSON and in the store.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Reason::NotConverged => "not_converged",
-            Reason::ContactCycling => "contact_cycling",
-            Reason::FalseConvergence => "false_convergence",
-            Reason::SingularSystem => "singular_system",
-            Reason::NonFinite => "non_finite",
-            Reason::TimedOut => "timed_out",
-            Reason::QueueExpired => "queue_expired",
-            Reason::ResourceExhausted => "resource_exhausted",
-            Reason::WorkerLost => "worker_lost",
-            Reason::Internal => "internal",
-            Reason::UserCancel => "user_cancel",
+impl From<Reason> for Code {
+    fn from(reason: Reason) -> Code {
+        match reason {
+            Reason::NotConverged => Code::NotConverged,
+            Reason::ContactCycling => Code::ContactCycling,
+            Reason::FalseConvergence => Code::FalseConvergence,
+            Reason::SingularSystem => Code::SingularSystem,
+            Reason::NonFinite => Code::NonFinite,
+            Reason::TimedOut => Code::TimedOut,
+            Reason::QueueExpired => Code::QueueExpired,
+            Reason::ResourceExhausted => Code::ResourceExhausted,
+            Reason::WorkerLost => Code::WorkerLost,
+            Reason::Internal => Code::Internal,
+            Reason::UserCancel => Code::UserCancel,
         }
-    }
-
-    /// The reason of that name.
-    pub fn parse(word: &str) -> Option<Self> {
-        Reason::ALL
-            .into_iter()
-            .find(|reason| reason.as_str() == word)
     }
 }
 
 /// Whether a job has something to fetch.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+    EnumString,
+    VariantArray,
 )]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum ResultAvailable {
     /// Nothing.
     None,
@@ -309,24 +305,6 @@ pub enum ResultAvailable {
     Partial,
     /// A converged result.
     Final,
-}
-
-impl ResultAvailable {
-    /// The word used in JSON and in the store.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            ResultAvailable::None => "none",
-            ResultAvailable::Partial => "partial",
-            ResultAvailable::Final => "final",
-        }
-    }
-
-    /// The value of that name.
-    pub fn parse(word: &str) -> Option<Self> {
-        [Self::None, Self::Partial, Self::Final]
-            .into_iter()
-            .find(|value| value.as_str() == word)
-    }
 }
 
 /// What a job may take.
@@ -350,8 +328,22 @@ impl Default for Limits {
 }
 
 /// Whether earlier results may answer a job.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+    EnumString,
+    VariantArray,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Cache {
     /// The result of the same input answers it at once; a job at work on that input is joined.
     #[default]
@@ -360,24 +352,6 @@ pub enum Cache {
     Refresh,
     /// It is solved anew, and its result answers nobody else.
     Off,
-}
-
-impl Cache {
-    /// The word used in JSON and in the store.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Cache::Use => "use",
-            Cache::Refresh => "refresh",
-            Cache::Off => "off",
-        }
-    }
-
-    /// The value of that name.
-    pub fn parse(word: &str) -> Option<Self> {
-        [Cache::Use, Cache::Refresh, Cache::Off]
-            .into_iter()
-            .find(|cache| cache.as_str() == word)
-    }
 }
 
 /// The place of a queued job.
@@ -392,8 +366,21 @@ pub struct QueuePosition {
 }
 
 /// What a queued job waits for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+    EnumString,
+    VariantArray,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Waiting {
     /// All workers have something to do.
     WorkersBusy,
@@ -401,17 +388,6 @@ pub enum Waiting {
     Paused,
     /// A job with the same input is ahead of it; its result will answer both.
     Joined,
-}
-
-impl Waiting {
-    /// The word used in JSON.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Waiting::WorkersBusy => "workers_busy",
-            Waiting::Paused => "paused",
-            Waiting::Joined => "joined",
-        }
-    }
 }
 
 /// How far a job has come.
@@ -449,12 +425,11 @@ pub struct Failure {
 impl Failure {
     /// A failure of this kind.
     pub fn new(reason: Reason, detail: impl Into<String>) -> Self {
-        let code = reason.as_str().replace('_', "-");
-        let title = Code::parse(&code).map_or("", |code| code.kind().title);
+        let Kind { code, title, .. } = Code::from(reason).kind();
         Failure {
             r#type: format!("/v1/errors/{code}"),
             title: title.into(),
-            code,
+            code: code.into(),
             detail: detail.into(),
         }
     }
@@ -465,55 +440,66 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    /// What a job of that status may become.
+    fn becomes(from: Status) -> Vec<Status> {
+        let all = Status::VARIANTS.iter().copied();
+        all.filter(|to| from.may_become(*to)).collect()
+    }
+
+    /// From where a job may come to that status.
+    fn comes_from(to: Status) -> Vec<Status> {
+        let all = Status::VARIANTS.iter().copied();
+        all.filter(|from| from.may_become(to)).collect()
+    }
+
     #[test]
     fn a_terminal_job_never_moves_again() {
-        for from in Status::ALL
-            .into_iter()
-            .filter(|status| status.is_terminal())
-        {
-            assert!(
-                Status::ALL.into_iter().all(|to| !from.may_become(to)),
-                "{from:?}"
-            );
+        for from in Status::VARIANTS.iter().filter(|from| from.is_terminal()) {
+            assert_eq!(becomes(*from), [], "{from:?}");
         }
     }
 
     #[test]
     fn only_a_running_job_goes_back_to_the_queue() {
-        let back: Vec<_> = Status::ALL
-            .into_iter()
-            .filter(|from| from.may_become(Status::Queued))
-            .collect();
-        assert_eq!(back, [Status::Running]);
+        assert_eq!(comes_from(Status::Queued), [Status::Running]);
     }
 
     #[test]
     fn success_comes_only_from_running() {
-        let from: Vec<_> = Status::ALL
-            .into_iter()
-            .filter(|from| from.may_become(Status::Succeeded))
-            .collect();
-        assert_eq!(from, [Status::Running]);
+        assert_eq!(comes_from(Status::Succeeded), [Status::Running]);
+    }
+
+    /// In the store as in JSON, and read back from both.
+    fn has_words<T>()
+    where
+        T: VariantArray + Copy + PartialEq + std::fmt::Debug,
+        T: Into<&'static str> + std::str::FromStr + Serialize + serde::de::DeserializeOwned,
+    {
+        for value in T::VARIANTS {
+            let word: &str = (*value).into();
+            assert_eq!(serde_json::to_value(value).unwrap(), word);
+            assert_eq!(word.parse().ok(), Some(*value));
+            assert_eq!(serde_json::from_value::<T>(word.into()).unwrap(), *value);
+        }
     }
 
     #[test]
-    fn words_are_read_back_as_they_were_written() {
-        assert!(
-            Status::ALL
-                .into_iter()
-                .all(|status| Status::parse(status.as_str()) == Some(status))
-        );
-        assert!(
-            Reason::ALL
-                .into_iter()
-                .all(|reason| Reason::parse(reason.as_str()) == Some(reason))
-        );
+    fn a_word_is_the_same_in_the_store_and_in_json() {
+        has_words::<Status>();
+        has_words::<Reason>();
+        has_words::<ResultAvailable>();
+        has_words::<Cache>();
+        has_words::<Waiting>();
     }
 
     #[test]
-    fn every_reason_is_explained() {
-        for reason in Reason::ALL {
-            assert!(!Failure::new(reason, "").title.is_empty(), "{reason:?}");
+    fn a_failure_has_the_code_of_its_reason() {
+        for reason in Reason::VARIANTS {
+            let failure = Failure::new(*reason, "so");
+            let word: &str = reason.into();
+            assert_eq!(failure.code, word.replace('_', "-"));
+            assert_eq!(failure.r#type, format!("/v1/errors/{}", failure.code));
+            assert!(!failure.title.is_empty(), "{reason:?}");
         }
     }
 

@@ -1,6 +1,7 @@
 //! `signorini explain CODE`: what an error code means and what to do about it.
 
 use clap::Args;
+use strum::VariantArray;
 
 use super::Exit;
 use crate::catalog::{Code, Kind};
@@ -13,7 +14,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
     let Some(code) = code else {
-        for code in Code::ALL {
+        for code in Code::VARIANTS {
             let Kind { code, title, .. } = code.kind();
             println!("{code:<24} {title}");
         }
@@ -21,7 +22,7 @@ pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
     };
     // a job's reason is the same word with underscores, the type of an error its page
     let word = code.rsplit('/').next().unwrap_or_default();
-    let Some(found) = Code::parse(&word.replace('_', "-")) else {
+    let Ok(found) = word.replace('_', "-").parse::<Code>() else {
         eprintln!(
             "signorini: there is no error code {code:?}; `signorini explain` lists all of them"
         );

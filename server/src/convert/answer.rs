@@ -13,10 +13,12 @@ use solver::{
     },
 };
 
+use strum::VariantArray;
+
 use crate::{
     caller::Caller,
     event::{Event, Payload},
-    job::{Failure, Job, Progress, QueuePosition, Reason, ResultAvailable, Status},
+    job::{Failure, Job, Progress, QueuePosition, ResultAvailable, Status},
     mesh::{BoundaryInfo, MeshInfo},
     pb,
     run::{Summary, phase_name},
@@ -43,9 +45,8 @@ pub fn pb_status(status: Status) -> pb::Status {
 
 /// The status of that number, if there is one.
 pub fn status(number: i32) -> Option<Status> {
-    Status::ALL
-        .into_iter()
-        .find(|status| pb_status(*status) as i32 == number)
+    let mut all = Status::VARIANTS.iter().copied();
+    all.find(|status| pb_status(*status) as i32 == number)
 }
 
 impl From<Time> for Timestamp {
@@ -66,7 +67,7 @@ impl From<Job> for pb::Job {
         pb::Job {
             id: job.id.to_string(),
             status: pb_status(job.status).into(),
-            reason: job.reason.map(|reason| Reason::as_str(reason).into()),
+            reason: job.reason.map(|reason| <&str>::from(reason).into()),
             cancel_requested: job.cancel_requested,
             version: job.version,
             name: job.name,
@@ -89,7 +90,7 @@ impl From<Job> for pb::Job {
                  }| pb::QueuePosition {
                     position,
                     ahead,
-                    reason: reason.as_str().into(),
+                    reason: <&str>::from(reason).into(),
                 },
             ),
             progress: job.progress.map(
@@ -577,9 +578,9 @@ mod tests {
     #[test]
     fn statuses_keep_their_numbers_and_zero_is_none() {
         assert!(
-            Status::ALL
-                .into_iter()
-                .all(|s| status(pb_status(s) as i32) == Some(s))
+            Status::VARIANTS
+                .iter()
+                .all(|s| status(pb_status(*s) as i32) == Some(*s))
         );
         assert_eq!(status(0), None);
         assert_eq!(status(17), None);

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use serde_json::json;
+use strum::VariantArray;
 
 use crate::time::Time;
 
@@ -130,6 +131,18 @@ impl<T> Values for Words<T> {
     fn read(&self, text: &str) -> Option<T> {
         let mut all = self.0().into_iter();
         all.find_map(|(word, value)| (word == text).then_some(value))
+    }
+}
+
+impl<T: VariantArray + Copy + Into<&'static str>> Words<T> {
+    /// All variants of an enum.
+    pub const fn all() -> Words<T> {
+        Words(|| {
+            T::VARIANTS
+                .iter()
+                .map(|one| ((*one).into(), *one))
+                .collect()
+        })
     }
 }
 

@@ -249,8 +249,8 @@ fn judge(
                 },
                 _ => ending,
             };
-            let status = ending.status.as_str();
-            info!(job.id = %job.id, status, iterations, "job {} solved: {status} after {iterations} iterations", job.id);
+            let status = ending.status;
+            info!(job.id = %job.id, %status, iterations, "job {} solved: {status} after {iterations} iterations", job.id);
             (ending, Some(parts))
         }
         Ok(Err(SolveError::Stopped)) if out_of_time => (timed_out(job), None),

@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use strum::VariantArray;
+
 use super::operations::{self, Operation};
 use crate::{
     catalog::{Code, grpc_code_name},
@@ -87,7 +89,7 @@ fn section(out: &mut String, operation: &Operation) {
 fn errors(out: &mut String) {
     *out += "\n## Errors\n\n`signorini explain CODE` and `GET /v1/errors/{code}` explain each. Those without a status \
              are reasons why jobs fail.\n\n| code | HTTP | gRPC | title |\n|---|---|---|---|\n";
-    for kind in Code::ALL.map(Code::kind) {
+    for kind in Code::VARIANTS.iter().map(|code| code.kind()) {
         let status = kind
             .status
             .map_or(String::new(), |status| status.to_string());

@@ -44,7 +44,7 @@ pub(super) const CODE: Variable<Words<Code>> = Variable {
     name: "code",
     kind: "error",
     meaning: "The kind of error",
-    values: Words(|| Code::ALL.map(|code| (code.kind().code, code)).into()),
+    values: Words::all(),
 };
 
 /// What a kind of error means: for programs, or as a page for people.

@@ -1,5 +1,7 @@
 //! Which jobs a list holds, and in what order.
 
+use strum::{EnumString, IntoStaticStr, VariantArray};
+
 use crate::{caller::Owners, job::Status, time::Time};
 
 /// Which jobs; what is absent leaves none out.
@@ -31,7 +33,8 @@ impl Filter {
 
     /// The same filter with each status and label once.
     pub fn tidied(mut self) -> Self {
-        self.statuses.sort_unstable_by_key(|status| status.as_str());
+        self.statuses
+            .sort_unstable_by_key(|status| <&str>::from(*status));
         self.statuses.dedup();
         self.labels.sort_unstable();
         self.labels.dedup();
@@ -65,8 +68,9 @@ pub struct Order {
     pub descending: bool,
 }
 
-/// The time that orders a list.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The time that orders a list; its word is the column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
+#[strum(serialize_all = "snake_case")]
 pub enum OrderBy {
     /// When they were accepted.
     CreatedAt,
@@ -83,23 +87,14 @@ pub struct Cursor {
     pub key: i64,
 }
 
-/// What jobs are counted by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What jobs are counted by; its word is the column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
+#[strum(serialize_all = "snake_case")]
 pub enum GroupBy {
     /// Their status.
     Status,
     /// Their owner.
     Owner,
-}
-
-impl OrderBy {
-    /// Its name, here and outside.
-    pub fn column(self) -> &'static str {
-        match self {
-            OrderBy::CreatedAt => "created_at",
-            OrderBy::FinishedAt => "finished_at",
-        }
-    }
 }
 
 impl Order {

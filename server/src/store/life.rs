@@ -87,9 +87,9 @@ pub(super) async fn close(change: &mut Change<'_>, job: &Job, ending: &Ending) -
         "update job set reason = ?, failure = ?, result_available = ?, finished_at = ?, twin_of = null,
                         solver_version = ? where id = ?",
     )
-    .bind(ending.reason.map(Reason::as_str))
+    .bind(ending.reason.map(<&str>::from))
     .bind(failure)
-    .bind(result.as_str())
+    .bind(<&str>::from(result))
     .bind(now.micros())
     .bind(env!("CARGO_PKG_VERSION"))
     .bind(job.key)
@@ -121,7 +121,7 @@ pub(super) async fn change(change: &mut Change<'_>, job: &Job, next: Status) -> 
         )));
     }
     sqlx::query("update job set status = ?, version = version + 1 where id = ?")
-        .bind(next.as_str())
+        .bind(<&str>::from(next))
         .bind(job.key)
         .execute(change.sql())
         .await?;

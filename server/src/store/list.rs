@@ -113,7 +113,7 @@ pub(super) fn page_of_jobs(
         query.push(" limit ").push_bind(limit).push(")");
     }
     if leads.len() > 1 {
-        let (by, direction) = (order.by.column(), order.direction());
+        let (by, direction) = (<&str>::from(order.by), order.direction());
         query.push(format!(" order by {by} {direction}, id {direction} limit "));
         query.push_bind(limit);
     }
@@ -122,11 +122,7 @@ pub(super) fn page_of_jobs(
 
 /// The number of jobs in each group.
 pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> QueryBuilder<Sqlite> {
-    let group = match group_by {
-        Some(GroupBy::Status) => "status",
-        Some(GroupBy::Owner) => "owner",
-        None => "''",
-    };
+    let group = group_by.map_or("''", Into::into);
     let mut query = QueryBuilder::<Sqlite>::new(format!(
         "select {group} as kind, count(*) as jobs from job where true"
     ));
@@ -185,7 +181,9 @@ async fn few<'a>(
                 query.push("job where name = ").push_bind(name);
             }
             Lead::Status(status) => {
-                query.push("job where status = ").push_bind(status.as_str());
+                query
+                    .push("job where status = ")
+                    .push_bind(<&str>::from(status));
             }
             Lead::Ended => {
                 query.push("job indexed by job_by_finished where finished_at is not null");
@@ -271,7 +269,7 @@ fn page(
             query.push(format!(
                 "select * from job indexed by {index} where status = "
             ));
-            query.push_bind(status.as_str());
+            query.push_bind(<&str>::from(status));
         }
         Lead::Owner(owner) => {
             let index = if by_creation {
@@ -331,7 +329,7 @@ fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, lead: Option<Le
         query.push(" and job.status in (");
         let mut list = query.separated(", ");
         statuses.iter().for_each(|status| {
-            list.push_bind(status.as_str());
+            list.push_bind(<&str>::from(*status));
         });
         query.push(")");
     }

@@ -35,7 +35,7 @@ impl Store {
             .bind(key)
             .fetch_optional(&self.reader)
             .await?;
-        Ok(status.map(|word| Status::parse(&word).is_some_and(Status::is_terminal)))
+        Ok(status.map(|word| word.parse().is_ok_and(Status::is_terminal)))
     }
 
     /// The number of the job that came last; 0 when there is none.

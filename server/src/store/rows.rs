@@ -1,6 +1,6 @@
 //! A row of the table `job` as a [`Job`].
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, str::FromStr};
 
 use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use uuid::Uuid;
@@ -8,7 +8,7 @@ use uuid::Uuid;
 use super::error::{Result, StoreError};
 use crate::{
     caller::Owners,
-    job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status},
+    job::{Job, JobId, Limits, Status},
     time::Time,
 };
 
@@ -61,10 +61,9 @@ pub(super) async fn is_current(tx: &mut SqliteConnection, key: i64, attempt: i32
 }
 
 pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
-    let corrupt = |what: &str| StoreError::Corrupt(format!("job.{what}"));
     let uuid: &str = row.try_get("uuid")?;
     let id = JobId(Uuid::try_parse(uuid).map_err(|_| corrupt("uuid"))?);
-    let status = Status::parse(row.try_get("status")?).ok_or_else(|| corrupt("status"))?;
+    let status: Status = word("status", row.try_get("status")?)?;
     let reason: Option<&str> = row.try_get("reason")?;
     let time = |name: &str| -> Result<Option<Time>> {
         Ok(row.try_get::<Option<i64>, _>(name)?.map(Time::from_micros))
@@ -73,8 +72,6 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
     let (started_at, finished_at) = (time("started_at")?, time("finished_at")?);
     let progress: Option<&str> = row.try_get("progress")?;
     let failure: Option<&str> = row.try_get("failure")?;
-    let result_available = ResultAvailable::parse(row.try_get("result_available")?)
-        .ok_or_else(|| corrupt("result_available"))?;
     let other = |name: &str| -> Result<Option<JobId>> {
         let uuid: Option<&str> = row.try_get(name)?;
         let read = |text| Uuid::try_parse(text).map(JobId).map_err(|_| corrupt(name));
@@ -90,12 +87,10 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
         key,
         result_key,
         twin_of: row.try_get("twin_of")?,
-        cache: Cache::parse(row.try_get("cache")?).ok_or_else(|| corrupt("cache"))?,
+        cache: word("cache", row.try_get("cache")?)?,
         id,
         status,
-        reason: reason
-            .map(|word| Reason::parse(word).ok_or_else(|| corrupt("reason")))
-            .transpose()?,
+        reason: reason.map(|text| word("reason", text)).transpose()?,
         cancel_requested: row.try_get("cancel_requested")?,
         version: row.try_get("version")?,
         name: row.try_get("name")?,
@@ -122,9 +117,18 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
             queue_ttl_s: row.try_get("queue_ttl_s")?,
         },
         failure: failure.map(serde_json::from_str).transpose()?,
-        result_available,
+        result_available: word("result_available", row.try_get("result_available")?)?,
         links: links(id),
     })
+}
+
+/// What a word in this column stands for.
+fn word<T: FromStr>(column: &str, text: &str) -> Result<T> {
+    text.parse().map_err(|_| corrupt(column))
+}
+
+fn corrupt(column: &str) -> StoreError {
+    StoreError::Corrupt(format!("job.{column}"))
 }
 
 fn links(id: JobId) -> BTreeMap<String, String> {

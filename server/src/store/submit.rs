@@ -187,7 +187,7 @@ async fn insert(
     .bind(now.micros())
     .bind(&new.payload)
     .bind(new.parent.map(|id| id.0.to_string()))
-    .bind(new.cache.as_str())
+    .bind(<&str>::from(new.cache))
     .bind(twin_of)
     .bind(new.limits.timeout_s)
     .bind(new.limits.queue_ttl_s)

@@ -13,7 +13,7 @@ use crate::{
 pub const STATUS: Parameter<Words<Status>> = Parameter {
     name: "status",
     meaning: "Only jobs of this status; several may be given",
-    values: Words(|| Status::ALL.map(|status| (status.as_str(), status)).into()),
+    values: Words::all(),
 };
 
 /// By owner.

@@ -156,7 +156,7 @@ pub async fn delete(service: &Arc<Service>, caller: &Caller, id: JobId) -> Resul
                 service.queue.announce(&[job.key]);
                 Ok(())
             }
-            Deletion::Active => Err(ApiError::JobActive(job.status.as_str())),
+            Deletion::Active => Err(ApiError::JobActive(job.status)),
             Deletion::Unknown => Err(not_found(&service, &caller, id).await?),
         }
     })

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde_json::json;
+use strum::VariantArray;
 
 use super::{
     page::{self, Page, Paging},
@@ -31,10 +32,15 @@ pub struct Orders;
 impl Orders {
     /// All orders, each with its word.
     fn words() -> impl Iterator<Item = (String, Order)> {
-        let times = [OrderBy::CreatedAt, OrderBy::FinishedAt].into_iter();
-        let both = |by| [true, false].map(|descending| Order { by, descending });
+        let times = OrderBy::VARIANTS.iter();
+        let both = |by: &OrderBy| {
+            [true, false].map(|descending| Order {
+                by: *by,
+                descending,
+            })
+        };
         times.flat_map(both).map(|order| {
-            let word = format!("{} {}", order.by.column(), order.direction());
+            let word = format!("{} {}", <&str>::from(order.by), order.direction());
             (word, order)
         })
     }
@@ -44,11 +50,10 @@ impl Values for Orders {
     type Value = Order;
 
     fn schema(&self) -> serde_json::Value {
-        let short = [OrderBy::CreatedAt, OrderBy::FinishedAt].map(|by| by.column().to_owned());
-        let words: Vec<String> = short
-            .into_iter()
-            .chain(Orders::words().map(|(word, _)| word))
-            .collect();
+        let short = OrderBy::VARIANTS
+            .iter()
+            .map(|by| <&str>::from(*by).to_owned());
+        let words: Vec<String> = short.chain(Orders::words().map(|(word, _)| word)).collect();
         json!({ "type": "string", "enum": words })
     }
 
@@ -84,7 +89,7 @@ pub async fn list(
 pub const GROUP_BY: Parameter<Words<GroupBy>> = Parameter {
     name: "group_by",
     meaning: "Counts each of these on its own, too",
-    values: Words(|| vec![("status", GroupBy::Status), ("owner", GroupBy::Owner)]),
+    values: Words::all(),
 };
 
 /// How many jobs there are, and in groups how many of each.

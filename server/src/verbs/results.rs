@@ -71,7 +71,7 @@ pub(super) async fn with_result(
 /// profiles, but no fields.
 pub(super) fn no_result(job: &Job) -> ApiError {
     match job.status.is_terminal() {
-        true => ApiError::NoResult(job.status.as_str()),
-        false => ApiError::ResultNotReady(job.status.as_str()),
+        true => ApiError::NoResult(job.status),
+        false => ApiError::ResultNotReady(job.status),
     }
 }

@@ -56,7 +56,7 @@ pub async fn retry(
         }
         let job = jobs::get(&service, &caller, id).await?;
         if !job.status.is_terminal() {
-            return Err(ApiError::JobActive(job.status.as_str()));
+            return Err(ApiError::JobActive(job.status));
         }
         let stored = service.store.problem(job.key).await?;
         let (title, problem) = stored.ok_or(ApiError::Deleted(id))?;

@@ -3,6 +3,7 @@
 use axum::routing::{MethodFilter, MethodRouter};
 use schemars::{Schema, SchemaGenerator};
 use serde_json::Value;
+use strum::VariantArray;
 
 use crate::{
     catalog::Code,
@@ -212,8 +213,9 @@ impl Operation {
         }
         codes.extend(&self.errors);
         // in the order of the catalogue, each once
-        Code::ALL
-            .into_iter()
+        Code::VARIANTS
+            .iter()
+            .copied()
             .filter(|code| codes.contains(code))
             .collect()
     }
