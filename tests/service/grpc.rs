@@ -2,11 +2,7 @@
 
 use reqwest::StatusCode;
 use serde_json::json;
-use service::{
-    convert::problem_to_pb,
-    pb::{self, job_service_client::JobServiceClient},
-};
-use solver::problem::Problem;
+use service::pb::{self, job_service_client::JobServiceClient};
 use suite::{
     example, example_json,
     harness::{Server, large},
@@ -14,14 +10,15 @@ use suite::{
 use tonic::{Code, transport::Channel};
 use tonic_types::StatusExt;
 
-use crate::{SIGNORINI, server};
+use crate::{SIGNORINI, by_name, server};
 
 pub(crate) async fn connect(server: &Server) -> JobServiceClient<Channel> {
     JobServiceClient::connect(server.url.clone()).await.unwrap()
 }
 
+/// A problem as a message: by its names, not by the code under test.
 pub(crate) fn message(text: &str) -> pb::Problem {
-    problem_to_pb(&files::parse(text).unwrap())
+    by_name::message("Problem", &serde_json::from_str(text).unwrap())
 }
 
 /// Operations: CreateJob, GetJob, ListJobs, WatchJob, CancelJob, GetResult, GetProfile
@@ -211,10 +208,10 @@ async fn errors_carry_codes_and_details() {
     assert_eq!(grpc.get_job(long).await.unwrap_err().code(), Code::NotFound);
 
     // A message over 1 MiB.
-    let mut problem: Problem = files::parse(&example("sheet")).unwrap();
+    let mut problem = message(&example("sheet"));
     problem.title = Some("x".repeat(2 << 20));
     let request = pb::CreateJobRequest {
-        problem: Some(problem_to_pb(&problem)),
+        problem: Some(problem),
         ..Default::default()
     };
     let refused = grpc.create_job(request).await.unwrap_err();

@@ -2,12 +2,14 @@
 //! Nothing sleeps to wait: a test listens to events.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod by_name;
 mod cache;
 mod cancel;
 mod control;
 mod demo;
 mod description;
 mod errors;
+mod every_field;
 mod files;
 mod filters;
 mod grpc;

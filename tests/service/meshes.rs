@@ -9,7 +9,7 @@ use suite::{
 };
 use tonic::Code;
 
-use crate::{SIGNORINI, grpc::connect, server};
+use crate::{SIGNORINI, by_name, grpc::connect, server};
 
 fn file(name: &str) -> Vec<u8> {
     let path = format!("{}/../tests/data/{name}", env!("CARGO_MANIFEST_DIR"));
@@ -254,9 +254,9 @@ async fn grpc_stores_and_tells_the_same() {
         .await
         .unwrap_err();
     assert_eq!(refused.code(), Code::InvalidArgument);
-    let problem = files::parse(&pulled(json!({"stored": mesh.hash})).to_string()).unwrap();
+    let problem = pulled(json!({"stored": mesh.hash}));
     let job = pb::CreateJobRequest {
-        problem: Some(service::convert::problem_to_pb(&problem)),
+        problem: Some(by_name::message("Problem", &problem)),
         wait: Some(60.0),
         ..Default::default()
     };

@@ -15,7 +15,6 @@ use super::{Exit, examples, report};
 use crate::{
     app::App,
     config::{Config, MemoryBudget},
-    convert::problem_to_pb,
     event::{Event, Payload},
     job::{Job, Status},
     pb::{self, job_service_client::JobServiceClient},
@@ -181,7 +180,7 @@ async fn submit_grpc(
     text: &str,
 ) -> anyhow::Result<String> {
     let problem = match files::parse(text) {
-        Ok(problem) => problem_to_pb(&problem),
+        Ok(problem) => pb::Problem::from(problem),
         Err(violations) => bail!("{name}: {violations:?}"),
     };
     let labels = [("by".to_string(), "grpc".to_string())].into();

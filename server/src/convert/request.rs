@@ -1,12 +1,10 @@
 //! What requests hold beside a problem.
 
 use prost_types::Timestamp;
-use solver::error::Violation;
 
-use super::{problem_from_pb, status};
+use super::{Reader, read};
 use crate::{
     error::ApiError,
-    job::{Cache, Limits},
     pb,
     store::{Edit, Filter},
     time::Time,
@@ -14,7 +12,6 @@ use crate::{
         envelope::{Envelope, JobRequest},
         filters::{self, CREATED_AFTER, CREATED_BEFORE, FINISHED_AFTER, FINISHED_BEFORE, STATUS},
     },
-    violations,
 };
 
 /// A job as it is asked for. Pointers go into the request.
@@ -28,41 +25,20 @@ pub fn job_request(request: pb::CreateJobRequest) -> JobRequest {
         cache,
         ..
     } = request;
-    let mut violations = vec![];
-    let defaults = Limits::default();
-    let limits = limits.unwrap_or_default();
-    let cache = match pb::Cache::try_from(cache) {
-        Ok(pb::Cache::Unspecified | pb::Cache::Use) => Cache::Use,
-        Ok(pb::Cache::Refresh) => Cache::Refresh,
-        Ok(pb::Cache::Off) => Cache::Off,
-        Err(_) => {
-            violations.push(Violation {
-                pointer: "/cache".into(),
-                reason: "wrong_type".into(),
-                got: cache.to_string(),
-                expected: "use, refresh or off".into(),
-                hint: "Take a value of the enum Cache.".into(),
-            });
-            Cache::Use
-        }
-    };
+    let mut read = Reader::default();
+    // what cannot be read is noted, and then of no further importance
+    let limits = read.field("limits", limits).unwrap_or_default();
+    let cache = read.field("cache", cache).unwrap_or_default();
     let envelope = Envelope {
         name,
         labels,
         priority,
-        limits: Limits {
-            timeout_s: limits.timeout_s.unwrap_or(defaults.timeout_s),
-            queue_ttl_s: limits.queue_ttl_s.unwrap_or(defaults.queue_ttl_s),
-        },
+        limits,
         cache,
     };
-    let problem = problem_from_pb(problem.unwrap_or_default()); // which lacks everything, and is told so
-    let problem = problem.map_err(|found| violations::prefixed(violations::AT, found));
-    let problem = match problem {
-        Ok(problem) if violations.is_empty() => Ok(problem),
-        Ok(_) => Err(violations),
-        Err(found) => Err(found.into_iter().chain(violations).collect()),
-    };
+    // an absent problem lacks everything, and is told so
+    let problem = read.field("problem", problem.unwrap_or_default());
+    let problem = read.found(problem);
     JobRequest { envelope, problem }
 }
 
@@ -79,11 +55,11 @@ pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
         finished_after,
         finished_before,
     } = message.unwrap_or_default();
-    let read = |number| {
-        status(number).ok_or_else(|| bad(STATUS.name, number, "a value of the enum other than 0"))
+    let status = |number| {
+        read(number).map_err(|_| bad(STATUS.name, number, "a value of the enum other than 0"))
     };
     filters::checked(Filter {
-        statuses: numbers.into_iter().map(read).collect::<Result<_, _>>()?,
+        statuses: numbers.into_iter().map(status).collect::<Result<_, _>>()?,
         owner,
         labels: labels.into_iter().collect(),
         name,

@@ -12,7 +12,7 @@ use super::messages::{
 };
 use crate::{
     caller::Caller,
-    convert::{bad, edit, filter, job_request, problem_from_pb, problem_to_pb, validation},
+    convert::{bad, edit, filter, job_request, read},
     error::ApiError,
     event::Event,
     formats::Format,
@@ -54,12 +54,10 @@ impl JobService for Grpc {
     ) -> Reply<pb::ValidateProblemResponse> {
         let (caller, request) = asked(request)?;
         let message = request.problem.unwrap_or_default(); // which lacks everything, and is told so
-        let read = || {
-            problem_from_pb(message).map_err(|found| violations::prefixed(violations::AT, found))
-        };
-        let problem = self.service.work(read).await?;
+        let problem = || read(message).map_err(|found| violations::prefixed(violations::AT, found));
+        let problem = self.service.work(problem).await?;
         let found = problems::validate(&self.service, &caller, problem).await?;
-        Ok(Response::new(validation(found)))
+        Ok(Response::new(found.into()))
     }
 
     async fn create_job(&self, request: Request<pb::CreateJobRequest>) -> Reply<pb::Job> {
@@ -127,7 +125,7 @@ impl JobService for Grpc {
     ) -> Reply<pb::Problem> {
         let (caller, request) = asked(request)?;
         let problem = jobs::problem(&self.service, &caller, ID.read(&request.id)?).await?;
-        let message = problem_to_pb(&problem);
+        let message = pb::Problem::from(problem);
         if message.encoded_len() > MAX_MESSAGE_BYTES {
             return Err(ApiError::AnswerTooLarge {
                 instead: "GET /v1/jobs/{id}/problem",

@@ -205,6 +205,7 @@ pub struct Load {
     pub body_force: Option<[f64; 2]>,
 }
 
-fn default_quadrature() -> u32 {
+/// Gauss points of an element in each direction, where a problem says nothing of them.
+pub fn default_quadrature() -> u32 {
     3
 }

@@ -8,28 +8,22 @@ use serde::{Deserialize, Serialize};
 /// One load step: factors on the values given elsewhere, reached in equal or growing increments
 /// from those of the step before (from nothing at first).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Step {
     /// A name for people.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Factor on the indentation of every contact at the end of the step.
-    #[serde(default = "one")]
     pub indentation: f64,
     /// Factor on the tangential displacement of every obstacle.
-    #[serde(default)]
     pub tangential_displacement: f64,
     /// Factor on all loads.
-    #[serde(default = "one")]
     pub loads: f64,
     /// Factor on all prescribed displacements.
-    #[serde(default = "one")]
     pub supports: f64,
     /// Increments of the step (≥ 1).
-    #[serde(default = "one_increment")]
     pub increments: u32,
     /// How the indentation grows from increment to increment.
-    #[serde(default)]
     pub spacing: Spacing,
 }
 
@@ -59,35 +53,32 @@ impl Step {
     }
 }
 
-fn one() -> f64 {
-    1.0
-}
-
-fn one_increment() -> u32 {
-    1
+/// Everything as it is given, at once, but nothing is dragged.
+impl Default for Step {
+    fn default() -> Self {
+        Step {
+            tangential_displacement: 0.0,
+            ..Step::whole()
+        }
+    }
 }
 
 /// How to solve, and how far.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct SolverControls {
     /// The strategy.
-    #[serde(default)]
     pub algorithm: Algorithm,
     /// All residuals are dimensionless; each must fall below this (0 < tolerance < 1).
-    #[serde(default = "default_tolerance")]
     pub tolerance: f64,
     /// Most outer sweeps over the friction bound, per increment (≥ 1).
-    #[serde(default = "default_max_iterations")]
     pub max_iterations: u32,
     /// Solve once more from the bonded state, and say whether the two solutions agree.
-    #[serde(default)]
     pub check_uniqueness: bool,
     /// Solve once more with twice the increments, and say how much the result changes.
-    #[serde(default)]
     pub check_increments: bool,
     /// Choices that the thesis leaves to its user; for `algorithm: thesis` only.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub thesis: Option<ThesisOptions>,
 }
 
@@ -109,27 +100,22 @@ pub enum Algorithm {
 
 /// Choices of the thesis's own iteration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct ThesisOptions {
     /// First guess of the contact Γ_C*: `[s0, s1]` of arc length by boundary; absent: all of Γ_C.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub contact_guess: BTreeMap<String, [f64; 2]>,
     /// Way of evaluating the friction force, thesis 3.2: 1 at the boundary's own Gauss points, 2 along
     /// the two nearest rows of internal Gauss points, carried to the boundary linearly.
-    #[serde(default = "first_way")]
     pub friction_force: u32,
     /// Where the normal stress comes from.
-    #[serde(default)]
     pub pressure: ThesisPressure,
     /// Local Gauss points that the kernel is integrated with in each element, thesis 3.4.2, no further
     /// than the next element; for extrapolated pressure only. 0: the mesh-free average of nodal values.
-    #[serde(default)]
     pub local_points: u32,
     /// Part of the new friction force that is taken over (0 < relaxation ≤ 1).
-    #[serde(default = "one")]
     pub relaxation: f64,
     /// Let friction oppose the motion, as (1.8) means it, instead of acting along t throughout.
-    #[serde(default)]
     pub signed: bool,
 }
 
@@ -137,10 +123,10 @@ impl Default for ThesisOptions {
     fn default() -> Self {
         ThesisOptions {
             contact_guess: BTreeMap::new(),
-            friction_force: first_way(),
+            friction_force: 1,
             pressure: ThesisPressure::default(),
             local_points: 0,
-            relaxation: one(),
+            relaxation: 1.0,
             signed: false,
         }
     }
@@ -157,23 +143,12 @@ pub enum ThesisPressure {
     Extrapolated,
 }
 
-fn first_way() -> u32 {
-    1
-}
-fn default_tolerance() -> f64 {
-    1e-10
-}
-
-fn default_max_iterations() -> u32 {
-    200
-}
-
 impl Default for SolverControls {
     fn default() -> Self {
         Self {
             algorithm: Algorithm::Auto,
-            tolerance: default_tolerance(),
-            max_iterations: default_max_iterations(),
+            tolerance: 1e-10,
+            max_iterations: 200,
             check_uniqueness: false,
             check_increments: false,
             thesis: None,

@@ -1,5 +1,9 @@
-//! Generates the gRPC types, and the descriptor that reflection serves. protox compiles the
-//! contract in Rust, so that nobody has to install protoc. And unpacks the page of `/docs`.
+//! Generates the gRPC types, the conversions between them and ours, and the descriptor that reflection
+//! serves. protox compiles the contract in Rust, so that nobody has to install protoc. And unpacks the page
+//! of `/docs`.
+
+mod conversions;
+mod mirrors;
 
 use std::{
     env,
@@ -9,15 +13,18 @@ use std::{
 };
 
 use prost::Message;
+use protox::prost_reflect::DescriptorPool;
 
 fn main() -> Result<(), Box<dyn Error>> {
     // Tables and examples are compiled in too.
-    for input in ["../proto", "../migrations", "../examples"] {
+    for input in ["build", "../proto", "../migrations", "../examples"] {
         println!("cargo:rerun-if-changed={input}");
     }
     let descriptors = protox::compile(["signorini/v1/signorini.proto"], ["../proto"])?;
     let out = PathBuf::from(env::var("OUT_DIR")?);
     fs::write(out.join("descriptors.bin"), descriptors.encode_to_vec())?;
+    let pool = DescriptorPool::from_file_descriptor_set(descriptors.clone())?;
+    fs::write(out.join("conversions.rs"), conversions::source(&pool)?)?;
     // Ordered maps: the same answer is the same bytes.
     tonic_prost_build::configure()
         .btree_map(".")

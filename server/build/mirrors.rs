@@ -1,0 +1,206 @@
+//! Which type of ours mirrors which message or enum of the contract. From this list and the contract
+//! `conversions` writes the code between the two, field by field and value by value: a field or a value that
+//! only one side has does not compile, or is named here.
+//!
+//! Not in this list are the shapes that differ; `src/convert` has them by hand.
+
+/// A message or an enum of the contract, and the type of ours that says the same.
+pub(crate) struct Mirror {
+    /// Its name in the contract.
+    pub message: &'static str,
+    /// The type, as `src/convert/mirrors.rs` names it.
+    pub rust: &'static str,
+    pub shape: Shape,
+    /// It comes in requests. All go out in answers, or in our own clients' requests.
+    pub read: bool,
+    /// What a message leaves out is as in the type's `Default`.
+    pub defaulted: bool,
+    /// The same for a single field: its name, and what it is then.
+    pub otherwise: Option<(&'static str, &'static str)>,
+    /// A field that our type has under another name.
+    pub renamed: Option<(&'static str, &'static str)>,
+    /// Fields of our type that are not fields of the message: how a pattern takes them apart.
+    pub ours: &'static [&'static str],
+    /// Fields of the message that our type does not have: how a literal sets them.
+    pub theirs: &'static [&'static str],
+}
+
+/// What of a message stands where in our type.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Shape {
+    /// A struct with the fields of the message. Alternatives (`oneof`) are one field, of their common name.
+    Fields,
+    /// An enum with a variant for each alternative of the message's `kind`. A variant has the fields of its
+    /// alternative, and those that the message has beside `kind`.
+    Kinds,
+    /// An array of the fields.
+    Array,
+    /// What is in the only field.
+    Content,
+    /// An enum without data, with the names of the contract.
+    Names,
+}
+
+#[rustfmt::skip] // one per line
+pub(crate) const MIRRORS: &[Mirror] = &[
+    // the problem
+    fields("Problem", "problem::Problem").otherwise("quadrature", "problem::default_quadrature()"),
+    fields("Units", "problem::Units"),
+    kinds("Analysis", "problem::Analysis"),
+    fields("AdaptiveRefine", "problem::AdaptiveRefine"),
+    fields("ElementRange", "problem::ElementRange"),
+    fields("Grid", "problem::Grid"),
+    fields("InlineMesh", "problem::InlineMesh"),
+    fields("BoundaryPart", "problem::BoundaryPart").renamed("box", "corners"),
+    array("Point", "[f64; 2]"),
+    array("Range", "[f64; 2]"),
+    array("Vector", "[f64; 2]"),
+    array("Box", "[[f64; 2]; 2]"),
+    content("Element", "Element"),
+    content("Edge3", "[u32; 3]"),
+    content("EdgeList", "Vec<[u32; 3]>"),
+    content("ElementList", "Vec<u32>"),
+    content("NodeList", "Vec<u32>"),
+    fields("Material", "problem::Material"),
+    fields("Orthotropic", "problem::Orthotropic"),
+    fields("Support", "problem::Support"),
+    fields("Load", "problem::Load"),
+    array("Traction", "[problem::BoundaryValue; 2]"),
+    content("NodalForces", "Vec<[f64; 2]>"),
+    fields("Contact", "problem::Contact"),
+    names("NormalOf", "problem::NormalOf").defaulted(),
+    names("Condition", "problem::Condition").defaulted(),
+    kinds("Obstacle", "problem::Obstacle"),
+    names("Along", "problem::Along").defaulted(),
+    fields("Friction", "problem::Friction"),
+    fields("BoundTable", "problem::BoundTable"),
+    names("FrictionPoints", "problem::FrictionPoints").defaulted(),
+    names("Measure", "problem::Measure").defaulted(),
+    names("Kernel", "problem::Kernel").defaulted(),
+    names("Normalization", "problem::Normalization").defaulted(),
+    names("Transition", "problem::Transition").defaulted(),
+    names("History", "problem::History").defaulted(),
+    fields("Step", "problem::Step").defaulted(),
+    names("Spacing", "problem::Spacing").defaulted(),
+    fields("SolverControls", "problem::SolverControls").defaulted(),
+    fields("ThesisOptions", "problem::ThesisOptions").defaulted(),
+    names("ThesisPressure", "problem::ThesisPressure").defaulted(),
+    names("Algorithm", "problem::Algorithm").defaulted(),
+
+    // what is said of a problem
+    fields("ValidateProblemResponse", "problems::Validation").answer(),
+    fields("Violation", "solver::error::Violation").answer(),
+    fields("Warning", "solution::Warning").answer(),
+    fields("Estimate", "solver::Estimate").answer(),
+
+    // jobs
+    fields("Limits", "job::Limits").defaulted(),
+    names("Cache", "job::Cache").defaulted(),
+    fields("Job", "job::Job").answer().ours(&["key: _", "result_key: _", "twin_of: _", "cache: _", "links: _"]),
+    names("Status", "job::Status"),
+    names("ResultAvailable", "job::ResultAvailable").answer(),
+    fields("QueuePosition", "job::QueuePosition").answer(),
+    fields("JobProgress", "job::Progress").answer(),
+    fields("Failure", "job::Failure").answer(),
+    fields("CountJobsResponse", "lists::Count").answer(),
+    fields("CancelJobsResponse", "bulk::Many").answer(),
+    fields("DeleteJobsResponse", "bulk::Many").answer(),
+    names("CancelJobResponse.Outcome", "jobs::Cancellation").answer(),
+
+    // results
+    fields("Iteration", "solution::Iteration").answer().ours(&[
+        "contact: solution::ContactCount { active, entered, left }",
+        "friction: solution::FrictionCount { slip, stick }",
+        "force: solution::ForcePair { normal: normal_force, tangential: tangential_force }",
+    ]),
+    fields("Result", "results::JobResult").answer(),
+    fields("StepResult", "results::StepResult").answer(),
+    fields("Summary", "solution::Summary").answer()
+        .theirs(&["timings: BTreeMap::new()", "solver_version: String::new()", "input_hash: String::new()", "digest: String::new()"]),
+    fields("ErrorEstimate", "solution::ErrorEstimate").answer(),
+    fields("Comparison", "solution::Comparison").answer(),
+    fields("Refinement", "solution::Refinement").answer(),
+    names("Outcome", "solution::Outcome").answer(),
+    fields("ContactSummary", "solution::ContactSummary").answer(),
+    fields("Peak", "solution::Peak").answer(),
+    fields("Residuals", "solution::Residuals").answer(),
+    fields("ContactProfile", "solution::ContactProfile").answer(),
+    names("NodeState", "solution::NodeState").answer(),
+
+    // the service
+    fields("ServerInfo", "info::Info").answer(),
+    fields("ServiceLimits", "info::ServiceLimits").answer(),
+    fields("QueueState", "queue::QueueState").answer(),
+
+    // stored meshes
+    fields("MeshInfo", "mesh::MeshInfo").answer().ours(&["extent: [extent_x, extent_y]"]),
+    names("MeshFormat", "MeshFormat").answer(),
+    fields("BoundaryInfo", "mesh::BoundaryInfo").answer(),
+    fields("MeshQuality", "mesh::Quality").answer(),
+];
+
+const fn fields(message: &'static str, rust: &'static str) -> Mirror {
+    mirror(Shape::Fields, message, rust)
+}
+
+const fn kinds(message: &'static str, rust: &'static str) -> Mirror {
+    mirror(Shape::Kinds, message, rust)
+}
+
+const fn array(message: &'static str, rust: &'static str) -> Mirror {
+    mirror(Shape::Array, message, rust)
+}
+
+const fn content(message: &'static str, rust: &'static str) -> Mirror {
+    mirror(Shape::Content, message, rust)
+}
+
+const fn names(message: &'static str, rust: &'static str) -> Mirror {
+    mirror(Shape::Names, message, rust)
+}
+
+const fn mirror(shape: Shape, message: &'static str, rust: &'static str) -> Mirror {
+    Mirror {
+        message,
+        rust,
+        shape,
+        read: true,
+        defaulted: false,
+        otherwise: None,
+        renamed: None,
+        ours: &[],
+        theirs: &[],
+    }
+}
+
+impl Mirror {
+    const fn answer(mut self) -> Mirror {
+        self.read = false;
+        self
+    }
+
+    const fn defaulted(mut self) -> Mirror {
+        self.defaulted = true;
+        self
+    }
+
+    const fn otherwise(mut self, field: &'static str, value: &'static str) -> Mirror {
+        self.otherwise = Some((field, value));
+        self
+    }
+
+    const fn renamed(mut self, field: &'static str, rust: &'static str) -> Mirror {
+        self.renamed = Some((field, rust));
+        self
+    }
+
+    const fn ours(mut self, patterns: &'static [&'static str]) -> Mirror {
+        self.ours = patterns;
+        self
+    }
+
+    const fn theirs(mut self, values: &'static [&'static str]) -> Mirror {
+        self.theirs = values;
+        self
+    }
+}

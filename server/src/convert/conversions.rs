@@ -1,0 +1,66 @@
+//! What the build has written: the list is `server/build/mirrors.rs`, the writer `conversions.rs` beside it.
+
+use std::collections::BTreeMap;
+
+use files::MeshFormat;
+use solver::{element::Element, problem, solution};
+
+use super::{FromMessage, IntoMessage, Reader};
+use crate::{
+    job, mesh, pb,
+    run::Summary,
+    verbs::{bulk, info, jobs, lists, problems, queue, results},
+};
+
+/// A type that is written as a message, alone and as a field that is always there.
+macro_rules! written {
+    ($ours:ty => $message:ty) => {
+        impl IntoMessage<$message> for $ours {
+            fn into_message(self) -> $message {
+                self.into()
+            }
+        }
+
+        impl IntoMessage<Option<$message>> for $ours {
+            fn into_message(self) -> Option<$message> {
+                Some(self.into())
+            }
+        }
+    };
+}
+
+/// A type that is read from a message that has to be there.
+macro_rules! required {
+    ($message:ty => $ours:ty, $expected:literal) => {
+        impl FromMessage<Option<$message>> for $ours {
+            fn from_message(message: Option<$message>, read: &mut Reader) -> Option<Self> {
+                match message {
+                    Some(message) => Self::from_message(message, read),
+                    None => read.missing($expected),
+                }
+            }
+        }
+    };
+}
+
+/// A type that is read from a message that may be absent.
+macro_rules! defaulted {
+    ($message:ty => $ours:ty) => {
+        impl FromMessage<Option<$message>> for $ours {
+            fn from_message(message: Option<$message>, read: &mut Reader) -> Option<Self> {
+                match message {
+                    Some(message) => Self::from_message(message, read),
+                    None => Some(Self::default()),
+                }
+            }
+        }
+    };
+}
+
+written!(problem::BoundaryValue => pb::BoundaryValue);
+required!(pb::BoundaryValue => problem::BoundaryValue, "a value");
+written!(problem::MeshInput => pb::Mesh);
+required!(pb::Mesh => problem::MeshInput, "a mesh");
+written!(Summary => pb::Summary);
+
+include!(concat!(env!("OUT_DIR"), "/conversions.rs"));

@@ -1,0 +1,171 @@
+//! What a problem has in another shape than its message: alternatives that JSON tells apart by their form or
+//! by which of them is there, and lists of a fixed length.
+
+use solver::{
+    element::Element,
+    problem::{BoundaryValue, MeshInput, PrescribedBound, Refine},
+};
+
+use super::{FromMessage, IntoMessage, Reader};
+use crate::pb::{self, friction::Bound, mesh};
+
+impl FromMessage<pb::Mesh> for MeshInput {
+    fn from_message(message: pb::Mesh, read: &mut Reader) -> Option<Self> {
+        let pb::Mesh {
+            source,
+            refinement,
+            boundaries,
+            groups,
+        } = message;
+        let from = MeshInput::default();
+        let source = match source {
+            Some(mesh::Source::Grid(grid)) => {
+                let grid = read.field("grid", grid).map(Some);
+                grid.map(|grid| MeshInput { grid, ..from })
+            }
+            Some(mesh::Source::Inline(inline)) => {
+                let inline = read.field("inline", inline).map(Some);
+                inline.map(|inline| MeshInput { inline, ..from })
+            }
+            Some(mesh::Source::Gmsh(text)) => {
+                let gmsh = Some(text);
+                Some(MeshInput { gmsh, ..from })
+            }
+            Some(mesh::Source::Abaqus(text)) => {
+                let abaqus = Some(text);
+                Some(MeshInput { abaqus, ..from })
+            }
+            Some(mesh::Source::Stored(hash)) => {
+                let stored = Some(hash);
+                Some(MeshInput { stored, ..from })
+            }
+            None => read.missing("one of grid, inline, gmsh, abaqus, stored"),
+        };
+        let refine = match refinement {
+            Some(mesh::Refinement::Refine(times)) => Some(Refine::Times(times)),
+            Some(mesh::Refinement::Adaptive(goal)) => {
+                read.field("refine", goal).map(Refine::Adaptive)
+            }
+            None => Some(Refine::default()),
+        };
+        let boundaries = read.field("boundaries", boundaries);
+        let groups = read.field("groups", groups);
+        Some(MeshInput {
+            refine: refine?,
+            boundaries: boundaries?,
+            groups: groups?,
+            ..source?
+        })
+    }
+}
+
+impl From<MeshInput> for pb::Mesh {
+    fn from(ours: MeshInput) -> Self {
+        let MeshInput {
+            grid,
+            inline,
+            gmsh,
+            abaqus,
+            stored,
+            refine,
+            boundaries,
+            groups,
+        } = ours;
+        let sources = [
+            grid.map(|grid| mesh::Source::Grid(grid.into())),
+            inline.map(|inline| mesh::Source::Inline(inline.into())),
+            gmsh.map(mesh::Source::Gmsh),
+            abaqus.map(mesh::Source::Abaqus),
+            stored.map(mesh::Source::Stored),
+        ];
+        let refinement = match refine {
+            Refine::Times(times) => mesh::Refinement::Refine(times),
+            Refine::Adaptive(goal) => mesh::Refinement::Adaptive(goal.into()),
+        };
+        pb::Mesh {
+            source: sources.into_iter().flatten().next(),
+            refinement: Some(refinement),
+            boundaries: boundaries.into_message(),
+            groups: groups.into_message(),
+        }
+    }
+}
+
+/// A number, or two of them.
+impl FromMessage<pb::BoundaryValue> for BoundaryValue {
+    fn from_message(message: pb::BoundaryValue, read: &mut Reader) -> Option<Self> {
+        let pb::BoundaryValue { start, end } = message;
+        match end {
+            None => f64::from_message(start, read).map(BoundaryValue::Constant),
+            Some(end) => {
+                let (start, end) = (read.place(0, start), read.place(1, end));
+                Some(BoundaryValue::Linear([start?, end?]))
+            }
+        }
+    }
+}
+
+impl From<BoundaryValue> for pb::BoundaryValue {
+    fn from(ours: BoundaryValue) -> Self {
+        let (start, end) = match ours {
+            BoundaryValue::Constant(start) => (start, None),
+            BoundaryValue::Linear([start, end]) => (start, Some(end)),
+        };
+        pb::BoundaryValue { start, end }
+    }
+}
+
+/// A number, or a table.
+impl FromMessage<Bound> for PrescribedBound {
+    fn from_message(message: Bound, read: &mut Reader) -> Option<Self> {
+        match message {
+            Bound::ConstantBound(bound) => {
+                f64::from_message(bound, read).map(PrescribedBound::Constant)
+            }
+            Bound::BoundTable(table) => {
+                FromMessage::from_message(table, read).map(PrescribedBound::Table)
+            }
+        }
+    }
+}
+
+impl IntoMessage<Bound> for PrescribedBound {
+    fn into_message(self) -> Bound {
+        match self {
+            PrescribedBound::Constant(bound) => Bound::ConstantBound(bound),
+            PrescribedBound::Table(table) => Bound::BoundTable(table.into()),
+        }
+    }
+}
+
+impl FromMessage<Vec<u32>> for Element {
+    fn from_message(nodes: Vec<u32>, read: &mut Reader) -> Option<Self> {
+        let found = nodes.len();
+        let wrong = || read.wrong("wrong_length", numbers(found), "8 or 6 node numbers");
+        Element::try_from(nodes).ok().or_else(wrong)
+    }
+}
+
+impl IntoMessage<Vec<u32>> for Element {
+    fn into_message(self) -> Vec<u32> {
+        self.to_vec()
+    }
+}
+
+impl<const N: usize> FromMessage<Vec<u32>> for [u32; N] {
+    fn from_message(nodes: Vec<u32>, read: &mut Reader) -> Option<Self> {
+        let found = nodes.len();
+        let wrong = || read.wrong("wrong_length", numbers(found), &numbers(N));
+        nodes.try_into().ok().or_else(wrong)
+    }
+}
+
+impl<const N: usize> IntoMessage<Vec<u32>> for [u32; N] {
+    fn into_message(self) -> Vec<u32> {
+        self.to_vec()
+    }
+}
+
+fn numbers(count: usize) -> String {
+    format!("{count} node numbers")
+}

@@ -1,0 +1,174 @@
+//! Every field of every message of problems and answers arrives where its name says, in both directions.
+//! The messages are made from the contract alone, with another value in every field: two fields of the same
+//! type that change places are found, and a field that is added is among them by itself.
+
+use prost::Message;
+use prost_reflect::{
+    DynamicMessage, EnumDescriptor, FieldDescriptor, Kind, MapKey, MessageDescriptor, Value,
+};
+use serde::de::DeserializeOwned;
+use serde_json::{Value as Json, json};
+use service::{convert, event::Event, job::Job, mesh::MeshInfo, pb, run};
+use solver::{
+    error::Violation,
+    problem::Problem,
+    solution::{ContactProfile, Warning},
+};
+
+use crate::by_name::{assert_same, descriptor, dynamic, read};
+
+/// So often every message is filled, each time with the next of its alternatives: obstacles have most.
+const ROUNDS: usize = 12;
+
+#[test]
+fn every_field_of_a_problem_is_read_as_its_json() {
+    for round in 0..ROUNDS {
+        let filled = Filler { round, count: 0 }.message(&descriptor("Problem"));
+        let expected: Problem = serde_json::from_value(read(&filled)).unwrap();
+        let message: pb::Problem = filled.transcode_to().unwrap();
+        let problem: Problem = convert::read(message).unwrap();
+        assert_same(&json!(problem), &json!(expected), &format!("round {round}"));
+    }
+}
+
+#[test]
+fn every_field_of_a_problem_is_written_as_its_json() {
+    for round in 0..ROUNDS {
+        let filled = Filler { round, count: 0 }.message(&descriptor("Problem"));
+        let problem: Problem = serde_json::from_value(read(&filled)).unwrap();
+        let message = dynamic("Problem", &pb::Problem::from(problem));
+        assert_same(&read(&message), &read(&filled), &format!("round {round}"));
+    }
+}
+
+#[test]
+fn every_field_of_an_answer_is_written_as_its_json() {
+    answer::<Job, pb::Job>("Job");
+    answer::<Event, pb::Event>("Event");
+    answer::<run::Summary, pb::Summary>("Summary");
+    answer::<ContactProfile, pb::ContactProfile>("ContactProfile");
+    answer::<MeshInfo, pb::MeshInfo>("MeshInfo");
+    answer::<Violation, pb::Violation>("Violation");
+    answer::<Warning, pb::Warning>("Warning");
+}
+
+fn answer<T: DeserializeOwned + Into<M>, M: Message>(name: &str) {
+    for round in 0..ROUNDS {
+        let filled = Filler { round, count: 0 }.message(&descriptor(name));
+        let ours: T = serde_json::from_value(with_links(read(&filled))).unwrap();
+        let message = dynamic(name, &ours.into());
+        assert_same(
+            &read(&message),
+            &read(&filled),
+            &format!("{name}, round {round}"),
+        );
+    }
+}
+
+/// A job has addresses over REST, and in no message.
+fn with_links(mut answer: Json) -> Json {
+    for place in ["", "/job"] {
+        let job = answer.pointer_mut(place);
+        if let Some(job) = job.filter(|job| job["max_attempts"].is_number()) {
+            job["links"] = json!({});
+        }
+    }
+    answer
+}
+
+/// Fills messages, each field with the next value.
+struct Filler {
+    round: usize,
+    count: usize,
+}
+
+impl Filler {
+    fn message(&mut self, of: &MessageDescriptor) -> DynamicMessage {
+        let mut message = DynamicMessage::new(of.clone());
+        for field in of.fields() {
+            if let Some(alternatives) = field.containing_oneof() {
+                let count = alternatives.fields().len();
+                let chosen = alternatives.fields().nth(self.round % count);
+                if chosen != Some(field.clone()) {
+                    continue;
+                }
+            }
+            let value = self.field(of.name(), &field);
+            message.set_field(&field, value);
+        }
+        message
+    }
+
+    fn field(&mut self, message: &str, field: &FieldDescriptor) -> Value {
+        let kind = field.kind();
+        if field.is_map() {
+            let kind = kind.as_message().unwrap().map_entry_value_field().kind();
+            let mut entry = || {
+                let name = self.one(message, "", &Kind::String);
+                (
+                    MapKey::String(name.as_str().unwrap().into()),
+                    self.one(message, "", &kind),
+                )
+            };
+            return Value::Map([entry(), entry()].into());
+        }
+        if field.is_list() {
+            let entries = match message {
+                "Element" => [6, 8][self.round % 2],
+                "Edge3" => 3,
+                _ => 2,
+            };
+            let mut entry = |_| self.one(message, field.name(), &kind);
+            return Value::List((0..entries).map(&mut entry).collect());
+        }
+        self.one(message, field.name(), &kind)
+    }
+
+    fn one(&mut self, message: &str, field: &str, kind: &Kind) -> Value {
+        self.count += 1;
+        let count = self.count;
+        match kind {
+            // two of them differ in some round
+            Kind::Bool => Value::Bool((count >> (self.round % 8)) & 1 == 1),
+            Kind::Int32 => Value::I32(count as i32),
+            Kind::Int64 => Value::I64(count as i64),
+            Kind::Uint32 => Value::U32(count as u32),
+            Kind::Uint64 => Value::U64(count as u64),
+            Kind::Double => Value::F64(count as f64 + 0.25),
+            Kind::String => Value::String(text(message, field, count)),
+            Kind::Enum(names) => Value::EnumNumber(self.named(names)),
+            Kind::Message(message) if message.name() == "Timestamp" => {
+                let mut time = DynamicMessage::new(message.clone());
+                time.set_field_by_name("seconds", Value::I64(count as i64));
+                time.set_field_by_name("nanos", Value::I32(1000 * count as i32));
+                Value::Message(time)
+            }
+            Kind::Message(message) => Value::Message(self.message(message)),
+            other => panic!("{other:?} stands in no problem and no answer"),
+        }
+    }
+
+    /// Any value but the unspecified.
+    fn named(&self, names: &EnumDescriptor) -> i32 {
+        let said = names.values().len() - 1;
+        names
+            .values()
+            .nth(1 + (self.count + self.round) % said)
+            .unwrap()
+            .number()
+    }
+}
+
+/// A text of its own, where any will do.
+fn text(message: &str, field: &str, count: usize) -> String {
+    match (message, field) {
+        ("Job", "id" | "cached_from" | "parent") => {
+            format!("job_00000000-0000-7000-8000-{count:012}")
+        }
+        ("Job", "reason") => "timed_out".into(),
+        ("QueuePosition", "reason") => "paused".into(),
+        ("StageEvent", "stage") => "factor".into(),
+        ("Iteration" | "Summary", "stage") => "inner".into(),
+        _ => format!("text {count}"),
+    }
+}
