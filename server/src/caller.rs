@@ -1,4 +1,4 @@
-//! Who asks for something, what they may do, and whose things they see.
+//! The caller of a request: its owner name, its scopes, and whose jobs it sees.
 
 use std::collections::BTreeSet;
 
@@ -33,7 +33,7 @@ pub enum Scope {
     Admin,
 }
 
-/// Who asks: every verb takes one.
+/// The caller of a request; every verb takes one.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Caller {
     /// The owner of the jobs that this caller submits.
@@ -43,7 +43,7 @@ pub struct Caller {
 }
 
 impl Caller {
-    /// Who is known by that name, and may do this.
+    /// A caller of that name, with these scopes.
     pub fn new(owner: impl Into<String>, scopes: impl IntoIterator<Item = Scope>) -> Caller {
         Caller {
             owner: owner.into(),
@@ -51,7 +51,7 @@ impl Caller {
         }
     }
 
-    /// Everybody, as long as nobody is told apart: one owner, who may do everything.
+    /// The caller of every request as long as there is no authentication: one owner, with all scopes.
     pub fn local() -> Caller {
         Caller::new("local", Scope::VARIANTS.iter().copied())
     }

@@ -1,4 +1,4 @@
-//! What fits into a message, and what its fields say: the same parameters as over REST, checked alike.
+//! Reading the fields of messages, by the same parameters as over REST; and what fits into a message.
 
 use prost::Message;
 use tonic::{Request, Response, metadata::MetadataValue};
@@ -18,7 +18,7 @@ use crate::{
 
 /// Largest message, both ways; the contract's promise.
 pub(super) const MAX_MESSAGE_BYTES: usize = 1 << 20;
-/// Rows of a history in one answer, some 200 bytes each: it shall not be larger either.
+/// Rows of a history in one answer, some 200 bytes each: it must not be larger either.
 pub(super) const MAX_ROWS: usize = 4000;
 /// Places of a profile in one answer, some 90 bytes each.
 const MAX_PLACES: usize = 10_000;
@@ -34,10 +34,11 @@ pub(super) fn fitting(jobs: &[pb::Job]) -> usize {
     jobs.iter().take_while(fits).count().max(1)
 }
 
-/// Who asks, and the message.
+/// The caller and the message of a request.
 pub(super) fn asked<T>(mut request: Request<T>) -> Result<(Caller, T), ApiError> {
     let caller = request.extensions_mut().remove::<Caller>();
-    let caller = caller.ok_or_else(|| ApiError::internal("nobody said who asks"))?;
+    let caller =
+        caller.ok_or_else(|| ApiError::internal("the caller of a request was not identified"))?;
     Ok((caller, request.into_inner()))
 }
 
@@ -52,7 +53,7 @@ pub(super) fn given<V: Values>(
     }
 }
 
-/// What part of a list is asked for; a size of 0 is none.
+/// What part of a list is asked for; a size of 0 means the default.
 pub(super) fn paging(size: i32, token: String) -> Result<Paging, ApiError> {
     let size = match size {
         0 => None,

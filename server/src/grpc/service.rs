@@ -53,7 +53,7 @@ impl JobService for Grpc {
         request: Request<pb::ValidateProblemRequest>,
     ) -> Reply<pb::ValidateProblemResponse> {
         let (caller, request) = asked(request)?;
-        let message = request.problem.unwrap_or_default(); // which lacks everything, and is told so
+        let message = request.problem.unwrap_or_default(); // an empty one lacks everything, which is reported
         let problem = || read(message).map_err(|found| violations::prefixed(violations::AT, found));
         let problem = self.service.work(problem).await?;
         let found = problems::validate(&self.service, &caller, problem).await?;

@@ -1,5 +1,5 @@
-//! What a request may say beside its body: each parameter once, for both protocols. A skin, or a verb, names it,
-//! says which values it may have and what they mean; reading, range, error and description follow from that.
+//! Parameters of requests, defined once for both protocols. A definition has a name, the values that are allowed, and
+//! what they mean; reading, range check, error and description follow from it.
 
 mod parameter;
 mod values;

@@ -5,25 +5,24 @@ use serde_json::json;
 use super::values::{Seconds, Values, Whole};
 use crate::{error::ApiError, violations};
 
-/// Something that a request may say beside its body: a parameter of a query or a header over REST, a field of a
-/// message over gRPC.
+/// An input of a request: a query parameter or a header over REST, a field of a message over gRPC.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter<V> {
     /// Its name; the field's is the same.
     pub name: &'static str,
-    /// What it does, in a line without a stop.
+    /// What it does: one line, without a full stop.
     pub meaning: &'static str,
-    /// What it may say.
+    /// Its values.
     pub values: V,
 }
 
 impl<V: Values> Parameter<V> {
-    /// What this text stands for.
+    /// The value of this text.
     pub fn read(&self, text: &str) -> Result<V::Value, ApiError> {
         self.values.read(text).ok_or_else(|| self.bad(text))
     }
 
-    /// The error that this is none of its values.
+    /// The error that this is not one of its values.
     pub fn bad(&self, got: impl ToString) -> ApiError {
         ApiError::BadParameter {
             name: self.name,
@@ -74,21 +73,21 @@ impl Parameter<Seconds> {
     }
 }
 
-/// What a path names: there is nothing under any other name.
+/// A variable of a path. Any name that is not among its values is not found.
 #[derive(Clone, Copy, Debug)]
 pub struct Variable<V> {
-    /// As it stands in the path, in braces; the field's is the same.
+    /// Its name in the path, in braces; the field's is the same.
     pub name: &'static str,
-    /// What it names: `job`, `plot`.
+    /// What is named by it, for errors: `job`, `plot`.
     pub kind: &'static str,
-    /// What it means, in a line without a stop.
+    /// What it means: one line, without a full stop.
     pub meaning: &'static str,
-    /// The names.
+    /// The names that there are.
     pub values: V,
 }
 
 impl<V: Values> Variable<V> {
-    /// What this name stands for.
+    /// The value of this name.
     pub fn read(&self, text: &str) -> Result<V::Value, ApiError> {
         self.values.read(text).ok_or_else(|| {
             let (kind, name) = (self.kind, violations::name(text));
@@ -113,20 +112,20 @@ impl<V: Values> Variable<V> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum Place {
-    /// Between two slashes.
+    /// A segment of the path.
     Path,
-    /// Behind the question mark.
+    /// The query.
     Query,
-    /// Before the body.
+    /// A header.
     Header,
 }
 
 /// A parameter as the description of the API has it.
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// Where it stands.
+    /// Where it is sent.
     pub place: Place,
-    /// Its name; `label.{key}` stands for all that begin with `label.`.
+    /// Its name; with `{key}` at its end it is a name for each key.
     pub name: &'static str,
     /// Its values, as JSON Schema.
     pub schema: serde_json::Value,

@@ -7,18 +7,18 @@ use strum::VariantArray;
 
 use crate::time::Time;
 
-/// A set of values, each written as a text.
+/// A set of values, written as text.
 pub trait Values {
-    /// What a text stands for.
+    /// The meaning of a text.
     type Value;
 
     /// The texts, as JSON Schema.
     fn schema(&self) -> serde_json::Value;
 
-    /// The same in words.
+    /// The same in words, for errors.
     fn expected(&self) -> String;
 
-    /// What this text stands for; none if it is no value of the set.
+    /// The meaning of this text; none if it is not in the set.
     fn read(&self, text: &str) -> Option<Self::Value>;
 }
 
@@ -106,7 +106,7 @@ impl Values for Times {
     }
 }
 
-/// A few values, a word each; given as a list of both.
+/// A few values, a word each, as a list of both.
 #[derive(Clone, Copy, Debug)]
 pub struct Words<T>(pub fn() -> Vec<(&'static str, T)>);
 

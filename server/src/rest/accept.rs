@@ -1,9 +1,9 @@
-//! What the client wants to be answered with: `Accept`, and the parameter `format`.
+//! Content negotiation: `Accept`, and the parameter `format`.
 
 use axum::http::{HeaderMap, header};
 use serde_json::json;
 
-use super::takes::{Sent, Takes};
+use super::input::{Input, RawInput};
 use crate::{
     error::ApiError,
     formats::Format,
@@ -11,17 +11,17 @@ use crate::{
     violations,
 };
 
-/// One of these formats: that of the parameter `format`, else that of `Accept`, else the first.
+/// One of these formats: by the parameter `format`, else by `Accept`, else the first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FormatOf(pub(super) &'static [Format]);
 
 /// The parameter's name.
 const FORMAT: &str = "format";
 
-impl Takes for FormatOf {
+impl Input for FormatOf {
     type Value = Format;
 
-    fn described(&self) -> Vec<Description> {
+    fn descriptions(&self) -> Vec<Description> {
         let names: Vec<&str> = self.0.iter().map(|format| format.name()).collect();
         vec![Description {
             place: Place::Query,
@@ -32,8 +32,8 @@ impl Takes for FormatOf {
         }]
     }
 
-    fn take(&self, sent: &Sent<'_>) -> Result<Format, ApiError> {
-        choose(self.0, sent.one(FORMAT), sent.headers)
+    fn extract(&self, raw: &RawInput<'_>) -> Result<Format, ApiError> {
+        choose(self.0, raw.one(FORMAT), raw.headers)
     }
 }
 
@@ -68,7 +68,7 @@ fn choose(
         .ok_or_else(|| none(&accept.join(", ")))
 }
 
-/// The media types that the client takes, as it says.
+/// The media ranges of `Accept`.
 pub(super) fn accepted(headers: &HeaderMap) -> Vec<&str> {
     let values = headers.get_all(header::ACCEPT).iter();
     values
@@ -77,8 +77,8 @@ pub(super) fn accepted(headers: &HeaderMap) -> Vec<&str> {
         .collect()
 }
 
-/// How much a media type is wanted: the weight of the most specific range that covers it; how specific that is;
-/// and where it stands, the first one highest.
+/// How much a media type is preferred: the weight of the most specific range that covers it; how specific that is;
+/// and its place in the list, the first one highest.
 pub(super) fn weight(accepted: &[&str], media: &str) -> (f32, u8, isize) {
     let group = media.split('/').next().unwrap_or_default();
     let mut found = (0.0, 0, 0);
@@ -101,8 +101,8 @@ pub(super) fn weight(accepted: &[&str], media: &str) -> (f32, u8, isize) {
     found
 }
 
-/// Whether the client wants one of these media types rather than JSON.
-pub(super) fn wants(headers: &HeaderMap, media: &[&str]) -> bool {
+/// Whether the client prefers one of these media types to JSON.
+pub(super) fn prefers(headers: &HeaderMap, media: &[&str]) -> bool {
     let accepted = accepted(headers);
     let json = weight(&accepted, "application/json");
     let mut weights = media.iter().map(|media| weight(&accepted, media));
@@ -115,11 +115,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_client_wants_rather_than_json_goes_by_its_weights() {
-        let wants = |accept: &str| {
+    fn what_a_client_prefers_to_json_goes_by_its_weights() {
+        let prefers = |accept: &str| {
             let mut headers = HeaderMap::new();
             headers.insert("accept", accept.parse().unwrap());
-            wants(&headers, &["text/html"])
+            prefers(&headers, &["text/html"])
         };
         for html in [
             "text/html",
@@ -127,7 +127,7 @@ mod tests {
             "text/html, application/json",
             "*/*, text/html",
         ] {
-            assert!(wants(html), "{html}");
+            assert!(prefers(html), "{html}");
         }
         for json in [
             "*/*",
@@ -136,7 +136,7 @@ mod tests {
             "text/html;q=0, */*",
             "image/png",
         ] {
-            assert!(!wants(json), "{json}");
+            assert!(!prefers(json), "{json}");
         }
     }
 

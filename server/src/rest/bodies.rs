@@ -1,5 +1,5 @@
-//! Bodies of requests in JSON: what each may hold, and all that is wrong with one. A problem in it is a text
-//! for the solver's own parser.
+//! Bodies of requests in JSON: their schemas, and reading them with all errors reported together. A problem inside is
+//! read by the parser of `files`.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -26,8 +26,8 @@ use crate::{
     violations::{self, AT, Violations, prefixed},
 };
 
-/// A body that submits a job; for its schema only, since it is read by hand: what is wrong with the
-/// problem comes together with what is wrong around it.
+/// A body that submits a job; for its schema only, since it is read by hand: the errors of the
+/// problem are reported together with those around it.
 #[derive(JsonSchema)]
 #[schemars(deny_unknown_fields)]
 #[allow(dead_code)]
@@ -40,13 +40,13 @@ pub(super) struct Submission {
     /// Labels for programs, at most 64.
     #[schemars(default, extend("maxProperties" = 64))]
     labels: Option<BTreeMap<Label, Label>>,
-    /// Higher first; absent: 0.
+    /// Jobs of higher priority run first; absent: 0.
     #[schemars(default, range(min = -10, max = 10))]
     priority: Option<i32>,
-    /// What it may take.
+    /// Time limits.
     #[schemars(default)]
     limits: Option<Limits>,
-    /// Whether an earlier result may answer it; absent: use.
+    /// Whether the result of an earlier job with the same input may be used; absent: use.
     #[schemars(default)]
     cache: Option<Cache>,
 }
@@ -56,7 +56,7 @@ pub(super) struct Submission {
 #[schemars(deny_unknown_fields)]
 #[allow(dead_code)]
 pub(super) struct Submissions {
-    /// All or none of them are accepted.
+    /// The jobs; all or none of them are accepted.
     #[schemars(length(min = 1, max = 1000))]
     jobs: Vec<Submission>,
 }
@@ -66,40 +66,40 @@ pub(super) struct Submissions {
 #[schemars(deny_unknown_fields)]
 #[allow(dead_code)]
 pub(super) struct Edits {
-    /// A name for people, at most 256 characters; null takes it away.
+    /// A name for people, at most 256 characters; null removes it.
     #[schemars(default, length(max = 256))]
     name: Option<String>,
-    /// All labels that it shall have, at most 64: they replace those that it had; null takes them away.
+    /// The new labels, all of them, at most 64: they replace the old ones; null removes them.
     #[schemars(default, extend("maxProperties" = 64))]
     labels: Option<BTreeMap<Label, Label>>,
-    /// Higher first.
+    /// Jobs of higher priority run first.
     #[schemars(default, range(min = -10, max = 10))]
     priority: Option<i32>,
-    /// Never removed by age. Who deletes it deletes it all the same.
+    /// Kept whatever its age; it can still be deleted on request.
     #[schemars(default)]
     pinned: Option<bool>,
 }
 
-/// A body that changes a job as it is tried again: what is absent stays; for its schema only.
+/// A body that changes the new job of a retry: what is absent stays; for its schema only.
 #[derive(JsonSchema)]
 #[schemars(deny_unknown_fields)]
 #[allow(dead_code)]
 pub(super) struct Retry {
-    /// What it may take; what is absent stays.
+    /// Time limits; those that are absent stay.
     #[schemars(default)]
     limits: Option<NewLimits>,
-    /// Higher first.
+    /// Jobs of higher priority run first.
     #[schemars(default, range(min = -10, max = 10))]
     priority: Option<i32>,
 }
 
-/// Limits that are changed.
+/// Time limits that are changed.
 #[derive(Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct NewLimits {
     /// Seconds from a start to the end.
     timeout_s: Option<f64>,
-    /// Seconds that it may wait for a start.
+    /// Seconds that it may wait in the queue.
     queue_ttl_s: Option<f64>,
 }
 
@@ -118,7 +118,7 @@ pub(super) struct BareProblem {
     problem: Problem,
 }
 
-/// What is wrong with a body whose JSON is well formed, or what it holds.
+/// The content of a body whose JSON is well formed, or its violations.
 type Read<T> = Result<T, Vec<Violation>>;
 
 /// A body `{problem, name, labels, priority, limits, cache}`. The problem's text goes to the solver's own
@@ -161,7 +161,7 @@ pub(super) fn batch(text: &str) -> Result<Read<Vec<JobRequest>>, ApiError> {
         texts
     });
     let mut requests = vec![];
-    // one more than there may be: the verb says that they are too many
+    // one more than allowed: the verb reports that they are too many
     for (n, text) in texts.iter().flatten().take(MAX_BATCH + 1).enumerate() {
         let at = format!("/jobs/{n}");
         match submission(text.get()) {
@@ -226,7 +226,7 @@ const LABELS: &str = "an object of strings";
 const PRIORITY: &str = "a whole number from -10 to 10";
 const LIMITS: &str = "an object of timeout_s and queue_ttl_s, each a number, and nothing else";
 
-/// An object whose fields are taken out one by one; all that is wrong with them is said at the end.
+/// An object whose fields are taken out one by one; all violations are reported at the end.
 struct Body<'a> {
     fields: BTreeMap<String, &'a RawValue>,
     violations: Violations,
@@ -238,7 +238,7 @@ impl<'a> Body<'a> {
             let nothing = format!("the body is empty; expected {expected}");
             return Err(ApiError::MalformedJson(nothing));
         }
-        // First only the syntax, so that a well-formed array is told that it should be an object.
+        // First only the syntax, so that a well-formed array is reported as the wrong type.
         let whole: &RawValue = serde_json::from_str(text)
             .map_err(|error| ApiError::MalformedJson(error.to_string()))?;
         let Pairs(pairs) = serde_json::from_str(whole.get())
@@ -252,15 +252,15 @@ impl<'a> Body<'a> {
                     reason: "duplicate_name".into(),
                     got: "the name twice".into(),
                     expected: "each name once".into(),
-                    hint: "Leave one of them out: it would have had no effect.".into(),
+                    hint: "Leave one of them out; one would be ignored.".into(),
                 });
             }
         }
         Ok(Body { fields, violations })
     }
 
-    /// The problem itself where an envelope around it was expected: to call each of its names unknown
-    /// would not help.
+    /// The problem itself where an envelope around it was expected: one violation says so, instead of one for each
+    /// of its names.
     fn unwrapped(&self) -> Option<Violation> {
         let has = |name: &str| self.fields.contains_key(name);
         (!has("problem") && (has("analysis") || has("mesh"))).then(|| Violation {
@@ -272,7 +272,7 @@ impl<'a> Body<'a> {
         })
     }
 
-    /// The field `problem`, read by the solver's own parser.
+    /// The field `problem`.
     fn problem(&mut self) -> Option<Problem> {
         let raw = self.require(
             "problem",
@@ -300,7 +300,7 @@ impl<'a> Body<'a> {
         found
     }
 
-    /// A field that may be there; null is as good as absent.
+    /// An optional field; null means absent.
     fn take<T: DeserializeOwned>(&mut self, name: &str, expected: &str) -> Option<T> {
         let raw = self.fields.remove(name).filter(|raw| !is_null(raw))?;
         let value = serde_json::from_str(raw.get());
@@ -312,9 +312,9 @@ impl<'a> Body<'a> {
             .add(wrong_type(&format!("/{name}"), raw, expected));
     }
 
-    /// What was read, if nothing was wrong and nothing unknown is left over.
+    /// What was read, if there are no violations and no unknown fields left.
     fn close<T>(mut self, known: &str, read: Option<T>) -> Read<T> {
-        // One more than are listed: the list shall say that there are more.
+        // One more than are listed, so that the list says that there are more.
         for name in self.fields.into_keys().take(violations::MOST + 1) {
             let name = violations::name(&name);
             self.violations.add(Violation {
@@ -332,7 +332,7 @@ impl<'a> Body<'a> {
     }
 }
 
-/// The members of an object as they come. A map would keep the last one of a name, without a word.
+/// The members of an object in their order. A map would silently keep only the last one of a name.
 struct Pairs<'a>(Vec<(String, &'a RawValue)>);
 
 impl<'de> Deserialize<'de> for Pairs<'de> {
@@ -386,9 +386,9 @@ mod tests {
             .collect()
     }
 
-    /// What a body may have, by what it is told that has something else.
-    fn known(told: Vec<Violation>) -> Vec<String> {
-        let unknown = told.iter().find(|v| v.reason == "unknown_name").unwrap();
+    /// What a body may have, by the violation that reports an unknown name.
+    fn known(found: Vec<Violation>) -> Vec<String> {
+        let unknown = found.iter().find(|v| v.reason == "unknown_name").unwrap();
         let names = unknown.expected.strip_prefix("one of ").unwrap();
         names.split(", ").map(str::to_owned).collect()
     }
@@ -408,7 +408,7 @@ mod tests {
         let ApiError::InvalidProblem(changes) = retry(OTHER).unwrap_err() else {
             unreachable!("it is well-formed");
         };
-        for (told, mut described) in [
+        for (found, mut described) in [
             (
                 submission(OTHER).unwrap().problem.unwrap_err(),
                 described::<Submission>(),
@@ -424,7 +424,7 @@ mod tests {
             (edits, described::<Edits>()),
             (changes, described::<Retry>()),
         ] {
-            let mut known = known(told);
+            let mut known = known(found);
             known.sort();
             described.sort();
             assert_eq!(known, described);
@@ -441,7 +441,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bare_problem_is_told_once_to_be_wrapped() {
+    fn a_bare_problem_is_one_violation() {
         let text = serde_json::to_string(&crate::fake::problem()).unwrap();
         let by_both = [
             submission(&text).unwrap().problem.unwrap_err(),

@@ -66,8 +66,8 @@ pub(super) fn declared_length(headers: &HeaderMap) -> Option<usize> {
     value.to_str().ok()?.parse().ok()
 }
 
-/// Takes in, for a while, what nobody reads: many clients look at the answer only after they have
-/// sent everything, and see a broken connection if we hang up before.
+/// Reads the rest of a refused body for a while, and drops it: many clients read the answer only after they have
+/// sent everything, and see a broken connection if the server closes it before.
 pub(super) async fn discard(mut pieces: BodyDataStream) {
     const MOST_BYTES: usize = 256 << 20;
     const LONGEST: Duration = Duration::from_secs(10);

@@ -1,4 +1,4 @@
-//! A request on its way to its handler: its parameters are read and checked, then the handler runs.
+//! A request on its way to its handler: its input is read and checked, then the handler runs.
 
 use std::sync::Arc;
 
@@ -13,19 +13,19 @@ use serde_json::Value;
 
 use super::{
     body,
-    takes::{Sent, Takes},
+    input::{Input, RawInput},
 };
 use crate::{caller::Caller, error::ApiError, verbs::Service};
 
 /// What all handlers work with.
 #[derive(Clone, Debug)]
-pub(super) struct Site {
+pub(super) struct AppState {
     pub(super) service: Arc<Service>,
     /// The description of the API, which is made of all operations and served by one of them.
     pub(super) openapi: fn() -> &'static Value,
 }
 
-/// A request without its parameters, which handlers receive beside it.
+/// A request without its input, which handlers receive beside it.
 pub(super) struct Call {
     pub(super) service: Arc<Service>,
     pub(super) caller: Caller,
@@ -47,7 +47,7 @@ impl Call {
     }
 }
 
-/// What does an operation: an async function of the call and of what the operation takes, in its order.
+/// What does an operation: an async function of the call and of the operation's input, in the order of the table.
 pub(super) trait Handler<Values>: Clone + Send + Sync + 'static {
     /// Does it.
     fn handle(
@@ -77,37 +77,42 @@ functions!(() (A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E G));
 /// The route of an operation. A `strict` one refuses parameters that it does not know.
 pub(super) fn route<T, H>(
     method: MethodFilter,
-    takes: T,
+    input: T,
     strict: bool,
     handler: H,
-) -> MethodRouter<Site>
+) -> MethodRouter<AppState>
 where
-    T: Takes<Value: Send> + Send + Sync + 'static,
+    T: Input<Value: Send> + Send + Sync + 'static,
     H: Handler<T::Value>,
 {
-    let described = takes.described();
-    let operation = Arc::new((takes, described));
-    on(method, move |State(site): State<Site>, request: Request| {
-        let (handler, operation) = (handler.clone(), operation.clone());
-        async move {
-            let (mut parts, body) = request.into_parts();
-            let variables = Sent::variables(&mut parts).await?;
-            let caller = parts.extensions.remove::<Caller>();
-            let caller = caller.ok_or_else(|| ApiError::internal("nobody said who asks"))?;
-            let sent = Sent::new(variables, parts.uri.query(), &parts.headers);
-            let (takes, described) = &*operation;
-            if strict {
-                sent.check(described)?;
+    let described = input.descriptions();
+    let operation = Arc::new((input, described));
+    on(
+        method,
+        move |State(site): State<AppState>, request: Request| {
+            let (handler, operation) = (handler.clone(), operation.clone());
+            async move {
+                let (mut parts, body) = request.into_parts();
+                let variables = RawInput::variables(&mut parts).await?;
+                let caller = parts.extensions.remove::<Caller>();
+                let caller = caller.ok_or_else(|| {
+                    ApiError::internal("the caller of a request was not identified")
+                })?;
+                let raw = RawInput::new(variables, parts.uri.query(), &parts.headers);
+                let (input, described) = &*operation;
+                if strict {
+                    raw.check(described)?;
+                }
+                let values = input.extract(&raw)?;
+                let call = Call {
+                    service: site.service,
+                    caller,
+                    headers: parts.headers,
+                    body,
+                    openapi: site.openapi,
+                };
+                handler.handle(call, values).await
             }
-            let values = takes.take(&sent)?;
-            let call = Call {
-                service: site.service,
-                caller,
-                headers: parts.headers,
-                body,
-                openapi: site.openapi,
-            };
-            handler.handle(call, values).await
-        }
-    })
+        },
+    )
 }

@@ -12,16 +12,16 @@ use sha2::{Digest, Sha256};
 
 use super::{
     headers::{Tags, header as described, like, text},
-    takes::{Sent, Takes},
+    input::{Input, RawInput},
 };
 use crate::{digest::hex, error::ApiError, formats::Format, parameters::Description};
 
-/// What part of a file is asked for.
-pub(super) const PART: PartOf = PartOf;
+/// The part of a file that is asked for.
+pub(super) const PART: PartHeaders = PartHeaders;
 
 /// The headers that ask for a part of a file, or only for one that is not known yet.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PartOf;
+pub(super) struct PartHeaders;
 
 /// What of a file is asked for, and what is known of it; as it was sent.
 #[derive(Debug, Default)]
@@ -31,10 +31,10 @@ pub(super) struct Part {
     if_range: Option<String>,
 }
 
-impl Takes for PartOf {
+impl Input for PartHeaders {
     type Value = Part;
 
-    fn described(&self) -> Vec<Description> {
+    fn descriptions(&self) -> Vec<Description> {
         vec![
             described("If-None-Match", text(), "The ETag of a file that is known"),
             described(
@@ -50,13 +50,13 @@ impl Takes for PartOf {
         ]
     }
 
-    fn take(&self, sent: &Sent<'_>) -> Result<Part, ApiError> {
+    fn extract(&self, raw: &RawInput<'_>) -> Result<Part, ApiError> {
         let text = |name: HeaderName| {
-            let value = sent.headers.get(name)?.to_str().ok()?;
+            let value = raw.headers.get(name)?.to_str().ok()?;
             Some(value.trim().to_owned())
         };
         Ok(Part {
-            known: Tags::of(sent.headers, header::IF_NONE_MATCH.as_str()),
+            known: Tags::of(raw.headers, header::IF_NONE_MATCH.as_str()),
             range: text(header::RANGE),
             if_range: text(header::IF_RANGE),
         })
@@ -73,7 +73,7 @@ pub(super) struct File {
     pub(super) digest: Vec<u8>,
 }
 
-/// Answers with bytes that are there.
+/// Answers with bytes in memory.
 pub(super) fn whole(
     part: &Part,
     format: Format,
@@ -92,7 +92,7 @@ pub(super) fn whole(
     })
 }
 
-/// Answers with a file or a range of it, or with the word that the client has it already. `body` gives the
+/// Answers with a file or a range of it, or with 304 if the client has it already. `body` gives the
 /// bytes of a range.
 pub(super) fn answer(
     part: &Part,
@@ -112,10 +112,10 @@ pub(super) fn answer(
     if part.known.as_ref().is_some_and(|tags| tags.contain(&tag)) {
         return Ok(with(StatusCode::NOT_MODIFIED.into_response(), known));
     }
-    let range = match asked_range(part, &tag, file.bytes) {
-        Asked::All => None,
-        Asked::Part(range) => Some(range),
-        Asked::Nothing => return Err(ApiError::RangeNotSatisfiable(file.bytes)),
+    let range = match select(part, &tag, file.bytes) {
+        Selection::All => None,
+        Selection::Part(range) => Some(range),
+        Selection::Nothing => return Err(ApiError::RangeNotSatisfiable(file.bytes)),
     };
     let (status, content) = match &range {
         None => (
@@ -132,7 +132,7 @@ pub(super) fn answer(
     };
     let range = range.unwrap_or(0..file.bytes);
     let length = range.end - range.start;
-    // a boundary's name may be any text; a file's should be a plain one everywhere
+    // the name of a boundary may be any text; that of a file must be valid on every system
     let plain = |c: char| {
         if c.is_ascii_alphanumeric() || "._-".contains(c) {
             c
@@ -167,27 +167,27 @@ fn with<const N: usize>(mut response: Response, headers: [(HeaderName, String); 
     response
 }
 
-/// What of a file is asked for.
+/// What of a file is sent.
 #[derive(Debug, PartialEq, Eq)]
-enum Asked {
+enum Selection {
     All,
     Part(Range<u64>),
-    /// A range behind its end.
+    /// A range behind its end was asked for.
     Nothing,
 }
 
 /// The one range of a request, unless it holds for another version of the file. Several ranges, and what
 /// is not understood, are answered with everything, as RFC 9110 has it.
-fn asked_range(part: &Part, tag: &str, length: u64) -> Asked {
+fn select(part: &Part, tag: &str, length: u64) -> Selection {
     if part.if_range.as_ref().is_some_and(|of| of != tag) {
-        return Asked::All;
+        return Selection::All;
     }
     let range = part.range.as_deref();
     let Some(range) = range.and_then(|range| range.strip_prefix("bytes=")) else {
-        return Asked::All;
+        return Selection::All;
     };
     let Some((first, last)) = range.split_once('-') else {
-        return Asked::All;
+        return Selection::All;
     };
     let number = |text: &str| text.trim().parse::<u64>().ok();
     let (start, end) = match (number(first), number(last)) {
@@ -195,16 +195,16 @@ fn asked_range(part: &Part, tag: &str, length: u64) -> Asked {
         (Some(start), None) if last.trim().is_empty() => (start, length),
         (None, Some(suffix)) if first.trim().is_empty() => {
             if suffix == 0 {
-                return Asked::Nothing;
+                return Selection::Nothing;
             }
             (length.saturating_sub(suffix), length)
         }
-        _ => return Asked::All,
+        _ => return Selection::All,
     };
     if start >= length {
-        return Asked::Nothing;
+        return Selection::Nothing;
     }
-    Asked::Part(start..end.min(length))
+    Selection::Part(start..end.min(length))
 }
 
 #[cfg(test)]
@@ -212,24 +212,24 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    fn asked(range: &str) -> Asked {
+    fn asked(range: &str) -> Selection {
         let range = Some(range.to_owned());
         let part = Part {
             range,
             ..Part::default()
         };
-        asked_range(&part, "\"t\"", 10)
+        select(&part, "\"t\"", 10)
     }
 
     #[test]
     fn ranges_are_read_as_the_rfc_has_them() {
-        assert_eq!(asked("bytes=0-3"), Asked::Part(0..4));
-        assert_eq!(asked("bytes=3-"), Asked::Part(3..10));
-        assert_eq!(asked("bytes=-3"), Asked::Part(7..10));
-        assert_eq!(asked("bytes=-30"), Asked::Part(0..10));
-        assert_eq!(asked("bytes=8-99"), Asked::Part(8..10));
-        assert_eq!(asked("bytes=10-"), Asked::Nothing);
-        assert_eq!(asked("bytes=-0"), Asked::Nothing);
+        assert_eq!(asked("bytes=0-3"), Selection::Part(0..4));
+        assert_eq!(asked("bytes=3-"), Selection::Part(3..10));
+        assert_eq!(asked("bytes=-3"), Selection::Part(7..10));
+        assert_eq!(asked("bytes=-30"), Selection::Part(0..10));
+        assert_eq!(asked("bytes=8-99"), Selection::Part(8..10));
+        assert_eq!(asked("bytes=10-"), Selection::Nothing);
+        assert_eq!(asked("bytes=-0"), Selection::Nothing);
         for all in [
             "bytes=0-1,3-4",
             "bytes=5-2",
@@ -237,7 +237,7 @@ mod tests {
             "bytes=a-b",
             "bytes=-",
         ] {
-            assert_eq!(asked(all), Asked::All, "{all}");
+            assert_eq!(asked(all), Selection::All, "{all}");
         }
     }
 
@@ -249,10 +249,10 @@ mod tests {
                 if_range: Some(of.into()),
                 known: None,
             };
-            asked_range(&part, "\"t\"", 10)
+            select(&part, "\"t\"", 10)
         };
-        assert_eq!(asked("\"other\""), Asked::All);
-        assert_eq!(asked("\"t\""), Asked::Part(2..4));
+        assert_eq!(asked("\"other\""), Selection::All);
+        assert_eq!(asked("\"t\""), Selection::Part(2..4));
     }
 
     #[test]

@@ -13,7 +13,7 @@ use axum::{
 use futures_util::{Stream, StreamExt, TryStreamExt};
 
 use super::{
-    accept::{accepted, wants, weight},
+    accept::{accepted, prefers, weight},
     call::Call,
 };
 use crate::{
@@ -32,7 +32,7 @@ const SSE: &str = "text/event-stream";
 /// A JSON object per line, by its names.
 const LINES: [&str; 2] = ["application/jsonl", "application/x-ndjson"];
 
-/// A browser reconnects to the same address, and this is what it knows better.
+/// A browser that reconnects asks for the same address, and sends this beside it.
 pub(super) const LAST_EVENT_ID: Parameter<Whole> = Parameter {
     name: "Last-Event-ID",
     meaning: "The same; it takes precedence",
@@ -64,7 +64,7 @@ pub(super) async fn events(
     }
     Ok(write(
         events,
-        wanted(&call.headers).unwrap_or(Encoding::Stream),
+        preferred(&call.headers).unwrap_or(Encoding::Stream),
     ))
 }
 
@@ -77,15 +77,15 @@ pub(super) enum Encoding {
     Lines,
 }
 
-/// How the client wants the events of a job, if it wants these rather than JSON.
-pub(super) fn wanted(headers: &HeaderMap) -> Option<Encoding> {
-    if wants(headers, &[SSE]) {
+/// How the client wants the events of a job, if it prefers them to JSON.
+pub(super) fn preferred(headers: &HeaderMap) -> Option<Encoding> {
+    if prefers(headers, &[SSE]) {
         return Some(Encoding::Stream);
     }
-    wants(headers, &LINES).then_some(Encoding::Lines)
+    prefers(headers, &LINES).then_some(Encoding::Lines)
 }
 
-/// Events as they come. An error just ends the stream: without `done` the client knows that there is more.
+/// Events as they come. An error just ends the stream: without `done` the client knows that it is incomplete.
 pub(super) fn write(
     events: impl Stream<Item = Result<Event, ApiError>> + Send + 'static,
     encoding: Encoding,

@@ -1,6 +1,6 @@
 //! The filters of lists of jobs, read from a query.
 
-use super::takes::{Sent, Takes};
+use super::input::{Input, RawInput};
 use crate::{
     error::ApiError,
     parameters::{Description, Parameter, Text},
@@ -18,28 +18,28 @@ pub(super) const FILTERS: Filters = Filters;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Filters;
 
-impl Takes for Filters {
+impl Input for Filters {
     type Value = Filter;
 
-    fn described(&self) -> Vec<Description> {
+    fn descriptions(&self) -> Vec<Description> {
         filters::describe().into()
     }
 
-    fn take(&self, sent: &Sent<'_>) -> Result<Filter, ApiError> {
-        let statuses = sent.all(STATUS.name).flat_map(|list| list.split(','));
-        let text = |filter: Parameter<Text>| sent.one(filter.name).map(str::to_owned);
+    fn extract(&self, raw: &RawInput<'_>) -> Result<Filter, ApiError> {
+        let statuses = raw.all(STATUS.name).flat_map(|list| list.split(','));
+        let text = |filter: Parameter<Text>| raw.one(filter.name).map(str::to_owned);
         filters::checked(Filter {
             statuses: statuses
                 .map(|word| STATUS.read(word))
                 .collect::<Result<_, _>>()?,
             owner: text(OWNER),
-            labels: sent.keyed(LABEL.name).collect(),
+            labels: raw.keyed(LABEL.name).collect(),
             name: text(NAME),
             input_hash: text(INPUT_HASH),
-            created_after: CREATED_AFTER.take(sent)?,
-            created_before: CREATED_BEFORE.take(sent)?,
-            finished_after: FINISHED_AFTER.take(sent)?,
-            finished_before: FINISHED_BEFORE.take(sent)?,
+            created_after: CREATED_AFTER.extract(raw)?,
+            created_before: CREATED_BEFORE.extract(raw)?,
+            finished_after: FINISHED_AFTER.extract(raw)?,
+            finished_before: FINISHED_BEFORE.extract(raw)?,
         })
     }
 }
@@ -60,8 +60,8 @@ mod tests {
                 .into_iter()
                 .find_map(|value| {
                     let query = format!("{name}={value}");
-                    let sent = Sent::new(vec![], Some(&query), &headers);
-                    FILTERS.take(&sent).ok()
+                    let raw = RawInput::new(vec![], Some(&query), &headers);
+                    FILTERS.extract(&raw).ok()
                 });
             assert_ne!(found.unwrap(), Filter::default(), "{name}");
         }

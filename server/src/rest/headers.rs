@@ -3,7 +3,7 @@
 use axum::http::HeaderMap;
 use serde_json::{Value, json};
 
-use super::takes::{Sent, Takes};
+use super::input::{Input, RawInput};
 use crate::{
     error::ApiError,
     parameters::{Description, Parameter, Place, Values},
@@ -11,14 +11,14 @@ use crate::{
     violations,
 };
 
-/// A parameter that is sent as a header.
+/// A parameter in a header.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Header<V>(pub(super) Parameter<V>);
 
-impl<V: Values> Takes for Header<V> {
+impl<V: Values> Input for Header<V> {
     type Value = Option<V::Value>;
 
-    fn described(&self) -> Vec<Description> {
+    fn descriptions(&self) -> Vec<Description> {
         let Parameter {
             name,
             meaning,
@@ -27,9 +27,9 @@ impl<V: Values> Takes for Header<V> {
         vec![header(name, values.schema(), meaning)]
     }
 
-    fn take(&self, sent: &Sent<'_>) -> Result<Option<V::Value>, ApiError> {
+    fn extract(&self, raw: &RawInput<'_>) -> Result<Option<V::Value>, ApiError> {
         let name = self.0.name;
-        let Some(value) = sent.headers.get(name) else {
+        let Some(value) = raw.headers.get(name) else {
             return Ok(None);
         };
         let unreadable = |_| ApiError::BadParameter {
@@ -58,7 +58,7 @@ pub(super) fn text() -> Value {
     json!({ "type": "string" })
 }
 
-/// Usually so; what is otherwise is ignored, as HTTP has it of preferences and ranges.
+/// A pattern that HTTP only recommends: preferences and ranges of another form are ignored.
 pub(super) fn like(pattern: &str) -> Value {
     json!({ "type": "string", "anyOf": [{ "pattern": pattern }, {}] })
 }
@@ -82,15 +82,15 @@ pub(super) struct Condition {
     meaning: &'static str,
 }
 
-impl Takes for Condition {
+impl Input for Condition {
     type Value = Option<Tags>;
 
-    fn described(&self) -> Vec<Description> {
+    fn descriptions(&self) -> Vec<Description> {
         vec![header(self.name, text(), self.meaning)]
     }
 
-    fn take(&self, sent: &Sent<'_>) -> Result<Option<Tags>, ApiError> {
-        Ok(Tags::of(sent.headers, self.name))
+    fn extract(&self, raw: &RawInput<'_>) -> Result<Option<Tags>, ApiError> {
+        Ok(Tags::of(raw.headers, self.name))
     }
 }
 
@@ -143,11 +143,11 @@ pub(super) const PREFER: PreferWait = PreferWait;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PreferWait;
 
-impl Takes for PreferWait {
+impl Input for PreferWait {
     /// At most what may be waited.
     type Value = Option<u64>;
 
-    fn described(&self) -> Vec<Description> {
+    fn descriptions(&self) -> Vec<Description> {
         vec![header(
             "Prefer",
             like("^wait=([0-9]|[1-5][0-9]|60)$"),
@@ -155,8 +155,8 @@ impl Takes for PreferWait {
         )]
     }
 
-    fn take(&self, sent: &Sent<'_>) -> Result<Option<u64>, ApiError> {
-        let wait_s = preferred_wait_s(sent.headers);
+    fn extract(&self, raw: &RawInput<'_>) -> Result<Option<u64>, ApiError> {
+        let wait_s = preferred_wait_s(raw.headers);
         Ok(wait_s.map(|seconds| seconds.min(MAX_WAIT_S as u64)))
     }
 }

@@ -8,7 +8,7 @@ mod body;
 mod call;
 mod filters;
 mod headers;
-mod takes;
+mod input;
 
 // Answers on their way out.
 mod data;

@@ -1,5 +1,5 @@
 //! `/openapi.json`: the list of operations as an OpenAPI document. The shapes of bodies are those of
-//! the types that are read and written, so a renamed field shows here without further ado.
+//! the types that are read and written, so that a renamed field changes the document by itself.
 
 use std::{collections::BTreeMap, sync::LazyLock};
 
@@ -50,12 +50,12 @@ fn document() -> Value {
     })
 }
 
-const INTRODUCTION: &str = "The same verbs, names and numbers as over gRPC \
+const INTRODUCTION: &str = "The same operations, names and numbers as over gRPC \
 ([/proto/signorini.proto](/proto/signorini.proto)), on one port. A problem by itself: \
 [/v1/schema/problem.json](/v1/schema/problem.json). \
-Units are the client's own, used consistently; stresses are negative in compression; times are RFC 3339 in UTC. \
-A name that is not known is refused, in bodies and in queries. Every error is a document of RFC 9457, whose `code` \
-is stable and explained at its `type`.";
+Units are chosen by the client and must be consistent; stresses are negative in compression; times are RFC 3339 in UTC. \
+Unknown names are refused, in bodies and in queries. Every error is a document of RFC 9457; its `code` \
+is stable, and explained at its `type`.";
 
 /// Collects the schemas that operations refer to.
 struct Schemas {
@@ -189,24 +189,24 @@ fn by_status(codes: &[Code]) -> BTreeMap<u16, Vec<Kind>> {
     found
 }
 
-/// `ApiError::document`, which a test holds to this.
+/// The schema of `ApiError::document`; a test compares the two.
 fn error_schema(violation: &Value) -> Value {
     json!({
         "title": "Error",
         "description": "What went wrong (RFC 9457).",
         "type": "object",
         "properties": {
-            "type": { "type": "string", "description": "Where this kind of error is explained." },
-            "title": { "type": "string", "description": "One line, the same for every error of its kind." },
+            "type": { "type": "string", "description": "The address of the explanation." },
+            "title": { "type": "string", "description": "One line, the same for all errors of this kind." },
             "status": { "type": "integer", "minimum": 400, "maximum": 599 },
-            "code": { "type": "string", "description": "The kind, stable for programs." },
+            "code": { "type": "string", "description": "The kind of error, a stable name for programs." },
             "detail": { "type": "string", "description": "What happened this time." },
-            "instance": { "type": "string", "description": "The path that was asked for." },
+            "instance": { "type": "string", "description": "The path of the request." },
             "retryable": { "type": "boolean", "description": "The same request may succeed later." },
             "errors": {
                 "type": "array",
                 "items": violation,
-                "description": "All that is wrong with the request, if that can be said piece by piece.",
+                "description": "The violations of an invalid request, one by one.",
             },
         },
         "required": ["type", "title", "status", "code", "detail", "instance", "retryable", "errors"],
@@ -224,7 +224,7 @@ mod tests {
         fields.map(|(name, _)| name.clone()).collect()
     }
 
-    /// One list of schemas is made of two, which do not know each other's names.
+    /// One list of schemas is made of two, which may use the same name.
     #[test]
     fn two_types_do_not_share_a_name() {
         let mut schemas = Schemas::new();

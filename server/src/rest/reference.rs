@@ -40,8 +40,8 @@ const INTRODUCTION: &str = "# The API
 
 Generated from the list of operations (`server/src/rest/operations`) by `signorini openapi --reference`; the same
 list makes the routes, `/openapi.json` and the test that every rpc has its route. Bodies are described there, a
-problem by `signorini schema`; `/docs` shows it all and can try it out. A name that is not known is refused,
-in bodies and in queries. Every error is a document of RFC 9457 with one of the codes below.
+problem by `signorini schema`; `/docs` shows all of it and can try it out. Unknown names are refused, in bodies
+and in queries. Every error is a document of RFC 9457 with one of the codes below.
 
 ";
 
@@ -131,7 +131,7 @@ fn anchor(operation: &Operation) -> String {
         .collect()
 }
 
-fn capital(word: &str) -> String {
-    let (first, rest) = word.split_at(1);
+fn capital(name: &str) -> String {
+    let (first, rest) = name.split_at(1);
     first.to_uppercase() + rest
 }

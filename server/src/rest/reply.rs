@@ -51,7 +51,7 @@ pub(super) async fn errors_as_documents(request: Request, next: Next) -> Respons
     Response::from_parts(parts, Body::from(document))
 }
 
-/// What nobody knows: a gRPC status for a gRPC caller, a document for everybody else.
+/// The answer on an unknown path: a gRPC status for a gRPC client, an error document for others.
 pub(super) async fn not_found(request: Request) -> Response {
     let content_type = request
         .headers()

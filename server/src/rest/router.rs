@@ -5,21 +5,20 @@ use std::sync::Arc;
 use axum::{Router, extract::DefaultBodyLimit, middleware};
 use tower_http::catch_panic::CatchPanicLayer;
 
-use super::{authenticate::authenticate, call::Site, openapi::openapi, operations, reply};
+use super::{authenticate::authenticate, call::AppState, openapi::openapi, operations, reply};
 use crate::{error::ApiError, verbs::Service};
 
-/// All routes. `grpc` shares the port; what neither knows is answered by `reply::not_found`.
+/// All routes, REST and gRPC. Unknown paths are answered by `reply::not_found`.
 pub fn router(service: Arc<Service>, grpc: Router) -> Router {
     operations::routes()
         .method_not_allowed_fallback(async || ApiError::MethodNotAllowed)
-        .with_state(Site { service, openapi })
+        .with_state(AppState { service, openapi })
         .merge(grpc)
-        // After the merge: the gRPC router brings a fallback of its own, which would answer every
-        // unknown path with a gRPC status.
+        // After the merge: the fallback of the gRPC router would answer every unknown path with a gRPC status.
         .fallback(reply::not_found)
         .layer(middleware::from_fn(authenticate))
         .layer(CatchPanicLayer::custom(reply::panicked))
-        // `body::json_text` has our own limit, with our own answer.
+        // `body::json_text` has its own limit, which answers with an error document.
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn(reply::errors_as_documents))
 }

@@ -1,4 +1,4 @@
-//! The service itself: queue, info, caller, errors, schema, probes.
+//! The service itself: queue, info, caller, errors, descriptions, probes.
 
 use axum::{
     Json,
@@ -7,7 +7,7 @@ use axum::{
 };
 use serde_json::Value;
 
-use super::{accept::wants, call::Call};
+use super::{accept::prefers, call::Call};
 use crate::{
     caller::Caller,
     catalog::{Code, Kind},
@@ -51,7 +51,7 @@ pub(super) const CODE: Variable<Words<Code>> = Variable {
 pub(super) async fn error(call: Call, code: Code) -> Result<Response, ApiError> {
     let kind = code.kind();
     let vary = [(header::VARY, "Accept")];
-    if wants(&call.headers, &["text/html"]) {
+    if prefers(&call.headers, &["text/html"]) {
         let html = [
             (header::CONTENT_TYPE, "text/html; charset=utf-8"),
             (
@@ -64,7 +64,7 @@ pub(super) async fn error(call: Call, code: Code) -> Result<Response, ApiError> 
     Ok((vary, Json(kind)).into_response())
 }
 
-/// The explanation as a page. All its texts are our own, and hold nothing that HTML would read.
+/// The explanation as a page. Its texts are constants without any character that HTML would interpret.
 fn page(kind: &Kind) -> String {
     let Kind {
         code,

@@ -87,7 +87,7 @@ async fn answer(
         accepted: mut job,
         replayed,
     } = submitted;
-    if let Some(encoding) = events::wanted(&call.headers)
+    if let Some(encoding) = events::preferred(&call.headers)
         && let Some(events) = watch::watch(service, caller, job.id, 0).await?
     {
         let mut response = events::write(events, encoding);

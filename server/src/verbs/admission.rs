@@ -41,7 +41,7 @@ pub(super) async fn prepare(
                 Ok(problem) => {
                     digest::of_json(&(&envelope, problem, id)).map_err(ApiError::internal)?
                 }
-                Err(_) => String::new(), // it is refused before anybody compares
+                Err(_) => String::new(), // it is refused before it is compared
             };
             Ok(Prepared {
                 envelope,
@@ -121,7 +121,7 @@ pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJo
     }
 }
 
-/// Stores jobs in the queue of their owner, the caller; all or none.
+/// Stores jobs in the queue, all or none; the caller is their owner.
 pub(super) async fn enqueue(
     service: &Service,
     caller: &Caller,

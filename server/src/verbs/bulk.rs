@@ -1,4 +1,4 @@
-//! What is done to all jobs that match a filter: canceled, deleted.
+//! Bulk operations: cancel or delete all jobs that match a filter.
 
 use std::sync::Arc;
 
@@ -48,8 +48,8 @@ enum Action {
     Delete,
 }
 
-/// Does the same to every job that matches a filter, each in a transaction of its own: nobody else waits for all
-/// of them. A client that hangs up changes nothing.
+/// Applies the action to every job that matches a filter, each in a transaction of its own, so that other requests
+/// do not wait for all of them. It goes on when the client hangs up.
 async fn for_each(
     service: &Arc<Service>,
     caller: &Caller,

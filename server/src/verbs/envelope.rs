@@ -1,4 +1,4 @@
-//! What is submitted beside a problem, and what is wrong with it.
+//! What is submitted beside a problem, and its violations.
 
 use std::collections::BTreeMap;
 
@@ -25,15 +25,15 @@ pub struct Envelope {
     pub name: Option<String>,
     /// Labels for programs.
     pub labels: BTreeMap<String, String>,
-    /// Higher first.
+    /// Jobs of higher priority run first.
     pub priority: i32,
-    /// What it may take.
+    /// Time limits.
     pub limits: Limits,
-    /// Whether earlier results may answer it.
+    /// Whether earlier results may be used.
     pub cache: Cache,
 }
 
-/// A job as it is asked for.
+/// A request for a job.
 #[derive(Clone, Debug)]
 pub struct JobRequest {
     /// What comes beside the problem.

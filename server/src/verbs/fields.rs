@@ -41,7 +41,7 @@ pub async fn fields(
 }
 
 impl StoredFields {
-    /// The bytes from `start` to before `end`, piece by piece: they may be many.
+    /// The bytes from `start` to before `end`, in pieces: they may be many.
     pub fn bytes(
         &self,
         service: &Arc<Service>,
@@ -63,7 +63,7 @@ impl StoredFields {
     }
 }
 
-/// The same in another format, at once.
+/// The fields in another format, in memory.
 pub async fn converted_fields(
     service: &Service,
     caller: &Caller,

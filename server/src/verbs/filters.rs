@@ -1,4 +1,4 @@
-//! Which jobs: the filters of lists, counts, and of what is done to many. One list for both protocols.
+//! The filters of jobs, for lists, counts and bulk operations. One list for both protocols.
 
 use serde_json::json;
 
@@ -23,7 +23,7 @@ pub const OWNER: Parameter<Text> = Parameter {
     values: Text,
 };
 
-/// By label: `label.{key}` stands for any key.
+/// By label: `label.{key}` is a name for each key.
 pub const LABEL: Parameter<Text> = Parameter {
     name: "label.{key}",
     meaning: "label.KEY=VALUE: only jobs with this label; several may be given",
@@ -97,7 +97,7 @@ fn labels() -> Description {
     }
 }
 
-/// A filter that can be asked for, each status and label once.
+/// A filter within the limits, each status and label once.
 pub fn checked(filter: Filter) -> Result<Filter, ApiError> {
     let filter = filter.tidied();
     if filter.labels.len() > Filter::MOST_LABELS {
@@ -110,7 +110,7 @@ pub fn checked(filter: Filter) -> Result<Filter, ApiError> {
     Ok(filter)
 }
 
-/// A filter that leaves some jobs out, for what is done to many: nobody does it to all by accident.
+/// A filter that is not empty, for bulk operations: nobody should apply one to all jobs by accident.
 pub(super) fn required(filter: Filter) -> Result<Filter, ApiError> {
     match filter.is_empty() {
         true => Err(ApiError::MissingFilter(

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{page::MAX_PAGE_SIZE, service::Service, submit::MAX_BATCH, watch::MAX_WAIT_S};
 use crate::{caller::Caller, formats::Format};
 
-/// What this service is.
+/// Version and limits of a service.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Info {
     /// Its name.
@@ -17,15 +17,15 @@ pub struct Info {
     pub api_version: String,
     /// Jobs that can run at the same time.
     pub workers: u32,
-    /// What it takes at most.
+    /// Its limits.
     pub limits: ServiceLimits,
-    /// What rows (profiles, history) are served as, the default first.
+    /// Formats of rows (profiles, history), the default first.
     pub table_formats: Vec<String>,
-    /// What fields are served as, the default first.
+    /// Formats of fields, the default first.
     pub field_formats: Vec<String>,
 }
 
-/// What the service takes at most.
+/// Limits of the service.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ServiceLimits {
     /// Bytes of a request over REST.
@@ -44,7 +44,7 @@ pub struct ServiceLimits {
     pub max_wait_s: f64,
 }
 
-/// What this service is.
+/// Version and limits.
 pub fn info(service: &Service, _caller: &Caller) -> Info {
     let names = |formats: &[Format]| formats.iter().map(|f| f.name().to_owned()).collect();
     Info {

@@ -58,7 +58,7 @@ impl Values for Hashes {
     }
 }
 
-/// Stores a mesh file that arrives in pieces, and says whether it is new. The file streams to the disk
+/// Stores a mesh file that arrives in pieces; and whether it is new. The file streams to the disk
 /// and from there through the reader: only the parsed mesh is ever in memory.
 pub async fn upload(
     service: &Arc<Service>,
@@ -67,7 +67,7 @@ pub async fn upload(
 ) -> Result<(MeshInfo, bool), ApiError> {
     service.accepting()?;
     let limit_bytes = service.max_mesh_bytes;
-    // without a name: it is gone with the process, whatever happens
+    // without a name: the system removes it with the process
     let file = tempfile::tempfile_in(&service.data).map_err(unwritten)?;
     let mut out = tokio::io::BufWriter::with_capacity(
         PIECE_BYTES,
@@ -221,7 +221,7 @@ pub async fn delete(service: &Arc<Service>, _caller: &Caller, hash: &str) -> Res
 
 /// The mesh that a problem names, or the violation that there is none.
 pub(super) async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mesh), ApiError> {
-    // who waits for a thread holds no mesh yet
+    // loaded once there is a permit: what waits uses no memory
     let load = async {
         let found = match service.store.mesh(hash).await? {
             Some(info) => service
@@ -240,7 +240,7 @@ pub(super) async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mes
     service.work_on(load, read).await?
 }
 
-/// What is said where a problem names a mesh that is not there.
+/// The violation that a problem names a mesh that is not stored.
 pub(super) fn missing(hash: &str) -> Violation {
     Violation {
         pointer: format!("{}/mesh/stored", violations::AT),

@@ -1,5 +1,6 @@
-//! What the service does, each verb once, whatever the protocol. The skins only translate. A verb takes the
-//! service, then who asks, then what is asked; the parameters that a request may say stand beside it.
+//! What the service does, each verb once, whatever the protocol; `rest` and `grpc` only translate. A verb takes the
+//! service, the caller, and then what the caller asks for. The parameters of requests are defined beside the verb that
+//! they belong to.
 
 // What every verb works with.
 mod service;
@@ -10,13 +11,13 @@ pub mod filters;
 pub mod key;
 pub mod page;
 
-// Meshes and problems; from there to the queue.
+// Meshes and problems; how a job is admitted.
 pub mod meshes;
 pub mod problems;
 
 mod admission;
 
-// Jobs: submitted, looked after, watched.
+// Jobs.
 pub mod bulk;
 pub mod jobs;
 pub mod lists;
@@ -24,7 +25,7 @@ pub mod retry;
 pub mod submit;
 pub mod watch;
 
-// What they have found.
+// Results.
 pub mod fields;
 pub mod history;
 pub mod plots;

@@ -55,7 +55,7 @@ impl Paging {
             .transpose()
     }
 
-    /// How many to ask the store for: one more than the page holds tells whether there is another.
+    /// How many to ask the store for: one more than the page holds shows whether there is another page.
     pub(super) fn limit(&self) -> i64 {
         self.size() + 1
     }
@@ -79,7 +79,7 @@ impl Paging {
     }
 }
 
-/// What tells a list of jobs from others: its filters and its order, whatever the order of statuses and labels.
+/// Identifies a list of jobs: its filters and its order. The order of statuses and labels does not matter.
 pub(super) fn list_of_jobs(filter: &Filter, order: Order) -> String {
     let filter = filter.clone().tidied();
     format!("jobs {filter:?} {order:?}")
@@ -100,7 +100,7 @@ pub(super) fn after(job: &Job, order: Order) -> Cursor {
 /// The token for what comes after the cursor in this list.
 fn token(cursor: Cursor, list: &str) -> String {
     let Cursor { micros, key } = cursor;
-    format!("{micros:016x}{key:016x}{}", seal(cursor, list))
+    format!("{micros:016x}{key:016x}{}", checksum(cursor, list))
 }
 
 /// Reads a token for this list; none if it is not one.
@@ -114,8 +114,8 @@ fn cursor(token: &str, list: &str) -> Option<Cursor> {
     (self::token(cursor, list) == token).then_some(cursor)
 }
 
-/// Ties a token to its list. No secret: who forges one sees what the list would have shown anyway.
-fn seal(Cursor { micros, key }: Cursor, list: &str) -> String {
+/// Ties a token to its list. No secret: a forged token shows only what the list would have shown anyway.
+fn checksum(Cursor { micros, key }: Cursor, list: &str) -> String {
     let hash = Sha256::digest(format!("{micros} {key} {list}"));
     hex(&hash[..4])
 }

@@ -64,10 +64,10 @@ pub async fn plot(
     plot: Plot,
     style: Style,
 ) -> Result<String, ApiError> {
-    // who waits for a thread holds nothing yet
+    // loaded once there is a permit: what waits uses no memory
     let load = async {
         let mut found = match plot {
-            // of the problem and of the iteration alone: there while the job waits or runs
+            // these show the problem or the iterations, and so can be drawn while the job waits or runs
             Plot::Mesh | Plot::Convergence => jobs::snapshot(service, caller, id).await?,
             Plot::Profile | Plot::Deformed => results::with_result(service, caller, id).await?,
         };

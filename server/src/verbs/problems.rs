@@ -13,14 +13,14 @@ use crate::{
     violations::{AT, prefixed},
 };
 
-/// What was found when a problem was checked.
+/// The result of checking a problem.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Validation {
     /// It would be accepted.
     pub valid: bool,
     /// Everything that is wrong with it.
     pub violations: Vec<Violation>,
-    /// What to know before trusting its result.
+    /// What to consider before trusting its result.
     pub warnings: Vec<Warning>,
     /// What it would cost; absent when it could not be read.
     pub estimate: Option<Estimate>,
@@ -82,7 +82,7 @@ impl Validation {
     }
 }
 
-/// What an answer says of a problem that a request would be refused for.
+/// The violation of a problem that is over the memory budget.
 fn too_large(estimate: &Estimate, budget_bytes: u64) -> Violation {
     let (unknowns, memory) = (count(estimate.dofs), size(estimate.memory_bytes));
     Violation {
@@ -107,7 +107,7 @@ pub(super) struct Admitted {
     pub mesh: Option<String>,
 }
 
-/// The stored mesh that a problem names, unless it would not be looked at anyway.
+/// The stored mesh that a problem names, if it names one.
 async fn stored(
     service: &Service,
     problem: &Problem,

@@ -1,4 +1,4 @@
-//! What a job has found, summed up; and whether there is anything.
+//! The summary of a result; and whether there is a result.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! A job that has ended, tried again.
+//! Retrying a job that has ended.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::{
     jobs,
     key::Key,
     service::{Service, detached},
-    submit::{Submitted, only},
+    submit::{Submitted, single},
 };
 use crate::{
     caller::Caller,
@@ -21,18 +21,18 @@ use crate::{
     store::{Accepted, NewJob, RequestKey},
 };
 
-/// What is changed of a job that is tried again; what is absent stays.
+/// What the new job has otherwise; what is absent stays.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Changes {
     /// Seconds from a start to the end.
     pub timeout_s: Option<f64>,
-    /// Seconds that it may wait for a start.
+    /// Seconds that it may wait in the queue.
     pub queue_ttl_s: Option<f64>,
-    /// Higher first.
+    /// Jobs of higher priority run first.
     pub priority: Option<i32>,
 }
 
-/// Submits the problem of a job that has ended again, with the same envelope, as a new job that is solved anew.
+/// Submits the problem of an ended job again, with the same envelope, as a new job that uses no earlier result.
 pub async fn retry(
     service: &Arc<Service>,
     caller: &Caller,
@@ -52,7 +52,7 @@ pub async fn retry(
             }
         };
         if let Some(old) = replayed(&service, &caller, key.as_ref()).await? {
-            return only(old, true);
+            return single(old, true);
         }
         let job = jobs::get(&service, &caller, id).await?;
         if !job.status.is_terminal() {
@@ -76,7 +76,7 @@ pub async fn retry(
                 timeout_s: changes.timeout_s.unwrap_or(limits.timeout_s),
                 queue_ttl_s: changes.queue_ttl_s.unwrap_or(limits.queue_ttl_s),
             },
-            // who kept its result to itself means that still
+            // a result that was not to be shared is still not to be
             cache: match cache {
                 Cache::Off => Cache::Off,
                 Cache::Use | Cache::Refresh => Cache::Refresh,
@@ -91,7 +91,7 @@ pub async fn retry(
             ..admit(&service, prepared).await?
         };
         let Accepted { jobs, replayed, .. } = enqueue(&service, &caller, vec![new], key).await?;
-        only(jobs, replayed)
+        single(jobs, replayed)
     })
     .await
 }

@@ -14,12 +14,11 @@ use crate::{
 /// What every verb works with.
 #[derive(Debug)]
 pub struct Service {
-    /// What is durable.
+    /// All that is durable.
     pub store: Arc<Store>,
-    /// Who solves.
+    /// Runs the jobs.
     pub queue: Arc<Queue>,
-    /// Bounds the problems read and checked, and the results converted, at the same time: that is
-    /// work, and the cores are few.
+    /// Bounds how many problems are checked, and results converted, at the same time: that takes a core each.
     checks: Arc<Semaphore>,
     /// Jobs that may wait before more are refused.
     pub(super) max_queued: u32,
@@ -34,7 +33,7 @@ pub struct Service {
 }
 
 impl Service {
-    /// The verbs' common ground.
+    /// A service on this store and queue.
     pub fn new(config: &Config, store: Arc<Store>, queue: Arc<Queue>) -> Service {
         Service {
             store,
@@ -57,9 +56,9 @@ impl Service {
         }
     }
 
-    /// Does what takes as long as the client makes it (reading, meshing, hashing a problem) on a
-    /// blocking thread, a few at a time: the async threads stay free for everybody else. The place
-    /// is held by the work, not by the request: who hangs up does not make room before it is done.
+    /// Runs work whose duration depends on the client's input (reading, meshing, hashing a problem) on a blocking
+    /// thread, a few at a time: the async threads stay free for other requests. The permit belongs to the work, not
+    /// to the request: a client that hangs up does not free it before the work is done.
     pub async fn work<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
@@ -67,17 +66,17 @@ impl Service {
         self.work_on(async { Ok(()) }, |()| work()).await
     }
 
-    /// The same on something large that is loaded first: who has no place yet holds none of it.
+    /// The same on something large that is loaded first, once there is a permit: what waits uses no memory.
     pub async fn work_on<L: Send + 'static, T: Send + 'static>(
         &self,
         load: impl Future<Output = Result<L, ApiError>>,
         work: impl FnOnce(L) -> T + Send + 'static,
     ) -> Result<T, ApiError> {
-        let place = self.checks.clone().acquire_owned().await;
-        let place = place.map_err(ApiError::internal)?;
+        let permit = self.checks.clone().acquire_owned().await;
+        let permit = permit.map_err(ApiError::internal)?;
         let loaded = load.await?;
         let working = tokio::task::spawn_blocking(move || {
-            let _place = place;
+            let _permit = permit;
             work(loaded)
         });
         working.await.map_err(ApiError::internal)
@@ -114,9 +113,9 @@ mod tests {
 
     use crate::verbs::tests::service;
 
-    /// On the one thread of this test: work that held it would wait for a word that cannot come.
+    /// This test has one thread: work that blocked it would wait for ever.
     #[tokio::test]
-    async fn work_leaves_the_async_threads_to_the_others() {
+    async fn work_leaves_the_async_threads_free() {
         let folder = tempfile::tempdir().unwrap();
         let service = service(folder.path()).await;
         let (say, heard) = mpsc::channel();
@@ -127,7 +126,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn who_hangs_up_makes_no_room_before_the_work_is_done() {
+    async fn a_client_that_hangs_up_frees_no_permit_before_the_work_is_done() {
         let folder = tempfile::tempdir().unwrap();
         let service = service(folder.path()).await;
         let (say, heard) = mpsc::channel::<()>();
@@ -137,7 +136,7 @@ mod tests {
             heard.recv()
         });
         tokio::select! {
-            _ = work => unreachable!("it waits for a word"),
+            _ = work => unreachable!("it waits for a message"),
             _ = started => {} // and the request is dropped
         }
         assert_eq!(service.checks.available_permits(), 1);

@@ -48,7 +48,7 @@ pub async fn create(
         let payload = prepared.payload.clone();
         let key = key.map(|Key(key)| RequestKey { key, payload });
         if let Some(old) = replayed(&service, &caller, key.as_ref()).await? {
-            return only(old, true);
+            return single(old, true);
         }
         // before it is looked at in depth: what was accepted once need not be acceptable now
         if let Some(id) = prepared.id
@@ -57,12 +57,12 @@ pub async fn create(
             let owner = caller.owner();
             let named = service.store.replay_named(owner, id, &prepared.payload);
             if let Some(old) = named.await? {
-                return only(vec![old], true);
+                return single(vec![old], true);
             }
         }
         let new = admit(&service, prepared).await?;
         let Accepted { jobs, replayed, .. } = enqueue(&service, &caller, vec![new], key).await?;
-        only(jobs, replayed)
+        single(jobs, replayed)
     })
     .await
 }
@@ -113,14 +113,14 @@ pub async fn create_batch(
 }
 
 /// The one job of a submission of one.
-pub(super) fn only(jobs: Vec<Job>, replayed: bool) -> Result<Submitted<Job>, ApiError> {
+pub(super) fn single(jobs: Vec<Job>, replayed: bool) -> Result<Submitted<Job>, ApiError> {
     let accepted = jobs.into_iter().next();
     let accepted =
         accepted.ok_or_else(|| ApiError::internal("a job was accepted, but not given"))?;
     Ok(Submitted { accepted, replayed })
 }
 
-/// Does the same with each of many, a few at a time, in order; all that is wrong with any of them comes together.
+/// Does the same with each of many, a few at a time, in order; the violations of all are reported together.
 async fn each<A, B, F: Future<Output = Result<B, ApiError>>>(
     many: Vec<A>,
     work: impl Fn(A) -> F,

@@ -48,13 +48,13 @@ pub enum Until {
     Terminal,
     /// Its version is another than this one.
     Changed(i64),
-    /// Its version is another than when it was asked for; or it has ended: a client that knows no version
-    /// waits for a change of its job, and there will be none.
+    /// Its version has changed since the request; or it has ended: a client that knows no version waits for a
+    /// change, and there will be none.
     NextChange,
 }
 
-/// The job when that has come to pass, or as it is after `seconds` or when the service stops; and whether
-/// it has.
+/// The job when the condition is met, or as it is after `seconds` or when the service stops; and whether the
+/// condition is met.
 pub async fn wait(
     service: &Service,
     caller: &Caller,
@@ -84,9 +84,9 @@ pub async fn wait(
     }
 }
 
-/// Stored events after number `after`, then live ones; ends after `done`, or with the job if `after`
-/// lies beyond that. `None`: the job has ended, and nothing lies after that number. When the service stops, or
-/// the job is deleted before, the stream ends with an error, so that nobody takes that for the end of the job.
+/// Stored events after number `after`, then live ones; the stream ends after `done`, or when the job ends if `after`
+/// is beyond that. `None`: the job has ended, and there are no events after that number. When the service stops, or
+/// the job is deleted before, the stream ends with an error, so that this is not mistaken for the end of the job.
 pub async fn watch(
     service: &Arc<Service>,
     caller: &Caller,
@@ -128,10 +128,10 @@ fn follow(
             }
             if idle {
                 let has_ended = service.store.has_ended(key).await?;
-                // deleted: whoever has not seen `done` by now does not see it any more
+                // deleted: `done` cannot be seen any more
                 if has_ended.ok_or(ApiError::Deleted(id))? {
                     ended = true;
-                    continue; // once more: `done` may have come after the look for events
+                    continue; // read again: `done` may have been written after the last read
                 }
             }
             if service.queue.stopping().is_cancelled() {

@@ -43,7 +43,7 @@ pub(super) const FILE: Variable<Words<File>> = Variable {
                 "text/javascript; charset=utf-8",
                 include_str!("start.js"),
             ),
-            // Swagger UI is under the Apache licence, which wants to come with it.
+            // Swagger UI is under the Apache licence, whose text must come with it.
             file(
                 "license.txt",
                 "text/plain; charset=utf-8",

@@ -1,4 +1,4 @@
-//! What stands in bodies, in the words of JSON Schema.
+//! Bodies, described by JSON Schema.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
@@ -19,7 +19,7 @@ pub(super) fn bytes(media: &'static str) -> Content {
 }
 
 /// A stream of server-sent events, the data of each a `T` as JSON. The schema is of one event: OpenAPI
-/// 3.1 has no word for the stream.
+/// 3.1 cannot describe the stream.
 pub(super) fn stream<T: JsonSchema>() -> Content {
     vec![("text/event-stream", |generator| {
         let data = generator.subschema_for::<T>();
@@ -55,7 +55,7 @@ pub(super) fn submission() -> Value {
     json!({ "problem": problem })
 }
 
-/// What JSON Schema has no word for.
+/// What JSON Schema cannot describe.
 pub(super) fn anything(_: &mut SchemaGenerator) -> Schema {
     Schema::default()
 }

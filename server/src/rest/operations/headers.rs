@@ -25,10 +25,10 @@ pub(super) fn retry_after() -> Description {
 
 /// Whether the request had been made before.
 pub(super) fn replayed() -> Description {
-    let word = json!({ "type": "string", "enum": ["true"] });
+    let yes = json!({ "type": "string", "enum": ["true"] });
     header(
         "Idempotency-Replayed",
-        word,
+        yes,
         "The key or id was known: nothing new was submitted",
     )
 }

@@ -97,7 +97,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .fails(&[Code::StorageFull]),
         post("/v1/jobs/{id}/retry", (ID, KEY, PREFER), submit::retry)
             .rpcs(&["RetryJob"])
-            .summary("Submits the problem of a job that has ended again, as a new job whose parent it is, to be solved anew; a body changes the limits and the priority of the new one")
+            .summary("Submits the problem of an ended job again, as a new job with the old one as its parent, which is solved without the cache; a body changes the limits and the priority of the new one")
             .optional_body(json::<Retry>())
             .submits()
             .fails(&[Code::JobActive]),

@@ -2,9 +2,9 @@
 //! what it takes and what it answers. The router, `/openapi.json`, `docs/api.md` and the test of parity with gRPC
 //! are all made from this list, so none of them can know an operation that another does not.
 //!
-//! Why no crate writes the document from the handlers (utoipa, aide): they describe what extractors
-//! read, and ours read by hand, since all that is wrong with a request is told at once. And the table
-//! must feed the parity test and the reference as well.
+//! Why no crate makes the document from the handlers (utoipa, aide): they describe what extractors read, while
+//! bodies are read here by hand, since all errors of a request are reported together. And the table must feed the
+//! parity test and the reference as well.
 
 // An entry, and the bodies and headers that entries name.
 mod content;
@@ -21,7 +21,7 @@ use axum::Router;
 
 pub(super) use operation::{Answer, Content, Operation};
 
-use super::call::Site;
+use super::call::AppState;
 
 /// Name and subject of the groups, and what belongs to each, in the order in which they are documented.
 pub(super) const GROUPS: [Group; 4] = [
@@ -37,7 +37,7 @@ pub(super) const GROUPS: [Group; 4] = [
 
 type Group = (&'static str, &'static str, fn() -> Vec<Operation>);
 
-/// What can be asked of the service.
+/// All operations.
 pub(super) fn all() -> Vec<Operation> {
     let mut list = vec![];
     for (group, _, operations) in GROUPS {
@@ -50,7 +50,7 @@ pub(super) fn all() -> Vec<Operation> {
 }
 
 /// The routes: there are no others.
-pub(super) fn routes() -> Router<Site> {
+pub(super) fn routes() -> Router<AppState> {
     all().into_iter().fold(Router::new(), |router, operation| {
         router.route(operation.path, operation.route)
     })
@@ -128,7 +128,7 @@ mod tests {
             assert!(ids.insert(id), "two operations are called {id:?}");
             assert!(
                 routes.insert((method, path)),
-                "{method} {path} stands twice"
+                "{method} {path} is listed twice"
             );
             assert!(!id.is_empty() && !summary.is_empty(), "{method} {path}");
             assert!(!summary.ends_with('.'), "{summary}");
@@ -164,8 +164,8 @@ mod tests {
         }
     }
 
-    /// The operations that tests say they hold to their word: a line `/// Operations: CreateJob, GetJob` above a
-    /// test, or such a line behind `#` in a script.
+    /// The operations that tests cover by their own account: a line `/// Operations: CreateJob, GetJob` above a
+    /// test, or such a line after `#` in a script.
     fn tested() -> BTreeSet<String> {
         let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests");
         let mut found = BTreeSet::new();

@@ -1,4 +1,4 @@
-//! One entry of the list: an operation with all that is said of it.
+//! One entry of the list: an operation, its route and its description.
 
 use axum::routing::{MethodFilter, MethodRouter};
 use schemars::{Schema, SchemaGenerator};
@@ -9,41 +9,41 @@ use crate::{
     catalog::Code,
     parameters::{Description, Place},
     rest::{
-        call::{Handler, Site, route},
-        takes::Takes,
+        call::{AppState, Handler, route},
+        input::Input,
     },
 };
 
-/// One thing that can be asked of the service.
+/// An operation of the API.
 pub(in crate::rest) struct Operation {
     /// In capitals.
     pub(in crate::rest) method: &'static str,
     /// With its variables in braces.
     pub(in crate::rest) path: &'static str,
-    pub(super) route: MethodRouter<Site>,
+    pub(super) route: MethodRouter<AppState>,
     /// Name of its group.
     pub(in crate::rest) group: &'static str,
-    /// The rpcs that do the same, the nearest one first; none: over REST only.
+    /// The rpcs that do the same, the closest one first; none: over REST only.
     pub(in crate::rest) rpcs: &'static [&'static str],
     /// Name of the operation: that of the first rpc, if there is one.
     pub(in crate::rest) id: &'static str,
-    /// One line.
+    /// One line, without a full stop.
     pub(in crate::rest) summary: &'static str,
-    /// Those that its handler receives.
+    /// As its input describes them.
     pub(in crate::rest) parameters: Vec<Description>,
-    /// What is sent.
+    /// The body of a request.
     pub(in crate::rest) body: Option<Content>,
     pub(in crate::rest) needs_body: bool,
-    /// Such a body.
+    /// An example of the body.
     pub(in crate::rest) example: Option<Value>,
-    /// What comes back when all is well.
+    /// The successful answers.
     pub(in crate::rest) answers: Vec<Answer>,
     /// It refuses parameters that it does not know.
     strict: bool,
     errors: Vec<Code>,
 }
 
-/// An answer when all is well.
+/// A successful answer.
 pub(in crate::rest) struct Answer {
     pub(in crate::rest) status: u16,
     pub(in crate::rest) meaning: &'static str,
@@ -58,23 +58,23 @@ pub(in crate::rest) type Content = Vec<(&'static str, SchemaOf)>;
 /// The schema of a type, by way of the generator that collects the parts.
 pub(in crate::rest) type SchemaOf = fn(&mut SchemaGenerator) -> Schema;
 
-/// What `takes` reads the handler receives: a parameter that is not listed here cannot be asked for there.
+/// The handler receives what `input` reads: a parameter that is not listed here cannot be asked for there.
 fn operation<T, H>(
     (method, filter): (&'static str, MethodFilter),
     path: &'static str,
-    takes: T,
+    input: T,
     strict: bool,
     handler: H,
 ) -> Operation
 where
-    T: Takes<Value: Send> + Send + Sync + 'static,
+    T: Input<Value: Send> + Send + Sync + 'static,
     H: Handler<T::Value>,
 {
     Operation {
         method,
         path,
-        parameters: takes.described(),
-        route: route(filter, takes, strict, handler),
+        parameters: input.descriptions(),
+        route: route(filter, input, strict, handler),
         group: "",
         rpcs: &[],
         id: "",
@@ -90,18 +90,18 @@ where
 
 macro_rules! methods {
     ($($name:ident $word:literal $filter:ident),*) => {
-        $(pub(super) fn $name<T, H>(path: &'static str, takes: T, handler: H) -> Operation
+        $(pub(super) fn $name<T, H>(path: &'static str, input: T, handler: H) -> Operation
         where
-            T: Takes<Value: Send> + Send + Sync + 'static,
+            T: Input<Value: Send> + Send + Sync + 'static,
             H: Handler<T::Value>,
         {
-            operation(($word, MethodFilter::$filter), path, takes, true, handler)
+            operation(($word, MethodFilter::$filter), path, input, true, handler)
         })*
     };
 }
 methods!(get "GET" GET, post "POST" POST, put "PUT" PUT, patch "PATCH" PATCH, delete "DELETE" DELETE);
 
-/// A probe: whoever asks it may add parameters of their own.
+/// A probe: clients may add parameters of their own.
 pub(super) fn probe<H: Handler<()>>(path: &'static str, handler: H) -> Operation {
     operation(("GET", MethodFilter::GET), path, (), false, handler)
 }
@@ -114,25 +114,25 @@ impl Operation {
         self
     }
 
-    /// There is no such rpc; a name of its own.
+    /// Over REST only, under this name.
     pub(super) fn rest_only(mut self, id: &'static str) -> Self {
         self.id = id;
         self
     }
 
-    /// Another route of an rpc, with a name of its own.
+    /// A second operation for the same rpc, under this name.
     pub(super) fn named(mut self, id: &'static str) -> Self {
         self.id = id;
         self
     }
 
-    /// What it does: one line, without a stop.
+    /// One line, without a full stop.
     pub(super) fn summary(mut self, summary: &'static str) -> Self {
         self.summary = summary;
         self
     }
 
-    /// What is sent to it.
+    /// The body of a request.
     pub(super) fn body(mut self, body: Content) -> Self {
         self.body = Some(body);
         self
@@ -146,13 +146,13 @@ impl Operation {
         }
     }
 
-    /// Such a body.
+    /// An example of the body.
     pub(super) fn example(mut self, body: Value) -> Self {
         self.example = Some(body);
         self
     }
 
-    /// An answer when all is well.
+    /// A successful answer.
     pub(super) fn answers(mut self, status: u16, meaning: &'static str, content: Content) -> Self {
         self.answers.push(Answer {
             status,
@@ -163,7 +163,7 @@ impl Operation {
         self
     }
 
-    /// Headers that the answer before always has.
+    /// Headers that the previous answer always has.
     pub(super) fn with(mut self, headers: impl IntoIterator<Item = Description>) -> Self {
         if let Some(answer) = self.answers.last_mut() {
             answer
@@ -173,7 +173,7 @@ impl Operation {
         self
     }
 
-    /// A header that it has sometimes.
+    /// A header that it may have.
     pub(super) fn sometimes_with(mut self, header: Description) -> Self {
         if let Some(answer) = self.answers.last_mut() {
             answer.headers.push((header, false));
@@ -181,13 +181,13 @@ impl Operation {
         self
     }
 
-    /// Codes beside those that the shape of the operation implies.
+    /// Errors besides those that follow from the input and the body.
     pub(super) fn fails(mut self, codes: &[Code]) -> Self {
         self.errors.extend(codes);
         self
     }
 
-    /// The codes of the errors that it can answer, each once.
+    /// The errors that it may answer with, each once.
     pub(in crate::rest) fn errors(&self) -> Vec<Code> {
         let mut codes = vec![Code::Internal, Code::RateLimited];
         if self.strict {
@@ -203,8 +203,8 @@ impl Operation {
         if self.path.starts_with("/v1/jobs/{id}") {
             codes.push(Code::Deleted);
         }
-        let takes = |media| self.body.iter().flatten().any(|(name, _)| *name == media);
-        if takes("application/json") {
+        let accepts = |media| self.body.iter().flatten().any(|(name, _)| *name == media);
+        if accepts("application/json") {
             codes.extend([
                 Code::MalformedJson,
                 Code::UnsupportedMedia,

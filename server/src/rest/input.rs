@@ -1,5 +1,5 @@
-//! What operations take beside a body: each thing describes itself in the table, and is read and checked before
-//! the handler runs.
+//! The input of operations beside their body: path variables, query parameters, headers. Each describes itself for
+//! the table, and is read and checked before the handler runs.
 
 use axum::{
     RequestPartsExt,
@@ -12,30 +12,30 @@ use crate::{
     parameters::{Description, Parameter, Place, Values, Variable},
 };
 
-/// Something that an operation takes.
-pub(super) trait Takes {
-    /// What a handler receives of it.
+/// An input of an operation.
+pub(super) trait Input {
+    /// What a handler receives.
     type Value;
 
-    /// For the description of the API: one parameter, or several that belong together.
-    fn described(&self) -> Vec<Description>;
+    /// For the description of the API; several if they belong together.
+    fn descriptions(&self) -> Vec<Description>;
 
-    /// Reads it.
-    fn take(&self, sent: &Sent<'_>) -> Result<Self::Value, ApiError>;
+    /// Reads and checks it.
+    fn extract(&self, raw: &RawInput<'_>) -> Result<Self::Value, ApiError>;
 }
 
-/// What a request says beside its body.
+/// A request without its body, as it was sent.
 #[derive(Debug)]
-pub(super) struct Sent<'a> {
+pub(super) struct RawInput<'a> {
     variables: Vec<(String, String)>,
     query: Vec<(String, String)>,
     pub(super) headers: &'a HeaderMap,
 }
 
-/// What stands for any key in the name of a parameter.
+/// The part of a parameter's name that may be any key.
 const ANY_KEY: &str = "{key}";
 
-impl<'a> Sent<'a> {
+impl<'a> RawInput<'a> {
     /// The variables of the path, as the router found them; an ill-formed path names nothing.
     pub(super) async fn variables(parts: &mut Parts) -> Result<Vec<(String, String)>, ApiError> {
         let ill_formed = |_| ApiError::NotFound("the path is not well formed".into());
@@ -44,26 +44,26 @@ impl<'a> Sent<'a> {
         Ok(found.iter().map(owned).collect())
     }
 
-    /// What a request says.
+    /// Splits a query into its parameters.
     pub(super) fn new(
         variables: Vec<(String, String)>,
         query: Option<&str>,
         headers: &'a HeaderMap,
-    ) -> Sent<'a> {
+    ) -> RawInput<'a> {
         let query = form_urlencoded::parse(query.unwrap_or_default().as_bytes());
-        Sent {
+        RawInput {
             variables,
             query: query.into_owned().collect(),
             headers,
         }
     }
 
-    /// Refuses a parameter of a name that is not known, since it was meant to do something, and a second value,
-    /// since the first was.
+    /// Refuses a parameter that is not known, and a second value where there can be one: they would be ignored,
+    /// and the client expects an effect.
     pub(super) fn check(&self, described: &[Description]) -> Result<(), ApiError> {
         let known = described.iter().filter(|one| one.place == Place::Query);
         for (n, (name, value)) in self.query.iter().enumerate() {
-            let Some(parameter) = known.clone().find(|one| stands_for(one.name, name)) else {
+            let Some(parameter) = known.clone().find(|one| matches(one.name, name)) else {
                 let known: Vec<&str> = known.map(|one| one.name).collect();
                 return Err(ApiError::UnknownParameter {
                     name: name.clone(),
@@ -96,7 +96,7 @@ impl<'a> Sent<'a> {
         named.map(|(_, value)| value.as_str())
     }
 
-    /// Keys and values of the query parameters that such a name stands for.
+    /// Keys and values of the query parameters with such a name.
     pub(super) fn keyed(&self, name: &str) -> impl Iterator<Item = (String, String)> {
         let start = name.trim_end_matches(ANY_KEY);
         self.query.iter().filter_map(move |(own, value)| {
@@ -106,71 +106,71 @@ impl<'a> Sent<'a> {
     }
 }
 
-/// Whether this is the name of a parameter, or of one of those that it stands for.
-fn stands_for(parameter: &str, name: &str) -> bool {
+/// Whether `name` belongs to this parameter; one with `{key}` has many.
+fn matches(parameter: &str, name: &str) -> bool {
     match parameter.strip_suffix(ANY_KEY) {
         Some(start) => name.starts_with(start),
         None => name == parameter,
     }
 }
 
-impl<V: Values> Takes for Variable<V> {
+impl<V: Values> Input for Variable<V> {
     type Value = V::Value;
 
-    fn described(&self) -> Vec<Description> {
+    fn descriptions(&self) -> Vec<Description> {
         vec![self.describe()]
     }
 
-    fn take(&self, sent: &Sent<'_>) -> Result<V::Value, ApiError> {
-        let mut named = sent.variables.iter().filter(|(name, _)| name == self.name);
-        // the table says that its paths have their variables: a test holds it to that
+    fn extract(&self, raw: &RawInput<'_>) -> Result<V::Value, ApiError> {
+        let mut named = raw.variables.iter().filter(|(name, _)| name == self.name);
+        // it is there: a test checks that each path has the variables of its operation
         let text = named.next().map_or("", |(_, value)| value.as_str());
         self.read(text)
     }
 }
 
-impl<V: Values> Takes for Parameter<V> {
+impl<V: Values> Input for Parameter<V> {
     type Value = Option<V::Value>;
 
-    fn described(&self) -> Vec<Description> {
+    fn descriptions(&self) -> Vec<Description> {
         vec![self.describe()]
     }
 
-    fn take(&self, sent: &Sent<'_>) -> Result<Option<V::Value>, ApiError> {
-        let text = sent.one(self.name);
+    fn extract(&self, raw: &RawInput<'_>) -> Result<Option<V::Value>, ApiError> {
+        let text = raw.one(self.name);
         text.map(|text| self.read(text)).transpose()
     }
 }
 
-/// Several things are a tuple of them.
+/// Several inputs are a tuple.
 macro_rules! tuples {
     ($(($($T:ident)*))*) => {$(
         #[allow(non_snake_case, clippy::unused_unit)]
-        impl<$($T: Takes),*> Takes for ($($T,)*) {
+        impl<$($T: Input),*> Input for ($($T,)*) {
             type Value = ($($T::Value,)*);
 
-            fn described(&self) -> Vec<Description> {
+            fn descriptions(&self) -> Vec<Description> {
                 let ($($T,)*) = self;
-                [$($T.described()),*].concat()
+                [$($T.descriptions()),*].concat()
             }
 
-            fn take(&self, sent: &Sent<'_>) -> Result<Self::Value, ApiError> {
+            fn extract(&self, raw: &RawInput<'_>) -> Result<Self::Value, ApiError> {
                 let ($($T,)*) = self;
-                Ok(($($T.take(sent)?,)*))
+                Ok(($($T.extract(raw)?,)*))
             }
         }
     )*};
 }
 tuples!((A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E F));
 
-impl Takes for () {
+impl Input for () {
     type Value = ();
 
-    fn described(&self) -> Vec<Description> {
+    fn descriptions(&self) -> Vec<Description> {
         vec![]
     }
 
-    fn take(&self, _: &Sent<'_>) -> Result<(), ApiError> {
+    fn extract(&self, _: &RawInput<'_>) -> Result<(), ApiError> {
         Ok(())
     }
 }
@@ -184,8 +184,8 @@ mod tests {
     fn refused(query: &str) -> Option<String> {
         let headers = HeaderMap::new();
         let described = [filters::describe().to_vec(), vec![PAGE_SIZE.describe()]].concat();
-        let sent = Sent::new(vec![], Some(query), &headers);
-        sent.check(&described).err().map(|error| error.to_string())
+        let raw = RawInput::new(vec![], Some(query), &headers);
+        raw.check(&described).err().map(|error| error.to_string())
     }
 
     #[test]
@@ -194,7 +194,7 @@ mod tests {
             "",
             "status=queued&status=failed",
             "label.a=1&label.a=2&label.=3",
-            "page_size=many", // whether it makes sense is looked at when it is read
+            "page_size=many", // values are checked when they are read
         ] {
             assert_eq!(refused(good), None, "{good}");
         }
@@ -216,8 +216,10 @@ mod tests {
     fn values_are_read_from_a_query_and_checked() {
         let headers = HeaderMap::new();
         let read = |query: &str| {
-            let sent = Sent::new(vec![], Some(query), &headers);
-            (PAGE_SIZE,).take(&sent).map_err(|error| error.to_string())
+            let raw = RawInput::new(vec![], Some(query), &headers);
+            (PAGE_SIZE,)
+                .extract(&raw)
+                .map_err(|error| error.to_string())
         };
         assert_eq!(read(""), Ok((None,)));
         assert_eq!(read("page_size=7"), Ok((Some(7),)));
