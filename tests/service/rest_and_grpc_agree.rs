@@ -4,7 +4,7 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 use service::pb;
-use suite::{example, example_json};
+use suite::{example, example_json, harness::Server};
 
 use crate::{
     SIGNORINI,
@@ -234,7 +234,8 @@ async fn both_protocols_give_a_problem_back_as_it_was_handed_in() {
 
 #[tokio::test]
 async fn both_protocols_say_the_same_of_the_service_of_meshes_and_of_problems() {
-    let server = server().await;
+    // alone: the queue must stand still between the two questions
+    let server = Server::start_alone(SIGNORINI, &[]).await;
     let mut grpc = connect(&server).await;
     let queue = grpc.get_queue(pb::GetQueueRequest {}).await.unwrap();
     agree(
