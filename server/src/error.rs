@@ -42,7 +42,7 @@ pub enum ApiError {
     #[error("the page token does not belong to this list; start again without one")]
     BadPageToken,
     /// Something for many jobs, without saying for which.
-    #[error("say for which jobs: at least one of {0}")]
+    #[error("a filter is required: at least one of {0}")]
     MissingFilter(String),
     /// No such thing.
     #[error("{0}")]
@@ -54,7 +54,7 @@ pub enum ApiError {
     #[error("the job ended without a result (status {0})")]
     NoResult(JobStatus),
     /// The path exists, the method does not.
-    #[error("this path does not know the method; the header Allow lists those it does")]
+    #[error("this path does not have this method; the Allow header lists those it has")]
     MethodNotAllowed,
     /// None of the wanted formats exists.
     #[error("not available as {got}; available: {available}")]
@@ -71,24 +71,24 @@ pub enum ApiError {
     #[error("the job is {0}; cancel it, or wait for its end")]
     JobActive(JobStatus),
     /// The name belongs to a job with other content.
-    #[error("{0} was handed in with other content; make a new id for another job")]
+    #[error("{0} was submitted with other content; use a new id for another job")]
     IdConflict(JobId),
     /// The key belongs to a request with other content.
     #[error(
-        "this key was used for a request with other content; use a new key, or hand in the same again"
+        "this key was used for a request with other content; use a new key, or repeat that request unchanged"
     )]
     KeyReuse,
     /// The job was changed since.
-    #[error("the job is of version {0}")]
+    #[error("the job has version {0}")]
     StaleVersion(i64),
     /// A range that begins behind the end.
     #[error("there are {0} bytes")]
     RangeNotSatisfiable(u64),
     /// Jobs that wait or run need the mesh.
-    #[error("jobs that wait or run need this mesh; cancel them or let them end first")]
+    #[error("queued or running jobs use this mesh; cancel them or wait for their end")]
     MeshInUse,
     /// The job is not done.
-    #[error("the job is {0}; its result comes when it is done")]
+    #[error("the job is {0}; its result is available when it has ended")]
     ResultNotReady(JobStatus),
     /// The body is too large.
     #[error("the body is larger than {limit_bytes} bytes")]
@@ -98,7 +98,7 @@ pub enum ApiError {
     },
     /// What was asked for does not fit into one message.
     #[error(
-        "the answer is larger than a message may be (1 MiB); over REST it is not bounded: {instead}"
+        "the response is larger than a message may be (1 MiB); REST has no such limit: {instead}"
     )]
     AnswerTooLarge {
         /// Where it is to be had.
@@ -106,7 +106,7 @@ pub enum ApiError {
     },
     /// The job would need too much.
     #[error(
-        "the job has {} unknowns and needs about {} of memory; the budget is {}; take a coarser mesh or refine less",
+        "the job has {} unknowns and needs about {} of memory; the budget is {}; use a coarser mesh or less refinement",
         count(estimate.dofs), size(estimate.memory_bytes), size(*budget_bytes)
     )]
     ProblemTooLarge {
@@ -119,7 +119,7 @@ pub enum ApiError {
     #[error("{}", summed_up(.0))]
     InvalidProblem(Vec<Violation>),
     /// Too much is asked at once.
-    #[error("more is asked at once than can be answered soon")]
+    #[error("more requests arrive at once than can be answered soon")]
     RateLimited,
     /// Our fault; the cause is in the log under this number.
     #[error("an unexpected error, logged as incident {incident}")]
@@ -128,13 +128,13 @@ pub enum ApiError {
         incident: Uuid,
     },
     /// Too many jobs wait.
-    #[error("{limit} jobs are waiting already")]
+    #[error("the queue holds {limit} jobs already")]
     QueueFull {
         /// The limit.
         limit: u32,
     },
     /// The service is about to stop.
-    #[error("the service is stopping; come back when it has been restarted")]
+    #[error("the service is stopping; try again when it has been restarted")]
     Draining,
     /// The disk is full.
     #[error("the disk is full")]
@@ -277,7 +277,10 @@ impl From<ApiError> for Status {
             let (pointer, text) = (shortened(&v.pointer, 300), shortened(&text, 300));
             bytes += pointer.len() + text.len() + 10;
             if bytes > MOST_BYTES {
-                let more = format!("and {} more, which do not fit in here", all.len() - n);
+                let more = format!(
+                    "and {} more, which do not fit into this message",
+                    all.len() - n
+                );
                 details.add_bad_request_violation("", more);
                 break;
             }

@@ -1,5 +1,6 @@
 //! Frictional contact in linear elasticity by finite elements, with the nonlocal, nonlinear law of
-//! Oden and Pires (A.C. Bolt, MSc thesis, University of Cape Town, 1983).
+//! Oden and Pires (A.C. Bolt, MSc thesis, University of Cape Town, 1983). Comments cite the thesis by its
+//! numbers, and docs/formulation.md as "formulation 4.3".
 //!
 //! A library of pure functions: no clock, thread, file or network; the same problem gives the same
 //! bits. Reading and writing of any format is the business of the crate `files`. From the ground up; each

@@ -1,4 +1,4 @@
-//! Load steps and their increments: the incremental law (FORMULATION 1), and results along a history
+//! Load steps and their increments: the incremental law (formulation 1.5), and results along a history
 //! of loading for either law.
 
 use std::ops::ControlFlow;

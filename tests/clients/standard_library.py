@@ -130,7 +130,7 @@ def read_result(client, job):
     result = client.get("/v1/jobs/%s/result" % job)
     summary = result["summary"]
     equal((summary["outcome"], summary["converged"]), ("converged", True), "the outcome")
-    # API.md: example 1 has +14.17
+    # formulation 5.2: example 1 has +14.17
     equal(round(summary["tangential_force"], 2), 14.17, "the tangential force")
     profile = client.get("/v1/jobs/%s/profiles/top" % job)
     equal(list(profile), PROFILE, "the columns of a profile")

@@ -3,7 +3,7 @@
 //!   cargo run --release --bin verification
 //!
 //! runs the tests and writes; `--records DIR` takes the lines of a run that has been, `--out DIR`
-//! writes elsewhere than into docs. Fails when a row of VERIFICATION.md has no line.
+//! writes elsewhere than into docs. Fails when a row of docs/verification.md has no line.
 #![allow(clippy::unwrap_used, clippy::panic)] // a tool of ours: it stops where it stands
 
 mod examples;

@@ -1,4 +1,4 @@
-//! The rows of VERIFICATION.md and the robustness grid.
+//! The rows of docs/verification.md and the robustness grid.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

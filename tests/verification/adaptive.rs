@@ -1,4 +1,4 @@
-//! Adaptive refinement: the mesh-converged values of FORMULATION 5 without a hand on the mesh.
+//! Adaptive refinement: the mesh-converged values of formulation 5.3 without a hand on the mesh.
 
 use solver::problem::{AdaptiveRefine, Refine};
 

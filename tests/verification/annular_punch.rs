@@ -1,4 +1,4 @@
-//! VERIFICATION row 12. Frictionless flat punch b ≤ r ≤ a on a half-space: P/(2E* a δ) by an independent
+//! docs/verification.md, row 12. Frictionless flat punch b ≤ r ≤ a on a half-space: P/(2E* a δ) by an independent
 //! integral-equation code.
 //!
 //! ```text

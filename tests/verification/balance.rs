@@ -1,4 +1,4 @@
-//! VERIFICATION row 25: what every solution must satisfy, checked on the five examples.
+//! docs/verification.md, row 25: what every solution must satisfy, checked on the five examples.
 
 use std::ops::ControlFlow;
 
@@ -218,7 +218,7 @@ fn sequence(mut seed: u64) -> impl FnMut() -> f64 {
 
 /// Against admissible states near and far: no lower energy, and the variational inequality (1.17)
 /// a(u, v − u) + j(v) − j(u) ≥ f(v − u). The axis node of example 4 is no inequality of its own
-/// (FORMULATION 3): there v keeps it where it is.
+/// (formulation 3.5): there v keeps it where it is.
 #[test]
 fn no_admissible_state_has_less_energy_and_the_variational_inequality_holds() {
     for name in EXAMPLES {

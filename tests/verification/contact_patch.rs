@@ -1,4 +1,4 @@
-//! VERIFICATION row 7. Contact patch test: a block of distorted elements on a rigid flat under uniform
+//! docs/verification.md, row 7. Contact patch test: a block of distorted elements on a rigid flat under uniform
 //! stress must press on it uniformly, to round-off.
 //!
 //! ```text

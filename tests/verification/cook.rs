@@ -1,4 +1,4 @@
-//! VERIFICATION row 4. Cook's membrane: R.D. Cook, J. Struct. Div. ASCE 100 (1974). Bending and shear in
+//! docs/verification.md, row 4. Cook's membrane: R.D. Cook, J. Struct. Div. ASCE 100 (1974). Bending and shear in
 //! a swept panel, plane stress, E = 1, ν = 1/3, thickness 1, F = 1 spread over the right edge.
 //!
 //! ```text

@@ -1,4 +1,4 @@
-//! VERIFICATION row 9. Hertz: a rigid cylinder on a half-space, frictionless. R = 8, E = 1000,
+//! docs/verification.md, row 9. Hertz: a rigid cylinder on a half-space, frictionless. R = 8, E = 1000,
 //! ν = .3: contact half-width a = 1 needs P = 107.884 (full load) and gives p₀ = 68.681.
 
 use serde_json::json;

@@ -1,4 +1,4 @@
-//! VERIFICATION row 6. Uniform pressure p on a disc of radius a on a half-space (Timoshenko & Goodier,
+//! docs/verification.md, row 6. Uniform pressure p on a disc of radius a on a half-space (Timoshenko & Goodier,
 //! art. 139): u_z(0) = 2(1 − ν²) p a/E, u_z(a) = 4(1 − ν²) p a/(π E), both into the body.
 //!
 //! ```text

@@ -1,4 +1,4 @@
-//! VERIFICATION row 13. A rigid punch of even profile f on a half-plane, frictionless: at half-width a
+//! docs/verification.md, row 13. A rigid punch of even profile f on a half-plane, frictionless: at half-width a
 //!
 //!   P = E* ∫₀ᵃ x f′(x)/√(a² − x²) dx
 //!

@@ -1,4 +1,4 @@
-//! The five examples of thesis chapter 4, FORMULATION 5: discrete values on the thesis-size meshes
+//! The five examples of thesis chapter 4, formulation 5: discrete values on the thesis-size meshes
 //! to 1e-6, and mesh-converged values on graded ones.
 
 use solver::problem::{Problem, Refine};
@@ -147,7 +147,7 @@ fn the_same_input_twice_gives_the_same_bits() {
     assert_eq!(solve(&problem), solve(&problem));
 }
 
-/// FORMULATION 6: T = 11.46, 13.86, 14.124, 14.152 for ε = 1e-2 … 1e-5 after two refinements.
+/// formulation 6.2: T = 11.46, 13.86, 14.124, 14.152 for ε = 1e-2 … 1e-5 after two refinements.
 #[test]
 fn the_elastic_slip_matters_as_published() {
     for (elastic_slip, tangential, digits) in [
@@ -192,7 +192,7 @@ fn hard_cases_converge_by_the_fallback() {
     assert!(fallbacks >= 2, "the fallback was taken {fallbacks} times");
 }
 
-/// FORMULATION 3: on the thesis-size mesh ε ≤ 1e-5 lets stick tractions oscillate (∫|σ_t| = 14.17,
+/// formulation 3.3: on the thesis-size mesh ε ≤ 1e-5 lets stick tractions oscillate (∫|σ_t| = 14.17,
 /// 15.20, 19.64 for ε = 1e-4, 1e-5, 1e-6), and the user is told.
 #[test]
 fn oscillating_stick_tractions_have_their_published_size_and_a_warning() {

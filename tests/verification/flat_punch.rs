@@ -1,4 +1,4 @@
-//! VERIFICATION rows 8 and 11: frictionless flat punches on a half-space, a = .5, E = 1000, ν = .3.
+//! docs/verification.md, rows 8 and 11: frictionless flat punches on a half-space, a = .5, E = 1000, ν = .3.
 //!
 //! ```text
 //!      |<- a ->|  punch, pushed by δ

@@ -1,4 +1,4 @@
-//! VERIFICATION row 10. Hertz: a rigid sphere on a half-space, frictionless. With R = 8, E = 1000, ν = .3
+//! docs/verification.md, row 10. Hertz: a rigid sphere on a half-space, frictionless. With R = 8, E = 1000, ν = .3
 //! and δ = a²/R for a = 1: P = 4/3 E* √R δ^1.5 = 4 E* a³/(3R), p = p₀ √(1 − r²/a²), p₀ = 2E* a/(πR).
 
 use serde_json::json;

@@ -1,4 +1,4 @@
-//! VERIFICATION row 24: units, mirrors and numbering change nothing.
+//! docs/verification.md, row 24: units, mirrors and numbering change nothing.
 
 use serde_json::{Value, json};
 use solver::problem::{Algorithm, Problem};

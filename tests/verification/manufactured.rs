@@ -1,4 +1,4 @@
-//! VERIFICATION row 5. Manufactured solutions: a smooth displacement field is chosen, the body force that
+//! docs/verification.md, row 5. Manufactured solutions: a smooth displacement field is chosen, the body force that
 //! belongs to it derived, and the field must come back with the rates of quadratic elements.
 //!
 //! f = −(λ + G) ∇(div u) − G ∇²u, and in cylindrical coordinates (∇²u)_r = ∇²u_r − u_r/r².

@@ -1,4 +1,4 @@
-//! VERIFICATION row 1, continued: constant strain on a distorted patch that is turned out of the axes, so
+//! docs/verification.md, row 1, continued: constant strain on a distorted patch that is turned out of the axes, so
 //! that supports along normal and tangent, tractions and an orthotropic material all act obliquely.
 //!
 //! ```text

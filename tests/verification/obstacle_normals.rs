@@ -1,4 +1,4 @@
-//! `normal: obstacle`: gap and displacement along the obstacle's own normal, FORMULATION 1 and the API.
+//! `normal: obstacle`: gap and displacement along the obstacle's own normal, formulation 1.2.
 
 use serde_json::{Value, json};
 use solver::model::{ContactModel, Model};

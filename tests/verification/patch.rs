@@ -1,4 +1,4 @@
-//! VERIFICATION rows 1 and 2: the element.
+//! docs/verification.md, rows 1 and 2: the element.
 
 use faer::Side;
 use solver::elasticity::{Section, assemble_element, isotropic};

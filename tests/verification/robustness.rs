@@ -1,4 +1,4 @@
-//! The grid of FORMULATION 4's claims: `auto` converges on all of it, and says where its friction
+//! The grid of formulation 4.3's claims: `auto` converges on all of it, and says where its friction
 //! cannot be trusted.
 
 use std::collections::BTreeMap;
@@ -99,7 +99,7 @@ fn warned(summary: &Summary) -> bool {
         .any(|w| w.code == "oscillating_stick")
 }
 
-/// The sheet of FORMULATION 4's non-unique case.
+/// The sheet of formulation 4.8, with two solutions.
 fn dragged_sheet(pull: f64, drag: f64, mu: f64) -> Problem {
     let mut sheet = example("sheet");
     let mut x = vec![0.0, 0.5];
@@ -143,7 +143,14 @@ fn the_jammed_sheet_is_found_beside_the_free_one() {
         assert!(second.converged && !second.agrees);
         // five decimals are published
         let what = format!("sheet jammed at μ = {mu}: Y from the bonded state");
-        held(0, &what, "FORMULATION 4", second.normal_force, jammed, 1e-6);
+        held(
+            0,
+            &what,
+            "formulation 4.8",
+            second.normal_force,
+            jammed,
+            1e-6,
+        );
         assert!(summary.warnings.iter().any(|w| w.code == "not_unique"));
     }
     for mu in [0.3, 0.6] {

@@ -1,4 +1,4 @@
-//! VERIFICATION rows 14, 16, 17 and 20: bodies that slide, and slide back.
+//! docs/verification.md, rows 14, 16, 17 and 20: bodies that slide, and slide back.
 
 use serde_json::{Value, json};
 use solver::solution::Solution;

@@ -1,4 +1,4 @@
-//! VERIFICATION rows 15, 18, 19, 22 and 23: where punches and cylinders stick, and what averaging does
+//! docs/verification.md, rows 15, 18, 19, 22 and 23: where punches and cylinders stick, and what averaging does
 //! to their pressure.
 
 use serde_json::{Value, json};

@@ -1,4 +1,4 @@
-//! The thesis's own iteration, FORMULATION 4: what it does at the thesis's parameters, and what the
+//! The thesis's own iteration, formulation 4.5: what it does at the thesis's parameters, and what the
 //! limits of its integration cost.
 
 use solver::problem::{Algorithm, Problem, ThesisOptions, ThesisPressure};

@@ -1,4 +1,4 @@
-//! VERIFICATION row 3. Thick cylinder, Lamé's solution: a = 1, b = 2, inner pressure 1, E = 1000,
+//! docs/verification.md, row 3. Thick cylinder, Lamé's solution: a = 1, b = 2, inner pressure 1, E = 1000,
 //! ν = .3; once as a quarter ring in plane strain with curved elements, once axisymmetric.
 
 use serde_json::json;

@@ -55,7 +55,7 @@ pub(super) fn sweep(
 /// Sweeps from a state and the bound it implies until everything settles.
 ///
 /// Converged means: contact set unchanged, and the kkt, friction and monolithic residuals at or
-/// below the tolerance (FORMULATION 4.4).
+/// below the tolerance (formulation 4.4).
 pub(super) fn run(
     track: &mut Track<'_, '_>,
     start: Measured,

@@ -1,4 +1,4 @@
-//! Contact and friction on the condensed system, FORMULATION 4.
+//! Contact and friction on the condensed system, docs/formulation.md section 4.
 //!
 //! Algorithms are functions of one kind: from a [`System`] to its final state, an iteration at a
 //! time to the observer. [`run`] chooses among them.

@@ -1,5 +1,5 @@
 //! One monolithic semi-smooth Newton iteration for contact, friction and averaging together,
-//! FORMULATION 4.3. The friction bound is a function of the displacements here,
+//! formulation 4.3. The friction bound is a function of the displacements here,
 //!
 //!   τ(v) = bound(W p),   p = P R,   R = f̂_n − Ŝ_n v on active nodes,
 //!

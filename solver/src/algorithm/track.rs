@@ -32,7 +32,7 @@ impl Measured {
         let pressures = system.pressures(&reactions);
         let implied_bound = system.friction_bound(&pressures);
         let bound_change = largest_difference(&implied_bound, &bound);
-        // the largest bound, old or new: FORMULATION 4, guarded where one of them is nothing
+        // the largest bound, old or new: formulation 4.4, guarded where one of them is nothing
         let scale = implied_bound
             .iter()
             .chain(&bound)

@@ -124,7 +124,7 @@ impl Averaging {
         if rest <= 0.0 {
             return 0.0;
         }
-        // exp(ρ²/(x² − ρ²)): the exponent's sign as FORMULATION 2 reads (1.2)
+        // exp(ρ²/(x² − ρ²)): the exponent's sign as formulation 2.1 reads (1.2)
         let shape = match self.kernel {
             Kernel::Bump => (-1.0 / rest).exp(),
             Kernel::Parabola => rest,

@@ -12,7 +12,7 @@ use crate::problem::{Friction, History, Transition};
 
 /// From pressure and tangential displacement along Γ_C to the tangential traction,
 /// σ_t = −τ φ_ε(|e|) sign(e): thesis (1.3), (1.8). e = u_t − d in the total law; in the incremental
-/// law e = u_t − d − g with the anchor g of the point, FORMULATION 1.
+/// law e = u_t − d − g with the anchor g of the point, formulation 1.5.
 #[derive(Clone, Debug)]
 pub struct FrictionLaw {
     /// τ.

@@ -311,6 +311,6 @@ pub enum History {
     #[default]
     Total,
     /// Friction depends on the displacement since the point last slipped: each point keeps an anchor,
-    /// FORMULATION 1. For the linear transition only.
+    /// docs/formulation.md 1.5. For the linear transition only.
     Incremental,
 }

@@ -82,7 +82,7 @@ pub struct SolverControls {
     pub thesis: Option<ThesisOptions>,
 }
 
-/// The strategy of solution, FORMULATION 4.
+/// The strategy of solution, docs/formulation.md section 4.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Algorithm {

@@ -1,7 +1,7 @@
 //! The thesis's own iteration (3.1), to the letter.
 //!
 //! It stays because the thesis is our source, and because it shows what the other algorithms repair:
-//! at the thesis's parameters it does not solve the problem (FORMULATION 4). Friction enters as a
+//! at the thesis's parameters it does not solve the problem (formulation 4.5). Friction enters as a
 //! load that is one iteration old, and the gain of that loop, μS/ε × tangential compliance, is in the
 //! hundreds. Without the sign it settles in a false state of full slip, friction pushing along the
 //! motion; with the sign it falls into a cycle of two. So the residuals that come back are those of
