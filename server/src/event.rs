@@ -1,4 +1,4 @@
-//! What happens to a job, as its watchers are told.
+//! What happens to a job, as those who watch it are told.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,12 +10,12 @@ use crate::{
     time::Time,
 };
 
-/// One line of a job's story; `seq` is dense from 1, across attempts and restarts.
+/// One event of a job. `seq` counts from 1 without gaps, across attempts and restarts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Event {
     /// Number of the event.
     pub seq: i64,
-    /// The start it belongs to; 0 before the first.
+    /// The attempt it belongs to; 0 before the first.
     pub attempt: i32,
     /// When it happened.
     pub t: Time,
@@ -29,11 +29,11 @@ pub struct Event {
 #[serde(tag = "type", rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Payload {
-    /// The job changed its status, but is not at its end.
+    /// The job changed its status, but has not ended.
     Status {
         /// The new status.
         status: Status,
-        /// Why it went back to the queue.
+        /// Why it was requeued.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         reason: Option<String>,
     },
@@ -42,11 +42,11 @@ pub enum Payload {
         /// Which.
         stage: Phase,
     },
-    /// One more row of history.
+    /// One more iteration.
     Iteration(Iteration),
-    /// Something to know.
+    /// A warning about the problem or its solution.
     Warning(Warning),
-    /// The end, and the job as it ended. There is exactly one of these.
+    /// The end, and the job as it ended. There is exactly one of these, and it is the last.
     Done {
         /// The terminal job.
         job: Box<Job>,
@@ -67,7 +67,7 @@ impl Payload {
         }
     }
 
-    /// Back to the queue, and why.
+    /// A job was requeued, and why.
     pub fn requeued(reason: Requeue) -> Self {
         Payload::Status {
             status: Status::Queued,
@@ -76,13 +76,13 @@ impl Payload {
     }
 }
 
-/// Why a running job goes back to the queue.
+/// Why a running job is requeued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum Requeue {
-    /// The process died under it.
+    /// The process died while it ran.
     WorkerLost,
-    /// The service was asked to stop.
+    /// The service stopped.
     Drain,
 }
 

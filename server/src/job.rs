@@ -1,4 +1,4 @@
-//! A job: its identity, its status and the moves it may make. No I/O.
+//! A job: its identity, its status and how that may change. No I/O.
 
 use std::{borrow::Cow, collections::BTreeMap, fmt};
 
@@ -12,28 +12,28 @@ use crate::{
     time::Time,
 };
 
-/// A problem on its way through the service, as clients see it.
+/// A problem submitted to the service, as clients see it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Job {
     /// The store's own number, in order of arrival; never shown.
     #[serde(skip)]
     pub key: i64,
-    /// Where the store keeps what there is of its result.
+    /// The key under which the store keeps its result.
     #[serde(skip)]
     pub result_key: i64,
-    /// The key of the job whose end will be its own.
+    /// The key of the job that it is coalesced into: it is not solved itself, but ends with that one's result.
     #[serde(skip)]
-    pub twin_of: Option<i64>,
+    pub coalesced_into: Option<i64>,
     /// Whether an earlier result may answer it.
     #[serde(skip)]
     pub cache: Cache,
-    /// The public name.
+    /// The public id.
     pub id: JobId,
-    /// Where it stands.
+    /// Its status.
     pub status: Status,
     /// Why it failed or was canceled.
     pub reason: Option<Reason>,
-    /// Somebody asked a running job to stop.
+    /// A client asked it to stop while it was running.
     pub cancel_requested: bool,
     /// Counts status changes and edits, not progress.
     pub version: i64,
@@ -41,20 +41,20 @@ pub struct Job {
     pub name: Option<String>,
     /// Labels for programs.
     pub labels: BTreeMap<String, String>,
-    /// Whose job it is.
+    /// Who submitted it.
     pub owner: String,
     /// −10 … 10, higher first.
     pub priority: i32,
-    /// Number of the current or last start, 0 before the first.
+    /// Number of the current or last attempt to solve it, 0 before the first.
     pub attempt: i32,
-    /// A worker lost in the last of these fails the job.
+    /// If the worker is lost in the last of these attempts, the job fails.
     pub max_attempts: i32,
     /// SHA-256 of the problem with its defaults, without its title.
     pub input_hash: String,
     /// The job whose result answered this one.
     #[serde(default)]
     pub cached_from: Option<JobId>,
-    /// The job that this one tries again.
+    /// The job that this one retries.
     #[serde(default)]
     pub parent: Option<JobId>,
     /// Never removed by age.
@@ -62,47 +62,47 @@ pub struct Job {
     pub pinned: bool,
     /// When it was accepted.
     pub created_at: Time,
-    /// When it was last started.
+    /// When its last attempt began.
     pub started_at: Option<Time>,
     /// When it became terminal.
     pub finished_at: Option<Time>,
-    /// Seconds from acceptance to the last start.
+    /// Seconds from acceptance to the start of the last attempt.
     pub queue_wait_s: Option<f64>,
-    /// Seconds from the last start to the end.
+    /// Seconds from the start of the last attempt to the end.
     pub run_s: Option<f64>,
-    /// Its place, while queued.
+    /// Its position in the queue, while it waits.
     pub queue: Option<QueuePosition>,
-    /// How far it has come, once started.
+    /// How far it has come, once it was started.
     pub progress: Option<Progress>,
-    /// What it may take.
+    /// Its time limits.
     #[serde(default)]
     pub limits: Limits,
     /// What went wrong.
     pub failure: Option<Failure>,
-    /// Whether there is something to fetch.
+    /// Whether there is a result to fetch.
     pub result_available: ResultAvailable,
-    /// Where to go from here.
+    /// Addresses of what belongs to it.
     pub links: BTreeMap<String, String>,
 }
 
 impl Job {
-    /// It waits, for a worker and not for another job.
-    pub fn waits_in_line(&self) -> bool {
-        self.status == Status::Queued && self.twin_of.is_none()
+    /// It waits for a worker, and is not coalesced into another job.
+    pub fn waits_for_a_worker(&self) -> bool {
+        self.status == Status::Queued && self.coalesced_into.is_none()
     }
 }
 
-/// The public name of a job, `job_<uuidv7>`.
+/// The public id of a job, `job_<uuidv7>`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct JobId(pub Uuid);
 
 impl JobId {
-    /// A new name, later than all before it.
+    /// A new id, later than all before it.
     pub fn new() -> Self {
         JobId(Uuid::now_v7())
     }
 
-    /// Reads the canonical form and no other: one job has one name.
+    /// Reads the canonical form and no other: a job has one spelling.
     pub fn parse(text: &str) -> Option<Self> {
         let id = JobId(Uuid::try_parse(text.strip_prefix("job_")?).ok()?);
         (id.to_string() == text).then_some(id)
@@ -141,14 +141,14 @@ impl JsonSchema for JobId {
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({
-            "description": "The public name of a job, job_<uuidv7>.",
+            "description": "The public id of a job, job_<uuidv7>.",
             "type": "string",
             "pattern": "^job_[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}$",
         })
     }
 }
 
-/// Where a job stands.
+/// The status of a job.
 #[derive(
     Clone,
     Copy,
@@ -168,7 +168,7 @@ impl JsonSchema for JobId {
 pub enum Status {
     /// Accepted and waiting.
     Queued,
-    /// In the hands of a worker.
+    /// Being solved by a worker.
     Running,
     /// Solved.
     Succeeded,
@@ -179,18 +179,18 @@ pub enum Status {
 }
 
 impl Status {
-    /// No move leads away from here.
+    /// A job of this status has ended, and never changes it again.
     pub fn is_terminal(self) -> bool {
         matches!(self, Status::Succeeded | Status::Failed | Status::Canceled)
     }
 
-    /// The legal moves:
+    /// The changes that are allowed:
     ///
     /// ```text
     /// queued ──► running ──► succeeded | failed | canceled
     ///   ▲  │        │
     ///   │  └────────┼──────► canceled | failed
-    ///   └───────────┘  only by recovery after a crash, or a drain
+    ///   └───────────┘  only when the service stops, or after a crash
     /// ```
     pub fn may_become(self, next: Status) -> bool {
         match self {
@@ -226,24 +226,24 @@ pub enum Reason {
     FalseConvergence,
     /// The stiffness matrix has no factor.
     SingularSystem,
-    /// A number that is not finite came up.
+    /// A number became infinite or not a number.
     NonFinite,
-    /// It ran longer than it may.
+    /// It ran longer than `limits.timeout_s`.
     TimedOut,
-    /// It waited longer than it may.
+    /// It waited longer than `limits.queue_ttl_s`.
     QueueExpired,
-    /// It needs more than there is.
+    /// It needs more memory than there is.
     ResourceExhausted,
-    /// The process died under it once too often.
+    /// The process died during each of `max_attempts` attempts.
     WorkerLost,
-    /// Our fault.
+    /// An error of the service itself.
     Internal,
-    /// The client's wish.
+    /// A client canceled it.
     UserCancel,
 }
 
 impl Reason {
-    /// A property of the problem: whoever solves it again ends the same way.
+    /// The reason lies in the problem: solved again, it would end in the same way.
     pub fn belongs_to_the_problem(self) -> bool {
         match self {
             Reason::NotConverged
@@ -279,7 +279,7 @@ impl From<Reason> for Code {
     }
 }
 
-/// Whether a job has something to fetch.
+/// Whether a job has a result to fetch.
 #[derive(
     Clone,
     Copy,
@@ -307,14 +307,14 @@ pub enum ResultAvailable {
     Final,
 }
 
-/// What a job may take.
+/// The time limits of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
-    /// Seconds from a start to the end; then it fails with `timed_out`. Its solver then has two more to hand
-    /// over its last state.
+    /// Seconds that an attempt may take; then the job fails with `timed_out`. The solver has two more seconds to
+    /// return its last state, which is kept.
     pub timeout_s: f64,
-    /// Seconds that it may wait for a start; then it fails with `queue_expired`.
+    /// Seconds that it may wait for a worker; then it fails with `queue_expired`.
     pub queue_ttl_s: f64,
 }
 
@@ -327,7 +327,7 @@ impl Default for Limits {
     }
 }
 
-/// Whether earlier results may answer a job.
+/// Whether a job may be answered with the result of another one.
 #[derive(
     Clone,
     Copy,
@@ -345,19 +345,20 @@ impl Default for Limits {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Cache {
-    /// The result of the same input answers it at once; a job at work on that input is joined.
+    /// It is answered at once if there is a result of the same input, and coalesced into a job of the same input if
+    /// one waits or runs.
     #[default]
     Use,
-    /// It is solved anew, and its result answers later ones.
+    /// It is solved anew, and its result may answer later jobs.
     Refresh,
-    /// It is solved anew, and its result answers nobody else.
+    /// It is solved anew, and its result answers no other job.
     Off,
 }
 
-/// The place of a queued job.
+/// The position of a queued job.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct QueuePosition {
-    /// From 1; 0 for a job that another one, already running, will answer.
+    /// From 1; 0 for a job that is coalesced into one that runs.
     pub position: i64,
     /// Jobs before this one.
     pub ahead: i64,
@@ -382,12 +383,12 @@ pub struct QueuePosition {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Waiting {
-    /// All workers have something to do.
+    /// All workers are busy.
     WorkersBusy,
-    /// The queue was paused.
+    /// The queue is paused.
     Paused,
-    /// A job with the same input is ahead of it; its result will answer both.
-    Joined,
+    /// It is coalesced into a job with the same input that waits or runs, and will end with its result.
+    Coalesced,
 }
 
 /// How far a job has come.
@@ -395,15 +396,15 @@ pub enum Waiting {
 pub struct Progress {
     /// The phase that began last: mesh, assemble, …, recover.
     pub stage: String,
-    /// Rows of history so far.
+    /// Iterations so far.
     pub iteration: u32,
-    /// The larger of the two residuals of the last row (dimensionless).
+    /// The larger of the two residuals of the last iteration (dimensionless).
     pub residual: Option<f64>,
     /// What both must fall below.
     pub tolerance: Option<f64>,
-    /// Nodes that entered or left contact in the last row.
+    /// Nodes that entered or left contact in the last iteration.
     pub contact_changes: Option<u32>,
-    /// Contraction number of the sweeps.
+    /// Factor by which an iteration reduces the residual.
     pub rate: Option<f64>,
     /// Seconds to the end, extrapolated from the rate.
     pub eta_s: Option<f64>,
@@ -418,7 +419,7 @@ pub struct Failure {
     pub title: String,
     /// The kind, stable for programs.
     pub code: String,
-    /// What happened this time.
+    /// What happened in this case.
     pub detail: String,
 }
 

@@ -96,7 +96,7 @@ async fn two_of_the_same_input_are_solved_once_and_canceled_apart() {
     };
     let (source, twin, canceled) = (post().await, post().await, post().await);
     let waiting = server.job(&twin).await;
-    assert_eq!(waiting["queue"]["reason"], "joined");
+    assert_eq!(waiting["queue"]["reason"], "coalesced");
     assert_eq!(
         server.json("/v1/queue").await["running"],
         1,

@@ -1,11 +1,11 @@
-//! Ends before the solver's own: a client's cancel, and the drain of the service.
+//! Stopping solvers: on a client's cancel, and when the service stops.
 
 use std::{sync::Arc, time::Duration};
 
 use tracing::{error, info};
 
 use super::{
-    running::{Running, Why},
+    running::{Running, StopReason},
     state::Queue,
 };
 use crate::{
@@ -13,27 +13,27 @@ use crate::{
     store::{CancelOutcome, Ending, Result},
 };
 
-/// A solver that was asked to stop gets this long; then the job is canceled over its head and only
-/// the worker's slot waits for it. Half of what the API promises, the rest is for commits.
-pub(super) const COOPERATION: Duration = Duration::from_millis(250);
+/// How long a solver that was asked to stop may take; then its job is canceled without waiting for it, and only the
+/// worker stays busy. Half of what the API promises: the rest is for commits.
+pub(super) const CANCEL_GRACE: Duration = Duration::from_millis(250);
 
 impl Queue {
     /// Asks a job to stop. A queued one is canceled when this returns, a running one within half a
     /// second.
     pub async fn cancel(self: &Arc<Self>, key: i64) -> Result<CancelOutcome> {
-        let _gate = self.gate.write().await;
+        let _guard = self.claiming.write().await;
         let mut outcome = self.store.request_cancel(key).await?;
         if let CancelOutcome::Requested { attempt } = outcome {
             let running = self.running().get(&key).cloned();
             match running {
                 Some(running) => {
-                    self.announce(&[key]); // the wish is a new version
-                    running.stop(Why::Unwanted);
-                    tokio::spawn(self.clone().cancel_over_its_head(key, running.attempt));
+                    self.announce(&[key]); // the request has changed its version
+                    running.stop(StopReason::Unwanted);
+                    tokio::spawn(self.clone().force_cancel(key, running.attempt));
                 }
-                // Its worker has let it go, as the service stops: nobody else would end it.
+                // its worker has released it, as the service stops: nobody else would end it
                 None => {
-                    let ended = self.end(key, attempt, &Ending::canceled()).await?;
+                    let ended = self.end_attempt(key, attempt, &Ending::canceled()).await?;
                     outcome = match ended {
                         true => CancelOutcome::Canceled(vec![]),
                         false => CancelOutcome::AlreadyTerminal,
@@ -43,42 +43,46 @@ impl Queue {
         }
         if let CancelOutcome::Canceled(changed) = &outcome {
             self.announce(changed);
-            self.wake.notify_one(); // a twin may have taken its place
+            self.wake.notify_one(); // a job coalesced into it may have taken its place
         }
         Ok(outcome)
     }
 
-    async fn cancel_over_its_head(self: Arc<Self>, key: i64, attempt: i32) {
-        tokio::time::sleep(COOPERATION).await;
-        if let Err(cause) = self.end(key, attempt, &Ending::canceled()).await {
+    /// Cancels a job whose solver does not stop in time; nothing happens if it did.
+    async fn force_cancel(self: Arc<Self>, key: i64, attempt: i32) {
+        tokio::time::sleep(CANCEL_GRACE).await;
+        if let Err(cause) = self.end_attempt(key, attempt, &Ending::canceled()).await {
             error!(job.key = key, %cause, "job could not be canceled: {cause}");
         }
     }
 
-    /// Takes no more jobs and puts those that are running back for the next start of the service,
-    /// without waiting for their solvers.
+    /// Takes no more jobs, and requeues those that are running for the next start of the service, without waiting
+    /// for their solvers.
     pub async fn drain(&self) {
         self.stopping.cancel();
-        let _gate = self.gate.write().await; // whoever is claiming has entered its job
+        let _guard = self.claiming.write().await; // no claim is under way
         let running: Vec<(i64, Running)> = self
             .running()
             .iter()
             .map(|(key, running)| (*key, running.clone()))
             .collect();
         for (key, running) in running {
-            running.stop(Why::Unwanted);
+            running.stop(StopReason::Unwanted);
             let attempt = running.attempt;
             match self.store.requeue_drained(key, attempt).await {
                 Ok(Some(Status::Canceled)) => {
                     info!(
                         job.key = key,
-                        attempt, "job canceled, as was asked before the stop"
+                        attempt, "job canceled, as requested before the service stopped"
                     );
                 }
-                Ok(Some(_)) => info!(job.key = key, attempt, "job put back for the next start"),
+                Ok(Some(_)) => info!(
+                    job.key = key,
+                    attempt, "job requeued for the next start of the service"
+                ),
                 Ok(None) => {}
-                // The next start finds it running and puts it back.
-                Err(cause) => error!(job.key = key, %cause, "job could not be put back: {cause}"),
+                // the next start of the service finds it running, and requeues it
+                Err(cause) => error!(job.key = key, %cause, "job could not be requeued: {cause}"),
             }
         }
     }

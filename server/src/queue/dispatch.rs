@@ -1,4 +1,4 @@
-//! From the queue to the workers: whenever one is free and a job waits.
+//! Starting jobs: whenever a worker is free and a job waits. And what is done from time to time.
 
 use std::{sync::Arc, time::Duration};
 
@@ -11,39 +11,39 @@ use crate::{
     time::Time,
 };
 
-/// The longest that a job waits for its end after the end of its time in the queue.
-const TICK: Duration = Duration::from_secs(1);
+/// How often the time limits of waiting jobs are checked.
+const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Queue {
-    /// Starts the workers. They run until the drain.
+    /// Starts the workers. They run until the service stops.
     pub fn start(self: &Arc<Self>) {
         self.slots.add_permits(usize::from(self.workers));
         tokio::spawn(self.clone().dispatch());
-        tokio::spawn(self.clone().watch_the_clock());
+        tokio::spawn(self.clone().run_periodic_tasks());
     }
 
-    /// Accepts jobs. They are on the disk when this returns; if a worker is free, the first of the queue is
-    /// in its hands with the same commit.
+    /// Accepts jobs. They are on the disk when this returns; if a worker is free, it is given the next job of the
+    /// queue in the same commit.
     pub async fn submit(self: &Arc<Self>, submission: Submission) -> Result<Accepted> {
         let Some(slot) = self.free_slot() else {
             let mut accepted = self.store.submit(submission, false).await?;
             self.announce(&accepted.changed);
             self.wake.notify_one();
-            self.store.try_to_place(&mut accepted.jobs).await;
+            self.store.try_add_queue_positions(&mut accepted.jobs).await;
             return Ok(accepted);
         };
-        let _gate = self.gate.read().await;
+        let _guard = self.claiming.read().await;
         let claim = !self.stopping.is_cancelled() && !self.store.is_paused();
         let submitted = self.store.submit(submission, claim).await;
         match submitted {
             Ok(mut accepted) => {
                 self.announce(&accepted.changed);
                 match accepted.claim.take() {
-                    Some(claim) => self.begin(claim, slot),
+                    Some(claim) => self.start_worker(claim, slot),
                     None => drop(slot),
                 }
-                self.wake.notify_one(); // several may have come, or the slot is free again
-                self.store.try_to_place(&mut accepted.jobs).await;
+                self.wake.notify_one(); // there may be several jobs, or the slot is free again
+                self.store.try_add_queue_positions(&mut accepted.jobs).await;
                 Ok(accepted)
             }
             Err(cause) => {
@@ -54,17 +54,17 @@ impl Queue {
         }
     }
 
-    /// Claims whenever a slot is free and something waits, until the drain.
+    /// Claims whenever a slot is free and a job waits, until the service stops.
     async fn dispatch(self: Arc<Self>) {
         loop {
-            // A word said from here on is kept for the wait below: nothing is overlooked.
+            // a notification from here on is kept for the wait below: none is missed
             while let Some(slot) = self.free_slot() {
                 match self.claim(slot).await {
                     Ok(true) => {}
                     Ok(false) => break,
                     Err(cause) => {
                         error!(%cause, "no job could be claimed: {cause}");
-                        tokio::time::sleep(Duration::from_secs(1)).await; // a full disk may pass
+                        tokio::time::sleep(Duration::from_secs(1)).await; // the disk may be full for a while
                     }
                 }
             }
@@ -75,7 +75,7 @@ impl Queue {
         }
     }
 
-    /// A worker that may start something.
+    /// An idle worker, unless nothing is to be started.
     fn free_slot(&self) -> Option<OwnedSemaphorePermit> {
         if self.store.is_paused() || self.stopping.is_cancelled() {
             return None;
@@ -83,24 +83,24 @@ impl Queue {
         self.slots.clone().try_acquire_owned().ok()
     }
 
-    /// Takes the next job, if there is one.
+    /// Claims the next job for a worker; false if there was nothing to do.
     async fn claim(self: &Arc<Self>, slot: OwnedSemaphorePermit) -> Result<bool> {
-        let _gate = self.gate.read().await;
+        let _guard = self.claiming.read().await;
         if self.stopping.is_cancelled() || self.store.is_paused() {
             return Ok(false);
         }
         let (claim, changed) = self.store.claim_next().await?;
         self.announce(&changed);
         match claim {
-            Some(claim) => self.begin(claim, slot),
+            Some(claim) => self.start_worker(claim, slot),
             None if changed.is_empty() => return Ok(false),
             None => {} // some were answered; there may be more
         }
         Ok(true)
     }
 
-    /// Hands a claimed job to a worker. Under the gate.
-    fn begin(self: &Arc<Self>, claim: Claim, slot: OwnedSemaphorePermit) {
+    /// Gives a claimed job to a worker. To be called while `claiming` is held.
+    fn start_worker(self: &Arc<Self>, claim: Claim, slot: OwnedSemaphorePermit) {
         let running = Running {
             attempt: claim.job.attempt,
             stop: Arc::default(),
@@ -108,14 +108,14 @@ impl Queue {
         self.running().insert(claim.job.key, running.clone());
         let queue = self.clone();
         tokio::spawn(async move {
-            worker::attempt(&queue, claim, running).await;
+            worker::run_attempt(&queue, claim, running).await;
             drop(slot);
             queue.wake.notify_one();
         });
     }
 
-    /// Ends jobs that have waited too long, and forgets what was deleted long ago, until the drain.
-    async fn watch_the_clock(self: Arc<Self>) {
+    /// Ends jobs that have waited too long, and forgets what was deleted long ago, until the service stops.
+    async fn run_periodic_tasks(self: Arc<Self>) {
         loop {
             match self.store.expire_queued(Time::now()).await {
                 Ok(changed) if changed.is_empty() => {}
@@ -129,10 +129,10 @@ impl Queue {
                 }
             }
             if let Err(cause) = self.store.forget_deleted(Time::now()).await {
-                error!(%cause, "names of deleted jobs could not be forgotten: {cause}");
+                error!(%cause, "ids of deleted jobs could not be removed: {cause}");
             }
             tokio::select! {
-                () = tokio::time::sleep(TICK) => {}
+                () = tokio::time::sleep(CHECK_INTERVAL) => {}
                 () = self.stopping.cancelled() => return,
             }
         }

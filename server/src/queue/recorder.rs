@@ -1,4 +1,4 @@
-//! The scribe beside a running solver: commits what it says in batches, then announces it.
+//! Records what a running solver reports: commits its events in batches, then announces them.
 
 use std::time::Duration;
 
@@ -10,96 +10,100 @@ use tokio::{
 use tracing::warn;
 
 use super::{
-    backoff::Pauses,
-    running::{Running, Why},
+    backoff::Backoff,
+    running::{Running, StopReason},
     state::Queue,
 };
 use crate::{
     event::Payload,
     job::{Job, Progress},
     run::phase_name,
-    store::{LastWords, Parts, Result},
+    store::{FinalBatch, Parts, Result},
     time::Time,
 };
 
-/// A batch ends with this many rows …
-const ROWS: usize = 50;
-/// … or so long after its first.
+/// Most events of a batch …
+const MOST_EVENTS: usize = 50;
+/// … and the longest time from its first event until it is stored.
 const LATENCY: Duration = Duration::from_millis(50);
 
-/// What a solver says.
+/// What a solver reports.
 #[derive(Debug)]
-pub(super) enum Line {
-    /// An event, with the moment it happened.
+pub(super) enum Report {
+    /// An event, with the time when it happened.
     Event(Time, Payload),
-    /// What it has found so far, ready to be stored.
+    /// A partial result, ready to be stored.
     Partial(Box<Parts>),
-    /// The end of the sweeps will be that of the job: there are no further increments, steps or grids.
+    /// There is one load level on one grid: when its iterations end, the job ends, and the time until then can be
+    /// estimated.
     OneLevel,
 }
 
-/// Lines that are written together.
+/// Reports that are stored together.
 #[derive(Debug, Default)]
 struct Batch {
     events: Vec<(Time, Payload)>,
-    /// What comes after them.
+    /// A partial result, reported after them.
     partial: Option<Box<Parts>>,
     one_level: bool,
-    /// Nothing comes after them: the solver hung up.
+    /// The solver has ended: nothing comes after them.
     last: bool,
 }
 
-/// Writes until the solver hangs up, and gives what it said last: that is written with the job's end, in
-/// one commit. What cannot be stored is tried again, while the solver waits for us: a full disk may pass. When
-/// the start is no longer current, the solver is told to stop and the rest is thrown away.
+/// Stores what the solver reports until it ends, and returns its last events: these are stored together with the
+/// end of the job, in one commit. What cannot be stored is retried while the solver waits, since the disk may be full
+/// for a while. When the attempt is no longer the current one, the solver is told to stop and the rest is dropped.
 pub(super) async fn record(
     queue: &Queue,
     job: &Job,
     running: &Running,
-    mut lines: mpsc::Receiver<Line>,
-) -> LastWords {
+    mut reports: mpsc::Receiver<Report>,
+) -> FinalBatch {
     let (mut progress, mut one_level) = (Progress::default(), false);
     loop {
-        let batch = next_batch(&mut lines).await;
+        let batch = next_batch(&mut reports).await;
         let payloads = batch.events.iter().map(|(_, payload)| payload);
         one_level |= batch.one_level;
-        payloads.for_each(|payload| follow(&mut progress, payload, one_level));
+        payloads.for_each(|payload| update_progress(&mut progress, payload, one_level));
         if batch.last {
-            let lines = batch.events;
-            return LastWords { lines, progress };
+            return FinalBatch {
+                events: batch.events,
+                progress,
+            };
         }
-        if !written(queue, job, running, &batch, &progress).await {
+        if !store_with_retries(queue, job, running, &batch, &progress).await {
             break;
         }
     }
-    running.stop(Why::Unwanted);
-    while lines.recv().await.is_some() {} // the solver must not block on a full channel
-    LastWords::default()
+    running.stop(StopReason::Unwanted);
+    while reports.recv().await.is_some() {} // the solver must not block on a full channel
+    FinalBatch::default()
 }
 
-/// Writes a batch, however long that takes; false when the start is no longer current, or the service stops.
-async fn written(
+/// Stores a batch, however long that takes; false when the attempt is no longer the current one, or the service
+/// stops.
+async fn store_with_retries(
     queue: &Queue,
     job: &Job,
     running: &Running,
     batch: &Batch,
     progress: &Progress,
 ) -> bool {
-    let mut pauses = Pauses::default();
+    let mut backoff = Backoff::default();
     loop {
-        let cause = match write(queue, job, running, batch, progress).await {
-            Ok(written) => return written,
+        let cause = match store_batch(queue, job, running, batch, progress).await {
+            Ok(stored) => return stored,
             Err(cause) => cause,
         };
         warn!(job.id = %job.id, %cause, "events of job {} could not be stored yet: {cause}", job.id);
-        if !pauses.next(&queue.stopping).await {
+        if !backoff.wait(&queue.stopping).await {
             return false;
         }
     }
 }
 
-/// Writes a batch; false when the start is no longer current.
-async fn write(
+/// Stores a batch; false when the attempt is no longer the current one.
+async fn store_batch(
     queue: &Queue,
     job: &Job,
     running: &Running,
@@ -108,8 +112,8 @@ async fn write(
 ) -> Result<bool> {
     let (store, key, attempt) = (&queue.store, job.key, running.attempt);
     if !batch.events.is_empty() {
-        let written = store.append_events(key, attempt, &batch.events, progress);
-        match written.await? {
+        let stored = store.append_events(key, attempt, &batch.events, progress);
+        match stored.await? {
             true => queue.announce(&[key]),
             false => return Ok(false),
         }
@@ -120,11 +124,11 @@ async fn write(
     }
 }
 
-/// The next lines.
-async fn next_batch(lines: &mut mpsc::Receiver<Line>) -> Batch {
+/// The next reports.
+async fn next_batch(reports: &mut mpsc::Receiver<Report>) -> Batch {
     let mut batch = Batch::default();
-    match lines.recv().await {
-        Some(line) => batch.take(line),
+    match reports.recv().await {
+        Some(report) => batch.add(report),
         None => batch.last = true,
     }
     let end = sleep_until(Instant::now() + LATENCY);
@@ -132,8 +136,8 @@ async fn next_batch(lines: &mut mpsc::Receiver<Line>) -> Batch {
     while batch.is_open() {
         tokio::select! {
             biased;
-            line = lines.recv() => match line {
-                Some(line) => batch.take(line),
+            report = reports.recv() => match report {
+                Some(report) => batch.add(report),
                 None => batch.last = true,
             },
             () = &mut end => break,
@@ -143,25 +147,25 @@ async fn next_batch(lines: &mut mpsc::Receiver<Line>) -> Batch {
 }
 
 impl Batch {
-    fn take(&mut self, line: Line) {
-        match line {
-            Line::Event(time, payload) => self.events.push((time, payload)),
-            Line::Partial(parts) => self.partial = Some(parts),
-            Line::OneLevel => self.one_level = true,
+    fn add(&mut self, report: Report) {
+        match report {
+            Report::Event(time, payload) => self.events.push((time, payload)),
+            Report::Partial(parts) => self.partial = Some(parts),
+            Report::OneLevel => self.one_level = true,
         }
     }
 
     fn is_open(&self) -> bool {
-        self.events.len() < ROWS && self.partial.is_none() && !self.last
+        self.events.len() < MOST_EVENTS && self.partial.is_none() && !self.last
     }
 }
 
-/// Keeps up with what the solver says.
-fn follow(progress: &mut Progress, payload: &Payload, one_level: bool) {
+/// The progress after one more event.
+fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) {
     match payload {
         Payload::Stage { stage } => {
             progress.stage = phase_name(*stage).to_string();
-            progress.eta_s = None; // of a phase nothing is known
+            progress.eta_s = None; // nothing is known about how long a phase takes
         }
         Payload::Iteration(row) => {
             *progress = Progress {
@@ -171,7 +175,7 @@ fn follow(progress: &mut Progress, payload: &Payload, one_level: bool) {
                 tolerance: Some(row.tolerance),
                 contact_changes: Some(row.contact.entered + row.contact.left),
                 rate: row.contraction,
-                // of several levels the end of these sweeps is not the job's
+                // with several levels the end of these iterations is not that of the job
                 eta_s: eta_s(row).filter(|_| one_level),
             }
         }
@@ -179,17 +183,18 @@ fn follow(progress: &mut Progress, payload: &Payload, one_level: bool) {
     }
 }
 
-/// Sweeps still to go if each takes as long as those before and shrinks the residual by q:
+/// Seconds to the end: the iterations still to do, if each reduces the residual by the factor q and takes as long as
+/// those before:
 /// n = ln(tolerance / residual) / ln q.
 fn eta_s(row: &Iteration) -> Option<f64> {
     let q = row.contraction.filter(|q| (1e-6..1.0).contains(q))?;
     let residual = row.residual.max(row.friction_residual);
-    let sweeps = if residual <= row.tolerance {
+    let iterations = if residual <= row.tolerance {
         0.0
     } else {
         (row.tolerance / residual).ln() / q.ln()
     };
-    Some(sweeps.ceil() * row.wall_s / f64::from(row.k.max(1)))
+    Some(iterations.ceil() * row.wall_s / f64::from(row.k.max(1)))
 }
 
 #[cfg(test)]
@@ -200,11 +205,11 @@ mod tests {
     use solver::solution::Phase;
 
     #[tokio::test]
-    async fn a_batch_ends_when_the_solver_hangs_up_or_after_fifty_rows() {
-        let (sender, mut lines) = mpsc::channel(64);
+    async fn a_batch_ends_when_the_solver_ends_or_after_fifty_events() {
+        let (sender, mut reports) = mpsc::channel(64);
         for k in 1..=51 {
             sender
-                .send(Line::Event(
+                .send(Report::Event(
                     Time::now(),
                     Payload::Iteration(fake::iteration(k)),
                 ))
@@ -212,9 +217,9 @@ mod tests {
                 .unwrap();
         }
         drop(sender);
-        let batch = next_batch(&mut lines).await;
+        let batch = next_batch(&mut reports).await;
         assert_eq!((batch.events.len(), batch.last), (50, false));
-        let batch = next_batch(&mut lines).await;
+        let batch = next_batch(&mut reports).await;
         assert_eq!((batch.events.len(), batch.last), (1, true));
     }
 
@@ -225,16 +230,16 @@ mod tests {
         (row.contraction, row.wall_s) = (Some(0.1), 8.0);
         assert!(
             (eta_s(&row).unwrap() - 8.0).abs() < 1e-9,
-            "four sweeps of two seconds"
+            "four iterations of two seconds"
         );
         let mut progress = Progress::default();
         let row = Payload::Iteration(row);
-        follow(&mut progress, &row, false);
+        update_progress(&mut progress, &row, false);
         assert_eq!(progress.eta_s, None, "there are more steps");
-        follow(&mut progress, &row, true);
+        update_progress(&mut progress, &row, true);
         assert!(progress.eta_s.is_some());
         let stage = Phase::Recover;
-        follow(&mut progress, &Payload::Stage { stage }, true);
+        update_progress(&mut progress, &Payload::Stage { stage }, true);
         assert_eq!((progress.eta_s, progress.rate), (None, Some(0.1)));
     }
 }

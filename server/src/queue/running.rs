@@ -5,23 +5,24 @@ use std::sync::{Arc, OnceLock};
 /// The handle on a solver at work.
 #[derive(Clone, Debug)]
 pub(super) struct Running {
+    /// The number of the attempt.
     pub(super) attempt: i32,
-    /// Looked at by the solver in every iteration.
-    pub(super) stop: Arc<OnceLock<Why>>,
+    /// Set to ask the solver to stop; it looks at this in every iteration.
+    pub(super) stop: Arc<OnceLock<StopReason>>,
 }
 
 impl Running {
     /// Asks the solver to stop. The first reason given is the one that counts.
-    pub(super) fn stop(&self, why: Why) {
-        let _ = self.stop.set(why); // an earlier one stays: that is the error of it, and no harm
+    pub(super) fn stop(&self, reason: StopReason) {
+        let _ = self.stop.set(reason); // fails if there is one already, which stays
     }
 }
 
 /// Why a solver should stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Why {
-    /// The job has run longer than it may.
+pub(super) enum StopReason {
+    /// The job has reached its time limit.
     OutOfTime,
-    /// Nobody waits for what it finds: the job was canceled or put back.
+    /// Its result is not needed: the job was canceled or requeued.
     Unwanted,
 }

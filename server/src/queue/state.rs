@@ -1,4 +1,4 @@
-//! What all tasks of the queue share, and how it stands.
+//! What all tasks of the queue share, and the state of the queue.
 
 use std::{
     collections::HashMap,
@@ -10,12 +10,12 @@ use tokio_util::sync::CancellationToken;
 
 use super::{
     running::Running,
-    watchers::{Live, Subscription},
+    watchers::{Subscription, Watchers},
 };
 use crate::{
     job::Job,
     run::Solve,
-    store::{Ending, LastWords, Result, Store},
+    store::{Ending, FinalBatch, Result, Store},
 };
 
 /// Runs, cancels and announces jobs.
@@ -23,33 +23,33 @@ use crate::{
 pub struct Queue {
     pub(super) store: Arc<Store>,
     pub(super) solve: Solve,
-    /// One permit for each worker that has nothing to do.
+    /// One permit for each idle worker.
     pub(super) slots: Arc<Semaphore>,
     pub(super) workers: u16,
-    /// Something may be ready to be claimed.
+    /// Notified when a job may be ready to be claimed.
     pub(super) wake: Notify,
-    pub(super) live: Live,
-    /// Jobs in the hands of a worker of this process.
+    pub(super) watchers: Watchers,
+    /// Jobs that a worker of this process is solving.
     pub(super) running: Mutex<HashMap<i64, Running>>,
-    /// Read while a job is claimed and entered into `running`, written while one is asked to stop: a
-    /// cancel never falls between the two.
-    pub(super) gate: RwLock<()>,
+    /// Held for reading while a job is claimed and entered into `running`, for writing while one is asked to stop:
+    /// no cancel falls between the two.
+    pub(super) claiming: RwLock<()>,
+    /// Canceled when the service is about to stop.
     pub(super) stopping: CancellationToken,
 }
 
-/// How the queue stands.
+/// The state of the queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct State {
     /// No new job is started.
     pub paused: bool,
-    /// Jobs that wait for a worker, or for the end of another one of the same input.
+    /// Jobs that wait for a worker, or for the job that they are coalesced into.
     pub queued: usize,
-    /// Jobs in the hands of workers.
+    /// Jobs that workers are solving.
     pub running: usize,
     /// How many workers there are.
     pub workers: u16,
-    /// How many of them have nothing to do. A worker whose job was ended over its solver's head is not
-    /// free before the solver is.
+    /// How many of them are idle. A worker whose job was ended by force stays busy until its solver returns.
     pub idle: usize,
 }
 
@@ -62,29 +62,29 @@ impl Queue {
             slots: Arc::new(Semaphore::new(0)),
             workers,
             wake: Notify::new(),
-            live: Live::default(),
+            watchers: Watchers::default(),
             running: Mutex::default(),
-            gate: RwLock::default(),
+            claiming: RwLock::default(),
             stopping: CancellationToken::new(),
         })
     }
 
-    /// Listens to a job. Subscribe before reading its rows.
+    /// Subscribes to the changes of a job; to be called before its rows are read.
     pub fn subscribe(&self, key: i64) -> Subscription<'_> {
-        self.live.subscribe(key)
+        self.watchers.subscribe(key)
     }
 
-    /// Says that something new about these jobs is on the disk.
+    /// Tells those who watch these jobs that there is something new to read.
     pub fn announce(&self, jobs: &[i64]) {
-        jobs.iter().for_each(|key| self.live.announce(*key));
+        jobs.iter().for_each(|key| self.watchers.announce(*key));
     }
 
-    /// Ends when the service is about to stop; streams end with it.
+    /// Canceled when the service is about to stop; streams end then.
     pub fn stopping(&self) -> &CancellationToken {
         &self.stopping
     }
 
-    /// How the queue stands.
+    /// The state of the queue.
     pub fn state(&self) -> State {
         State {
             paused: self.store.is_paused(),
@@ -95,23 +95,28 @@ impl Queue {
         }
     }
 
-    /// Lets no job start until the queue is resumed, also after a restart; those that run go on.
+    /// Starts no more jobs until the queue is resumed, also across restarts; those that run go on.
     pub async fn pause(&self) -> Result<()> {
-        let _gate = self.gate.write().await; // whoever is claiming has done so
+        let _guard = self.claiming.write().await; // no claim is under way
         self.store.set_paused(true).await
     }
 
-    /// Lets jobs start again.
+    /// Starts jobs again.
     pub async fn resume(&self) -> Result<()> {
-        let _gate = self.gate.write().await; // no pause at the same time
+        let _guard = self.claiming.write().await; // no pause is under way
         self.store.set_paused(false).await?;
         self.wake.notify_one();
         Ok(())
     }
 
-    /// Ends a start of a job without its solver; false if it was no longer current.
-    pub(super) async fn end(&self, key: i64, attempt: i32, ending: &Ending) -> Result<bool> {
-        let last = LastWords::default();
+    /// Ends an attempt without waiting for its solver; false if it was no longer the current one.
+    pub(super) async fn end_attempt(
+        &self,
+        key: i64,
+        attempt: i32,
+        ending: &Ending,
+    ) -> Result<bool> {
+        let last = FinalBatch::default();
         let changed = self.store.finish(key, attempt, ending, last, None).await?;
         if let Some(changed) = &changed {
             self.announce(changed);
@@ -120,10 +125,12 @@ impl Queue {
         Ok(changed.is_some())
     }
 
+    /// Its worker has finished with the job.
     pub(super) fn release(&self, job: &Job) {
         self.running().remove(&job.key);
     }
 
+    /// Jobs that a worker of this process is solving, by key.
     pub(super) fn running(&self) -> MutexGuard<'_, HashMap<i64, Running>> {
         // No code panics while it holds this lock; if one did, the map would still be whole.
         self.running.lock().unwrap_or_else(PoisonError::into_inner)

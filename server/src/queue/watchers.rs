@@ -1,4 +1,4 @@
-//! How watchers learn that there is something new to read. They are not told what: they read the store.
+//! How those who watch a job learn that there is something new. They are not told what: they read the store.
 
 use std::{
     collections::HashMap,
@@ -9,18 +9,19 @@ use tokio::sync::watch;
 
 /// The jobs that somebody watches.
 #[derive(Debug, Default)]
-pub(super) struct Live {
+pub(super) struct Watchers {
     watched: Mutex<HashMap<i64, watch::Sender<()>>>,
 }
 
-impl Live {
-    /// Says that something new about a job is on the disk.
+impl Watchers {
+    /// Tells those who watch a job that there is something new in the store.
     pub(super) fn announce(&self, key: i64) {
         if let Some(sender) = self.watched().get(&key) {
             sender.send_replace(());
         }
     }
 
+    /// Subscribes to the announcements about a job.
     pub(super) fn subscribe(&self, key: i64) -> Subscription<'_> {
         let receiver = self
             .watched()
@@ -28,7 +29,7 @@ impl Live {
             .or_insert_with(|| watch::channel(()).0)
             .subscribe();
         Subscription {
-            live: self,
+            watchers: self,
             key,
             receiver,
         }
@@ -39,10 +40,10 @@ impl Live {
     }
 }
 
-/// One watcher's ear.
+/// A subscription to the announcements about one job.
 #[derive(Debug)]
 pub struct Subscription<'a> {
-    live: &'a Live,
+    watchers: &'a Watchers,
     key: i64,
     receiver: watch::Receiver<()>,
 }
@@ -50,15 +51,15 @@ pub struct Subscription<'a> {
 impl Subscription<'_> {
     /// Returns when something was announced since the subscription or the last call.
     pub async fn news(&mut self) {
-        // An error means that the sender is gone; it lives as long as we listen.
+        // an error would mean that the sender is gone, but it lives as long as this subscription
         let _ = self.receiver.changed().await;
     }
 }
 
 impl Drop for Subscription<'_> {
     fn drop(&mut self) {
-        let mut watched = self.live.watched();
-        // Under the lock nobody subscribes in between: the one receiver left is our own.
+        let mut watched = self.watchers.watched();
+        // nobody subscribes meanwhile, under the lock: the one receiver left is this one
         if watched
             .get(&self.key)
             .is_some_and(|sender| sender.receiver_count() <= 1)
@@ -74,19 +75,19 @@ mod tests {
 
     #[tokio::test]
     async fn an_announcement_between_subscribing_and_listening_is_heard() {
-        let live = Live::default();
-        let mut subscription = live.subscribe(7);
-        live.announce(7);
+        let watchers = Watchers::default();
+        let mut subscription = watchers.subscribe(7);
+        watchers.announce(7);
         subscription.news().await;
     }
 
     #[test]
     fn nothing_is_kept_for_a_job_that_nobody_watches() {
-        let live = Live::default();
-        let (one, two) = (live.subscribe(7), live.subscribe(7));
+        let watchers = Watchers::default();
+        let (one, two) = (watchers.subscribe(7), watchers.subscribe(7));
         drop(one);
-        assert_eq!(live.watched().len(), 1);
+        assert_eq!(watchers.watched().len(), 1);
         drop(two);
-        assert!(live.watched().is_empty());
+        assert!(watchers.watched().is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! A worker: has a claimed job solved, and ends it.
+//! A worker: solves a claimed job, and ends it.
 
 use std::{any::Any, ops::ControlFlow, sync::Arc, time::Duration, time::Instant};
 
@@ -13,41 +13,41 @@ use tracing::{error, info, warn};
 use uuid::Uuid;
 
 use super::{
-    backoff::Pauses,
-    recorder::{self, Line},
-    running::{Running, Why},
+    backoff::Backoff,
+    recorder::{self, Report},
+    running::{Running, StopReason},
     state::Queue,
 };
 use crate::{
     event::Payload,
     job::{Failure, Job, Reason, ResultAvailable, Status},
     run::{self, Document, Said, SoFar, Solve},
-    store::{Claim, Ending, LastWords, Parts, Store},
+    store::{Claim, Ending, FinalBatch, Parts, Store},
     time::Time,
 };
 
-/// Lines that a solver may be ahead of its recorder; then it waits.
-const AHEAD: usize = 256;
+/// Most reports of a solver that are not recorded yet; then it waits.
+const MOST_UNRECORDED: usize = 256;
 
-/// A solver whose job has run out of time gets this long to leave its last state; `Limits` says so.
-const LAST_STATE: Duration = Duration::from_secs(2);
+/// How long the solver of a job that has reached its time limit may take to return its last state (see `Limits`).
+const TIMEOUT_GRACE: Duration = Duration::from_secs(2);
 
-/// One start of a job, from claim to end.
-pub(super) async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) {
+/// One attempt to solve a job, from claim to end.
+pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Running) {
     let Claim {
         job, problem, mesh, ..
     } = claim;
     info!(job.id = %job.id, job.attempt, "job {} started", job.id);
-    let (say, lines) = mpsc::channel(AHEAD);
+    let (sender, reports) = mpsc::channel(MOST_UNRECORDED);
     let stop = running.stop.clone();
     let solve = queue.solve;
     let store = queue.store.clone();
     let solving = tokio::task::spawn_blocking(move || {
         let mesh = mesh.map(|hash| stored_mesh(&store, &hash)).transpose()?;
-        solve_aloud(&problem, mesh, solve, |line| {
-            // An error means that the recorder is gone, and with it everybody who would listen.
-            let heard = line.is_none_or(|line| say.blocking_send(line).is_ok());
-            if heard && stop.get().is_none() {
+        solve_and_report(&problem, mesh, solve, |report| {
+            // an error means that the recorder has ended: there is nobody to solve for
+            let recording = report.is_none_or(|report| sender.blocking_send(report).is_ok());
+            if recording && stop.get().is_none() {
                 ControlFlow::Continue(())
             } else {
                 ControlFlow::Break(())
@@ -55,27 +55,31 @@ pub(super) async fn attempt(queue: &Arc<Queue>, claim: Claim, running: Running) 
         })
         .map_err(Unsolved::Solve)
     });
-    let clock = tokio::spawn(time_out(queue.clone(), job.clone(), running.clone()));
-    let last = recorder::record(queue, &job, &running, lines).await;
+    let timer = tokio::spawn(time_out(queue.clone(), job.clone(), running.clone()));
+    let last = recorder::record(queue, &job, &running, reports).await;
     let solved = solving.await;
-    clock.abort();
-    let (ending, parts) = judge(&job, solved, running.stop.get() == Some(&Why::OutOfTime));
-    // at a drain it is put back, by that or by the next start, and not canceled
+    timer.abort();
+    let (ending, parts) = ending_of_attempt(
+        &job,
+        solved,
+        running.stop.get() == Some(&StopReason::OutOfTime),
+    );
+    // when the service stops, it is requeued then or at the next start, and not canceled
     if !(ending.status == Status::Canceled && queue.stopping.is_cancelled()) {
-        end(queue, &job, ending, last, parts).await;
+        end_with_retries(queue, &job, ending, last, parts).await;
     }
     queue.release(&job);
 }
 
-/// Stops a job that runs longer than it may, if need be over its solver's head.
+/// Stops a job at its time limit, and ends it by force if its solver does not stop.
 async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
     tokio::time::sleep(Duration::from_secs_f64(job.limits.timeout_s)).await;
-    running.stop(Why::OutOfTime);
-    tokio::time::sleep(LAST_STATE).await;
-    // in a task of its own: a solver that returns now stops this clock, but not a commit under way
+    running.stop(StopReason::OutOfTime);
+    tokio::time::sleep(TIMEOUT_GRACE).await;
+    // in a task of its own: a solver that returns now stops this timer, but not a commit that has begun
     tokio::spawn(async move {
         let ending = timed_out(&job);
-        if let Err(cause) = queue.end(job.key, running.attempt, &ending).await {
+        if let Err(cause) = queue.end_attempt(job.key, running.attempt, &ending).await {
             error!(job.id = %job.id, %cause, "job {} could not be ended: {cause}", job.id);
         }
     });
@@ -92,11 +96,11 @@ fn timed_out(job: &Job) -> Ending {
 /// Why there is no solution.
 enum Unsolved {
     Solve(SolveError),
-    /// The mesh that was there when the job was accepted cannot be had.
+    /// The mesh, which was there when the job was accepted, cannot be read.
     Mesh(String),
 }
 
-/// A mesh from the store. On a blocking thread.
+/// Reads a mesh from the store. On a blocking thread.
 fn stored_mesh(store: &Store, hash: &str) -> Result<Mesh, Unsolved> {
     let failed = |cause: &dyn std::fmt::Display| Unsolved::Mesh(format!("mesh {hash}: {cause}"));
     let body = tokio::runtime::Handle::current().block_on(store.mesh_body(hash));
@@ -105,13 +109,13 @@ fn stored_mesh(store: &Store, hash: &str) -> Result<Mesh, Unsolved> {
     postcard::from_bytes(&body).map_err(|error| failed(&error))
 }
 
-/// Reads the problem and solves it, telling everything on the way, or nothing where it only asks
-/// whether to go on. On a blocking thread.
-fn solve_aloud(
+/// Reads the problem and solves it. `report` is called with everything that is to be recorded, and with nothing where
+/// the solver only asks whether to go on. On a blocking thread.
+fn solve_and_report(
     problem: &str,
     mesh: Option<Mesh>,
     solve: Solve,
-    mut say: impl FnMut(Option<Line>) -> ControlFlow<()>,
+    mut report: impl FnMut(Option<Report>) -> ControlFlow<()>,
 ) -> Result<Solved, SolveError> {
     let start = Instant::now();
     let problem: Problem = files::parse(problem).map_err(SolveError::Invalid)?;
@@ -121,13 +125,13 @@ fn solve_aloud(
         && problem.steps.iter().all(single)
         && matches!(problem.mesh.refine, Refine::Times(_))
     {
-        // whether anybody listens is seen at the next word
-        let _ = say(Some(Line::OneLevel));
+        // whether to stop is asked again at the next report
+        let _ = report(Some(Report::OneLevel));
     }
-    let event = |payload| Some(Line::Event(Time::now(), payload));
+    let event = |payload| Some(Report::Event(Time::now(), payload));
     let mut partials = Partials::default();
     let document = run::run(&problem, mesh, parse_s, solve, &mut |said| {
-        say(match said {
+        report(match said {
             Said::Step(so_far) => partials.next(&so_far),
             Said::Progress(progress) => match progress {
                 Progress::Phase(stage) => event(Payload::Stage { stage }),
@@ -139,37 +143,37 @@ fn solve_aloud(
     })?;
     let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite { phase: "recover" })?;
     Ok(Solved {
-        ending: ending_of(&document),
+        ending: ending_of_solution(&document),
         iterations: document.history.len(),
         parts,
     })
 }
 
-/// What finished load steps have found, from time to time: each time all of it is written, and a problem may
-/// have a thousand steps. Where it has grown large the last that was written stays until the end.
+/// Decides when the results of finished load steps are stored as a partial result: not after each, since all of it is
+/// written each time and a problem may have a thousand steps; and no longer once it has grown large.
 #[derive(Default)]
 struct Partials {
-    /// Not before this moment.
+    /// Not before this time.
     next: Option<Instant>,
 }
 
 impl Partials {
-    /// What there is, if it is time for it.
-    fn next(&mut self, so_far: &SoFar<'_>) -> Option<Line> {
-        /// They are written at once, and hold the single writer for so long: some 40 ms.
+    /// The partial result, if it is time to store it.
+    fn next(&mut self, so_far: &SoFar<'_>) -> Option<Report> {
+        /// It is written in one transaction, which holds up the single writer for some 40 ms.
         const MOST_BYTES: usize = 4 << 20;
-        /// A tenth of the time, and at most once a second.
+        /// It takes at most a tenth of the time, and happens at most once a second.
         const SHARE: u32 = 10;
         const PAUSE: Duration = Duration::from_secs(1);
         let start = Instant::now();
         if self.next.is_some_and(|next| start < next) {
             return None;
         }
-        // what is not finite, or has no JSON, is told at the end
+        // numbers that are not finite, and so have no JSON, are reported at the end
         let parts = Parts::of(&so_far.document().ok()?).ok();
         self.next = Some(start + (start.elapsed() * SHARE).max(PAUSE));
         let parts = parts.filter(|parts| parts.bytes() <= MOST_BYTES)?;
-        Some(Line::Partial(Box::new(parts)))
+        Some(Report::Partial(Box::new(parts)))
     }
 }
 
@@ -181,7 +185,7 @@ struct Solved {
 }
 
 /// What the outcome of a solution means for its job.
-fn ending_of(document: &Document) -> Ending {
+fn ending_of_solution(document: &Document) -> Ending {
     let (summary, partial) = (&document.summary.solution, ResultAvailable::Partial);
     let residuals = &summary.residuals;
     let failed = |reason, found: String| {
@@ -223,8 +227,8 @@ fn ending_of(document: &Document) -> Ending {
     }
 }
 
-/// What a solver's answer, or its panic, means for the job.
-fn judge(
+/// How the job ends, by what its solver has returned, or its panic.
+fn ending_of_attempt(
     job: &Job,
     solved: Result<Result<Solved, Unsolved>, JoinError>,
     out_of_time: bool,
@@ -242,7 +246,7 @@ fn judge(
             parts,
         })) => {
             let ending = match ending.status {
-                // it stopped because it was asked to, and says no more than that
+                // the solver was asked to stop, and does not know why
                 Status::Canceled if out_of_time => Ending {
                     result: ending.result,
                     ..timed_out(job)
@@ -260,7 +264,7 @@ fn judge(
         }
         Ok(Err(error @ SolveError::NonFinite { .. })) => failed(Reason::NonFinite, &error),
         Ok(Err(error @ SolveError::ResourceExhausted)) => failed(Reason::ResourceExhausted, &error),
-        // It was checked before it was accepted: ours to explain, not the client's.
+        // it was checked before it was accepted: an error of the service, not of the client
         Ok(Err(error @ SolveError::Invalid(_))) => (internal(job, &error), None),
         Err(panic) => (internal(job, &panicked(panic)), None),
     }
@@ -270,7 +274,7 @@ fn failed(reason: Reason, error: &SolveError) -> (Ending, Option<Parts>) {
     (Ending::failed(reason, error.to_string()), None)
 }
 
-/// Logs the cause under an incident number, which is all that the client is told.
+/// Logs the cause under an incident number, and tells the client only that number.
 fn internal(job: &Job, cause: &dyn std::fmt::Display) -> Ending {
     let incident = Uuid::now_v7();
     error!(job.id = %job.id, %incident, %cause, "job {} failed, incident {incident}: {cause}", job.id);
@@ -295,13 +299,19 @@ fn panicked(error: JoinError) -> String {
     format!("the solver panicked: {}", text(&*panic).unwrap_or_default())
 }
 
-/// Stores the result, then the end. What fails is tried again for as long as it takes, since a job must not
-/// stay running: a full disk may pass. When the service stops, its next start puts the job back.
-async fn end(queue: &Queue, job: &Job, ending: Ending, last: LastWords, parts: Option<Parts>) {
-    let mut pauses = Pauses::default();
+/// Stores the result, then the end. This is retried for as long as it takes, since the disk may be full for a while
+/// and a job must not stay running. If the service stops meanwhile, its next start requeues the job.
+async fn end_with_retries(
+    queue: &Queue,
+    job: &Job,
+    ending: Ending,
+    last: FinalBatch,
+    parts: Option<Parts>,
+) {
+    let mut backoff = Backoff::default();
     while let Err(cause) = try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
         warn!(job.id = %job.id, %cause, "job {} could not be ended yet: {cause}", job.id);
-        if !pauses.next(&queue.stopping).await {
+        if !backoff.wait(&queue.stopping).await {
             return;
         }
     }
@@ -311,12 +321,12 @@ async fn try_to_end(
     queue: &Queue,
     job: &Job,
     ending: &Ending,
-    last: &LastWords,
+    last: &FinalBatch,
     parts: Option<&Parts>,
 ) -> crate::store::Result<()> {
     let (key, attempt) = (job.key, job.attempt);
     let current = match parts {
-        Some(parts) => queue.store.write_ahead(key, attempt, parts).await?,
+        Some(parts) => queue.store.write_before_end(key, attempt, parts).await?,
         None => true,
     };
     if !current {

@@ -1,34 +1,35 @@
-//! One transaction of the single writer, and what follows from it once it is on the disk: moves in the
-//! line of waiting jobs, and events that watchers may be told of.
+//! One transaction of the single writer, and what follows once it is committed: changes to the jobs that wait, as
+//! they are kept in memory, and jobs whose watchers are to be told.
 
 use sqlx::{Sqlite, SqliteConnection, Transaction};
 use tokio::sync::MutexGuard;
 
-use super::{database::Store, error::Result, line::Move};
+use super::{database::Store, error::Result, waiting::Move};
 
 /// An open transaction.
 pub(super) struct Change<'a> {
     store: &'a Store,
     tx: Transaction<'static, Sqlite>,
     moves: Vec<Move>,
-    /// Jobs that watchers may look at again.
+    /// Jobs that have changed, for those who watch them.
     changed: Vec<i64>,
-    /// Until the line has moved nobody else begins: moves are made in the order of their commits.
-    _turn: MutexGuard<'a, ()>,
+    /// Nobody else begins before the moves of this one are applied: they are applied in the order of commits.
+    _lock: MutexGuard<'a, ()>,
 }
 
-/// How far a transaction had come, to go back to.
+/// A point in a transaction to which it can be rolled back.
 #[derive(Clone, Copy)]
-pub(super) struct Mark {
+pub(super) struct Savepoint {
     moves: usize,
     changed: usize,
 }
 
 impl Store {
+    /// Begins a transaction that may change jobs that wait.
     pub(super) async fn change(&self) -> Result<Change<'_>> {
-        let turn = self.turn.lock().await;
+        let lock = self.change_lock.lock().await;
         Ok(Change {
-            _turn: turn,
+            _lock: lock,
             store: self,
             tx: self.begin().await?,
             moves: vec![],
@@ -38,69 +39,80 @@ impl Store {
 }
 
 impl Change<'_> {
+    /// The connection, for statements.
     pub(super) fn sql(&mut self) -> &mut SqliteConnection {
         &mut self.tx
     }
 
-    pub(super) fn moves(&mut self, step: Move) {
-        self.moves.push(step);
+    /// Changes the jobs that wait, as soon as this is committed.
+    pub(super) fn move_job(&mut self, change: Move) {
+        self.moves.push(change);
     }
 
+    /// This job has changed.
     pub(super) fn changed(&mut self, key: i64) {
         self.changed.push(key);
     }
 
-    /// Jobs that this part has changed.
-    pub(super) fn changed_since(&self, mark: Mark) -> Vec<i64> {
+    /// Jobs that have changed since a savepoint.
+    pub(super) fn changed_since(&self, savepoint: Savepoint) -> Vec<i64> {
         self.changed
-            .get(mark.changed..)
+            .get(savepoint.changed..)
             .unwrap_or_default()
             .to_vec()
     }
 
-    /// Jobs that wait, those of this transaction among them.
+    /// How many jobs wait, with what this transaction changes.
     pub(super) fn waiting(&self) -> usize {
-        let entered = |step: &Move| match step {
-            Move::Enter { .. } | Move::Join => 1,
-            Move::Leave { .. } | Move::Part => -1,
+        let difference = |change: &Move| match change {
+            Move::Enter { .. } | Move::Attach => 1,
+            Move::Leave { .. } | Move::Detach => -1,
         };
-        let change: isize = self.moves.iter().map(entered).sum();
+        let change: isize = self.moves.iter().map(difference).sum();
         self.store
-            .line()
+            .waiting_jobs()
             .len()
             .checked_add_signed(change)
             .unwrap_or(0)
     }
 
-    /// Begins a part that can be undone alone.
-    pub(super) async fn mark(&mut self) -> Result<Mark> {
-        sqlx::query("savepoint part").execute(self.sql()).await?;
-        Ok(Mark {
+    /// Marks a point to roll back to. There is one at a time: it is released, or rolled back to, before the next.
+    pub(super) async fn savepoint(&mut self) -> Result<Savepoint> {
+        sqlx::query("savepoint submission")
+            .execute(self.sql())
+            .await?;
+        Ok(Savepoint {
             moves: self.moves.len(),
             changed: self.changed.len(),
         })
     }
 
-    /// Keeps the part that began last.
-    pub(super) async fn keep(&mut self) -> Result<()> {
-        sqlx::query("release part").execute(self.sql()).await?;
+    /// Keeps what was done since the savepoint.
+    pub(super) async fn release(&mut self) -> Result<()> {
+        sqlx::query("release submission")
+            .execute(self.sql())
+            .await?;
         Ok(())
     }
 
-    /// Undoes the part that began at this mark.
-    pub(super) async fn undo(&mut self, mark: Mark) -> Result<()> {
-        sqlx::query("rollback to part").execute(self.sql()).await?;
-        self.keep().await?;
-        self.moves.truncate(mark.moves);
-        self.changed.truncate(mark.changed);
+    /// Undoes what was done since this savepoint.
+    pub(super) async fn roll_back_to(&mut self, savepoint: Savepoint) -> Result<()> {
+        sqlx::query("rollback to submission")
+            .execute(self.sql())
+            .await?;
+        self.release().await?;
+        self.moves.truncate(savepoint.moves);
+        self.changed.truncate(savepoint.changed);
         Ok(())
     }
 
-    /// On the disk when this returns. Only then the line moves. Gives the jobs that have changed.
+    /// On the disk when this returns, and only then applied to the jobs in memory. Gives the jobs that have changed.
     pub(super) async fn commit(self) -> Result<Vec<i64>> {
         self.tx.commit().await?;
-        let mut line = self.store.line();
-        self.moves.into_iter().for_each(|step| line.make(step));
+        let mut waiting = self.store.waiting_jobs();
+        self.moves
+            .into_iter()
+            .for_each(|change| waiting.apply(change));
         Ok(self.changed)
     }
 }

@@ -1,13 +1,14 @@
-//! The next job of the queue, given to a worker.
+//! The next job of the queue, claimed for a worker.
 
 use super::{
-    change::Change, database::Store, error::Result, life, rows::read, submission::Claim, twins,
+    change::Change, coalescing, database::Store, error::Result, lifecycle, rows::read,
+    submission::Claim,
 };
 use crate::job::Cache;
 
 impl Store {
-    /// The next job of the queue, now running; highest priority first, then in order of arrival.
-    /// Jobs before it that a result has come for are answered; all that have changed come with it.
+    /// Starts an attempt of the next job of the queue: highest priority first, then in order of arrival. Jobs
+    /// before it for which there is a result by now are answered. Gives all jobs that have changed, too.
     pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
         let mut change = self.change().await?;
         let claim = claim(&mut change).await?;
@@ -16,32 +17,35 @@ impl Store {
     }
 }
 
-/// The next job of the queue. The index is named because the planner, which knows nothing of how many jobs
-/// there are, would rather sort all that wait.
+/// The next job of the queue. The index is named because the planner, which does not know how many jobs there are,
+/// would rather sort all that wait.
 pub(super) const NEXT: &str = "select id from job indexed by job_queue
-     where status = 'queued' and twin_of is null order by priority desc, id limit 1";
+     where status = 'queued' and coalesced_into is null order by priority desc, id limit 1";
 
+/// Claims within a transaction.
 pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
-    /// A transaction that answers more than these is too long.
-    const ANSWERED: usize = 100;
-    for _ in 0..ANSWERED {
+    /// More jobs than these would make one transaction too long.
+    const MOST_ANSWERED: usize = 100;
+    for _ in 0..MOST_ANSWERED {
         let key: Option<i64> = sqlx::query_scalar(NEXT)
             .fetch_optional(change.sql())
             .await?;
         let Some(key) = key else { return Ok(None) };
         let waiting = read(change.sql(), key).await?;
-        // a result may have come since it was accepted
+        // there may be a result by now
         if waiting.cache == Cache::Use
-            && let Some(source) = twins::earlier(change, &waiting.input_hash).await?
+            && let Some(source) = coalescing::earlier_result(change, &waiting.input_hash).await?
         {
-            twins::answer(change, &waiting, &source).await?;
-            twins::settle(change, &waiting).await?;
+            coalescing::answer(change, &waiting, &source).await?;
+            coalescing::end_coalesced(change, &waiting).await?;
             continue;
         }
-        if waiting.cache == Cache::Use && twins::join_running(change, &waiting).await? {
+        if waiting.cache == Cache::Use
+            && coalescing::coalesce_into_running(change, &waiting).await?
+        {
             continue;
         }
-        let job = life::start(change, &waiting).await?;
+        let job = lifecycle::start_attempt(change, &waiting).await?;
         let (problem, mesh) = sqlx::query_as("select body, mesh from problem where input_hash = ?")
             .bind(&job.input_hash)
             .fetch_one(change.sql())

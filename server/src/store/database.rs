@@ -1,4 +1,4 @@
-//! The one SQLite file, and who may use it how.
+//! The one SQLite file: its connections, and what is kept in memory beside it.
 
 use std::{
     fs::{File, OpenOptions, TryLockError},
@@ -15,11 +15,11 @@ use tokio::sync::mpsc;
 
 use super::{
     error::{Result, StoreError},
-    line::Line,
-    submission::{Asking, Door},
+    submission::{Inbox, Pending},
+    waiting::WaitingJobs,
 };
 
-/// So long a list waits for its turn.
+/// How long a list waits for a connection.
 const LIST_PATIENCE: Duration = Duration::from_secs(5);
 
 /// The database of one server.
@@ -27,24 +27,24 @@ const LIST_PATIENCE: Duration = Duration::from_secs(5);
 pub struct Store {
     pub(super) writer: SqlitePool,
     pub(super) reader: SqlitePool,
-    /// Lists and counts, which may be slow, keep nobody else from reading.
+    /// For lists and counts, which may be slow, so that they keep nobody else from reading.
     pub(super) lists: SqlitePool,
-    /// Jobs that wait, in order; true to the disk after every commit.
-    pub(super) line: Mutex<Line>,
-    /// True to the disk too.
+    /// The jobs that wait; what the disk says, after every commit.
+    pub(super) waiting: Mutex<WaitingJobs>,
+    /// Whether the queue is paused; likewise.
     pub(super) paused: AtomicBool,
-    /// One transaction at a time moves the line.
-    pub(super) turn: tokio::sync::Mutex<()>,
+    /// One transaction at a time changes the jobs that wait.
+    pub(super) change_lock: tokio::sync::Mutex<()>,
     /// Where submissions wait for the next commit.
-    pub(super) door: Door,
-    /// Held as long as we live: a second server on the same folder would run our jobs again.
+    pub(super) inbox: Inbox,
+    /// Held as long as the store is open: a second server on the same folder would run the same jobs.
     _lock: File,
 }
 
 impl Store {
-    /// Connects to the store in `folder`, made if need be, and brings its tables up to date; with what comes in to
-    /// be committed. The line is still empty, and what was set is not yet read.
-    pub(super) async fn connect(folder: &Path) -> Result<(Store, mpsc::Receiver<Asking>)> {
+    /// Connects to the database in `folder`, created if need be, and brings its tables up to date. With the store
+    /// come the submissions made to it. What is kept in memory is not read yet.
+    pub(super) async fn connect(folder: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
         let lock = lock(folder)?;
         let options = SqliteConnectOptions::new()
             .filename(folder.join("signorini.db"))
@@ -56,7 +56,7 @@ impl Store {
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full);
         // A full disk makes SQLite end a transaction by itself, which leaves the driver's count of open ones
-        // wrong for ever: such a connection is given up for a new one.
+        // wrong for ever: such a connection is replaced by a new one.
         let writer = pool(1)
             .before_acquire(|connection, _| {
                 let whole = !connection.is_in_transaction();
@@ -71,26 +71,27 @@ impl Store {
             .acquire_timeout(LIST_PATIENCE)
             .connect_with(reading)
             .await?;
-        let (door, submissions) = Door::new();
+        let (inbox, submissions) = Inbox::new();
         let store = Store {
             writer,
             reader,
             lists,
-            line: Mutex::default(),
+            waiting: Mutex::default(),
             paused: AtomicBool::default(),
-            turn: tokio::sync::Mutex::default(),
-            door,
+            change_lock: tokio::sync::Mutex::default(),
+            inbox,
             _lock: lock,
         };
         Ok((store, submissions))
     }
 
-    pub(super) fn line(&self) -> MutexGuard<'_, Line> {
-        // No code panics while it holds this lock; if one did, the line would still be whole.
-        self.line.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The jobs that wait.
+    pub(super) fn waiting_jobs(&self) -> MutexGuard<'_, WaitingJobs> {
+        // No code panics while it holds this lock; if one did, the list would still be whole.
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Ends every connection, and with the last one the write-ahead log.
+    /// Closes every connection, and with the last one the write-ahead log.
     pub async fn close(&self) {
         self.lists.close().await;
         self.reader.close().await;
@@ -103,6 +104,7 @@ impl Store {
         Ok(())
     }
 
+    /// Begins a transaction of the single writer.
     pub(super) async fn begin(&self) -> Result<Transaction<'static, Sqlite>> {
         Ok(self.writer.begin_with("begin immediate").await?)
     }

@@ -1,26 +1,26 @@
-//! Deleting jobs, and remembering for a while that they were there.
+//! Deleting jobs; their ids are remembered for a while.
 
 use sqlx::SqliteConnection;
 
 use super::{database::Store, error::Result, results, rows::find};
 use crate::{caller::Owners, job::JobId, time::Time};
 
-/// A deleted job's name answers *gone* for so long, then *unknown*.
+/// How long the id of a deleted job is answered with *deleted*; then it is unknown.
 const REMEMBERED_S: f64 = 7.0 * 86_400.0;
 
 /// What deleting a job did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deletion {
-    /// It is gone.
+    /// It was deleted.
     Deleted,
-    /// It waits or runs.
+    /// It waits or runs, and was not deleted.
     Active,
-    /// There is none of that number, or no more.
+    /// There is no such job.
     Unknown,
 }
 
 impl Store {
-    /// Deletes a terminal job with its events, and its result unless another job serves it.
+    /// Deletes a job that has ended, with its events, and with its result unless other jobs were answered with it.
     pub async fn delete(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
         let mut change = self.change().await?;
         let job = find(change.sql(), key).await?;
@@ -52,7 +52,7 @@ impl Store {
         .execute(&mut *tx)
         .await?;
         for result in [key, job.result_key] {
-            if !is_served(tx, result).await? {
+            if !is_in_use(tx, result).await? {
                 results::remove(tx, result).await?;
             }
         }
@@ -60,14 +60,14 @@ impl Store {
         Ok(Deletion::Deleted)
     }
 
-    /// Whether a job of that public id was deleted not long ago.
+    /// Whether a job of these owners with this public id was deleted not long ago.
     pub async fn was_deleted(&self, owners: Owners<'_>, id: JobId) -> Result<bool> {
         let mut connection = self.reader.acquire().await?;
         let owner = owner_of_deleted(&mut connection, id).await?;
         Ok(owner.is_some_and(|owner| owners.include(&owner)))
     }
 
-    /// Forgets names of jobs that were deleted long ago.
+    /// Forgets the ids of jobs that were deleted long ago.
     pub async fn forget_deleted(&self, now: Time) -> Result<()> {
         let before = now.after_s(-REMEMBERED_S).micros();
         let some: bool =
@@ -87,7 +87,7 @@ impl Store {
     }
 }
 
-/// Whose a job was that was deleted not long ago; none if there was no such job.
+/// The owner of a job that was deleted not long ago; none if there was no such job.
 pub(super) async fn owner_of_deleted(
     connection: &mut SqliteConnection,
     id: JobId,
@@ -100,7 +100,7 @@ pub(super) async fn owner_of_deleted(
     )
 }
 
-/// The public id of a deleted job by its number.
+/// The public id of a deleted job, by its key.
 pub(super) async fn deleted_id(
     connection: &mut SqliteConnection,
     key: i64,
@@ -112,8 +112,8 @@ pub(super) async fn deleted_id(
     Ok(uuid.and_then(|text| text.parse().ok()).map(JobId))
 }
 
-/// Whether a job serves the result of this number: its own, or another's.
-async fn is_served(tx: &mut SqliteConnection, result: i64) -> Result<bool> {
+/// Whether a job has the result under this key: its own, or as an answer.
+async fn is_in_use(tx: &mut SqliteConnection, result: i64) -> Result<bool> {
     Ok(sqlx::query_scalar(
         "select exists (select 1 from job where id = ?1) or exists (select 1 from job where result_job = ?1)",
     )

@@ -1,21 +1,21 @@
-//! Changing what may be changed of a job: its names, its priority, how long it is kept.
+//! Editing a job: its name and labels, its priority, whether it is pinned.
 
 use std::collections::BTreeMap;
 
 use super::{
+    coalescing,
     database::Store,
     error::Result,
     labels,
-    line::Move,
-    rows::{named, read},
-    twins,
+    rows::{read, with_id},
+    waiting::Move,
 };
 use crate::{
     caller::Owners,
     job::{Job, JobId},
 };
 
-/// What is changed of a job; what is absent stays.
+/// What is changed of a job; what is absent stays as it is.
 #[derive(Clone, Debug, Default)]
 pub struct Edit {
     /// A name, or none.
@@ -29,8 +29,8 @@ pub struct Edit {
 }
 
 impl Store {
-    /// Changes what may be changed of a job, if it still is of that version. `Err` holds the version
-    /// that it is of instead; `None`: there is no such job.
+    /// Edits a job, if it still has that version. `Err` holds the version that it has instead; `None`: there is no
+    /// such job.
     pub async fn edit(
         &self,
         owners: Owners<'_>,
@@ -39,7 +39,7 @@ impl Store {
         version: Option<i64>,
     ) -> Result<Option<std::result::Result<Job, i64>>> {
         let mut change = self.change().await?;
-        let Some(job) = named(change.sql(), owners, id).await? else {
+        let Some(job) = with_id(change.sql(), owners, id).await? else {
             return Ok(None);
         };
         if version.is_some_and(|version| version != job.version) {
@@ -72,23 +72,20 @@ impl Store {
                     .await?;
                 labels::write(&mut change, key, job.created_at, labels).await?;
             }
-            if job.waits_in_line() && priority != job.priority {
-                let left = job.priority;
-                change.moves(Move::Leave {
-                    priority: left,
-                    key,
-                });
-                change.moves(Move::Enter { priority, key });
-                twins::overtake(&mut change, key, priority).await?;
+            if job.waits_for_a_worker() && priority != job.priority {
+                let old = job.priority;
+                change.move_job(Move::Leave { priority: old, key });
+                change.move_job(Move::Enter { priority, key });
+                coalescing::replace_if_outranked(&mut change, key, priority).await?;
             }
-            if let Some(source) = job.twin_of {
-                twins::leave_source(&mut change, &job, source, priority).await?;
+            if let Some(source) = job.coalesced_into {
+                coalescing::detach_if_ahead(&mut change, &job, source, priority).await?;
             }
         }
         let edited = read(change.sql(), key).await?;
         change.commit().await?;
         let mut edited = [edited];
-        self.try_to_place(&mut edited).await;
+        self.try_add_queue_positions(&mut edited).await;
         let [edited] = edited;
         Ok(Some(Ok(edited)))
     }

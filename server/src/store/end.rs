@@ -1,15 +1,15 @@
-//! The end of a job, whoever ends it: its worker, who cancels it, or the clock.
+//! The end of a job: by its worker, by a cancel, or because it has waited too long.
 
 use super::{
     change::Change,
+    coalescing,
     database::Store,
     error::Result,
-    events::{self, LastWords},
-    life::{self, Ending},
+    events::{self, FinalBatch},
+    lifecycle::{self, Ending},
     parts::Parts,
     results,
     rows::{find, is_current, read},
-    twins,
 };
 use crate::{
     job::{Job, Reason, Status},
@@ -19,19 +19,19 @@ use crate::{
 /// What asking a job to stop did.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CancelOutcome {
-    /// Nobody ran it and it is canceled.
+    /// It was not running, and is canceled. With the jobs that have changed.
     Canceled(Vec<i64>),
-    /// This start of it is running and should stop.
+    /// This attempt is running and should stop.
     Requested {
-        /// The number of the start.
+        /// The number of the attempt.
         attempt: i32,
     },
-    /// It had ended.
+    /// It had ended before.
     AlreadyTerminal,
 }
 
 impl Store {
-    /// Notes that somebody wants the job to stop; a queued one is canceled at once.
+    /// Notes that a client wants the job to stop; a queued one is canceled at once.
     pub async fn request_cancel(&self, key: i64) -> Result<CancelOutcome> {
         let mut change = self.change().await?;
         let Some(job) = find(change.sql(), key).await? else {
@@ -60,37 +60,38 @@ impl Store {
         Ok(CancelOutcome::Requested { attempt })
     }
 
-    /// Ends this start of a job, with the last that it said and the rest of its result; `None` when the
-    /// start is no longer current, because the job was canceled or put back meanwhile.
+    /// Ends a running job, with its last events and the rest of its result. Gives the jobs that have changed;
+    /// `None` when this attempt is no longer the current one, because the job was canceled or requeued meanwhile.
     pub async fn finish(
         &self,
         key: i64,
         attempt: i32,
         ending: &Ending,
-        last: LastWords,
+        last: FinalBatch,
         result: Option<&Parts>,
     ) -> Result<Option<Vec<i64>>> {
         let mut change = self.change().await?;
         if !is_current(change.sql(), key, attempt).await? {
             return Ok(None);
         }
-        if !last.lines.is_empty() {
-            events::tell(change.sql(), key, attempt, &last.lines, &last.progress).await?;
+        if !last.events.is_empty() {
+            events::append_with_progress(change.sql(), key, attempt, &last.events, &last.progress)
+                .await?;
         }
         if let Some(parts) = result {
-            results::write_last(change.sql(), key, parts).await?;
+            results::write_at_end(change.sql(), key, parts).await?;
         }
         let job = read(change.sql(), key).await?;
         end(&mut change, &job, ending).await?;
         Ok(Some(change.commit().await?))
     }
 
-    /// Ends jobs that have waited longer than they may, some at a time. A job that another one, already
-    /// running, will answer does not wait for a start.
+    /// Ends jobs that have waited longer than they may, some at a time. A job coalesced into one that runs does
+    /// not wait for a worker, and is left alone.
     pub async fn expire_queued(&self, now: Time) -> Result<Vec<i64>> {
         const AT_ONCE: i64 = 100;
-        // nearly always there is none: readers do not hold up the writer to find that out
-        let some = sqlx::query(LATE)
+        // nearly always there is none, and a reader finds that out without holding up the writer
+        let some = sqlx::query(EXPIRED)
             .bind(now.micros())
             .bind(1)
             .fetch_optional(&self.reader)
@@ -99,13 +100,13 @@ impl Store {
             return Ok(vec![]);
         }
         let mut change = self.change().await?;
-        let late: Vec<i64> = sqlx::query_scalar(LATE)
+        let expired: Vec<i64> = sqlx::query_scalar(EXPIRED)
             .bind(now.micros())
             .bind(AT_ONCE)
             .fetch_all(change.sql())
             .await?;
-        for key in late {
-            // as it is now: it may have been a twin of one that has just ended
+        for key in expired {
+            // as it is now: it may have been coalesced into one that has just ended
             let job = read(change.sql(), key).await?;
             let detail = format!(
                 "it was not started within {} s; see limits.queue_ttl_s",
@@ -123,14 +124,14 @@ impl Store {
 }
 
 /// Jobs that have waited too long, at most so many.
-pub(super) const LATE: &str = "select id from job indexed by job_expiry
+pub(super) const EXPIRED: &str = "select id from job indexed by job_expiry
      where status = 'queued' and expires_at <= ?
-           and (twin_of is null or exists
-                (select 1 from job source where source.id = job.twin_of and source.status = 'queued'))
+           and (coalesced_into is null or exists
+                (select 1 from job primary_job where primary_job.id = job.coalesced_into and primary_job.status = 'queued'))
      order by expires_at limit ?";
 
-/// Ends a job with its one `done` event, and its twins with it.
+/// Ends a job, and decides what becomes of those coalesced into it.
 pub(super) async fn end(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
-    life::close(change, job, ending).await?;
-    twins::settle(change, job).await
+    lifecycle::end_job(change, job, ending).await?;
+    coalescing::end_coalesced(change, job).await
 }

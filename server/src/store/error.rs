@@ -16,8 +16,8 @@ pub enum StoreError {
     /// The key was used for another request.
     #[error("the key was used for another request")]
     KeyReuse,
-    /// The name belongs to another job.
-    #[error("{0} is another job")]
+    /// The id belongs to another job.
+    #[error("{0} is the id of another job")]
     IdConflict(JobId),
     /// The job was deleted.
     #[error("{0} was deleted")]
@@ -25,16 +25,16 @@ pub enum StoreError {
     /// The job's mesh is not there.
     #[error("the mesh is not stored")]
     UnknownMesh,
-    /// Too many lists are asked for at once.
+    /// Too many lists are requested at once.
     #[error("too many lists at once")]
     Busy,
     /// The disk is full.
     #[error("the disk is full")]
     Full,
-    /// A row that cannot be ours.
+    /// A row that this program cannot have written.
     #[error("the database holds something unexpected: {0}")]
     Corrupt(String),
-    /// The database says no.
+    /// The database refused.
     #[error("database: {0}")]
     Database(sqlx::Error),
     /// The tables cannot be brought up to date.
@@ -56,8 +56,8 @@ impl From<sqlx::Error> for StoreError {
 }
 
 impl StoreError {
-    /// The same for another one whose transaction it was too.
-    pub(super) fn again(&self) -> StoreError {
+    /// The same error for another submission of the same transaction.
+    pub(super) fn for_another(&self) -> StoreError {
         match self {
             StoreError::Full => StoreError::Full,
             StoreError::Busy => StoreError::Busy,
@@ -72,5 +72,5 @@ impl From<serde_json::Error> for StoreError {
     }
 }
 
-/// What the store answers.
+/// The result of a question to the store.
 pub type Result<T> = std::result::Result<T, StoreError>;

@@ -1,4 +1,4 @@
-//! The story of each job: appended to, and read from any point on.
+//! The events of each job: appended, and read from any point on.
 
 use sqlx::{Row, SqliteConnection};
 
@@ -13,18 +13,18 @@ use crate::{
     time::Time,
 };
 
-/// The last that a solver has said, with what it amounts to.
+/// The last events of an attempt, stored together with its end.
 #[derive(Clone, Debug, Default)]
-pub struct LastWords {
-    /// Events not yet written.
-    pub lines: Vec<(Time, Payload)>,
-    /// How far it has come.
+pub struct FinalBatch {
+    /// Events not yet stored.
+    pub events: Vec<(Time, Payload)>,
+    /// The progress after them.
     pub progress: Progress,
 }
 
 impl Store {
-    /// Appends to the story of this start of a job, with the progress that it amounts to; false when the
-    /// start is no longer current.
+    /// Appends events of an attempt, with the progress after them; false when the attempt is no longer the current
+    /// one.
     pub async fn append_events(
         &self,
         key: i64,
@@ -36,7 +36,7 @@ impl Store {
         if !is_current(&mut tx, key, attempt).await? {
             return Ok(false);
         }
-        tell(&mut tx, key, attempt, payloads, progress).await?;
+        append_with_progress(&mut tx, key, attempt, payloads, progress).await?;
         tx.commit().await?;
         Ok(true)
     }
@@ -66,7 +66,7 @@ impl Store {
             .collect()
     }
 
-    /// The iterations of one start of a job, each as the JSON of its event, in order.
+    /// The iterations of one attempt of a job, each as the JSON of its event, in order.
     pub async fn iterations(&self, key: i64, attempt: i32) -> Result<Vec<String>> {
         Ok(sqlx::query_scalar(
             "select body from event where job_id = ? and attempt = ? and type = 'iteration' order by seq",
@@ -78,8 +78,8 @@ impl Store {
     }
 }
 
-/// Appends what a solver says, with the progress that it amounts to.
-pub(super) async fn tell(
+/// Appends events, with the progress after them.
+pub(super) async fn append_with_progress(
     tx: &mut SqliteConnection,
     key: i64,
     attempt: i32,
@@ -95,7 +95,7 @@ pub(super) async fn tell(
     Ok(())
 }
 
-/// Numbers and appends within a transaction.
+/// Numbers events and appends them.
 pub(super) async fn append(
     tx: &mut SqliteConnection,
     key: i64,

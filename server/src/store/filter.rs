@@ -1,10 +1,10 @@
-//! Which jobs a list holds, and in what order.
+//! Which jobs a list contains, and in what order.
 
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use crate::{caller::Owners, job::Status, time::Time};
 
-/// Which jobs; what is absent leaves none out.
+/// Conditions on jobs; absent ones match every job.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Filter {
     /// Of one of these statuses.
@@ -28,7 +28,7 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Labels that a filter may name.
+    /// Most labels in one filter.
     pub const MOST_LABELS: usize = 64;
 
     /// The same filter with each status and label once.
@@ -41,7 +41,7 @@ impl Filter {
         self
     }
 
-    /// The same filter on the jobs of these owners; none if it asks for the jobs of another.
+    /// The same filter restricted to these owners; none if it asks for the jobs of another.
     pub(super) fn among(&self, owners: Owners<'_>) -> Option<Self> {
         let mut filter = self.clone();
         if let Owners::Only(owner) = owners {
@@ -53,22 +53,22 @@ impl Filter {
         Some(filter)
     }
 
-    /// Leaves no job out.
+    /// It matches every job.
     pub fn is_empty(&self) -> bool {
         *self == Filter::default()
     }
 }
 
-/// The order of a list; of equal times the order of arrival decides.
+/// The order of a list; jobs of equal times are in order of arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Order {
-    /// By which time.
+    /// The time to sort by.
     pub by: OrderBy,
     /// Latest first.
     pub descending: bool,
 }
 
-/// The time that orders a list; its word is the column.
+/// The time that orders a list; its name is that of the column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum OrderBy {
@@ -83,11 +83,11 @@ pub enum OrderBy {
 pub struct Cursor {
     /// Its time in the list's order, in microseconds.
     pub micros: i64,
-    /// Its number.
+    /// Its key.
     pub key: i64,
 }
 
-/// What jobs are counted by; its word is the column.
+/// What jobs are grouped by; its name is that of the column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum GroupBy {

@@ -1,4 +1,4 @@
-//! What was handed in before: under a request key, or under an id that the client made. Both belong to their owner.
+//! Requests that are repeated: under a request key, or with an id that the client made. Both belong to an owner.
 
 use std::ops::Range;
 
@@ -19,21 +19,26 @@ use crate::{
 };
 
 impl Store {
-    /// The jobs of a key that this owner has used before.
+    /// The jobs that this owner has submitted under a key.
     pub async fn replay(&self, owner: &str, key: &RequestKey) -> Result<Option<Vec<Job>>> {
         let mut connection = self.reader.acquire().await?;
-        let Some(keys) = keyed(&mut connection, owner, key).await? else {
+        let Some(keys) = jobs_of_key(&mut connection, owner, key).await? else {
             return Ok(None);
         };
         let Some(mut jobs) = remaining(&mut connection, keys).await? else {
             return Ok(None);
         };
-        self.place(&mut connection, &mut jobs).await?;
+        self.add_queue_positions(&mut connection, &mut jobs).await?;
         Ok(Some(jobs))
     }
 
-    /// The job of an id that the client made, if this owner handed it in with that payload.
-    pub async fn replay_named(&self, owner: &str, id: JobId, payload: &str) -> Result<Option<Job>> {
+    /// The job with an id that the client made, if this owner submitted it with that payload.
+    pub async fn replay_with_id(
+        &self,
+        owner: &str,
+        id: JobId,
+        payload: &str,
+    ) -> Result<Option<Job>> {
         let same: Option<i64> =
             sqlx::query_scalar("select id from job where uuid = ? and payload = ?")
                 .bind(id.0.to_string())
@@ -47,15 +52,15 @@ impl Store {
     }
 }
 
-/// The jobs that a key or a client's own id stands for already.
-pub(super) async fn known(
+/// The jobs of a submission that repeats an earlier one, by its key or by a client's id.
+pub(super) async fn already_submitted(
     change: &mut Change<'_>,
     owner: &str,
     jobs: &[NewJob],
     key: Option<&RequestKey>,
 ) -> Result<Option<Vec<Job>>> {
     if let Some(key) = key
-        && let Some(keys) = keyed(change.sql(), owner, key).await?
+        && let Some(keys) = jobs_of_key(change.sql(), owner, key).await?
         && let Some(old) = remaining(change.sql(), keys).await?
     {
         return Ok(Some(old));
@@ -77,7 +82,7 @@ pub(super) async fn known(
             Some(_) => return Err(StoreError::IdConflict(id)),
             None => match owner_of_deleted(change.sql(), id).await? {
                 Some(theirs) if theirs == owner => return Err(StoreError::Deleted(id)),
-                // another owner's id: whether that job is still there is not told
+                // of another owner: whether that job is still there is not said
                 Some(_) => return Err(StoreError::IdConflict(id)),
                 None => {}
             },
@@ -107,8 +112,8 @@ pub(super) async fn remember(
     Ok(())
 }
 
-/// The keys of the jobs that a request key stands for.
-async fn keyed(
+/// The jobs that were accepted under a request key, by number.
+async fn jobs_of_key(
     connection: &mut SqliteConnection,
     owner: &str,
     key: &RequestKey,
@@ -127,8 +132,8 @@ async fn keyed(
     }
 }
 
-/// The jobs of a key that are still there. A key whose jobs were all deleted says so as long as that is
-/// remembered; then it stands for nothing any more.
+/// Those of these jobs that are still there. If all of them were deleted, that is an error as long as it is
+/// remembered; after that the key may be used anew.
 async fn remaining(
     connection: &mut SqliteConnection,
     keys: Range<i64>,

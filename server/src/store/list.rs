@@ -1,9 +1,9 @@
 //! Lists of jobs: pages, counts, keys.
 //!
 //! A page costs as many rows as it shows, not as many as there are. Each filter has an index in the order of
-//! the list. One filter leads, and the others are checked on the rows that it finds: one that leaves few jobs,
-//! which are sorted where they have to be, or else one whose index has the order of the list, since then a
-//! page is soon full.
+//! the list. One filter is chosen as the access path, and the others are checked on the rows that it finds: a
+//! filter that matches few jobs, which are then sorted if need be, or else one whose index has the order of the
+//! list, since then a page is soon full.
 
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
@@ -18,21 +18,21 @@ use crate::{
     job::{Job, Status},
 };
 
-/// What finds the rows of a list.
+/// The index by which the rows of a list are found.
 #[derive(Clone, Copy)]
-pub(super) enum Lead<'a> {
+pub(super) enum AccessPath<'a> {
     Label(&'a (String, String)),
     InputHash(&'a str),
     Name(&'a str),
     Status(Status),
     Owner(&'a str),
-    /// The time of the end, in a list by the time of arrival.
+    /// By the time of the end, in a list ordered by the time of arrival.
     Ended,
     All,
 }
 
-/// A filter that leaves no more jobs than this leads whatever the order: to look at all of them, and to sort
-/// them, takes less than a page may.
+/// A filter that matches no more jobs than this is the access path, whatever the order of the list: to read and sort
+/// all of them costs less than a page may.
 const FEW: i64 = 1000;
 
 impl Store {
@@ -49,18 +49,18 @@ impl Store {
             return Ok(vec![]);
         };
         let mut connection = self.lists.acquire().await?;
-        let leads = match few(&mut connection, filter, order).await? {
-            Some(lead) => vec![lead],
-            None => leads(filter, order),
+        let paths = match selective_path(&mut connection, filter, order).await? {
+            Some(path) => vec![path],
+            None => ordered_paths(filter, order),
         };
-        let mut query = page_of_jobs(filter, &leads, order, cursor, limit);
+        let mut query = page_of_jobs(filter, &paths, order, cursor, limit);
         let rows = query.build().fetch_all(&mut *connection).await?;
         let mut jobs = rows.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
-        self.place(&mut connection, &mut jobs).await?;
+        self.add_queue_positions(&mut connection, &mut jobs).await?;
         Ok(jobs)
     }
 
-    /// How many jobs there are, in groups if asked for, the groups by name.
+    /// How many jobs there are, in groups if asked for; the groups are sorted by name.
     pub async fn count(
         &self,
         owners: Owners<'_>,
@@ -77,7 +77,7 @@ impl Store {
             .collect()
     }
 
-    /// The numbers of at most `limit` jobs, in order of arrival, after one number and up to another.
+    /// The keys of at most `limit` jobs, in order of arrival, after one key and up to another.
     pub async fn keys(
         &self,
         owners: Owners<'_>,
@@ -94,25 +94,25 @@ impl Store {
     }
 }
 
-/// At most `limit` jobs: of each lead so many, and of all of them together.
+/// At most `limit` jobs, from the lists of all access paths merged.
 pub(super) fn page_of_jobs(
     filter: &Filter,
-    leads: &[Lead<'_>],
+    paths: &[AccessPath<'_>],
     order: Order,
     cursor: Option<Cursor>,
     limit: i64,
 ) -> QueryBuilder<Sqlite> {
     let mut query = QueryBuilder::<Sqlite>::new("");
-    for (n, lead) in leads.iter().enumerate() {
+    for (n, path) in paths.iter().enumerate() {
         query.push(if n == 0 {
             "select * from ("
         } else {
             " union all select * from ("
         });
-        page(&mut query, filter, *lead, order, cursor);
+        page(&mut query, filter, *path, order, cursor);
         query.push(" limit ").push_bind(limit).push(")");
     }
-    if leads.len() > 1 {
+    if paths.len() > 1 {
         let (by, direction) = (<&str>::from(order.by), order.direction());
         query.push(format!(" order by {by} {direction}, id {direction} limit "));
         query.push_bind(limit);
@@ -132,7 +132,7 @@ pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> QueryBuilde
     query
 }
 
-/// At most `limit` numbers of jobs, in order.
+/// The keys of at most `limit` jobs, in order.
 pub(super) fn keys_of_jobs(
     filter: &Filter,
     after: i64,
@@ -147,52 +147,52 @@ pub(super) fn keys_of_jobs(
     query
 }
 
-/// A filter that leaves few jobs, if there is one and there is a choice.
-async fn few<'a>(
+/// The access path by a filter that matches few jobs, if there is one and there is a choice.
+async fn selective_path<'a>(
     connection: &mut SqliteConnection,
     filter: &'a Filter,
     order: Order,
-) -> Result<Option<Lead<'a>>> {
-    let mut candidates: Vec<Lead<'a>> = filter.labels.iter().map(Lead::Label).collect();
-    candidates.extend(filter.input_hash.as_deref().map(Lead::InputHash));
-    candidates.extend(filter.name.as_deref().map(Lead::Name));
-    candidates.extend(filter.owner.as_deref().map(Lead::Owner));
+) -> Result<Option<AccessPath<'a>>> {
+    let mut candidates: Vec<AccessPath<'a>> = filter.labels.iter().map(AccessPath::Label).collect();
+    candidates.extend(filter.input_hash.as_deref().map(AccessPath::InputHash));
+    candidates.extend(filter.name.as_deref().map(AccessPath::Name));
+    candidates.extend(filter.owner.as_deref().map(AccessPath::Owner));
     if let [status] = filter.statuses[..] {
-        candidates.push(Lead::Status(status));
+        candidates.push(AccessPath::Status(status));
     }
     let by_creation = order.by == OrderBy::CreatedAt;
     if by_creation && (filter.finished_after.is_some() || filter.finished_before.is_some()) {
-        candidates.push(Lead::Ended);
+        candidates.push(AccessPath::Ended);
     }
-    if by_creation && candidates.len() == 1 && !matches!(candidates[0], Lead::Ended) {
+    if by_creation && candidates.len() == 1 && !matches!(candidates[0], AccessPath::Ended) {
         return Ok(None);
     }
-    for lead in candidates {
+    for path in candidates {
         let mut query = QueryBuilder::<Sqlite>::new("select count(*) from (select 1 from ");
-        match lead {
-            Lead::Label((key, value)) => {
+        match path {
+            AccessPath::Label((key, value)) => {
                 query.push("job_label where key = ").push_bind(key);
                 query.push(" and value = ").push_bind(value);
             }
-            Lead::InputHash(hash) => {
+            AccessPath::InputHash(hash) => {
                 query.push("job where input_hash = ").push_bind(hash);
             }
-            Lead::Name(name) => {
+            AccessPath::Name(name) => {
                 query.push("job where name = ").push_bind(name);
             }
-            Lead::Status(status) => {
+            AccessPath::Status(status) => {
                 query
                     .push("job where status = ")
                     .push_bind(<&str>::from(status));
             }
-            Lead::Ended => {
+            AccessPath::Ended => {
                 query.push("job indexed by job_by_finished where finished_at is not null");
                 times(&mut query, filter, "finished_at", None);
             }
-            Lead::Owner(owner) => {
+            AccessPath::Owner(owner) => {
                 query.push("job where owner = ").push_bind(owner);
             }
-            Lead::All => continue,
+            AccessPath::All => continue,
         }
         query.push(" limit ").push_bind(FEW + 1).push(")");
         let jobs: i64 = query
@@ -200,19 +200,22 @@ async fn few<'a>(
             .fetch_one(&mut *connection)
             .await?;
         if jobs <= FEW {
-            return Ok(Some(lead));
+            return Ok(Some(path));
         }
     }
     Ok(None)
 }
 
-/// What leads where every filter leaves many jobs: an index in the order of the list. One lead, or where only
-/// statuses can one for each of them, since their lists are merged.
-pub(super) fn leads(filter: &Filter, order: Order) -> Vec<Lead<'_>> {
+/// The access path where every filter matches many jobs: an index in the order of the list. It is one path, or one
+/// for each status, whose lists are merged.
+pub(super) fn ordered_paths(filter: &Filter, order: Order) -> Vec<AccessPath<'_>> {
     let statuses = &filter.statuses;
-    let by_status: Vec<Lead<'_>> = statuses.iter().copied().map(Lead::Status).collect();
-    let owner_or_all = filter.owner.as_deref().map_or(Lead::All, Lead::Owner);
-    // most jobs succeed: of the others there are fewer than most filters leave
+    let by_status: Vec<AccessPath<'_>> = statuses.iter().copied().map(AccessPath::Status).collect();
+    let owner_or_all = filter
+        .owner
+        .as_deref()
+        .map_or(AccessPath::All, AccessPath::Owner);
+    // most jobs succeed: of the other statuses there are fewer jobs than most filters match
     let of_the_others = !by_status.is_empty() && !statuses.contains(&Status::Succeeded);
     if order.by == OrderBy::FinishedAt || of_the_others {
         return match by_status.is_empty() {
@@ -221,13 +224,13 @@ pub(super) fn leads(filter: &Filter, order: Order) -> Vec<Lead<'_>> {
         };
     }
     if let Some(label) = filter.labels.first() {
-        return vec![Lead::Label(label)];
+        return vec![AccessPath::Label(label)];
     }
     if let Some(hash) = &filter.input_hash {
-        return vec![Lead::InputHash(hash)];
+        return vec![AccessPath::InputHash(hash)];
     }
     if let Some(name) = &filter.name {
-        return vec![Lead::Name(name)];
+        return vec![AccessPath::Name(name)];
     }
     if !by_status.is_empty() {
         return by_status;
@@ -235,32 +238,32 @@ pub(super) fn leads(filter: &Filter, order: Order) -> Vec<Lead<'_>> {
     vec![owner_or_all]
 }
 
-/// One ordered list without its limit.
+/// The list of one access path, in order and without its limit.
 fn page(
     query: &mut QueryBuilder<Sqlite>,
     filter: &Filter,
-    lead: Lead<'_>,
+    path: AccessPath<'_>,
     order: Order,
     cursor: Option<Cursor>,
 ) {
     let by_creation = order.by == OrderBy::CreatedAt;
-    // `indexed by`: the planner knows nothing of how many jobs a filter leaves, and would guess
-    match lead {
-        Lead::Label((key, value)) => {
+    // `indexed by`: the planner does not know how many jobs a filter matches, and would guess
+    match path {
+        AccessPath::Label((key, value)) => {
             query.push("select job.* from job_label cross join job on job.id = job_label.job_id where job_label.key = ");
             query.push_bind(key.clone());
             query.push(" and job_label.value = ");
             query.push_bind(value.clone());
         }
-        Lead::InputHash(hash) => {
+        AccessPath::InputHash(hash) => {
             query.push("select * from job indexed by job_by_input where input_hash = ");
             query.push_bind(hash.to_owned());
         }
-        Lead::Name(name) => {
+        AccessPath::Name(name) => {
             query.push("select * from job indexed by job_by_name where name = ");
             query.push_bind(name.to_owned());
         }
-        Lead::Status(status) => {
+        AccessPath::Status(status) => {
             let index = if by_creation {
                 "job_by_status"
             } else {
@@ -271,7 +274,7 @@ fn page(
             ));
             query.push_bind(<&str>::from(status));
         }
-        Lead::Owner(owner) => {
+        AccessPath::Owner(owner) => {
             let index = if by_creation {
                 "job_by_owner"
             } else {
@@ -282,11 +285,11 @@ fn page(
             ));
             query.push_bind(owner.to_owned());
         }
-        Lead::Ended => {
+        AccessPath::Ended => {
             query
                 .push("select * from job indexed by job_by_finished where finished_at is not null");
         }
-        Lead::All => {
+        AccessPath::All => {
             let index = if by_creation {
                 "job_by_created"
             } else {
@@ -298,9 +301,9 @@ fn page(
     if order.by == OrderBy::FinishedAt {
         query.push(" and job.finished_at is not null");
     }
-    conditions(query, filter, Some(lead));
-    let (by, id) = match lead {
-        Lead::Label(_) if by_creation => ("job_label.created_at", "job_label.job_id"),
+    conditions(query, filter, Some(path));
+    let (by, id) = match path {
+        AccessPath::Label(_) if by_creation => ("job_label.created_at", "job_label.job_id"),
         _ if by_creation => ("job.created_at", "job.id"),
         _ => ("job.finished_at", "job.id"),
     };
@@ -314,9 +317,9 @@ fn page(
     query.push(format!(" order by {by} {direction}, {id} {direction}"));
 }
 
-/// All conditions of a filter but for times. The one that leads is said twice, which costs nothing, but for
-/// statuses, of which each leads a list of its own, and labels, which are rows elsewhere.
-fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, lead: Option<Lead<'_>>) {
+/// The conditions of a filter except for times. The condition of the access path is repeated, which costs nothing,
+/// unless it is a status, of which each has a list of its own, or a label, which stands in another table.
+fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, path: Option<AccessPath<'_>>) {
     let Filter {
         statuses,
         owner,
@@ -325,7 +328,7 @@ fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, lead: Option<Le
         input_hash,
         ..
     } = filter;
-    if !statuses.is_empty() && !matches!(lead, Some(Lead::Status(_))) {
+    if !statuses.is_empty() && !matches!(path, Some(AccessPath::Status(_))) {
         query.push(" and job.status in (");
         let mut list = query.separated(", ");
         statuses.iter().for_each(|status| {
@@ -335,9 +338,9 @@ fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, lead: Option<Le
     }
     for label in labels {
         let (key, value) = label;
-        match lead {
-            Some(Lead::Label(leading)) if leading == label => continue,
-            // one look for each row that the lead finds
+        match path {
+            Some(AccessPath::Label(leading)) if leading == label => continue,
+            // one lookup for each row of the access path
             Some(_) => query.push(
                 " and exists (select 1 from job_label where created_at = job.created_at and job_id = job.id and key = ",
             ),
@@ -355,12 +358,12 @@ fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, lead: Option<Le
     }
 }
 
-/// The bounds of both times. `by` is the column that orders the list; what a cursor in this order says of it
-/// is not said again, since the index would start from either.
+/// The bounds of both times. `by` is the column that orders the list; a bound that a cursor in this order implies is
+/// left out, since the index would start from the weaker one as well.
 fn times(query: &mut QueryBuilder<Sqlite>, filter: &Filter, by: &str, cursor: Option<Order>) {
     let (mut created_before, mut finished_after) = (filter.created_before, filter.finished_after);
     let by_creation = by.ends_with("created_at");
-    // Nobody ends before it was accepted: a bound on one time is one on the other, by which the list is read.
+    // No job ends before it was accepted: a bound on one time is also one on the other, by which the list is read.
     if by_creation {
         let bounds = [created_before, filter.finished_before];
         created_before = bounds.into_iter().flatten().min();
@@ -374,9 +377,9 @@ fn times(query: &mut QueryBuilder<Sqlite>, filter: &Filter, by: &str, cursor: Op
         ("job.finished_at", ">=", finished_after),
         ("job.finished_at", "<", filter.finished_before),
     ] {
-        let said = cursor.is_some_and(|order| order.descending == (comparison == "<"));
+        let implied = cursor.is_some_and(|order| order.descending == (comparison == "<"));
         if let Some(time) = time
-            && !(said && column == by)
+            && !(implied && column == by)
         {
             query.push(format!(" and {column} {comparison} "));
             query.push_bind(time.micros());

@@ -9,25 +9,25 @@ use crate::mesh::MeshInfo;
 /// What removing a mesh did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Removal {
-    /// It is gone.
+    /// It was removed.
     Removed,
-    /// There was none.
+    /// There is no such mesh.
     Unknown,
-    /// Jobs that wait or run need it.
+    /// Jobs that wait or run need it; it was not removed.
     InUse,
 }
 
-/// A stored mesh and its place in the list.
+/// A stored mesh, with its place in the list.
 #[derive(Debug)]
 pub struct StoredMesh {
     /// Order of arrival.
     pub key: i64,
-    /// What is said of it.
+    /// What clients see of it.
     pub info: MeshInfo,
 }
 
 impl Store {
-    /// What is said of a mesh.
+    /// What clients see of a mesh.
     pub async fn mesh(&self, hash: &str) -> Result<Option<MeshInfo>> {
         let info: Option<String> = sqlx::query_scalar("select info from mesh where hash = ?")
             .bind(hash)
@@ -36,7 +36,7 @@ impl Store {
         Ok(info.map(|info| serde_json::from_str(&info)).transpose()?)
     }
 
-    /// Meshes that came before the one numbered `before`, newest first.
+    /// Meshes that were stored before the one with key `before`, newest first.
     pub async fn meshes(&self, before: Option<i64>, limit: i64) -> Result<Vec<StoredMesh>> {
         let rows: Vec<(i64, String)> =
             sqlx::query_as("select id, info from mesh where id < ? order by id desc limit ?")
@@ -51,7 +51,7 @@ impl Store {
         rows.into_iter().map(read).collect()
     }
 
-    /// Writes pieces of a mesh, numbered from `first`. They count with `insert_mesh`.
+    /// Writes pieces of a mesh, numbered from `first`. They are used only once `insert_mesh` was called.
     pub async fn write_mesh_pieces(
         &self,
         hash: &str,
@@ -60,7 +60,7 @@ impl Store {
     ) -> Result<()> {
         let mut tx = self.begin().await?;
         for (piece, body) in (first..).zip(pieces) {
-            // the same file may be on its way twice, or have died half-way: its pieces are the same
+            // the same file may be uploaded twice at once, or again after an interruption: its pieces are the same
             sqlx::query("insert or replace into mesh_piece (hash, piece, body) values (?, ?, ?)")
                 .bind(hash)
                 .bind(piece)
@@ -135,7 +135,7 @@ impl Store {
         Ok(Removal::Removed)
     }
 
-    /// Removes what uploads left that never came to their end.
+    /// Removes the pieces of uploads that were interrupted.
     pub async fn remove_orphaned_mesh_pieces(&self) -> Result<u64> {
         let mut tx = self.begin().await?;
         let done = sqlx::query("delete from mesh_piece where hash not in (select hash from mesh)")

@@ -4,11 +4,11 @@
 //! for want of a lock; others read at the same time (WAL). A commit is on the disk when it returns
 //! (synchronous FULL). Each method answers one question, in one transaction.
 //!
-//! Who names a job by its public id, or asks for a list, says whose jobs are meant ([`Owners`]): a job of
+//! Questions about a public id, lists and counts name the owners whose jobs are meant ([`Owners`]): a job of
 //! another owner is not found, as if there were none. Keys, the store's own numbers of jobs, come only from such
 //! answers.
 //!
-//! The files from the ground up; each uses only those above it.
+//! The files are listed from the ground up: none uses a file that uses it.
 //!
 //! [`Owners`]: crate::caller::Owners
 
@@ -18,10 +18,10 @@ mod filter;
 mod parts;
 mod submission;
 
-// The file, one transaction of its single writer, and the queue that follows it in memory.
+// The database; one transaction of its single writer; the jobs that wait, mirrored in memory.
 mod change;
 mod database;
-mod line;
+mod waiting;
 
 // A job: its row, its labels, its events, its result.
 mod events;
@@ -29,26 +29,26 @@ mod labels;
 mod results;
 mod rows;
 
-// Its life: started and ended; with others of the same input; by a worker, a client, the clock, a restart.
+// Its lifecycle: attempts and end; coalesced with others of the same input; claimed, ended, requeued.
 mod claim;
+mod coalescing;
 mod end;
-mod life;
+mod lifecycle;
 mod requeue;
-mod twins;
 
-// Accepted, under keys; changed; deleted.
+// Submitted, under request keys; edited; deleted.
 mod delete;
 mod edit;
 mod keys;
 mod submit;
 
-// Read: one, its place in the queue, its result; many.
+// Read: one job, its queue position, its result; many jobs.
 mod list;
 mod lookup;
-mod places;
+mod positions;
 mod snapshot;
 
-// What is no job.
+// What is not a job.
 mod meshes;
 mod settings;
 
@@ -63,9 +63,9 @@ pub use self::{
     edit::Edit,
     end::CancelOutcome,
     error::{Result, StoreError},
-    events::LastWords,
+    events::FinalBatch,
     filter::{Cursor, Filter, GroupBy, Order, OrderBy},
-    life::Ending,
+    lifecycle::Ending,
     meshes::{Removal, StoredMesh},
     parts::{PIECE_BYTES, PIECES_PER_COMMIT, Parts, ProfilePoints},
     snapshot::{PartInfo, Snapshot},
@@ -73,10 +73,10 @@ pub use self::{
 };
 
 impl Store {
-    /// Opens the store in `folder`, made if need be, and brings its tables up to date.
+    /// Opens the store in `folder`, created if need be, and brings its tables up to date.
     pub async fn open(folder: &Path) -> Result<Arc<Store>> {
         let (store, submissions) = Store::connect(folder).await?;
-        store.fill_line().await?;
+        store.read_waiting_jobs().await?;
         store.read_settings().await?;
         let store = Arc::new(store);
         let committing = submit::commit_submissions(Arc::downgrade(&store), submissions);

@@ -1,4 +1,4 @@
-//! A result as named parts, each in pieces: what is written and what is served.
+//! A result as it is stored: named parts, each in pieces.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use solver::solution::ContactProfile;
 
 use crate::run::Document;
 
-/// Bytes of one piece of a stored result or mesh; larger rows make SQLite chain pages and readers hold more.
+/// Bytes of one piece of a stored result or mesh: larger rows make SQLite chain pages, and readers need more memory.
 pub const PIECE_BYTES: usize = 256 << 10;
 /// Pieces per transaction: 1 MiB holds the single writer for some ten milliseconds, so that a
 /// cancel or a submit beside a large result still answers at once.
@@ -26,7 +26,7 @@ pub(super) struct Part {
 }
 
 impl Parts {
-    /// Cuts a document into the parts that routes serve.
+    /// Divides a document into the parts that can be requested.
     pub fn of(document: &Document) -> serde_json::Result<Parts> {
         let mut parts = vec![
             (
@@ -38,7 +38,7 @@ impl Parts {
                 serde_json::to_vec(&document.history)?,
             ),
         ];
-        // the rows of a step are among the history's; its profiles are served one by one
+        // the iterations of a step are part of the history; its profiles are requested one by one
         let steps: Vec<_> = document
             .steps
             .iter()
@@ -73,7 +73,7 @@ impl Parts {
         Ok(Parts(parts.into_iter().map(hashed).collect()))
     }
 
-    /// All of them together.
+    /// The size of all parts together.
     pub fn bytes(&self) -> usize {
         self.0.iter().map(|part| part.body.len()).sum()
     }

@@ -1,14 +1,14 @@
-//! Back to the queue: at a drain, and after the process has died under a job.
+//! Running jobs back in the queue: when the service stops, and after it has crashed.
 
 use super::{
     change::Change,
+    coalescing,
     database::Store,
     end::end,
     error::Result,
     events,
-    life::{self, Ending},
+    lifecycle::{self, Ending},
     rows::{from_row, is_current, read},
-    twins,
 };
 use crate::{
     event::{Payload, Requeue},
@@ -17,15 +17,15 @@ use crate::{
 };
 
 impl Store {
-    /// Puts a running job back for a drain, which does not count against it; one that was asked to
-    /// stop is canceled instead. Gives its new status; `None` when the start is no longer current.
+    /// Requeues a running job because the service stops, which does not count against its attempts; one that was
+    /// asked to stop is canceled instead. Gives its new status; `None` when the attempt is no longer the current one.
     pub async fn requeue_drained(&self, key: i64, attempt: i32) -> Result<Option<Status>> {
         let mut change = self.change().await?;
         if !is_current(change.sql(), key, attempt).await? {
             return Ok(None);
         }
         let job = read(change.sql(), key).await?;
-        // Somebody who asked it to stop is not made to wait for the restart.
+        // who asked it to stop does not have to wait for the restart
         let status = if job.cancel_requested {
             end(&mut change, &job, &Ending::canceled()).await?;
             Status::Canceled
@@ -37,8 +37,8 @@ impl Store {
         Ok(Some(status))
     }
 
-    /// Takes care of jobs that were running when the process died: back to the queue, or to their
-    /// end when somebody wanted that or when too many starts were lost. Before the listener opens.
+    /// Requeues the jobs that were running when the process died; ends those that were asked to stop, and those
+    /// whose attempts are used up. To be called before the listener opens. Gives how many there were.
     pub async fn requeue_interrupted(&self) -> Result<usize> {
         let mut change = self.change().await?;
         let rows = sqlx::query("select * from job where status = 'running'")
@@ -50,7 +50,7 @@ impl Store {
                 end(&mut change, &job, &Ending::canceled()).await?;
             } else if job.attempt >= job.max_attempts {
                 let detail = format!(
-                    "the process died during each of {} starts",
+                    "the process died during each of {} attempts",
                     job.max_attempts
                 );
                 end(
@@ -68,26 +68,27 @@ impl Store {
     }
 }
 
-async fn requeue(change: &mut Change<'_>, job: &Job, why: Requeue) -> Result<()> {
-    life::change(change, job, Status::Queued).await?;
-    // The start keeps its number, so that events tell starts apart, but a drain gives it back.
-    let given_back = i32::from(why == Requeue::Drain);
+/// Puts a running job back in the queue.
+async fn requeue(change: &mut Change<'_>, job: &Job, reason: Requeue) -> Result<()> {
+    lifecycle::set_status(change, job, Status::Queued).await?;
+    // The attempt keeps its number, by which events are told apart; where it does not count, one more is allowed.
+    let one_more = i32::from(reason == Requeue::Drain);
     sqlx::query("update job set max_attempts = max_attempts + ? where id = ?")
-        .bind(given_back)
+        .bind(one_more)
         .bind(job.key)
         .execute(change.sql())
         .await?;
-    // its waiting begins anew, and that of the jobs that wait for it
-    sqlx::query("update job set expires_at = ? + cast(queue_ttl_s * 1e6 as integer) where id = ? or twin_of = ?")
+    // its time in the queue begins anew, and that of the jobs coalesced into it
+    sqlx::query("update job set expires_at = ? + cast(queue_ttl_s * 1e6 as integer) where id = ? or coalesced_into = ?")
         .bind(Time::now().micros())
         .bind(job.key)
         .bind(job.key)
         .execute(change.sql())
         .await?;
-    // it runs no more: a twin of a higher priority need not wait for it
-    twins::overtake(change, job.key, job.priority).await?;
-    let back = [(Time::now(), Payload::requeued(why))];
-    events::append(change.sql(), job.key, job.attempt, &back).await?;
+    // it no longer runs: a coalesced job of a higher priority need not wait for it
+    coalescing::replace_if_outranked(change, job.key, job.priority).await?;
+    let requeued = [(Time::now(), Payload::requeued(reason))];
+    events::append(change.sql(), job.key, job.attempt, &requeued).await?;
     change.changed(job.key);
     Ok(())
 }

@@ -1,8 +1,8 @@
-//! Results, written: piece by piece before the job's end, or in place of what it had found before.
+//! Writing results, in pieces.
 //!
-//! Pieces stand under the number of the job that wrote them, which may serve several jobs. What a job that
-//! still runs has found so far (its finished load steps) stands under the negative of its number: the
-//! final result can then be written beside it, and takes its place with the job's end.
+//! Pieces are stored under the key of the job that was solved; other jobs may be answered with them. The partial
+//! result of a running job (its finished load steps) is stored under the negative of its key, so that the final
+//! result can be written beside it and replaces it when the job ends.
 
 use sqlx::SqliteConnection;
 
@@ -10,24 +10,24 @@ use super::{
     database::Store,
     error::Result,
     parts::{Parts, Piece},
-    rows::{is_current, running},
+    rows::{is_current, partial_key},
 };
 
 impl Store {
-    /// Writes the result of this start of a job over several short transactions, all but its last
-    /// megabyte, which is written with the job's end; false when the start is no longer current.
-    pub async fn write_ahead(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
+    /// Writes the result of an attempt in several short transactions, all but its last megabyte, which is
+    /// written when the job ends; false when the attempt is no longer the current one.
+    pub async fn write_before_end(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
         let groups = parts.groups();
-        let Some((_, ahead)) = groups.split_last() else {
+        let Some((_, all_but_last)) = groups.split_last() else {
             return Ok(true);
         };
-        for (n, group) in ahead.iter().enumerate() {
+        for (n, group) in all_but_last.iter().enumerate() {
             let mut tx = self.begin().await?;
             if !is_current(&mut tx, key, attempt).await? {
                 return Ok(false);
             }
             if n == 0 {
-                // Pieces of an earlier start that died while it wrote them.
+                // pieces of an earlier attempt that was interrupted while it wrote them
                 remove(&mut tx, key).await?;
             }
             insert(&mut tx, key, group).await?;
@@ -36,18 +36,18 @@ impl Store {
         Ok(true)
     }
 
-    /// Keeps what a running job has found so far, in place of what it had before; false when the start is
-    /// no longer current.
+    /// Stores the partial result of a running job in place of an earlier one; false when the attempt is no longer
+    /// the current one.
     pub async fn write_partial(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
         let mut tx = self.begin().await?;
         if !is_current(&mut tx, key, attempt).await? {
             return Ok(false);
         }
-        remove(&mut tx, running(key)).await?;
+        remove(&mut tx, partial_key(key)).await?;
         for group in parts.groups() {
-            insert(&mut tx, running(key), &group).await?;
+            insert(&mut tx, partial_key(key), &group).await?;
         }
-        describe(&mut tx, running(key), parts).await?;
+        write_info(&mut tx, partial_key(key), parts).await?;
         sqlx::query("update job set result_available = 'partial' where id = ?")
             .bind(key)
             .execute(&mut *tx)
@@ -57,8 +57,8 @@ impl Store {
     }
 }
 
-/// The last pieces of a result, with what its parts are. In the transaction of the job's end.
-pub(super) async fn write_last(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
+/// Writes the last pieces of a result, and the size and hash of each part, in the transaction that ends the job.
+pub(super) async fn write_at_end(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
     let groups = parts.groups();
     if groups.len() == 1 {
         remove(tx, key).await?;
@@ -66,29 +66,29 @@ pub(super) async fn write_last(tx: &mut SqliteConnection, key: i64, parts: &Part
     if let Some(last) = groups.last() {
         insert(tx, key, last).await?;
     }
-    describe(tx, key, parts).await
+    write_info(tx, key, parts).await
 }
 
-/// What a job has found while it ran becomes its result; but its history is the one that was told, which
-/// went on after the last finished load step.
-pub(super) async fn promote(tx: &mut SqliteConnection, key: i64) -> Result<()> {
+/// The partial result of a running job becomes its result; but its history is that of its events, which went on
+/// after the last finished load step.
+pub(super) async fn keep_partial(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     remove(tx, key).await?;
     sqlx::query("delete from result_part where job_id = ? and name = 'history'")
-        .bind(running(key))
+        .bind(partial_key(key))
         .execute(&mut *tx)
         .await?;
     for table in ["result_part", "result_info"] {
         let statement = format!("update {table} set job_id = ? where job_id = ?");
         sqlx::query(sqlx::AssertSqlSafe(statement))
             .bind(key)
-            .bind(running(key))
+            .bind(partial_key(key))
             .execute(&mut *tx)
             .await?;
     }
     Ok(())
 }
 
-/// Removes all that is kept under this number.
+/// Removes the result under this key.
 pub(super) async fn remove(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     for statement in [
         "delete from result_part where job_id = ?",
@@ -99,6 +99,7 @@ pub(super) async fn remove(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     Ok(())
 }
 
+/// Writes pieces.
 async fn insert(tx: &mut SqliteConnection, key: i64, group: &[Piece<'_>]) -> Result<()> {
     for Piece { name, number, body } in group {
         sqlx::query("insert into result_part (job_id, name, piece, body) values (?, ?, ?, ?)")
@@ -112,7 +113,8 @@ async fn insert(tx: &mut SqliteConnection, key: i64, group: &[Piece<'_>]) -> Res
     Ok(())
 }
 
-async fn describe(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
+/// Writes the size and hash of each part.
+async fn write_info(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
     for part in &parts.0 {
         sqlx::query(
             "insert or replace into result_info (job_id, name, bytes, digest) values (?, ?, ?, ?)",

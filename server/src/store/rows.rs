@@ -12,6 +12,7 @@ use crate::{
     time::Time,
 };
 
+/// The job with this key, which must be there.
 pub(super) async fn read(tx: &mut SqliteConnection, key: i64) -> Result<Job> {
     from_row(
         &sqlx::query("select * from job where id = ?")
@@ -21,7 +22,7 @@ pub(super) async fn read(tx: &mut SqliteConnection, key: i64) -> Result<Job> {
     )
 }
 
-/// The job, if it is still there.
+/// The job with this key, if it is still there.
 pub(super) async fn find(connection: &mut SqliteConnection, key: i64) -> Result<Option<Job>> {
     let row = sqlx::query("select * from job where id = ?")
         .bind(key)
@@ -30,8 +31,8 @@ pub(super) async fn find(connection: &mut SqliteConnection, key: i64) -> Result<
     row.as_ref().map(from_row).transpose()
 }
 
-/// The job of that public id, without its place in the queue. A job of another owner is not found.
-pub(super) async fn named(
+/// The job with this public id, without its queue position. A job of another owner is not found.
+pub(super) async fn with_id(
     connection: &mut SqliteConnection,
     owners: Owners<'_>,
     id: JobId,
@@ -44,12 +45,12 @@ pub(super) async fn named(
     Ok(job.filter(|job| owners.include(&job.owner)))
 }
 
-/// Where a running job keeps what it has found so far.
-pub(super) fn running(key: i64) -> i64 {
+/// The key under which the partial result of a running job is kept.
+pub(super) fn partial_key(key: i64) -> i64 {
     -key
 }
 
-/// Whether this start of the job still has the word.
+/// Whether this attempt of the job is the current one, and running.
 pub(super) async fn is_current(tx: &mut SqliteConnection, key: i64, attempt: i32) -> Result<bool> {
     Ok(sqlx::query_scalar(
         "select exists (select 1 from job where id = ? and status = 'running' and attempt = ?)",
@@ -60,6 +61,7 @@ pub(super) async fn is_current(tx: &mut SqliteConnection, key: i64, attempt: i32
     .await?)
 }
 
+/// A row of the table as a job.
 pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
     let uuid: &str = row.try_get("uuid")?;
     let id = JobId(Uuid::try_parse(uuid).map_err(|_| corrupt("uuid"))?);
@@ -81,12 +83,12 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
     let result_key = match row.try_get::<Option<i64>, _>("result_job")? {
         Some(other) => other,
         None if status.is_terminal() => key,
-        None => running(key),
+        None => partial_key(key),
     };
     Ok(Job {
         key,
         result_key,
-        twin_of: row.try_get("twin_of")?,
+        coalesced_into: row.try_get("coalesced_into")?,
         cache: word("cache", row.try_get("cache")?)?,
         id,
         status,

@@ -1,11 +1,11 @@
-//! What was set while the service ran, and stays set.
+//! Settings that are changed while the service runs, and survive a restart.
 
 use std::sync::atomic::Ordering;
 
 use super::{database::Store, error::Result};
 
 impl Store {
-    /// Reads what was set when the store was last open.
+    /// Reads the settings, when the store is opened.
     pub(super) async fn read_settings(&self) -> Result<()> {
         let paused: bool =
             sqlx::query_scalar("select exists (select 1 from setting where name = 'queue_paused')")
@@ -20,7 +20,7 @@ impl Store {
         self.paused.load(Ordering::Relaxed)
     }
 
-    /// Pauses the queue or lets it go on, until the opposite is said, also after a restart.
+    /// Pauses or resumes the queue, also across restarts.
     pub async fn set_paused(&self, paused: bool) -> Result<()> {
         let mut tx = self.begin().await?;
         let statement = if paused {

@@ -1,4 +1,4 @@
-//! What there is of a job's result, read.
+//! Reading the result of a job.
 
 use sha2::{Digest, Sha256};
 use sqlx::{Sqlite, Transaction};
@@ -7,28 +7,28 @@ use super::{
     database::Store,
     error::Result,
     parts::{ProfilePoints, profile_part},
-    rows::named,
+    rows::with_id,
 };
 use crate::{
     caller::Owners,
     job::{Job, JobId},
 };
 
-/// What a part is, as bytes.
+/// Size and hash of a part.
 #[derive(Clone, Debug)]
 pub struct PartInfo {
-    /// Its length.
+    /// Its size.
     pub bytes: u64,
     /// Its SHA-256.
     pub digest: Vec<u8>,
 }
 
 impl Store {
-    /// A job with what there is of its result, as of one moment: while it runs, or is being deleted, the
-    /// parts are replaced and removed.
+    /// A job and its result, both as of one moment: while it runs the parts may be replaced, and removed when it is
+    /// deleted.
     pub async fn snapshot(&self, owners: Owners<'_>, id: JobId) -> Result<Option<Snapshot>> {
         let mut tx = self.reader.begin().await?;
-        let job = named(&mut tx, owners, id).await?;
+        let job = with_id(&mut tx, owners, id).await?;
         Ok(job.map(|job| Snapshot { job, tx }))
     }
 
@@ -45,15 +45,15 @@ impl Store {
     }
 }
 
-/// A job and its result as of one moment. It holds a reader: not for long.
+/// A job and its result as of one moment. It holds a connection, and should be dropped soon.
 pub struct Snapshot {
-    /// The job; without its place in the queue.
+    /// The job, without its queue position.
     pub job: Job,
     tx: Transaction<'static, Sqlite>,
 }
 
 impl Snapshot {
-    /// What a part is, as bytes.
+    /// Size and hash of a part.
     pub async fn part_info(&mut self, part: &str) -> Result<Option<PartInfo>> {
         let found: Option<(i64, Vec<u8>)> =
             sqlx::query_as("select bytes, digest from result_info where job_id = ? and name = ?")
@@ -65,7 +65,7 @@ impl Snapshot {
             let bytes = bytes as u64;
             return Ok(Some(PartInfo { bytes, digest }));
         }
-        // stored before lengths and fingerprints were
+        // written by a version that did not store size and hash
         let body = self.part(part).await?;
         Ok(body.map(|body| PartInfo {
             bytes: body.len() as u64,

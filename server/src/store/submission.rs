@@ -1,4 +1,4 @@
-//! What is handed in, and what comes of it; and where it waits for the next commit.
+//! What is submitted, what becomes of it, and where it waits for the next commit.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::job::{Cache, Job, JobId, Limits};
 /// A job that is about to be accepted.
 #[derive(Clone, Debug)]
 pub struct NewJob {
-    /// Its name, if the client made it.
+    /// Its public id, if the client made it.
     pub id: Option<JobId>,
     /// A name for people.
     pub name: Option<String>,
@@ -18,13 +18,13 @@ pub struct NewJob {
     pub labels: BTreeMap<String, String>,
     /// −10 … 10.
     pub priority: i32,
-    /// What it may take.
+    /// Its time limits.
     pub limits: Limits,
     /// Whether earlier results may answer it.
     pub cache: Cache,
-    /// The job that it tries again.
+    /// The job that it retries.
     pub parent: Option<JobId>,
-    /// The problem's title, exactly.
+    /// The problem's title.
     pub title: Option<String>,
     /// Fingerprint of the problem.
     pub input_hash: String,
@@ -32,14 +32,14 @@ pub struct NewJob {
     pub problem: String,
     /// The stored mesh that it names.
     pub mesh: Option<String>,
-    /// Fingerprint of all that the client handed in.
+    /// Fingerprint of all that the client submitted.
     pub payload: String,
 }
 
 /// A key that makes a request repeatable.
 #[derive(Clone, Debug)]
 pub struct RequestKey {
-    /// The client's own.
+    /// The client's text.
     pub key: String,
     /// Fingerprint of the whole request.
     pub payload: String,
@@ -48,7 +48,7 @@ pub struct RequestKey {
 /// Jobs that are accepted together or not at all.
 #[derive(Clone, Debug)]
 pub struct Submission {
-    /// Whose jobs, and whose key.
+    /// The owner of the jobs and of the key.
     pub owner: String,
     /// One or more.
     pub jobs: Vec<NewJob>,
@@ -63,15 +63,15 @@ pub struct Submission {
 pub struct Accepted {
     /// Its jobs, in order.
     pub jobs: Vec<Job>,
-    /// They were there already: the key, or the job's name, was used before.
+    /// They were there already: the key, or the client's id of the job, was used before.
     pub replayed: bool,
-    /// The next job of the queue, if that was asked for and there is one.
+    /// The next job of the queue, if a claim was asked for and there is one.
     pub claim: Option<Claim>,
-    /// Jobs that have changed with it, those among them that a result was there for when their turn came.
+    /// Jobs that have changed: these, and those that were answered while the next job was claimed.
     pub changed: Vec<i64>,
 }
 
-/// A job that a worker has just taken.
+/// A job that was claimed for a worker.
 #[derive(Debug)]
 pub struct Claim {
     /// The job, running.
@@ -82,19 +82,27 @@ pub struct Claim {
     pub mesh: Option<String>,
 }
 
-/// Submissions that share a commit at most.
-pub(super) const TOGETHER: usize = 64;
+/// Most submissions that share a commit.
+pub(super) const MOST_PER_COMMIT: usize = 64;
 
-pub(super) type Asking = (Submission, bool, oneshot::Sender<Result<Accepted>>);
+/// A submission that waits for the next commit.
+#[derive(Debug)]
+pub(super) struct Pending {
+    pub(super) submission: Submission,
+    /// Whether the next job of the queue is to be claimed with it.
+    pub(super) claim: bool,
+    /// Where the answer goes.
+    pub(super) reply: oneshot::Sender<Result<Accepted>>,
+}
 
 /// Where submissions wait for the next commit.
 #[derive(Debug)]
-pub(super) struct Door(pub(super) mpsc::Sender<Asking>);
+pub(super) struct Inbox(pub(super) mpsc::Sender<Pending>);
 
-impl Door {
-    /// A door, and what comes through it.
-    pub(super) fn new() -> (Door, mpsc::Receiver<Asking>) {
-        let (sender, receiver) = mpsc::channel(4 * TOGETHER);
-        (Door(sender), receiver)
+impl Inbox {
+    /// An inbox, and where its submissions come out.
+    pub(super) fn new() -> (Inbox, mpsc::Receiver<Pending>) {
+        let (sender, receiver) = mpsc::channel(4 * MOST_PER_COMMIT);
+        (Inbox(sender), receiver)
     }
 }

@@ -1,7 +1,7 @@
 //! Accepting jobs: one commit for many clients.
 //!
 //! A commit costs a flush of the disk, whatever it holds. Submissions that arrive while one is under
-//! way therefore wait together and share the next: each in a part of its own, so that one that is
+//! way therefore wait together and share the next, each with a savepoint of its own, so that one that is
 //! refused undoes nothing of the others.
 
 use std::sync::{Arc, Weak};
@@ -9,16 +9,14 @@ use std::sync::{Arc, Weak};
 use tokio::sync::{mpsc, oneshot};
 
 use super::{
-    change::{Change, Mark},
-    claim,
+    change::{Change, Savepoint},
+    claim, coalescing,
     database::Store,
     error::{Result, StoreError},
-    events, keys, labels,
-    line::Move,
-    meshes,
+    events, keys, labels, meshes,
     rows::read,
-    submission::{Accepted, Asking, NewJob, Submission, TOGETHER},
-    twins,
+    submission::{Accepted, MOST_PER_COMMIT, NewJob, Pending, Submission},
+    waiting::Move,
 };
 use crate::{
     event::Payload,
@@ -27,35 +25,44 @@ use crate::{
 };
 
 impl Store {
-    /// Accepts jobs. They are on the disk when this returns. With `claim` somebody is free to run a job, and the
-    /// next one of the queue is claimed with the same commit.
+    /// Accepts jobs. They are on the disk when this returns. With `claim` (a worker is free) the next job of the
+    /// queue is claimed in the same commit.
     pub async fn submit(&self, submission: Submission, claim: bool) -> Result<Accepted> {
         let (reply, answer) = oneshot::channel();
-        let gone = || StoreError::Folder("the store is closed".into());
-        let sent = self.door.0.send((submission, claim, reply)).await;
-        sent.map_err(|_| gone())?;
-        answer.await.map_err(|_| gone())?
+        let closed = || StoreError::Folder("the store is closed".into());
+        let sent = self
+            .inbox
+            .0
+            .send(Pending {
+                submission,
+                claim,
+                reply,
+            })
+            .await;
+        sent.map_err(|_| closed())?;
+        answer.await.map_err(|_| closed())?
     }
 
-    async fn commit_together(&self, asking: Vec<Asking>) {
+    /// Accepts submissions in one commit, and answers each.
+    async fn commit_together(&self, pending: Vec<Pending>) {
         let (mut submissions, mut replies) = (vec![], vec![]);
-        for (submission, claim, reply) in asking {
-            submissions.push((submission, claim));
-            replies.push(reply);
+        for one in pending {
+            submissions.push((one.submission, one.claim));
+            replies.push(one.reply);
         }
         let mut answers = vec![];
         let committed = async {
             let mut change = self.change().await?;
             for (submission, claim) in submissions {
-                let mark = change.mark().await?;
-                match accept(&mut change, mark, submission, claim).await {
+                let savepoint = change.savepoint().await?;
+                match accept(&mut change, savepoint, submission, claim).await {
                     Ok(accepted) => {
-                        change.keep().await?;
+                        change.release().await?;
                         answers.push(Ok(accepted));
                     }
-                    Err(cause) => match change.undo(mark).await {
+                    Err(cause) => match change.roll_back_to(savepoint).await {
                         Ok(()) => answers.push(Err(cause)),
-                        // a full disk made the database undo all of it by itself, and is what to tell
+                        // a full disk made the database roll back everything by itself: that is the cause to report
                         Err(_) => return Err(cause),
                     },
                 }
@@ -66,21 +73,22 @@ impl Store {
         match committed {
             Ok(_) => {
                 for (reply, accepted) in replies.into_iter().zip(answers) {
-                    let _ = reply.send(accepted); // who asked may have gone
+                    let _ = reply.send(accepted); // the client may have gone
                 }
             }
             Err(cause) => {
                 for reply in replies {
-                    let _ = reply.send(Err(cause.again()));
+                    let _ = reply.send(Err(cause.for_another()));
                 }
             }
         }
     }
 }
 
+/// Accepts one submission within the transaction.
 async fn accept(
     change: &mut Change<'_>,
-    mark: Mark,
+    savepoint: Savepoint,
     submission: Submission,
     claim: bool,
 ) -> Result<Accepted> {
@@ -90,7 +98,7 @@ async fn accept(
         key,
         max_queued,
     } = submission;
-    if let Some(old) = keys::known(change, &owner, &jobs, key.as_ref()).await? {
+    if let Some(old) = keys::already_submitted(change, &owner, &jobs, key.as_ref()).await? {
         return Ok(Accepted {
             jobs: old,
             replayed: true,
@@ -117,30 +125,30 @@ async fn accept(
         jobs: accepted,
         replayed: false,
         claim,
-        changed: change.changed_since(mark),
+        changed: change.changed_since(savepoint),
     })
 }
 
 /// Commits submissions until the store is dropped.
-pub(super) async fn commit_submissions(store: Weak<Store>, mut door: mpsc::Receiver<Asking>) {
-    while let Some(first) = door.recv().await {
+pub(super) async fn commit_submissions(store: Weak<Store>, mut inbox: mpsc::Receiver<Pending>) {
+    while let Some(first) = inbox.recv().await {
         let Some(store) = store.upgrade() else { return };
-        let mut waiting = vec![first];
-        while waiting.len() < TOGETHER
-            && let Ok(next) = door.try_recv()
+        let mut pending = vec![first];
+        while pending.len() < MOST_PER_COMMIT
+            && let Ok(next) = inbox.try_recv()
         {
-            waiting.push(next);
+            pending.push(next);
         }
-        // In a task of its own: a panic there must not close the door for all who come later.
+        // in a task of its own: a panic there must not close the inbox for all later submissions
         let store: Arc<Store> = store;
-        let done = tokio::spawn(async move { store.commit_together(waiting).await }).await;
+        let done = tokio::spawn(async move { store.commit_together(pending).await }).await;
         if let Err(panic) = done {
             tracing::error!(%panic, "submissions were lost to a panic: {panic}");
         }
     }
 }
 
-/// Inserts a job: waiting, or answered at once by an earlier result, or joined to a twin.
+/// Inserts a job: waiting for a worker, answered at once by an earlier result, or coalesced into another.
 async fn insert(
     change: &mut Change<'_>,
     owner: &str,
@@ -148,15 +156,14 @@ async fn insert(
     max_queued: u32,
 ) -> Result<i64> {
     let answer = match new.cache {
-        Cache::Use => twins::earlier(change, &new.input_hash).await?,
+        Cache::Use => coalescing::earlier_result(change, &new.input_hash).await?,
         Cache::Refresh | Cache::Off => None,
     };
-    let twin_of = match (&answer, new.cache) {
-        (Some(source), _) => Some(source.key), // for a moment
-        (None, Cache::Use) => twins::under_way(change, new).await?,
+    let coalesced_into = match (&answer, new.cache) {
+        (Some(source), _) => Some(source.key), // until it is answered, below
+        (None, Cache::Use) => coalescing::primary_for(change, new).await?,
         (None, _) => None,
     };
-    let waits = twin_of.is_none();
     if answer.is_none() && change.waiting() >= max_queued as usize {
         return Err(StoreError::QueueFull);
     }
@@ -175,7 +182,7 @@ async fn insert(
     let expires_at = now.after_s(new.limits.queue_ttl_s);
     let key: i64 = sqlx::query_scalar(
         "insert into job (uuid, status, name, title, labels, priority, input_hash, created_at, payload, parent,
-                          cache, twin_of, timeout_s, queue_ttl_s, expires_at, owner)
+                          cache, coalesced_into, timeout_s, queue_ttl_s, expires_at, owner)
          values (?, 'queued', ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) returning id",
     )
     .bind(new.id.unwrap_or_default().0.to_string())
@@ -188,7 +195,7 @@ async fn insert(
     .bind(&new.payload)
     .bind(new.parent.map(|id| id.0.to_string()))
     .bind(<&str>::from(new.cache))
-    .bind(twin_of)
+    .bind(coalesced_into)
     .bind(new.limits.timeout_s)
     .bind(new.limits.queue_ttl_s)
     .bind(expires_at.micros())
@@ -199,13 +206,13 @@ async fn insert(
     let queued = [(now, Payload::status(Status::Queued))];
     events::append(change.sql(), key, 0, &queued).await?;
     let priority = new.priority;
-    change.moves(match waits {
-        true => Move::Enter { priority, key },
-        false => Move::Join,
+    change.move_job(match coalesced_into {
+        None => Move::Enter { priority, key },
+        Some(_) => Move::Attach,
     });
     if let Some(source) = answer {
         let job = read(change.sql(), key).await?;
-        twins::answer(change, &job, &source).await?;
+        coalescing::answer(change, &job, &source).await?;
     }
     Ok(key)
 }

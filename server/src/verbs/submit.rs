@@ -55,7 +55,7 @@ pub async fn create(
             && !prepared.payload.is_empty()
         {
             let owner = caller.owner();
-            let named = service.store.replay_named(owner, id, &prepared.payload);
+            let named = service.store.replay_with_id(owner, id, &prepared.payload);
             if let Some(old) = named.await? {
                 return single(vec![old], true);
             }

@@ -1,9 +1,9 @@
-//! The queue with stand-ins for the solver: what a real one does only on its worst days.
+//! The queue with stand-ins for the solver, for what a real one does only on its worst days.
 #![allow(clippy::unwrap_used)]
 
-mod answers;
-mod line;
-mod starts;
+mod attempts;
+mod coalescing;
+mod order;
 mod submits;
 
 use std::{
@@ -18,7 +18,7 @@ use solver::{
     solution::{Observer, Outcome, Progress, Solution},
 };
 
-use super::{cancel::COOPERATION, running::Why, *};
+use super::{cancel::CANCEL_GRACE, running::StopReason, *};
 use crate::{
     caller::Owners,
     digest,
@@ -27,7 +27,7 @@ use crate::{
     job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status, Waiting},
     run::Solve,
     store::{
-        Accepted, CancelOutcome, Edit, Ending, Filter, GroupBy, LastWords, NewJob, Order,
+        Accepted, CancelOutcome, Edit, Ending, Filter, FinalBatch, GroupBy, NewJob, Order,
         RequestKey, Store, StoreError, Submission,
     },
     time::Time,
@@ -88,13 +88,13 @@ impl Rig {
         accepted.jobs.into_iter().next().unwrap()
     }
 
-    /// Its solver has said something.
+    /// Its solver has reported something.
     async fn until_at_work(&self, job: &Job) {
         self.until(job, |event| matches!(event.payload, Payload::Iteration(_)))
             .await;
     }
 
-    async fn put_at(&self, job: &Job, priority: i32) -> Job {
+    async fn set_priority(&self, job: &Job, priority: i32) -> Job {
         let edit = Edit {
             priority: Some(priority),
             ..Edit::default()
@@ -107,9 +107,9 @@ impl Rig {
         edited.unwrap().unwrap()
     }
 
-    /// Ends a start by hand.
+    /// Ends an attempt by hand.
     async fn finish(&self, job: &Job, attempt: i32) -> Option<Vec<i64>> {
-        let last = LastWords::default();
+        let last = FinalBatch::default();
         let ending = Ending::canceled();
         let finished = self.store.finish(job.key, attempt, &ending, last, None);
         finished.await.unwrap()
@@ -138,7 +138,7 @@ impl Rig {
             "seq is dense from 1"
         );
         match events.into_iter().next_back().unwrap().payload {
-            // The number in our store is not part of the story.
+            // the keys in the store are no part of the event
             Payload::Done { job: done } => Job {
                 key: job.key,
                 result_key: job.key,

@@ -16,7 +16,7 @@ async fn one_key_is_one_job_however_many_ask_at_once() {
     other.key.as_mut().unwrap().payload = "another".into();
     let refused = rig.queue.submit(other).await.unwrap_err();
     assert!(matches!(refused, StoreError::KeyReuse), "{refused}");
-    // a key outlives its job, and says so
+    // the key outlives its job, and says that it was deleted
     rig.queue
         .cancel(rig.store.last_key().await.unwrap())
         .await
@@ -42,7 +42,7 @@ async fn one_that_is_refused_undoes_nothing_of_those_in_the_same_commit() {
         .submit(submission(vec![named("a")], None))
         .await
         .unwrap();
-    // two of three are new, the one between belongs to somebody else: none is accepted
+    // two of three are new, but the id of the other belongs to another job: none is accepted
     let batch = vec![new(0), named("b"), new(0)];
     let asking = [
         submission(vec![new(0)], None),
@@ -85,7 +85,7 @@ async fn a_key_stands_for_what_is_left_of_its_jobs() {
         .unwrap();
     let gone = rig.queue.submit(two.clone()).await;
     assert!(matches!(gone, Err(StoreError::Deleted(_))));
-    // forgotten with the names of its jobs
+    // forgotten with the ids of its jobs
     let later = crate::time::Time::now().after_s(8.0 * 86_400.0);
     rig.store.forget_deleted(later).await.unwrap();
     assert!(!rig.queue.submit(two).await.unwrap().replayed);

@@ -3,13 +3,12 @@
 
 mod owners;
 mod plans;
-
-use sqlx::{SqlitePool, migrate::Migrator, sqlite::SqliteConnectOptions};
+mod upgrades;
 
 use super::*;
 use crate::{
     caller::Owners,
-    job::{Cache, Limits, Status},
+    job::{Cache, Job, Limits, Status},
 };
 
 impl Store {
@@ -64,77 +63,6 @@ fn by(owner: &str, jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
         key,
         max_queued: 1_000_000,
     }
-}
-
-/// A store as it was before the job API, with a job that had ended and one that was waiting.
-async fn older_store(folder: &Path) {
-    let migrations = folder.join("migrations");
-    std::fs::create_dir(&migrations).unwrap();
-    let now = Path::new(env!("CARGO_MANIFEST_DIR")).join("../migrations");
-    for name in ["0001_jobs.sql", "0002_meshes.sql"] {
-        std::fs::copy(now.join(name), migrations.join(name)).unwrap();
-    }
-    let options = SqliteConnectOptions::new()
-        .filename(folder.join("signorini.db"))
-        .create_if_missing(true);
-    let db = SqlitePool::connect_with(options).await.unwrap();
-    let migrator = Migrator::new(migrations.as_path()).await.unwrap();
-    migrator.run(&db).await.unwrap();
-    for statement in [
-        "insert into problem (input_hash, body) values ('sha256:1', '{}')",
-        "insert into job (uuid, status, input_hash, labels, created_at, started_at, finished_at, attempt, result_available)
-         values ('01890a5d-ac96-774b-bcce-b302099a8057', 'succeeded', 'sha256:1', '{\"a\": \"b\"}', 1, 2, 3, 1, 'final')",
-        "insert into job (uuid, status, input_hash, created_at)
-         values ('01890a5d-ac96-774b-bcce-b302099a8058', 'queued', 'sha256:1', unixepoch() * 1000000)",
-        "insert into result_part (job_id, name, piece, body) values (1, 'fields', 0, x'7b'), (1, 'fields', 1, x'7d')",
-    ] {
-        sqlx::query(statement).execute(&db).await.unwrap();
-    }
-    db.close().await;
-}
-
-#[tokio::test]
-async fn an_older_store_is_brought_up_to_date_with_all_that_is_in_it() {
-    let folder = tempfile::tempdir().unwrap();
-    older_store(folder.path()).await;
-    let store = Store::open(folder.path()).await.unwrap();
-    let labeled = Filter {
-        labels: vec![("a".into(), "b".into())],
-        ..Filter::default()
-    };
-    let jobs = store.jobs(Owners::All, &labeled, Order::NEWEST_FIRST, None, 10);
-    let jobs = jobs.await.unwrap();
-    assert_eq!(jobs.len(), 1, "found by its label");
-    assert_eq!(
-        (jobs[0].status, jobs[0].limits),
-        (Status::Succeeded, Limits::default())
-    );
-    let key = jobs[0].result_key;
-    let mut found = store
-        .snapshot(Owners::All, jobs[0].id)
-        .await
-        .unwrap()
-        .unwrap();
-    assert_eq!(found.part("fields").await.unwrap().unwrap(), b"{}");
-    let info = found.part_info("fields").await.unwrap().unwrap();
-    drop(found);
-    assert_eq!((info.bytes, info.digest.len()), (2, 32));
-    // the one that waited is in line, and is not taken for one that has waited too long
-    assert_eq!(store.waiting(), 1);
-    assert!(
-        store
-            .expire_queued(crate::time::Time::now())
-            .await
-            .unwrap()
-            .is_empty()
-    );
-    assert!(store.claim_next().await.unwrap().0.is_some());
-    // what an older program has found answers nobody
-    assert_eq!(
-        store.delete(Owners::All, key).await.unwrap(),
-        Deletion::Deleted
-    );
-    assert_eq!(store.piece(key, "fields", 0).await.unwrap(), None);
 }
 
 /// SQLite ends a transaction by itself when the disk is full, and the driver does not notice.

@@ -48,7 +48,7 @@ async fn run_all(store: &Store) {
         result: crate::job::ResultAvailable::Final,
     };
     while let Some(Claim { job, .. }) = store.claim_next().await.unwrap().0 {
-        let finished = store.finish(job.key, job.attempt, &ending, LastWords::default(), None);
+        let finished = store.finish(job.key, job.attempt, &ending, FinalBatch::default(), None);
         finished.await.unwrap().unwrap();
     }
 }
@@ -206,7 +206,12 @@ async fn an_id_of_another_owner_is_refused_and_shows_nothing() {
             .await
     };
     assert!(submit("ada").await.unwrap().replayed);
-    let replayed = async |owner| store.replay_named(owner, ada.id, "payload").await.unwrap();
+    let replayed = async |owner| {
+        store
+            .replay_with_id(owner, ada.id, "payload")
+            .await
+            .unwrap()
+    };
     assert_eq!(replayed("ada").await.unwrap().id, ada.id);
     assert!(replayed("bob").await.is_none());
     // the same answer whether that job is there, or was deleted

@@ -20,7 +20,12 @@ fn sorts(steps: &[String]) -> bool {
 async fn the_questions_of_the_queue_are_answered_by_indexes() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
-    for question in [claim::NEXT, end::LATE, twins::EARLIER, twins::UNDER_WAY] {
+    for question in [
+        claim::NEXT,
+        end::EXPIRED,
+        coalescing::EARLIER_RESULT,
+        coalescing::PRIMARY,
+    ] {
         let steps = plan(&store, question).await;
         assert!(steps[0].contains("INDEX job_"), "{question}: {steps:?}");
         assert!(!sorts(&steps), "{question}: {steps:?}");
@@ -41,8 +46,8 @@ async fn lists_of_one_owner_are_answered_by_indexes() {
         for descending in [true, false] {
             let order = Order { by, descending };
             for cursor in [None, Some(Cursor { micros: 1, key: 1 })] {
-                let leads = list::leads(&mine, order);
-                let question = list::page_of_jobs(&mine, &leads, order, cursor, 50);
+                let paths = list::ordered_paths(&mine, order);
+                let question = list::page_of_jobs(&mine, &paths, order, cursor, 50);
                 let steps = plan(&store, question.sql().as_str()).await;
                 assert!(
                     steps[0].contains("SEARCH job USING INDEX job_by_owner"),

@@ -1,4 +1,4 @@
-//! The line of those that wait: its order, its pause, and how long a job may stand in it.
+//! The jobs that wait: their order, the pause of the queue, and how long they may wait.
 
 use super::*;
 
@@ -47,7 +47,7 @@ async fn a_job_that_waits_too_long_fails_with_a_reason_of_its_own() {
 }
 
 #[tokio::test]
-async fn a_paused_queue_starts_nothing_until_it_is_resumed_also_after_a_restart() {
+async fn a_paused_queue_starts_nothing_until_it_is_resumed_even_across_a_restart() {
     let rig = rig(fake::solve).await;
     rig.queue.start();
     rig.queue.pause().await.unwrap();
@@ -62,7 +62,7 @@ async fn a_paused_queue_starts_nothing_until_it_is_resumed_also_after_a_restart(
     } = rig;
     queue.drain().await;
     drop((store, queue));
-    // the committing task lets go of the store when it next looks
+    // the task that commits submissions drops the store when it next looks
     let store = loop {
         match Store::open(folder.path()).await {
             Ok(store) => break store,
@@ -85,7 +85,7 @@ async fn a_paused_queue_starts_nothing_until_it_is_resumed_also_after_a_restart(
 }
 
 #[tokio::test]
-async fn the_line_in_memory_is_the_queue_on_the_disk() {
+async fn the_jobs_that_wait_in_memory_are_the_queue_on_the_disk() {
     let rig = rig(fake::solve).await;
     let all = Filter::default();
     for priority in [0, 3, 0, -2, 3] {
@@ -121,7 +121,7 @@ async fn the_line_in_memory_is_the_queue_on_the_disk() {
 }
 
 #[tokio::test]
-async fn a_job_and_its_twin_may_have_waited_too_long_at_the_same_moment() {
+async fn a_job_and_one_coalesced_into_it_may_expire_at_the_same_moment() {
     let rig = rig(fake::solve).await; // its workers never start
     let short = || {
         let mut job = same();
@@ -129,7 +129,7 @@ async fn a_job_and_its_twin_may_have_waited_too_long_at_the_same_moment() {
         job
     };
     let jobs = [rig.submit_as(short()).await, rig.submit_as(short()).await];
-    assert!(jobs[1].twin_of.is_some());
+    assert!(jobs[1].coalesced_into.is_some());
     tokio::time::sleep(Duration::from_millis(100)).await;
     rig.store.expire_queued(Time::now()).await.unwrap();
     for job in &jobs {

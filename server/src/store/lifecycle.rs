@@ -1,12 +1,11 @@
-//! The life of one job: started, and ended. Every change of status goes through `change`.
+//! The lifecycle of one job: its attempts start, and it ends. Every change of status goes through `set_status`.
 
 use super::{
     change::Change,
     error::{Result, StoreError},
-    events,
-    line::Move,
-    results,
-    rows::{read, running},
+    events, results,
+    rows::{partial_key, read},
+    waiting::Move,
 };
 use crate::{
     event::Payload,
@@ -14,7 +13,7 @@ use crate::{
     time::Time,
 };
 
-/// How a running job ends.
+/// How a job ends.
 #[derive(Clone, Debug)]
 pub struct Ending {
     /// A terminal status.
@@ -23,12 +22,12 @@ pub struct Ending {
     pub reason: Option<Reason>,
     /// What went wrong, if it failed.
     pub failure: Option<Failure>,
-    /// What is stored with it.
+    /// The result that is stored with it.
     pub result: ResultAvailable,
 }
 
 impl Ending {
-    /// Canceled, with nothing to show.
+    /// Canceled, without a result.
     pub fn canceled() -> Self {
         let reason = Some(Reason::UserCancel);
         Ending {
@@ -39,7 +38,7 @@ impl Ending {
         }
     }
 
-    /// Failed, with nothing to show.
+    /// Failed, without a result.
     pub fn failed(reason: Reason, detail: impl Into<String>) -> Self {
         let failure = Some(Failure::new(reason, detail));
         Ending {
@@ -51,10 +50,10 @@ impl Ending {
     }
 }
 
-/// A start of a queued job.
-pub(super) async fn start(change: &mut Change<'_>, job: &Job) -> Result<Job> {
+/// Starts an attempt of a queued job; gives the job as it is then.
+pub(super) async fn start_attempt(change: &mut Change<'_>, job: &Job) -> Result<Job> {
     let now = Time::now();
-    self::change(change, job, Status::Running).await?;
+    set_status(change, job, Status::Running).await?;
     sqlx::query(
         "update job set attempt = attempt + 1, started_at = ?, progress = null, result_available = 'none'
          where id = ?",
@@ -70,21 +69,21 @@ pub(super) async fn start(change: &mut Change<'_>, job: &Job) -> Result<Job> {
     Ok(job)
 }
 
-/// The end itself. The last word on a job.
-pub(super) async fn close(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
+/// Ends a job, with its one `done` event. Jobs coalesced into it are not touched.
+pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
     debug_assert!(ending.status.is_terminal());
-    // Lists count on it that nobody ends before it was accepted, also where the clock was set back.
+    // Lists rely on it that no job ends before it was accepted, even if the clock was set back.
     let now = Time::now().max(job.created_at);
     let failure = ending
         .failure
         .as_ref()
         .map(serde_json::to_string)
         .transpose()?;
-    // what finished load steps have left stays, however the job ends
+    // the results of finished load steps are kept, however the job ends
     let result = ending.result.max(job.result_available);
-    self::change(change, job, ending.status).await?;
+    set_status(change, job, ending.status).await?;
     sqlx::query(
-        "update job set reason = ?, failure = ?, result_available = ?, finished_at = ?, twin_of = null,
+        "update job set reason = ?, failure = ?, result_available = ?, finished_at = ?, coalesced_into = null,
                         solver_version = ? where id = ?",
     )
     .bind(ending.reason.map(<&str>::from))
@@ -97,12 +96,12 @@ pub(super) async fn close(change: &mut Change<'_>, job: &Job, ending: &Ending) -
     .await?;
     match (ending.result, result) {
         (ResultAvailable::None, ResultAvailable::None) => {
-            // Pieces of a result that came too late.
+            // pieces that were written for a result that is not kept
             results::remove(change.sql(), job.key).await?;
-            results::remove(change.sql(), running(job.key)).await?;
+            results::remove(change.sql(), partial_key(job.key)).await?;
         }
-        (ResultAvailable::None, _) => results::promote(change.sql(), job.key).await?,
-        _ => results::remove(change.sql(), running(job.key)).await?,
+        (ResultAvailable::None, _) => results::keep_partial(change.sql(), job.key).await?,
+        _ => results::remove(change.sql(), partial_key(job.key)).await?,
     }
     let done = Payload::Done {
         job: Box::new(read(change.sql(), job.key).await?),
@@ -112,8 +111,8 @@ pub(super) async fn close(change: &mut Change<'_>, job: &Job, ending: &Ending) -
     Ok(())
 }
 
-/// The one place where a status changes, and with it the line.
-pub(super) async fn change(change: &mut Change<'_>, job: &Job, next: Status) -> Result<()> {
+/// Changes the status of a job, and with it the jobs that wait. Nothing else does.
+pub(super) async fn set_status(change: &mut Change<'_>, job: &Job, next: Status) -> Result<()> {
     if !job.status.may_become(next) {
         return Err(StoreError::Corrupt(format!(
             "{} cannot go from {:?} to {next:?}",
@@ -126,13 +125,13 @@ pub(super) async fn change(change: &mut Change<'_>, job: &Job, next: Status) -> 
         .execute(change.sql())
         .await?;
     let (priority, key) = (job.priority, job.key);
-    if job.waits_in_line() {
-        change.moves(Move::Leave { priority, key });
+    if job.waits_for_a_worker() {
+        change.move_job(Move::Leave { priority, key });
     } else if job.status == Status::Queued {
-        change.moves(Move::Part);
+        change.move_job(Move::Detach);
     }
     if next == Status::Queued {
-        change.moves(Move::Enter { priority, key });
+        change.move_job(Move::Enter { priority, key });
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! What becomes of a start: its end, its cancel, its time-out, its drain.
+//! How attempts end: by themselves, canceled, timed out, requeued when the service stops.
 
 use super::*;
 
@@ -72,7 +72,7 @@ async fn a_canceled_running_job_keeps_its_last_state() {
     );
 }
 
-/// Settles where the forces do not balance.
+/// Converges to a state whose forces do not balance.
 fn unbalanced(
     _: &Problem,
     _: Option<External>,
@@ -111,7 +111,7 @@ async fn a_job_that_converged_to_no_balance_fails_and_keeps_its_result() {
     );
 }
 
-/// At work in one long phase, with nothing to tell.
+/// In one long phase, with nothing to report.
 fn busy(
     _: &Problem,
     _: Option<External>,
@@ -132,15 +132,15 @@ async fn a_pulse_is_answered_and_not_recorded() {
     let start = Instant::now();
     rig.queue.cancel(job.key).await.unwrap();
     let done = rig.until_done(&job).await;
-    assert!(start.elapsed() < COOPERATION, "{:?}", start.elapsed());
+    assert!(start.elapsed() < CANCEL_GRACE, "{:?}", start.elapsed());
     assert_eq!((done.status, done.progress), (Status::Canceled, None));
     let events = rig.store.events_after(job.key, 0, 100).await.unwrap();
     let kinds: Vec<_> = events.iter().map(|event| event.payload.kind()).collect();
     assert_eq!(kinds, ["status", "status", "done"]);
 }
 
-/// As one long factorisation: deaf for a second.
-fn deaf(
+/// As one long factorisation: it does not react for a second.
+fn unresponsive(
     problem: &Problem,
     _: Option<External>,
     observe: &mut Observer<'_>,
@@ -150,8 +150,8 @@ fn deaf(
 }
 
 #[tokio::test]
-async fn a_deaf_solver_delays_only_its_slot_and_not_the_cancel() {
-    let rig = rig(deaf).await;
+async fn an_unresponsive_solver_delays_only_its_worker_and_not_the_cancel() {
+    let rig = rig(unresponsive).await;
     rig.queue.start();
     let job = rig.submit().await;
     rig.until(&job, |event| {
@@ -176,7 +176,7 @@ async fn a_deaf_solver_delays_only_its_slot_and_not_the_cancel() {
         (done.status, done.result_available),
         (Status::Canceled, ResultAvailable::None)
     );
-    // The slot comes back, and the late result changes nothing.
+    // the worker is free again, and the late result changes nothing
     let next = rig.submit().await;
     assert_eq!(rig.until_done(&next).await.status, Status::Succeeded);
     assert_eq!(
@@ -186,8 +186,8 @@ async fn a_deaf_solver_delays_only_its_slot_and_not_the_cancel() {
 }
 
 #[tokio::test]
-async fn a_running_job_that_no_worker_holds_is_canceled_at_once() {
-    let rig = rig(fake::solve).await; // its workers never start: nobody holds what we claim
+async fn a_running_job_without_a_worker_is_canceled_at_once() {
+    let rig = rig(fake::solve).await; // its workers never start: nobody solves what is claimed here
     let job = rig.submit().await;
     rig.store.claim_next().await.unwrap().0.unwrap();
     let outcome = rig.queue.cancel(job.key).await.unwrap();
@@ -200,7 +200,7 @@ async fn a_running_job_that_no_worker_holds_is_canceled_at_once() {
 }
 
 #[tokio::test]
-async fn a_drain_puts_a_running_job_back_without_using_up_a_start() {
+async fn a_drain_requeues_a_running_job_without_using_up_an_attempt() {
     let rig = rig(fake::solve_until_stopped).await;
     rig.queue.start();
     let job = rig.submit().await;
@@ -213,16 +213,16 @@ async fn a_drain_puts_a_running_job_back_without_using_up_a_start() {
     );
 }
 
-/// The drain could not store it: the next start of the service finds it running.
+/// The drain could not be stored: the next start of the service finds the job running.
 #[tokio::test]
-async fn a_job_that_could_not_be_put_back_is_not_canceled() {
+async fn a_job_that_could_not_be_requeued_is_not_canceled() {
     let rig = rig(fake::solve_until_stopped).await;
     rig.queue.start();
     let job = rig.submit().await;
     rig.until_at_work(&job).await;
     let running = rig.queue.running().get(&job.key).cloned().unwrap();
     rig.queue.stopping.cancel();
-    running.stop(Why::Unwanted);
+    running.stop(StopReason::Unwanted);
     while rig.queue.state().running > 0 {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
@@ -233,7 +233,7 @@ async fn a_job_that_could_not_be_put_back_is_not_canceled() {
 
 #[tokio::test]
 async fn a_job_that_loses_three_workers_fails() {
-    let rig = rig(fake::solve).await; // its workers never start: we claim, and die, in their place
+    let rig = rig(fake::solve).await; // its workers never start: jobs are claimed, and lost, here
     let job = rig.submit().await;
     for attempt in 1..=3 {
         let claim = rig.store.claim_next().await.unwrap().0.unwrap();
@@ -258,7 +258,7 @@ async fn a_running_job_with_a_cancel_request_is_canceled_at_the_next_start() {
 }
 
 #[tokio::test]
-async fn a_drain_says_what_became_of_each_job() {
+async fn a_drain_returns_the_new_status_of_each_job() {
     let rig = rig(fake::solve).await;
     let (one, two) = (rig.submit().await, rig.submit().await);
     for _ in 0..2 {
@@ -272,33 +272,33 @@ async fn a_drain_says_what_became_of_each_job() {
 }
 
 #[tokio::test]
-async fn what_an_overtaken_start_says_is_not_recorded() {
+async fn events_of_an_earlier_attempt_are_not_recorded() {
     let rig = rig(fake::solve).await;
     let job = rig.submit().await;
     rig.store.claim_next().await.unwrap().0.unwrap();
     rig.store.requeue_interrupted().await.unwrap();
     let again = rig.store.claim_next().await.unwrap().0.unwrap();
-    let line = [(
+    let events = [(
         crate::time::Time::now(),
         Payload::Iteration(fake::iteration(1)),
     )];
     assert!(
         !rig.store
-            .append_events(job.key, 1, &line, &Default::default())
+            .append_events(job.key, 1, &events, &Default::default())
             .await
             .unwrap()
     );
     assert_eq!(rig.finish(&job, 1).await, None);
     assert!(
         rig.store
-            .append_events(job.key, again.job.attempt, &line, &Default::default())
+            .append_events(job.key, again.job.attempt, &events, &Default::default())
             .await
             .unwrap()
     );
 }
 
 #[tokio::test]
-async fn a_job_out_of_time_fails_and_keeps_its_last_state() {
+async fn a_job_that_times_out_fails_and_keeps_its_last_state() {
     let rig = rig(fake::solve_until_stopped).await;
     rig.queue.start();
     let mut short = new(0);
@@ -317,8 +317,8 @@ async fn a_job_out_of_time_fails_and_keeps_its_last_state() {
 }
 
 #[tokio::test]
-async fn a_deaf_solver_out_of_time_is_ended_over_its_head() {
-    fn very_deaf(
+async fn a_job_that_times_out_is_ended_by_force_if_its_solver_does_not_react() {
+    fn very_unresponsive(
         _: &Problem,
         _: Option<External>,
         _: &mut Observer<'_>,
@@ -326,7 +326,7 @@ async fn a_deaf_solver_out_of_time_is_ended_over_its_head() {
         std::thread::sleep(Duration::from_secs(4));
         Err(SolveError::Stopped)
     }
-    let rig = rig(very_deaf).await;
+    let rig = rig(very_unresponsive).await;
     rig.queue.start();
     let mut short = new(0);
     short.limits.timeout_s = 0.05;
@@ -339,12 +339,12 @@ async fn a_deaf_solver_out_of_time_is_ended_over_its_head() {
         "{:?}",
         start.elapsed()
     );
-    assert_eq!(rig.queue.state().idle, 0, "its slot waits for the solver");
+    assert_eq!(rig.queue.state().idle, 0, "its worker waits for the solver");
 }
 
-/// Eight steps that take no time: what they found is written once, and not eight times.
+/// Eight steps that take no time: their results are stored once, and not eight times.
 #[tokio::test]
-async fn what_many_quick_steps_have_found_is_not_written_after_each() {
+async fn partial_results_of_many_quick_steps_are_not_stored_after_each() {
     fn quick_steps(
         _: &Problem,
         _: Option<External>,
@@ -391,13 +391,13 @@ async fn what_many_quick_steps_have_found_is_not_written_after_each() {
     assert!(kept.part("summary").await.unwrap().is_some());
     assert!(
         kept.part("history").await.unwrap().is_none(),
-        "what was told went on after it"
+        "its events went on after it"
     );
 }
 
-/// Its events cannot be stored for a moment.
+/// Its events cannot be stored for a while.
 #[tokio::test]
-async fn a_full_disk_holds_a_job_up_and_does_not_end_it() {
+async fn a_full_disk_delays_a_job_and_does_not_end_it() {
     let rig = rig(fake::solve_until_stopped).await;
     rig.queue.start();
     let mut short = new(0);
@@ -411,6 +411,6 @@ async fn a_full_disk_holds_a_job_up_and_does_not_end_it() {
         (done.status, done.reason),
         (Status::Failed, Some(Reason::TimedOut))
     );
-    let told = rig.store.iterations(job.key, 1).await.unwrap();
-    assert_eq!(told.len(), done.progress.unwrap().iteration as usize);
+    let stored = rig.store.iterations(job.key, 1).await.unwrap();
+    assert_eq!(stored.len(), done.progress.unwrap().iteration as usize);
 }

@@ -1,0 +1,205 @@
+//! Coalescing: jobs of the same input are solved once.
+//!
+//! A job is answered by the result of an earlier job, or coalesced into a job that waits or runs, its *primary*.
+//! A coalesced job is not solved itself: it waits until its primary has ended, and ends with the same result. Where
+//! the end of the primary is the primary's alone (it was canceled, say), the first of the jobs coalesced into it
+//! takes its place.
+
+use super::{
+    change::Change,
+    error::Result,
+    lifecycle::{self, Ending},
+    rows::{from_row, read},
+    submission::NewJob,
+    waiting::Move,
+};
+use crate::job::{Job, Reason, Status};
+
+/// Most jobs that are coalesced into one: they end in one transaction with it. Those beyond wait for a worker, and
+/// are answered when it is their turn.
+const MOST_COALESCED: i64 = 100;
+
+pub(super) const EARLIER_RESULT: &str = "select * from job indexed by job_answer
+     where input_hash = ? and status = 'succeeded' and result_available = 'final' and cache <> 'off'
+           and solver_version = ?
+     order by id desc limit 1";
+
+pub(super) const PRIMARY: &str = "select id from job indexed by job_under_way
+     where input_hash = ? and status in ('queued', 'running') and coalesced_into is null and cache <> 'off'
+           and cancel_requested = 0 and (status = 'running' or priority >= ?)
+     order by id limit 1";
+
+/// A priority that no job has: as the least priority of a primary that waits, it leaves those that run.
+const ONLY_RUNNING: i32 = i32::MAX;
+
+/// The newest job of this input whose final result, found by this version of the program, may answer others.
+pub(super) async fn earlier_result(
+    change: &mut Change<'_>,
+    input_hash: &str,
+) -> Result<Option<Job>> {
+    let row = sqlx::query(EARLIER_RESULT)
+        .bind(input_hash)
+        .bind(env!("CARGO_PKG_VERSION"))
+        .fetch_optional(change.sql())
+        .await?;
+    row.as_ref().map(from_row).transpose()
+}
+
+/// The job that a new one may be coalesced into. One that waits with a lower priority, or that is about to be
+/// canceled, would delay the new one.
+pub(super) async fn primary_for(change: &mut Change<'_>, new: &NewJob) -> Result<Option<i64>> {
+    let primary: Option<i64> = sqlx::query_scalar(PRIMARY)
+        .bind(&new.input_hash)
+        .bind(new.priority)
+        .fetch_optional(change.sql())
+        .await?;
+    Ok(match primary {
+        Some(primary) if count_coalesced(change, primary).await? < MOST_COALESCED => Some(primary),
+        _ => None,
+    })
+}
+
+async fn count_coalesced(change: &mut Change<'_>, primary: i64) -> Result<i64> {
+    let count = sqlx::query_scalar("select count(*) from job where coalesced_into = ?")
+        .bind(primary)
+        .fetch_one(change.sql());
+    Ok(count.await?)
+}
+
+/// Coalesces a job whose turn it is into one that runs on the same input, and with it those coalesced into it;
+/// false if there is none, or if they were too many. Two such jobs arise where the later one had a higher priority.
+pub(super) async fn coalesce_into_running(change: &mut Change<'_>, job: &Job) -> Result<bool> {
+    let primary: Option<i64> = sqlx::query_scalar(PRIMARY)
+        .bind(&job.input_hash)
+        .bind(ONLY_RUNNING)
+        .fetch_optional(change.sql())
+        .await?;
+    let Some(primary) = primary else {
+        return Ok(false);
+    };
+    let (there, more) = (
+        count_coalesced(change, primary).await?,
+        count_coalesced(change, job.key).await?,
+    );
+    if there + more >= MOST_COALESCED {
+        return Ok(false);
+    }
+    sqlx::query("update job set coalesced_into = ? where id = ? or coalesced_into = ?")
+        .bind(primary)
+        .bind(job.key)
+        .bind(job.key)
+        .execute(change.sql())
+        .await?;
+    let (priority, key) = (job.priority, job.key);
+    change.move_job(Move::Leave { priority, key });
+    change.move_job(Move::Attach);
+    Ok(true)
+}
+
+/// The jobs coalesced into this one, in the order in which they would be started.
+async fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Vec<Job>> {
+    let rows = sqlx::query("select * from job where coalesced_into = ? order by priority desc, id")
+        .bind(primary)
+        .fetch_all(change.sql())
+        .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// What becomes of the jobs coalesced into one that has ended: they end as it has ended, or the first of them
+/// takes its place.
+pub(super) async fn end_coalesced(change: &mut Change<'_>, primary: &Job) -> Result<()> {
+    let coalesced = coalesced_jobs(change, primary.key).await?;
+    let Some(first) = coalesced.first() else {
+        return Ok(());
+    };
+    let primary = read(change.sql(), primary.key).await?;
+    if !is_shared(primary.status, primary.reason) {
+        return replace_primary(change, first, primary.key).await;
+    }
+    for job in &coalesced {
+        answer(change, job, &primary).await?;
+    }
+    Ok(())
+}
+
+/// A primary waits with this priority now: if a job coalesced into it has a higher one, that takes its place.
+pub(super) async fn replace_if_outranked(
+    change: &mut Change<'_>,
+    primary: i64,
+    priority: i32,
+) -> Result<()> {
+    let coalesced = coalesced_jobs(change, primary).await?;
+    match coalesced.first() {
+        Some(first) if first.priority > priority => replace_primary(change, first, primary).await,
+        _ => Ok(()),
+    }
+}
+
+/// A job waits for a worker in place of its primary, and the others coalesced into that are coalesced into it.
+async fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
+    detach(change, job, job.priority).await?;
+    sqlx::query("update job set coalesced_into = ? where coalesced_into = ?")
+        .bind(job.key)
+        .bind(primary)
+        .execute(change.sql())
+        .await?;
+    Ok(())
+}
+
+/// A coalesced job waits for a worker itself, with this priority.
+async fn detach(change: &mut Change<'_>, job: &Job, priority: i32) -> Result<()> {
+    let key = job.key;
+    sqlx::query("update job set coalesced_into = null where id = ?")
+        .bind(key)
+        .execute(change.sql())
+        .await?;
+    change.move_job(Move::Detach);
+    change.move_job(Move::Enter { priority, key });
+    Ok(())
+}
+
+/// A coalesced job has this priority now: if its primary still waits with a lower one, it no longer waits for that.
+pub(super) async fn detach_if_ahead(
+    change: &mut Change<'_>,
+    job: &Job,
+    primary: i64,
+    priority: i32,
+) -> Result<()> {
+    let primary = read(change.sql(), primary).await?;
+    if primary.status != Status::Queued || primary.priority >= priority {
+        return Ok(());
+    }
+    detach(change, job, priority).await
+}
+
+/// Whether the end of a job is also that of the jobs coalesced into it.
+fn is_shared(status: Status, reason: Option<Reason>) -> bool {
+    match status {
+        Status::Succeeded => true,
+        // a job that has killed the process several times is not tried again for each of them
+        Status::Failed => reason
+            .is_some_and(|reason| reason.belongs_to_the_problem() || reason == Reason::WorkerLost),
+        Status::Queued | Status::Running | Status::Canceled => false,
+    }
+}
+
+/// Starts a queued job and ends it at once, with the result of another one of the same input.
+pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> Result<()> {
+    let job = lifecycle::start_attempt(change, job).await?;
+    sqlx::query(
+        "update job set cached_from = ?, coalesced_into = null,
+                        result_job = (select coalesce(result_job, id) from job where id = ?) where id = ?",
+    )
+    .bind(source.id.0.to_string())
+    .bind(source.key)
+    .bind(job.key)
+    .execute(change.sql())
+    .await?;
+    let ending = Ending {
+        status: source.status,
+        reason: source.reason,
+        failure: source.failure.clone(),
+        result: source.result_available,
+    };
+    lifecycle::end_job(change, &job, &ending).await
+}

@@ -1,0 +1,129 @@
+//! Stores that were written by earlier versions of the program.
+
+use sqlx::{AssertSqlSafe, SqlitePool, migrate::Migrator, sqlite::SqliteConnectOptions};
+
+use super::*;
+
+/// A store with the tables of these migrations and no later ones, and with what these statements insert.
+async fn older_store(folder: &Path, migrations: &[&str], statements: &[&'static str]) {
+    let older = folder.join("migrations");
+    std::fs::create_dir(&older).unwrap();
+    let all = Path::new(env!("CARGO_MANIFEST_DIR")).join("../migrations");
+    for name in migrations {
+        std::fs::copy(all.join(name), older.join(name)).unwrap();
+    }
+    let options = SqliteConnectOptions::new()
+        .filename(folder.join("signorini.db"))
+        .create_if_missing(true);
+    let db = SqlitePool::connect_with(options).await.unwrap();
+    let migrator = Migrator::new(older.as_path()).await.unwrap();
+    migrator.run(&db).await.unwrap();
+    for statement in statements {
+        sqlx::query(AssertSqlSafe(*statement))
+            .execute(&db)
+            .await
+            .unwrap();
+    }
+    db.close().await;
+}
+
+/// A job that had ended, and one that was waiting.
+const BEFORE_THE_JOB_API: [&str; 4] = [
+    "insert into problem (input_hash, body) values ('sha256:1', '{}')",
+    "insert into job (uuid, status, input_hash, labels, created_at, started_at, finished_at, attempt, result_available)
+     values ('01890a5d-ac96-774b-bcce-b302099a8057', 'succeeded', 'sha256:1', '{\"a\": \"b\"}', 1, 2, 3, 1, 'final')",
+    "insert into job (uuid, status, input_hash, created_at)
+     values ('01890a5d-ac96-774b-bcce-b302099a8058', 'queued', 'sha256:1', unixepoch() * 1000000)",
+    "insert into result_part (job_id, name, piece, body) values (1, 'fields', 0, x'7b'), (1, 'fields', 1, x'7d')",
+];
+
+/// A job that waits, one that waits for its end, and one that was deleted; all of the one owner that there was.
+const BEFORE_OWNERS: [&str; 5] = [
+    "insert into problem (input_hash, body) values ('sha256:1', '{}')",
+    "insert into job (uuid, status, input_hash, created_at)
+     values ('01890a5d-ac96-774b-bcce-b302099a8057', 'queued', 'sha256:1', 1)",
+    "insert into job (uuid, status, input_hash, created_at, twin_of)
+     values ('01890a5d-ac96-774b-bcce-b302099a8058', 'queued', 'sha256:1', 2, 1)",
+    "insert into job (uuid, status, input_hash, created_at, twin_of)
+     values ('01890a5d-ac96-774b-bcce-b302099a8059', 'queued', 'sha256:1', 3, 1)",
+    "insert into deleted_job (uuid, id, deleted_at) values ('01890a5d-ac96-774b-bcce-b302099a8056', 99, 1)",
+];
+
+#[tokio::test]
+async fn a_store_from_before_the_job_api_is_brought_up_to_date_with_all_that_is_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let migrations = ["0001_jobs.sql", "0002_meshes.sql"];
+    older_store(folder.path(), &migrations, &BEFORE_THE_JOB_API).await;
+    let store = Store::open(folder.path()).await.unwrap();
+    let labeled = Filter {
+        labels: vec![("a".into(), "b".into())],
+        ..Filter::default()
+    };
+    let jobs = store.jobs(Owners::All, &labeled, Order::NEWEST_FIRST, None, 10);
+    let jobs = jobs.await.unwrap();
+    assert_eq!(jobs.len(), 1, "found by its label");
+    assert_eq!(
+        (jobs[0].status, jobs[0].limits),
+        (Status::Succeeded, Limits::default())
+    );
+    let key = jobs[0].result_key;
+    let mut found = store
+        .snapshot(Owners::All, jobs[0].id)
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(found.part("fields").await.unwrap().unwrap(), b"{}");
+    let info = found.part_info("fields").await.unwrap().unwrap();
+    drop(found);
+    assert_eq!((info.bytes, info.digest.len()), (2, 32));
+    // the one that waited is in line, and is not taken for one that has waited too long
+    assert_eq!(store.waiting(), 1);
+    assert!(
+        store
+            .expire_queued(crate::time::Time::now())
+            .await
+            .unwrap()
+            .is_empty()
+    );
+    assert!(store.claim_next().await.unwrap().0.is_some());
+    // what an older program has found answers nobody
+    assert_eq!(
+        store.delete(Owners::All, key).await.unwrap(),
+        Deletion::Deleted
+    );
+    assert_eq!(store.piece(key, "fields", 0).await.unwrap(), None);
+}
+
+#[tokio::test]
+async fn a_store_from_before_owners_keeps_its_coalesced_and_its_deleted_jobs() {
+    let folder = tempfile::tempdir().unwrap();
+    let migrations = ["0001_jobs.sql", "0002_meshes.sql", "0003_job_api.sql"];
+    older_store(folder.path(), &migrations, &BEFORE_OWNERS).await;
+    let store = Store::open(folder.path()).await.unwrap();
+    assert_eq!(store.waiting(), 3);
+    let local = Owners::Only("local");
+    let oldest_first = Order {
+        descending: false,
+        ..Order::NEWEST_FIRST
+    };
+    let everything = Filter::default();
+    let jobs = store.jobs(local, &everything, oldest_first, None, 10);
+    let jobs: Vec<Job> = jobs.await.unwrap();
+    let coalesced: Vec<Option<i64>> = jobs.iter().map(|job| job.coalesced_into).collect();
+    assert_eq!(coalesced, [None, Some(1), Some(1)]);
+    // the one that was solved first is canceled: the next takes its place, with the other coalesced into it
+    store.request_cancel(1).await.unwrap();
+    let claim = store.claim_next().await.unwrap().0.unwrap();
+    assert_eq!(claim.job.id, jobs[1].id);
+    let last = store.job(local, jobs[2].id).await.unwrap().unwrap();
+    assert_eq!(last.coalesced_into, Some(jobs[1].key));
+    let deleted = "job_01890a5d-ac96-774b-bcce-b302099a8056";
+    let deleted = crate::job::JobId::parse(deleted).unwrap();
+    assert!(store.was_deleted(local, deleted).await.unwrap());
+    assert!(
+        !store
+            .was_deleted(Owners::Only("ada"), deleted)
+            .await
+            .unwrap()
+    );
+}
