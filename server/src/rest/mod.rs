@@ -9,6 +9,7 @@ mod call;
 mod filters;
 mod headers;
 mod input;
+mod object;
 
 // Answers on their way out.
 mod data;

@@ -10,9 +10,22 @@ use solver::{
 
 use crate::{
     job::{Cache, Limits},
+    parameters::{Values, Whole},
     violations::{Violations, shortened},
 };
 
+/// Characters of the longest name.
+pub const MAX_NAME: usize = 256;
+/// Most labels of a job.
+pub const MAX_LABELS: usize = 64;
+/// Characters of the longest key or value of a label.
+pub const MAX_LABEL: usize = 256;
+/// The lowest priority.
+pub const MIN_PRIORITY: i32 = -10;
+/// The highest priority.
+pub const MAX_PRIORITY: i32 = 10;
+/// All priorities.
+pub const PRIORITIES: Whole = Whole(MIN_PRIORITY as i64..=MAX_PRIORITY as i64);
 /// Longest time that a job may run, in seconds: a week.
 const MAX_TIMEOUT_S: f64 = 7.0 * 86_400.0;
 /// Longest time that it may wait: thirty days.
@@ -73,62 +86,58 @@ impl Envelope {
 
 /// What is wrong with a name, as an envelope and an edit have one.
 pub(super) fn name_violation(name: &str) -> Option<Violation> {
-    const MOST: usize = 256;
     let length = name.chars().count();
-    (length > MOST).then(|| Violation {
+    (length > MAX_NAME).then(|| Violation {
         pointer: "/name".into(),
         reason: "out_of_range".into(),
         got: format!("{length} characters"),
-        expected: "at most 256 characters".into(),
+        expected: format!("at most {MAX_NAME} characters"),
         hint: "Shorten it.".into(),
     })
 }
 
 /// What is wrong with a priority.
 pub(super) fn priority_violation(priority: i32) -> Option<Violation> {
-    (!(-10..=10).contains(&priority)).then(|| Violation {
+    (!PRIORITIES.0.contains(&priority.into())).then(|| Violation {
         pointer: "/priority".into(),
         reason: "out_of_range".into(),
         got: priority.to_string(),
-        expected: "-10 … 10".into(),
+        expected: PRIORITIES.expected(),
         hint: "Higher runs first; 0 is usual.".into(),
     })
 }
 
 /// What is wrong with labels.
 pub(super) fn label_violations(labels: &BTreeMap<String, String>) -> Vec<Violation> {
-    const MOST: usize = 256; // characters of a key or value
-    const LABELS: usize = 64;
-    let violation = |pointer: String, got: String, expected: &str, hint: &str| Violation {
+    let violation = |pointer: String, got: String, expected: String, hint: &str| Violation {
         pointer,
         reason: "out_of_range".into(),
         got,
-        expected: expected.into(),
+        expected,
         hint: hint.into(),
     };
     let mut found = vec![];
-    if labels.len() > LABELS {
+    if labels.len() > MAX_LABELS {
         found.push(violation(
             "/labels".into(),
             labels.len().to_string(),
-            "at most 64 labels",
+            format!("at most {MAX_LABELS} labels"),
             "Leave some out.",
         ));
     }
-    for (key, value) in labels.iter().take(LABELS) {
-        let pointer = || format!("/labels/{}", escape(&shortened(key, MOST)));
+    for (key, value) in labels.iter().take(MAX_LABELS) {
+        let pointer = || format!("/labels/{}", escape(&shortened(key, MAX_LABEL)));
         let length = key.chars().count();
-        if length == 0 || length > MOST {
-            let (got, hint) = (
-                format!("a key of {length} characters"),
-                "Name it otherwise.",
-            );
-            found.push(violation(pointer(), got, "a key of 1 … 256", hint));
+        if length == 0 || length > MAX_LABEL {
+            let got = format!("a key of {length} characters");
+            let expected = format!("a key of 1 … {MAX_LABEL}");
+            found.push(violation(pointer(), got, expected, "Choose another key."));
         }
         let length = value.chars().count();
-        if length > MOST {
+        if length > MAX_LABEL {
             let got = format!("a value of {length} characters");
-            found.push(violation(pointer(), got, "at most 256", "Shorten it."));
+            let expected = format!("at most {MAX_LABEL}");
+            found.push(violation(pointer(), got, expected, "Shorten it."));
         }
     }
     found
