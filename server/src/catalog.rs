@@ -31,16 +31,16 @@ impl Kind {
         self.retry_after_s.is_some()
     }
 
-    /// How it is told over either protocol, and whether it may pass: sentences for people.
+    /// Its status over either protocol, and whether it is temporary: sentences for people.
     pub fn facts(&self) -> Vec<String> {
-        let told = self
+        let status = self
             .status
             .zip(self.grpc)
             .map(|(status, grpc)| format!("HTTP {status}, gRPC {}.", grpc_code_name(grpc)));
-        let passes = self.retry_after_s.map(|seconds| {
+        let temporary = self.retry_after_s.map(|seconds| {
             format!("It is temporary: the same request may succeed after {seconds} s.")
         });
-        told.into_iter().chain(passes).collect()
+        status.into_iter().chain(temporary).collect()
     }
 }
 
@@ -102,13 +102,13 @@ fn of_job(code: &'static str, title: &'static str, explanation: &'static str) ->
     }
 }
 
-/// Makes the enum of the kinds, and what is said of each, from one table.
+/// Makes the enum of the kinds, and the facts about each, from one table.
 macro_rules! catalog {
     ($($code:ident: $of:ident($($fact:expr),*),)*) => {
         /// The kinds, in the order of their HTTP statuses; then those that only jobs end with.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
         #[strum(serialize_all = "kebab-case")]
-        #[allow(missing_docs)] // the table says of each what it is
+        #[allow(missing_docs)] // the table explains each
         pub enum Code {
             $($code,)*
         }

@@ -1,5 +1,5 @@
-//! Everything that a request can be told went wrong, with what is known of this time; `catalog` says of each
-//! kind what clients may rely on. Here it becomes the HTTP document, and the gRPC status with its details.
+//! Why a request failed, with the details of the case; `catalog` has, for each kind, what clients may rely on. Here
+//! an error becomes the HTTP document, and the gRPC status with its details.
 
 use axum::http::StatusCode;
 use serde_json::{Value, json};
@@ -14,54 +14,54 @@ use crate::{
     violations::shortened,
 };
 
-/// Why a request was not answered as asked.
+/// Why a request failed.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ApiError {
     /// The body is not JSON.
     #[error("{0}")]
     MalformedJson(String),
-    /// A query parameter that this route does not have.
+    /// A query parameter that this operation does not have.
     #[error("there is no parameter {name:?} here; known are: {known}")]
     UnknownParameter {
         /// What was sent.
         name: String,
-        /// What there is.
+        /// The parameters that it has.
         known: String,
     },
     /// A query parameter or header with a value that it cannot have.
     #[error("{name}: expected {expected}, got {got:?}")]
     BadParameter {
-        /// Which.
+        /// Its name.
         name: &'static str,
         /// What was sent.
         got: String,
-        /// What would have been right.
+        /// What was expected.
         expected: String,
     },
-    /// A page token that this service did not make for this list.
+    /// A page token that does not belong to this list.
     #[error("the page token does not belong to this list; start again without one")]
     BadPageToken,
-    /// Something for many jobs, without saying for which.
+    /// A change of many jobs, without a filter.
     #[error("a filter is required: at least one of {0}")]
     MissingFilter(String),
-    /// No such thing.
+    /// It does not exist.
     #[error("{0}")]
     NotFound(String),
-    /// The job was there.
+    /// The job was deleted.
     #[error("{0} was deleted")]
     Deleted(JobId),
     /// The job ended without a result.
     #[error("the job ended without a result (status {0})")]
     NoResult(JobStatus),
-    /// The path exists, the method does not.
+    /// The path does not have this method.
     #[error("this path does not have this method; the Allow header lists those it has")]
     MethodNotAllowed,
-    /// None of the wanted formats exists.
+    /// None of the requested formats is available.
     #[error("not available as {got}; available: {available}")]
     NotAcceptable {
-        /// What was asked for.
+        /// What was requested.
         got: String,
-        /// The names of those that there are.
+        /// The names of those that are available.
         available: String,
     },
     /// A body in a format that is not understood.
@@ -70,7 +70,7 @@ pub enum ApiError {
     /// The job has not ended.
     #[error("the job is {0}; cancel it, or wait for its end")]
     JobActive(JobStatus),
-    /// The name belongs to a job with other content.
+    /// The id belongs to a job with other content.
     #[error("{0} was submitted with other content; use a new id for another job")]
     IdConflict(JobId),
     /// The key belongs to a request with other content.
@@ -78,7 +78,7 @@ pub enum ApiError {
         "this key was used for a request with other content; use a new key, or repeat that request unchanged"
     )]
     KeyReuse,
-    /// The job was changed since.
+    /// The job has another version now.
     #[error("the job has version {0}")]
     StaleVersion(i64),
     /// A range that begins behind the end.
@@ -87,7 +87,7 @@ pub enum ApiError {
     /// Jobs that wait or run need the mesh.
     #[error("queued or running jobs use this mesh; cancel them or wait for their end")]
     MeshInUse,
-    /// The job is not done.
+    /// The job has not ended, and has no result yet.
     #[error("the job is {0}; its result is available when it has ended")]
     ResultNotReady(JobStatus),
     /// The body is too large.
@@ -96,32 +96,32 @@ pub enum ApiError {
         /// The limit.
         limit_bytes: usize,
     },
-    /// What was asked for does not fit into one message.
+    /// The answer does not fit into one message.
     #[error(
         "the response is larger than a message may be (1 MiB); REST has no such limit: {instead}"
     )]
     AnswerTooLarge {
-        /// Where it is to be had.
+        /// Where it is available.
         instead: &'static str,
     },
-    /// The job would need too much.
+    /// The job would need too much memory.
     #[error(
         "the job has {} unknowns and needs about {} of memory; the budget is {}; use a coarser mesh or less refinement",
         count(estimate.dofs), size(estimate.memory_bytes), size(*budget_bytes)
     )]
     ProblemTooLarge {
-        /// What it would need.
+        /// The memory that it would need.
         estimate: Estimate,
-        /// What it may have.
+        /// The memory that it may use.
         budget_bytes: u64,
     },
-    /// The problem, or the envelope it came in, is wrong.
+    /// The problem, or what was submitted with it, is invalid.
     #[error("{}", summed_up(.0))]
     InvalidProblem(Vec<Violation>),
-    /// Too much is asked at once.
+    /// Too many requests at once.
     #[error("more requests arrive at once than can be answered soon")]
     RateLimited,
-    /// Our fault; the cause is in the log under this number.
+    /// An error of the service itself; the cause is in the log under this number.
     #[error("an unexpected error, logged as incident {incident}")]
     Internal {
         /// Where to find it in the log.
@@ -142,7 +142,7 @@ pub enum ApiError {
 }
 
 impl ApiError {
-    /// Logs an unexpected cause once, here, and keeps it from strangers.
+    /// Logs an unexpected cause, here and once; clients are not shown it.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
         let incident = Uuid::now_v7();
         tracing::error!(%incident, %cause, "incident {incident}: {cause}");
@@ -263,8 +263,8 @@ impl From<ApiError> for Status {
         if let Some(seconds) = kind.retry_after_s {
             details.set_retry_info(Some(std::time::Duration::from_secs(seconds)));
         }
-        // Details travel in a header, a third longer for its coding, beside the message; clients take 8 KiB of
-        // headers.
+        // the details are sent in a header beside the message, a third longer by its coding; clients accept 8 KiB of
+        // headers
         const MOST_BYTES: usize = 2400;
         let mut bytes = 0;
         let all = error.violations();
@@ -273,7 +273,7 @@ impl From<ApiError> for Status {
                 "{}: expected {}, got {}. {}",
                 v.reason, v.expected, v.got, v.hint
             );
-            // They quote their input, and so may be as long as that.
+            // they quote the input, and may be as long as that
             let (pointer, text) = (shortened(&v.pointer, 300), shortened(&text, 300));
             bytes += pointer.len() + text.len() + 10;
             if bytes > MOST_BYTES {
@@ -290,7 +290,7 @@ impl From<ApiError> for Status {
     }
 }
 
-/// Bytes for people. By hand, as it is a line: what a crate would do beside it nobody needs.
+/// Bytes for people.
 pub fn size(bytes: u64) -> String {
     match bytes {
         u64::MAX => "more than 10^10 GiB".into(),
@@ -299,7 +299,7 @@ pub fn size(bytes: u64) -> String {
     }
 }
 
-/// A number of unknowns for people; estimates end where numbers do.
+/// A number of unknowns for people; estimates are bounded by the largest number.
 pub fn count(unknowns: u64) -> String {
     match unknowns {
         u64::MAX => "more than 10^19".into(),
@@ -307,7 +307,7 @@ pub fn count(unknowns: u64) -> String {
     }
 }
 
-/// The count and the first ones: a client that cannot unpack the details still learns something.
+/// The count and the first ones, for clients that do not read the details.
 fn summed_up(violations: &[Violation]) -> String {
     const SHOWN: usize = 3;
     let shown: Vec<String> = violations
@@ -354,7 +354,7 @@ mod tests {
         assert_eq!(details.error_info().unwrap().reason, "invalid-problem");
     }
 
-    /// Of the headers that clients take: grpcio 8 KiB.
+    /// Clients accept headers of a limited size: grpcio 8 KiB.
     #[test]
     fn many_violations_fit_into_the_headers_of_an_answer() {
         for length in [1, 20, 300] {
@@ -374,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn what_passes_by_itself_says_when_to_retry() {
+    fn a_temporary_error_says_when_to_retry() {
         let status = Status::from(ApiError::Draining);
         assert_eq!(status.code(), Code::Unavailable);
         assert!(status.get_error_details().retry_info().is_some());

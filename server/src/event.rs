@@ -1,4 +1,4 @@
-//! What happens to a job, as those who watch it are told.
+//! The events of a job, as those who watch it receive them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

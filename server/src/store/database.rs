@@ -29,7 +29,7 @@ pub struct Store {
     pub(super) reader: SqlitePool,
     /// For lists and counts, which may be slow, so that they keep nobody else from reading.
     pub(super) lists: SqlitePool,
-    /// The jobs that wait; what the disk says, after every commit.
+    /// The jobs that wait, as they are on the disk after every commit.
     pub(super) waiting: Mutex<WaitingJobs>,
     /// Whether the queue is paused; likewise.
     pub(super) paused: AtomicBool,

@@ -82,7 +82,7 @@ pub(super) async fn already_submitted(
             Some(_) => return Err(StoreError::IdConflict(id)),
             None => match owner_of_deleted(change.sql(), id).await? {
                 Some(theirs) if theirs == owner => return Err(StoreError::Deleted(id)),
-                // of another owner: whether that job is still there is not said
+                // of another owner: whether that job is still there is not revealed
                 Some(_) => return Err(StoreError::IdConflict(id)),
                 None => {}
             },
@@ -133,7 +133,7 @@ async fn jobs_of_key(
 }
 
 /// Those of these jobs that are still there. If all of them were deleted, that is an error as long as it is
-/// remembered; after that the key may be used anew.
+/// remembered; after that the key may be used again.
 async fn remaining(
     connection: &mut SqliteConnection,
     keys: Range<i64>,

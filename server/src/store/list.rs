@@ -318,7 +318,7 @@ fn page(
 }
 
 /// The conditions of a filter except for times. The condition of the access path is repeated, which costs nothing,
-/// unless it is a status, of which each has a list of its own, or a label, which stands in another table.
+/// unless it is a status, of which each has a list of its own, or a label, which is in another table.
 fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, path: Option<AccessPath<'_>>) {
     let Filter {
         statuses,

@@ -78,7 +78,7 @@ async fn requeue(change: &mut Change<'_>, job: &Job, reason: Requeue) -> Result<
         .bind(job.key)
         .execute(change.sql())
         .await?;
-    // its time in the queue begins anew, and that of the jobs coalesced into it
+    // its time in the queue begins again, and that of the jobs coalesced into it
     sqlx::query("update job set expires_at = ? + cast(queue_ttl_s * 1e6 as integer) where id = ? or coalesced_into = ?")
         .bind(Time::now().micros())
         .bind(job.key)

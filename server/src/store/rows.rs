@@ -124,7 +124,7 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
     })
 }
 
-/// What a word in this column stands for.
+/// The value that a word in this column stands for.
 fn word<T: FromStr>(column: &str, text: &str) -> Result<T> {
     text.parse().map_err(|_| corrupt(column))
 }
