@@ -1,6 +1,5 @@
 //! The mesh that a problem only names or quotes.
 
-use solver::error::Violation;
 use solver::mesh::{External, ExternalMesh, Mesh};
 use solver::problem::Problem;
 use solver::solution::Warning;
@@ -30,19 +29,12 @@ fn at(pointer: &str, read: Result<(Mesh, Vec<Warning>), ReadError>) -> External 
                 .for_each(|warning| warning.pointer = pointer());
             Ok(ExternalMesh { mesh, warnings })
         }
-        Err(ReadError::Invalid(mut violations)) => {
+        Err(error) => {
+            let mut violations = error.into_violations();
             violations
                 .iter_mut()
                 .for_each(|violation| violation.pointer = pointer());
             Err(violations)
         }
-        // a text in memory can always be read
-        Err(ReadError::Io(error)) => Err(vec![Violation {
-            pointer: pointer(),
-            reason: "malformed".to_owned(),
-            got: error.to_string(),
-            expected: "a readable text".to_owned(),
-            hint: "Send it again.".to_owned(),
-        }]),
     }
 }

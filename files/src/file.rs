@@ -6,8 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{ReadError, abaqus, gmsh};
-use solver::error::Violation;
-use solver::mesh::{Mesh, inline_mesh, inverted};
+use solver::error::{Reason, Violation};
+use solver::mesh::{Mesh, check_inverted, inline_mesh};
 use solver::problem::InlineMesh;
 use solver::solution::Warning;
 
@@ -32,7 +32,6 @@ pub fn read_mesh(mut reader: impl BufRead) -> Result<(MeshFormat, Mesh, Vec<Warn
         Some(b'*') => abaqus::read(reader).map(|(mesh, notes)| (MeshFormat::Abaqus, mesh, notes)),
         Some(b'{') => json(reader).map(|mesh| (MeshFormat::Json, mesh, Vec::new())),
         _ => Err(invalid(
-            "malformed",
             "a file that begins otherwise".to_owned(),
             "a Gmsh mesh ($MeshFormat), an Abaqus or CalculiX deck (*HEADING, *NODE), or an inline mesh as JSON",
             "Send the file as it is, without multipart or compression.",
@@ -46,29 +45,20 @@ fn json(reader: impl BufRead) -> Result<Mesh, ReadError> {
             return ReadError::Io(error.into());
         }
         invalid(
-            "malformed",
             error.to_string(),
             "an inline mesh: nodes, elements, boundaries, groups, node_sets",
             "See `InlineMesh` in /v1/schema/problem.json.",
         )
     })?;
     let mesh = inline_mesh(&inline, "").map_err(ReadError::Invalid)?;
-    let faults = inverted(&mesh, true, |e| format!("/elements/{e}"), "");
-    if faults.is_empty() {
-        Ok(mesh)
-    } else {
-        Err(ReadError::Invalid(faults))
-    }
+    let upright = check_inverted(&mesh, true, |e| format!("/elements/{e}"), "");
+    upright.map_err(ReadError::Invalid)?;
+    Ok(mesh)
 }
 
-fn invalid(reason: &str, got: String, expected: &str, hint: &str) -> ReadError {
-    ReadError::Invalid(vec![Violation {
-        pointer: String::new(),
-        reason: reason.to_owned(),
-        got,
-        expected: expected.to_owned(),
-        hint: hint.to_owned(),
-    }])
+fn invalid(got: String, expected: &str, hint: &str) -> ReadError {
+    let reason = Reason::Malformed;
+    ReadError::Invalid(vec![Violation::new("", reason, got, expected, hint)])
 }
 
 #[cfg(test)]

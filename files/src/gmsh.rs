@@ -11,6 +11,7 @@ use std::io::BufRead;
 
 use crate::source::{Labels, Plane, ReadError, Source};
 use solver::element::Element;
+use solver::error::Reason;
 use solver::mesh::{self, Mesh, NO_NODE, RawMesh};
 use solver::solution::Warning;
 
@@ -105,7 +106,7 @@ impl<R: BufRead> File<R> {
                 }
                 "$PartitionedEntities" => {
                     return Err(self.source.fault(
-                        "unsupported",
+                        Reason::Unsupported,
                         "a partitioned mesh",
                         "a mesh in one part",
                         "Save it without partitions (Mesh.PartitionOldStyleMsh2 and $PartitionedEntities are not read).",
@@ -124,7 +125,7 @@ impl<R: BufRead> File<R> {
                     self.once(self.seen.elements, "$Elements")?;
                     if !self.seen.nodes {
                         return Err(self.source.fault(
-                            "malformed",
+                            Reason::Malformed,
                             "$Elements before $Nodes",
                             "the nodes first",
                             "Save the mesh with Gmsh itself.",
@@ -144,7 +145,7 @@ impl<R: BufRead> File<R> {
                 _ => {
                     let got = format!("`{line:.40}`");
                     return Err(self.source.fault(
-                        "malformed",
+                        Reason::Malformed,
                         &got,
                         "a section, $…",
                         "Save the mesh again.",
@@ -154,7 +155,7 @@ impl<R: BufRead> File<R> {
         }
         if !self.seen.elements {
             return Err(self.source.fault(
-                "truncated",
+                Reason::Truncated,
                 "the end of the file",
                 "the sections $Nodes and $Elements",
                 "Mesh the geometry before saving (gmsh -2), and send the whole file.",
@@ -167,7 +168,7 @@ impl<R: BufRead> File<R> {
         if seen {
             let got = format!("{section} once more");
             return Err(self.source.fault(
-                "malformed",
+                Reason::Malformed,
                 &got,
                 "each section once",
                 "Save the mesh again.",
@@ -181,7 +182,7 @@ impl<R: BufRead> File<R> {
         let first = self.source.text().trim().to_owned();
         if first != "$MeshFormat" {
             return Err(self.source.fault(
-                "malformed",
+                Reason::Malformed,
                 &format!("`{first:.40}`"),
                 "$MeshFormat in the first line",
                 "A Gmsh mesh (.msh) is expected, not its geometry (.geo).",
@@ -193,7 +194,7 @@ impl<R: BufRead> File<R> {
             "4.1" => Version::Four,
             _ => {
                 return Err(self.source.fault(
-                    "unsupported",
+                    Reason::Unsupported,
                     &format!("MSH {version:.20}"),
                     "MSH 2.2 or 4.1",
                     "Save with gmsh -format msh41 (or msh22).",
@@ -204,16 +205,19 @@ impl<R: BufRead> File<R> {
         let size: u8 = self.source.number("the size of a number")?;
         if size != 8 {
             let got = format!("numbers of {size} bytes");
-            return Err(self
-                .source
-                .fault("unsupported", &got, "8 bytes", "Save the mesh again."));
+            return Err(self.source.fault(
+                Reason::Unsupported,
+                &got,
+                "8 bytes",
+                "Save the mesh again.",
+            ));
         }
         if self.binary {
             let one = i32::from_le_bytes(self.source.bytes("the number 1")?);
             self.source.swapped = one == 1i32.swap_bytes();
             if one != 1 && !self.source.swapped {
                 return Err(self.source.fault(
-                    "malformed",
+                    Reason::Malformed,
                     "another number",
                     "the number 1",
                     "Was the file sent as text?",
@@ -231,7 +235,7 @@ impl<R: BufRead> File<R> {
         }
         let got = format!("`{found:.40}`");
         Err(self.source.fault(
-            "malformed",
+            Reason::Malformed,
             &got,
             end,
             "A count in the section's head does not hold.",
@@ -248,7 +252,7 @@ impl<R: BufRead> File<R> {
                 Ok(false) => {
                     self.source.line = first;
                     return Err(self.source.fault(
-                        "truncated",
+                        Reason::Truncated,
                         "a section without its end",
                         end,
                         "Send the whole file.",
@@ -270,7 +274,7 @@ impl<R: BufRead> File<R> {
                 .and_then(|(_, rest)| rest.rsplit_once('"'));
             let Some((name, _)) = quoted else {
                 return Err(self.source.fault(
-                    "malformed",
+                    Reason::Malformed,
                     &format!("`{text:.40}`"),
                     "a name in quotes",
                     "Correct that line.",
@@ -304,7 +308,7 @@ impl<R: BufRead> File<R> {
             return Ok(value);
         }
         Err(self.source.fault(
-            "non_finite",
+            Reason::NotFinite,
             &format!("{value}"),
             "a finite number",
             "Correct the mesh.",
@@ -340,7 +344,7 @@ impl<R: BufRead> File<R> {
     fn node(&mut self, label: u64, place: [f64; 3]) -> Result<(), ReadError> {
         if self.raw.nodes.len() >= NO_NODE as usize {
             return Err(self.source.fault(
-                "too_many",
+                Reason::TooMany,
                 "more nodes than can be numbered",
                 "fewer",
                 "Coarsen the mesh.",
@@ -348,7 +352,7 @@ impl<R: BufRead> File<R> {
         }
         if !self.labels.add(label) {
             return Err(self.source.fault(
-                "repeated_node",
+                Reason::RepeatedNode,
                 &format!("node {label} once more"),
                 "each node once",
                 "Save the mesh again.",
@@ -493,7 +497,7 @@ impl<R: BufRead> File<R> {
             ),
         };
         Err(self.source.fault(
-            "unsupported",
+            Reason::Unsupported,
             &got,
             "triangles of 3 or 6 nodes, quadrilaterals of 4, 8 or 9, lines of 2 or 3, points",
             hint,
@@ -512,7 +516,7 @@ impl<R: BufRead> File<R> {
             let node = self.size_or_int()?;
             *slot = self.labels.get(node).ok_or_else(|| {
                 self.source.fault(
-                    "unknown_node",
+                    Reason::UnknownNode,
                     &format!("node {node} in element {label}"),
                     "a node of $Nodes",
                     "Save the mesh again, with all its nodes.",

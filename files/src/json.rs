@@ -9,7 +9,7 @@ use jsonschema::error::{TypeKind, ValidationErrorKind};
 use jsonschema::{ValidationError, Validator};
 use serde_json::Value;
 
-use solver::error::{Violation, escape};
+use solver::error::{Findings, Reason, Violation, escape, shortened};
 use solver::problem::Problem;
 
 /// The JSON Schema of a problem (draft 2020-12).
@@ -22,9 +22,6 @@ static SCHEMA: LazyLock<Value> = LazyLock::new(schema);
 static VALIDATOR: LazyLock<Option<Validator>> =
     LazyLock::new(|| jsonschema::validator_for(&SCHEMA).ok());
 
-/// More violations than this say nothing new, and cost time and space.
-const MOST_LISTED: usize = 100;
-
 /// Reads a problem, or says everything that is wrong with its structure. Pointers are relative to
 /// the problem.
 pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
@@ -33,56 +30,53 @@ pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
 
 fn explain(text: &str, first: &serde_json::Error) -> Vec<Violation> {
     if text.trim().is_empty() {
-        let hint = "An example is in the README.";
-        return vec![violation(
+        return vec![Violation::new(
             "",
-            "malformed_json",
-            "an empty text".to_owned(),
+            Reason::Malformed,
+            "an empty text",
             "a problem as JSON",
-            hint,
+            "An example is in the README.",
         )];
     }
     let value: Value = match serde_json::from_str(text) {
         Ok(value) => value,
         Err(error) => {
-            return vec![violation(
+            return vec![Violation::new(
                 "",
-                "malformed_json",
-                format!("{error}"),
+                Reason::Malformed,
+                error,
                 "a JSON document (RFC 8259), numbers within double precision",
                 "Check the text at that line and column.",
             )];
         }
     };
-    let mut found: Vec<Violation> = Vec::new();
+    let mut found = Findings::default();
     if let Some(validator) = &*VALIDATOR {
-        for error in validator.iter_errors(&value) {
-            if found.len() >= MOST_LISTED {
-                found.truncate(MOST_LISTED);
-                found[MOST_LISTED - 1]
-                    .hint
-                    .push_str(" (There are more violations.)");
-                break;
-            }
-            collect(&error, &mut found);
+        let mut errors = validator.iter_errors(&value);
+        while !found.is_full()
+            && let Some(error) = errors.next()
+        {
+            gather(&error, &mut found);
         }
+        found.count(errors.count());
     }
-    if found.is_empty() {
-        // a fault that the schema cannot express, such as a repeated name or a number out of its type
-        let path = serde_path_to_error::deserialize::<_, Problem>(
-            &mut serde_json::Deserializer::from_str(text),
-        )
-        .err()
-        .map_or_else(String::new, |error| pointer_of(error.path()));
-        found.push(violation(
-            &path,
-            "malformed_problem",
-            first.to_string(),
-            "a value as the schema describes it",
-            "See /v1/schema/problem.json.",
-        ));
+    match found.into_violations() {
+        list if list.is_empty() => vec![beyond_the_schema(text, first)],
+        list => list,
     }
-    found
+}
+
+/// A fault that the schema cannot express, such as a repeated name or a number out of its type.
+fn beyond_the_schema(text: &str, first: &serde_json::Error) -> Violation {
+    let mut reader = serde_json::Deserializer::from_str(text);
+    let path = serde_path_to_error::deserialize::<_, Problem>(&mut reader).err();
+    Violation::new(
+        path.map_or_else(String::new, |error| pointer_of(error.path())),
+        Reason::Malformed,
+        first,
+        "a value as the schema describes it",
+        "See /v1/schema/problem.json.",
+    )
 }
 
 fn pointer_of(path: &serde_path_to_error::Path) -> String {
@@ -95,91 +89,79 @@ fn pointer_of(path: &serde_path_to_error::Path) -> String {
         .collect()
 }
 
-fn violation(pointer: &str, reason: &str, got: String, expected: &str, hint: &str) -> Violation {
-    Violation {
-        pointer: pointer.to_owned(),
-        reason: reason.to_owned(),
-        got,
-        expected: expected.to_owned(),
-        hint: hint.to_owned(),
-    }
-}
-
 /// One schema error as one violation or more.
-fn collect(error: &ValidationError<'_>, found: &mut Vec<Violation>) {
+fn gather(error: &ValidationError<'_>, found: &mut Findings) {
     let pointer = error.instance_path().as_str();
-    let got = || shortened(error.instance());
-    match error.kind() {
+    let got = || quoted(error.instance());
+    found.add(match error.kind() {
         ValidationErrorKind::AdditionalProperties { unexpected } => {
-            let known = known_names(error);
-            for name in unexpected.iter().take(MOST_LISTED) {
-                found.push(violation(
-                    &format!("{pointer}/{:.80}", escape(name)),
-                    "unknown_name",
+            let expected = match known_names(error) {
+                known if known.is_empty() => "a name that the schema has".to_owned(),
+                known => format!("one of {}", known.join(", ")),
+            };
+            let unknown = |name: &String| {
+                Violation::new(
+                    format!("{pointer}/{:.80}", escape(name)),
+                    Reason::UnknownName,
                     format!("`{name:.80}`"),
-                    &if known.is_empty() {
-                        "a name that the schema has".to_owned()
-                    } else {
-                        format!("one of {}", known.join(", "))
-                    },
+                    &expected,
                     "Check the spelling; names that mean nothing here are refused.",
-                ));
-            }
+                )
+            };
+            return found.extend(unexpected.iter().map(unknown));
+        }
+        ValidationErrorKind::AnyOf { context } | ValidationErrorKind::OneOfNotValid { context } => {
+            return alternatives(error, context, found);
         }
         ValidationErrorKind::Required { property } => {
             let name = property.as_str().unwrap_or_default();
-            found.push(violation(
-                &format!("{pointer}/{name}"),
-                "missing",
-                "nothing".to_owned(),
-                &format!("a value for `{name}`"),
+            Violation::new(
+                format!("{pointer}/{name}"),
+                Reason::Missing,
+                "nothing",
+                format!("a value for `{name}`"),
                 "It has no default.",
-            ));
+            )
         }
-        ValidationErrorKind::AnyOf { context } | ValidationErrorKind::OneOfNotValid { context } => {
-            alternatives(error, context, found);
-        }
-        ValidationErrorKind::Minimum { limit } => found.push(violation(
+        ValidationErrorKind::Minimum { limit } => Violation::new(
             pointer,
-            "out_of_range",
+            Reason::OutOfRange,
             got(),
-            &format!("a number of at least {limit}"),
+            format!("a number of at least {limit}"),
             "Correct the number.",
-        )),
+        ),
         ValidationErrorKind::MinItems { limit } | ValidationErrorKind::MaxItems { limit } => {
             let items = error.instance().as_array().map_or(0, Vec::len);
-            found.push(violation(
+            Violation::new(
                 pointer,
-                "wrong_length",
+                Reason::WrongLength,
                 format!("{items} item(s)"),
-                &format!("{limit} items"),
+                format!("{limit} items"),
                 "Correct the list.",
-            ));
+            )
         }
-        ValidationErrorKind::Type { kind } => {
-            found.push(violation(
-                pointer,
-                "wrong_type",
-                got(),
-                &type_names(kind),
-                "Write the value in that form.",
-            ));
-        }
-        _ => found.push(violation(
+        ValidationErrorKind::Type { kind } => Violation::new(
             pointer,
-            "malformed",
+            Reason::WrongType,
             got(),
-            &error.to_string(),
+            type_names(kind),
+            "Write the value in that form.",
+        ),
+        _ => Violation::new(
+            pointer,
+            Reason::Malformed,
+            got(),
+            error.to_string(),
             "See /v1/schema/problem.json.",
-        )),
-    }
+        ),
+    });
 }
 
 /// The branch that was meant, judged by its `kind` and its type; or, when none was, what all offer.
 fn alternatives(
     error: &ValidationError<'_>,
     branches: &[Vec<ValidationError<'static>>],
-    found: &mut Vec<Violation>,
+    found: &mut Findings,
 ) {
     let pointer = error.instance_path().as_str();
     let kind = format!("{pointer}/kind");
@@ -199,8 +181,7 @@ fn alternatives(
         .filter(|errors| !errors.iter().any(excludes))
         .collect();
     if let [errors] = meant[..] {
-        errors.iter().for_each(|e| collect(e, found));
-        return;
+        return errors.iter().for_each(|error| gather(error, found));
     }
     let mut offers = Vec::new();
     let mut tagged = false;
@@ -222,9 +203,9 @@ fn alternatives(
     offers.retain(|offer| offer != "null");
     let instance = error.instance();
     let (place, got) = match instance.get("kind") {
-        Some(found) if tagged => (kind, shortened(found)),
+        Some(found) if tagged => (kind, quoted(found)),
         None if tagged && instance.is_object() => (kind, "nothing".to_owned()),
-        _ => (pointer.to_owned(), shortened(instance)),
+        _ => (pointer.to_owned(), quoted(instance)),
     };
     let kinds = kinds(error);
     let (expected, hint) = if kinds.is_empty() {
@@ -244,13 +225,8 @@ fn alternatives(
             example,
         )
     };
-    found.push(violation(
-        &place,
-        "unknown_alternative",
-        got,
-        &expected,
-        &hint,
-    ));
+    let reason = Reason::UnknownAlternative;
+    found.add(Violation::new(place, reason, got, expected, hint));
 }
 
 /// The `kind`s that the schema offers where `error` stands.
@@ -292,13 +268,8 @@ fn type_names(kind: &TypeKind) -> String {
 }
 
 /// A value as text, cut where it would fill the page.
-fn shortened(value: &Value) -> String {
-    const MOST: usize = 80;
-    let text = value.to_string();
-    match text.char_indices().nth(MOST) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text,
-    }
+fn quoted(value: &Value) -> String {
+    shortened(&value.to_string(), 80)
 }
 
 #[cfg(test)]
@@ -313,7 +284,7 @@ mod tests {
             "friction": {"coefficient": 0.3, "nonlocal_radius": 0.01, "elastic_slip": 1e-4}}]
     }"#;
 
-    fn faults(from: &str, to: &str) -> Vec<(String, String, String)> {
+    fn faults(from: &str, to: &str) -> Vec<(String, Reason, String)> {
         assert!(GOOD.contains(from), "{from}");
         let list = parse(&GOOD.replacen(from, to, 1)).expect_err("a faulty problem was accepted");
         list.into_iter()
@@ -363,8 +334,8 @@ mod tests {
             r#""boundary": "top", "bounce": 1,"#,
         );
         assert_eq!(
-            (&found[0].0[..], &found[0].1[..]),
-            ("/contacts/0/bounce", "unknown_name")
+            (&found[0].0[..], found[0].1),
+            ("/contacts/0/bounce", Reason::UnknownName)
         );
         assert!(found[0].2.contains("`indentation`"), "{}", found[0].2);
         for (from, to, pointer) in [
@@ -432,9 +403,9 @@ mod tests {
     #[test]
     fn text_that_is_no_json_and_numbers_beyond_double_precision_are_named() {
         for text in ["{", "", " \n"] {
-            assert_eq!(parse(text).unwrap_err()[0].reason, "malformed_json");
+            assert_eq!(parse(text).unwrap_err()[0].reason, Reason::Malformed);
         }
-        assert_eq!(faults("1000", "1e999")[0].1, "malformed_json");
+        assert_eq!(faults("1000", "1e999")[0].1, Reason::Malformed);
     }
 
     #[test]

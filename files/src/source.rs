@@ -3,7 +3,7 @@
 use std::io::{self, BufRead};
 use std::str::FromStr;
 
-use solver::error::Violation;
+use solver::error::{Reason, Violation};
 
 /// No line of a mesh file is longer; a file that is no text shall not fill the memory.
 const LONGEST_LINE: u64 = 1 << 20;
@@ -15,6 +15,22 @@ pub enum ReadError {
     Io(io::Error),
     /// What is wrong with them; pointers are empty, for only the caller knows where they came from.
     Invalid(Vec<Violation>),
+}
+
+impl ReadError {
+    /// What is wrong with a text in memory, whose bytes can always be had.
+    pub(crate) fn into_violations(self) -> Vec<Violation> {
+        match self {
+            ReadError::Invalid(violations) => violations,
+            ReadError::Io(error) => vec![Violation::new(
+                "",
+                Reason::Malformed,
+                error,
+                "a readable text",
+                "Send it again.",
+            )],
+        }
+    }
 }
 
 /// A reader that counts lines.
@@ -60,7 +76,7 @@ impl<R: BufRead> Source<R> {
         }
         if !whole && read as u64 == LONGEST_LINE {
             return Err(self.fault(
-                "malformed",
+                Reason::Malformed,
                 "a line of more than a MiB",
                 "a mesh file",
                 "Is it one?",
@@ -68,7 +84,7 @@ impl<R: BufRead> Source<R> {
         }
         self.text = String::from_utf8(bytes).map_err(|_| {
             self.fault(
-                "malformed",
+                Reason::Malformed,
                 "bytes that are no text",
                 "text here",
                 "Save the file again; a binary file must be sent as it is.",
@@ -96,7 +112,7 @@ impl<R: BufRead> Source<R> {
             }
             if !self.advance()? {
                 return Err(self.fault(
-                    "truncated",
+                    Reason::Truncated,
                     "the end of the file",
                     what,
                     "The file is cut off; save or send it again.",
@@ -112,7 +128,7 @@ impl<R: BufRead> Source<R> {
             Ok(number) => Ok(number),
             Err(_) => {
                 let got = format!("`{word:.40}`");
-                Err(self.fault("malformed", &got, what, "Correct that line."))
+                Err(self.fault(Reason::Malformed, &got, what, "Correct that line."))
             }
         }
     }
@@ -128,7 +144,7 @@ impl<R: BufRead> Source<R> {
                 Ok(bytes)
             }
             Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Err(self.fault(
-                "truncated",
+                Reason::Truncated,
                 "the end of the file",
                 what,
                 "The file is cut off; save or send it again.",
@@ -138,14 +154,9 @@ impl<R: BufRead> Source<R> {
     }
 
     /// An error at the current line.
-    pub(crate) fn fault(&self, reason: &str, got: &str, expected: &str, hint: &str) -> ReadError {
-        ReadError::Invalid(vec![Violation {
-            pointer: String::new(),
-            reason: reason.to_owned(),
-            got: format!("line {}: {got}", self.line),
-            expected: expected.to_owned(),
-            hint: hint.to_owned(),
-        }])
+    pub(crate) fn fault(&self, reason: Reason, got: &str, expected: &str, hint: &str) -> ReadError {
+        let got = format!("line {}: {got}", self.line);
+        ReadError::Invalid(vec![Violation::new("", reason, got, expected, hint)])
     }
 }
 
@@ -239,14 +250,14 @@ impl Plane {
         /// Rounding of a file with some nine digits.
         const FLAT: f64 = 1e-9;
         let ((low, at_low), (high, at_high)) = (self.lowest, self.highest);
-        (high - low > FLAT * self.extent.max(high.abs())).then(|| Violation {
-            pointer: String::new(),
-            reason: "not_plane".to_owned(),
-            got: format!("z = {low} at node {at_low} and {high} at node {at_high}"),
-            expected: "one z for all nodes".to_owned(),
-            hint:
-                "The body lies in the plane of x and y (axisymmetric: x is r, y is z of the body)."
-                    .to_owned(),
+        (high - low > FLAT * self.extent.max(high.abs())).then(|| {
+            Violation::new(
+                "",
+                Reason::NotPlane,
+                format!("z = {low} at node {at_low} and {high} at node {at_high}"),
+                "one z for all nodes",
+                "The body lies in the plane of x and y (axisymmetric: x is r, y is z of the body).",
+            )
         })
     }
 }

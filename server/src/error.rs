@@ -3,7 +3,10 @@
 
 use axum::http::StatusCode;
 use serde_json::{Value, json};
-use solver::{Estimate, error::Violation};
+use solver::{
+    Estimate,
+    error::{Violation, shortened},
+};
 use tonic::Status;
 use tonic_types::{ErrorDetails, StatusExt};
 use uuid::Uuid;
@@ -11,7 +14,6 @@ use uuid::Uuid;
 use crate::{
     catalog::{Code, Kind},
     job::{JobId, Status as JobStatus},
-    violations::shortened,
 };
 
 /// Why a request failed.
@@ -327,12 +329,13 @@ fn summed_up(violations: &[Violation]) -> String {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use solver::error::Reason;
     use tonic::Code;
 
     fn violation(pointer: &str) -> Violation {
         Violation {
             pointer: pointer.into(),
-            reason: "out_of_range".into(),
+            reason: Reason::OutOfRange,
             got: "-1".into(),
             expected: "> 0".into(),
             hint: "Check it.".into(),

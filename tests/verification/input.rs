@@ -1,7 +1,7 @@
 //! What `Model::new` refuses, all at once, and what the solver says of what it accepts.
 
 use solver::error::{SolveError, Violation};
-use solver::problem::Problem;
+use solver::problem::{Contact, Problem};
 
 use crate::support::{example, problem, solve};
 
@@ -10,11 +10,51 @@ pub(crate) fn violations(problem: &Problem) -> Vec<(String, String)> {
     list.iter().for_each(|Violation { expected, hint, .. }| {
         assert!(!expected.is_empty() && !hint.is_empty())
     });
-    list.into_iter().map(|v| (v.pointer, v.reason)).collect()
+    let pair = |v: Violation| (v.pointer, v.reason.to_string());
+    list.into_iter().map(pair).collect()
 }
 
 pub(crate) fn pair(pointer: &str, reason: &str) -> (String, String) {
     (pointer.to_owned(), reason.to_owned())
+}
+
+/// A hundred violations are as many as are listed; what comes after them is refused all the same.
+#[test]
+fn what_fails_after_a_full_list_still_fails() {
+    // this used to be meshed: the table is looked at as if it had points
+    let mut p = example("rectangular_punch");
+    let bad = Contact {
+        obstacle: serde_json::from_str(r#"{"kind": "circle", "radius": -1}"#).unwrap(),
+        ..p.contacts[0].clone()
+    };
+    p.contacts.splice(0..0, vec![bad; 100]);
+    p.contacts[100].obstacle =
+        serde_json::from_str(r#"{"kind": "table", "x": [], "gap": []}"#).unwrap();
+    let list = solver::check(&p, None).unwrap_err();
+    assert_eq!(list.len(), 100);
+    assert!(
+        list[99].hint.contains(" more violations.)"),
+        "{}",
+        list[99].hint
+    );
+
+    // and this mesh was taken for one without radii below zero
+    let mut p = example("cylinder_on_end");
+    p.contacts = vec![p.contacts[0].clone(); 100];
+    for contact in &mut p.contacts {
+        contact.friction.as_mut().unwrap().elastic_slip = -1.0;
+    }
+    let Some(grid) = &mut p.mesh.grid else {
+        panic!("the example is a grid");
+    };
+    grid.x.iter_mut().for_each(|x| *x -= 100.0);
+    let list = solver::check(&p, None).unwrap_err();
+    // the mesh is the last that is looked at: without one nothing else can be
+    assert!(
+        list[99].hint.ends_with("(1 more violation.)"),
+        "{}",
+        list[99].hint
+    );
 }
 
 #[test]
@@ -226,7 +266,7 @@ fn inverted_elements_are_named_with_their_gauss_point() {
     );
     let list = solver::check(&p, None).unwrap_err();
     assert_eq!(
-        (&list[0].pointer[..], &list[0].reason[..]),
+        (&list[0].pointer[..], list[0].reason.as_str()),
         ("/mesh/inline/elements/0", "inverted_element")
     );
     assert!(list[0].got.contains("Gauss point 0"), "{}", list[0].got);

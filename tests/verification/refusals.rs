@@ -220,7 +220,7 @@ fn supports_name_one_pair_of_directions_and_no_corner() {
         let base = json!({"boundary": "bottom", "ux": 0, "uy": 0});
         refused(&[("/supports", json!([base, support]))], expected);
     };
-    refused(json!({"boundary": "top"}), &[("/supports/1", "empty")]);
+    refused(json!({"boundary": "top"}), &[("/supports/1", "too_few")]);
     refused(
         json!({"boundary": "top", "ux": 0, "un": 0}),
         &[("/supports/1", "wrong_count")],

@@ -2,6 +2,7 @@
 
 use super::deck::{Deck, Elastic, ElementType, Force, Prescribed, Pressure, Target};
 use solver::element::{Element, Family};
+use solver::error::Reason;
 use solver::mesh::NO_NODE;
 
 /// What the data lines that follow belong to.
@@ -55,7 +56,7 @@ impl Deck {
                 let expected = format!("no data after {keyword}");
                 self.fault(
                     line,
-                    "malformed",
+                    Reason::Malformed,
                     got,
                     &expected,
                     "Remove the line, or name what it is.",
@@ -70,7 +71,7 @@ impl Deck {
                         Err(_) => {
                             self.fault(
                                 line,
-                                "malformed",
+                                Reason::Malformed,
                                 format!("`{word:.40}`"),
                                 "a number of a node or element",
                                 "Correct that line.",
@@ -120,7 +121,7 @@ impl Deck {
                         .push((target, side)),
                     None => self.fault(
                         line,
-                        "malformed",
+                        Reason::Malformed,
                         format!("`{text:.40}`"),
                         "an element or a set of them, and S1 … S4",
                         "Say which sides the surface is made of.",
@@ -211,7 +212,7 @@ impl Deck {
                 let expected = format!("{} nodes", kind.nodes);
                 self.fault(
                     line,
-                    "truncated",
+                    Reason::Truncated,
                     got,
                     &expected,
                     "The last element before this line is not complete.",
@@ -246,7 +247,7 @@ impl Deck {
         let Some(label) = label.filter(|_| sound) else {
             self.fault(
                 line,
-                "malformed",
+                Reason::Malformed,
                 format!("`{text:.60}`"),
                 "a node: number, x, y",
                 "Correct that line.",
@@ -256,7 +257,7 @@ impl Deck {
         if self.raw.nodes.len() >= NO_NODE as usize || !self.nodes.add(label) {
             self.fault(
                 line,
-                "repeated_node",
+                Reason::RepeatedNode,
                 format!("node {label} once more"),
                 "each node once",
                 "Renumber it.",
@@ -281,7 +282,7 @@ impl Deck {
             let Some(node) = self.nodes.get(*number) else {
                 self.fault(
                     line,
-                    "unknown_node",
+                    Reason::UnknownNode,
                     format!("node {number} in element {label}"),
                     "a node of *NODE, which stands before its elements",
                     "Correct the number.",
@@ -293,7 +294,7 @@ impl Deck {
         if !self.elements.add(label) {
             self.fault(
                 line,
-                "repeated_element",
+                Reason::RepeatedElement,
                 format!("element {label} once more"),
                 "each element once",
                 "Renumber it.",
@@ -331,7 +332,7 @@ impl Deck {
             _ => {
                 self.fault(
                     line,
-                    "malformed",
+                    Reason::Malformed,
                     format!("`{text:.40}`"),
                     "first, last, step",
                     "Correct that line.",

@@ -7,11 +7,8 @@ use super::block::Block;
 use super::keyword::Keyword;
 use crate::source::{Labels, Plane, ReadError, Source};
 use solver::element::Family;
-use solver::error::Violation;
+use solver::error::{Findings, Reason, Violation};
 use solver::mesh::RawMesh;
-
-/// More faults than this say nothing new.
-pub(super) const MOST_LISTED: usize = 50;
 
 /// The theory that a type of element stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,9 +109,9 @@ pub(super) struct Deck {
     pub(super) steps: usize,
     pub(super) title: Option<String>,
     /// What is wrong with the mesh.
-    pub(super) faults: Vec<Violation>,
+    pub(super) faults: Findings,
     /// What of the analysis was not understood.
-    pub(super) doubts: Vec<Violation>,
+    pub(super) doubts: Findings,
 }
 
 impl Deck {
@@ -145,7 +142,7 @@ impl Deck {
         if deck.raw.nodes.is_empty() {
             deck.fault(
                 line,
-                "too_few",
+                Reason::TooFew,
                 "a deck without *NODE",
                 "nodes and elements",
                 "Is it an Abaqus or CalculiX deck (.inp)?",
@@ -158,23 +155,19 @@ impl Deck {
     pub(super) fn fault(
         &mut self,
         line: u64,
-        reason: &str,
+        reason: Reason,
         got: impl Into<String>,
         expected: &str,
         hint: &str,
     ) {
-        say(&mut self.faults, line, reason, got.into(), expected, hint);
+        self.faults
+            .add(on_line(line, reason, got.into(), expected, hint));
     }
 
     pub(super) fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
-        say(
-            &mut self.doubts,
-            line,
-            "not_understood",
-            got.into(),
-            expected,
-            hint,
-        );
+        let reason = Reason::NotUnderstood;
+        self.doubts
+            .add(on_line(line, reason, got.into(), expected, hint));
     }
 
     /// The name as it was first written.
@@ -193,21 +186,6 @@ impl Deck {
     }
 }
 
-fn say(
-    list: &mut Vec<Violation>,
-    line: u64,
-    reason: &str,
-    got: String,
-    expected: &str,
-    hint: &str,
-) {
-    if list.len() < MOST_LISTED {
-        list.push(Violation {
-            pointer: String::new(),
-            reason: reason.to_owned(),
-            got: format!("line {line}: {got}"),
-            expected: expected.to_owned(),
-            hint: hint.to_owned(),
-        });
-    }
+fn on_line(line: u64, reason: Reason, got: String, expected: &str, hint: &str) -> Violation {
+    Violation::new("", reason, format!("line {line}: {got}"), expected, hint)
 }

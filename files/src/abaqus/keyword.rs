@@ -3,6 +3,7 @@
 use super::block::Block;
 use super::deck::{Deck, Elastic, ElementType, Section, Theory};
 use solver::element::Family;
+use solver::error::Reason;
 
 /// A keyword line in parts.
 pub(super) struct Keyword {
@@ -59,7 +60,7 @@ impl Deck {
             "HEADING" => Block::Title,
             "NODE" => {
                 if keyword.has("SYSTEM") || keyword.has("INPUT") {
-                    self.fault(line, "unsupported", "*NODE with SYSTEM or INPUT", "coordinates x, y in the deck itself", "Write the nodes out.");
+                    self.fault(line, Reason::Unsupported, "*NODE with SYSTEM or INPUT", "coordinates x, y in the deck itself", "Write the nodes out.");
                 }
                 Block::Nodes(keyword.get("NSET").map(|name| self.spelled(name)))
             }
@@ -136,7 +137,7 @@ impl Deck {
                 _ => Block::Skip,
             },
             "INCLUDE" | "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SYSTEM" | "TRANSFORM" => {
-                self.fault(line, "unsupported", format!("*{}", keyword.name), "nodes and elements written out in one file", "Let the preprocessor write the whole mesh.");
+                self.fault(line, Reason::Unsupported, format!("*{}", keyword.name), "nodes and elements written out in one file", "Let the preprocessor write the whole mesh.");
                 Block::Skip
             }
             name => {
@@ -149,7 +150,7 @@ impl Deck {
     fn nameless(&mut self, line: u64, keyword: &str, parameter: &str) -> Block {
         self.fault(
             line,
-            "malformed",
+            Reason::Malformed,
             keyword,
             &format!("{keyword}, {parameter}=…"),
             "Give it a name.",
@@ -181,7 +182,7 @@ impl Deck {
         let Some(kind) = element_type(&name) else {
             self.fault(
                 line,
-                "unsupported",
+                Reason::Unsupported,
                 format!("elements of type `{name:.20}`"),
                 "CPE, CPS or CAX with 3, 4, 6 or 8 nodes (and R for reduced integration)",
                 "Mesh with solid elements of plane strain, plane stress or axisymmetry.",

@@ -25,8 +25,6 @@ use solver::solution::Warning;
 pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
     let deck = deck::Deck::read(reader)?;
     let (raw, faults) = deck.into_raw();
-    if !faults.is_empty() {
-        return Err(ReadError::Invalid(faults));
-    }
-    mesh::build(raw).map_err(ReadError::Invalid)
+    let raw = faults.into_result(raw);
+    raw.and_then(mesh::build).map_err(ReadError::Invalid)
 }

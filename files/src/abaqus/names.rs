@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::deck::{Deck, MOST_LISTED, Target};
+use super::deck::{Deck, Target};
 use crate::source::Labels;
-use solver::error::Violation;
+use solver::error::{Findings, Reason, Violation};
 use solver::mesh::RawMesh;
 
 impl Deck {
@@ -22,7 +22,7 @@ impl Deck {
     }
 
     /// The mesh with all its names, and what is wrong with it.
-    pub(super) fn into_raw(mut self) -> (RawMesh, Vec<Violation>) {
+    pub(super) fn into_raw(mut self) -> (RawMesh, Findings) {
         let mut faults = std::mem::take(&mut self.faults);
         let element_sets = resolve(
             &self.element_sets,
@@ -108,7 +108,7 @@ fn resolve(
     labels: &Labels,
     what: &str,
     keyword: &str,
-    faults: &mut Vec<Violation>,
+    faults: &mut Findings,
 ) -> BTreeMap<String, Vec<u32>> {
     let mut resolved: BTreeMap<String, Vec<u32>> = BTreeMap::new();
     for (name, members) in sets {
@@ -164,7 +164,7 @@ fn resolve(
 }
 
 fn unknown<'a>(
-    faults: &mut Vec<Violation>,
+    faults: &mut Findings,
     got: &str,
     expected: &str,
     known: impl Iterator<Item = &'a String>,
@@ -174,13 +174,5 @@ fn unknown<'a>(
         true => "Correct the number.".to_owned(),
         false => format!("There are {}.", names.join(", ")),
     };
-    if faults.len() < MOST_LISTED {
-        faults.push(Violation {
-            pointer: String::new(),
-            reason: "unknown_name".to_owned(),
-            got: got.to_owned(),
-            expected: expected.to_owned(),
-            hint,
-        });
-    }
+    faults.add(Violation::new("", Reason::UnknownName, got, expected, hint));
 }

@@ -11,19 +11,7 @@ use solver::problem::{
 /// The problem that a deck states: one linear static step, without contact. The text itself becomes
 /// the problem's mesh.
 pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
-    let mut deck = match Deck::read(text.as_bytes()) {
-        Ok(deck) => deck,
-        Err(ReadError::Invalid(faults)) => return Err(faults),
-        Err(ReadError::Io(error)) => {
-            return Err(vec![Violation {
-                pointer: String::new(),
-                reason: "malformed".to_owned(),
-                got: error.to_string(),
-                expected: "a readable text".to_owned(),
-                hint: "Save the deck again.".to_owned(),
-            }]);
-        }
-    };
+    let mut deck = Deck::read(text.as_bytes()).map_err(ReadError::into_violations)?;
     let analysis = analysis(&mut deck);
     let quadrature = quadrature(&mut deck);
     let materials = materials(&mut deck);
@@ -40,11 +28,8 @@ pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
     let loads = loads(&mut deck, &analysis);
     let (title, doubts) = (deck.title.take(), std::mem::take(&mut deck.doubts));
     let (_, mut faults) = deck.into_raw();
-    faults.extend(doubts);
-    if !faults.is_empty() {
-        return Err(faults);
-    }
-    Ok(Problem {
+    faults.extend(doubts.into_violations());
+    faults.into_result(Problem {
         title,
         analysis,
         mesh: MeshInput {

@@ -56,7 +56,7 @@ macro_rules! words {
     };
 }
 
-words!(Reason, Stage, Waiting);
+words!(solver::error::Reason, Reason, Stage, Waiting);
 
 impl From<Caller> for pb::Caller {
     fn from(caller: Caller) -> Self {

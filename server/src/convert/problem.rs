@@ -3,6 +3,7 @@
 
 use solver::{
     element::Element,
+    error::Reason,
     problem::{BoundaryValue, MeshInput, PrescribedBound, Refine},
 };
 
@@ -141,7 +142,7 @@ impl IntoMessage<Bound> for PrescribedBound {
 impl FromMessage<Vec<u32>> for Element {
     fn from_message(nodes: Vec<u32>, read: &mut Reader) -> Option<Self> {
         let found = nodes.len();
-        let wrong = || read.wrong("wrong_length", numbers(found), "8 or 6 node numbers");
+        let wrong = || read.wrong(Reason::WrongLength, numbers(found), "8 or 6 node numbers");
         Element::try_from(nodes).ok().or_else(wrong)
     }
 }
@@ -155,7 +156,7 @@ impl IntoMessage<Vec<u32>> for Element {
 impl<const N: usize> FromMessage<Vec<u32>> for [u32; N] {
     fn from_message(nodes: Vec<u32>, read: &mut Reader) -> Option<Self> {
         let found = nodes.len();
-        let wrong = || read.wrong("wrong_length", numbers(found), &numbers(N));
+        let wrong = || read.wrong(Reason::WrongLength, numbers(found), &numbers(N));
         nodes.try_into().ok().or_else(wrong)
     }
 }

@@ -4,9 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use solver::error::{Violation, escape};
-
-use crate::violations::Violations;
+use solver::error::{Findings, Reason, Violation, escape};
 
 /// A type that a message, or a field of one, can be read as.
 #[diagnostic::on_unimplemented(
@@ -36,7 +34,7 @@ pub fn read<M, T: FromMessage<M>>(message: M) -> Result<T, Vec<Violation>> {
 #[derive(Debug, Default)]
 pub struct Reader {
     place: Vec<Token>,
-    found: Violations,
+    found: Findings,
 }
 
 /// A token of a JSON Pointer.
@@ -71,7 +69,7 @@ impl Reader {
 
     /// A message that has to be there is not.
     pub fn missing<T>(&mut self, expected: &str) -> Option<T> {
-        self.wrong("missing", "nothing", expected)
+        self.wrong(Reason::Missing, "nothing", expected)
     }
 
     /// None of the alternatives of `kind` is there.
@@ -83,14 +81,14 @@ impl Reader {
     /// A number that the enum does not have.
     pub fn unknown<T>(&mut self, number: i32, name: &str) -> Option<T> {
         self.wrong(
-            "unknown_value",
+            Reason::UnknownAlternative,
             number,
             &format!("a value of the enum {name}"),
         )
     }
 
     /// Something is wrong where we are.
-    pub fn wrong<T>(&mut self, reason: &str, got: impl ToString, expected: &str) -> Option<T> {
+    pub fn wrong<T>(&mut self, reason: Reason, got: impl ToString, expected: &str) -> Option<T> {
         let token = |token: &Token| match token {
             Token::Name(name) => format!("/{name}"),
             Token::Key(name) => format!("/{}", escape(name)),
@@ -98,7 +96,7 @@ impl Reader {
         };
         self.found.add(Violation {
             pointer: self.place.iter().map(token).collect(),
-            reason: reason.into(),
+            reason,
             got: got.to_string(),
             expected: expected.into(),
             hint: "See the comments in signorini.proto.".into(),
@@ -109,8 +107,8 @@ impl Reader {
     /// What was read, if nothing at all is wrong.
     pub fn found<T>(self, value: Option<T>) -> Result<T, Vec<Violation>> {
         match value {
-            Some(value) if self.found.is_empty() => Ok(value),
-            _ => Err(self.found.into_vec()),
+            Some(value) => self.found.into_result(value),
+            None => Err(self.found.into_violations()),
         }
     }
 
@@ -126,7 +124,7 @@ impl FromMessage<f64> for f64 {
     fn from_message(number: f64, read: &mut Reader) -> Option<f64> {
         match number.is_finite() {
             true => Some(number),
-            false => read.wrong("not_finite", number, "a finite number"),
+            false => read.wrong(Reason::NotFinite, number, "a finite number"),
         }
     }
 }

@@ -6,7 +6,10 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::value::RawValue;
-use solver::{error::Violation, problem::Problem};
+use solver::{
+    error::{Reason, Violation},
+    problem::Problem,
+};
 
 use super::object::{Object, Read};
 use crate::{
@@ -225,7 +228,7 @@ fn unwrapped(body: &Object<'_>) -> Option<Violation> {
     let bare = body.has("analysis") || body.has("mesh");
     (bare && !body.has("problem")).then(|| Violation {
         pointer: AT.into(),
-        reason: "missing".into(),
+        reason: Reason::Missing,
         got: "the bare problem".into(),
         expected: "an object with the field problem".into(),
         hint: "Wrap it as {\"problem\": …}.".into(),

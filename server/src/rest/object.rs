@@ -7,12 +7,9 @@ use serde::{
     de::{DeserializeOwned, MapAccess, Visitor},
 };
 use serde_json::value::RawValue;
-use solver::error::{Violation, escape};
+use solver::error::{Findings, Reason, Violation, escape};
 
-use crate::{
-    error::ApiError,
-    violations::{self, Violations},
-};
+use crate::{error::ApiError, violations};
 
 /// The content of a body whose JSON is well formed, or its violations.
 pub(super) type Read<T> = Result<T, Vec<Violation>>;
@@ -20,7 +17,7 @@ pub(super) type Read<T> = Result<T, Vec<Violation>>;
 /// An object whose fields are taken out one by one; all violations are reported at the end.
 pub(super) struct Object<'a> {
     fields: BTreeMap<String, &'a RawValue>,
-    pub(super) violations: Violations,
+    pub(super) violations: Findings,
 }
 
 impl<'a> Object<'a> {
@@ -35,13 +32,13 @@ impl<'a> Object<'a> {
             .map_err(|error| ApiError::MalformedJson(error.to_string()))?;
         let Pairs(pairs) = serde_json::from_str(whole.get())
             .map_err(|_| ApiError::InvalidProblem(vec![wrong_type("", whole, expected)]))?;
-        let mut violations = Violations::default();
+        let mut violations = Findings::default();
         let mut fields = BTreeMap::new();
         for (name, value) in pairs {
             if fields.insert(name.clone(), value).is_some() {
                 violations.add(Violation {
                     pointer: format!("/{}", escape(&violations::name(&name))),
-                    reason: "duplicate_name".into(),
+                    reason: Reason::DuplicateName,
                     got: "the name twice".into(),
                     expected: "each name once".into(),
                     hint: "Leave one of them out; one would be ignored.".into(),
@@ -72,7 +69,7 @@ impl<'a> Object<'a> {
         if found.is_none() {
             self.violations.add(Violation {
                 pointer: format!("/{name}"),
-                reason: "missing".into(),
+                reason: Reason::Missing,
                 got: "nothing".into(),
                 expected: expected.into(),
                 hint: hint.into(),
@@ -96,20 +93,19 @@ impl<'a> Object<'a> {
 
     /// What was read, if there are no violations and no unknown fields left.
     pub(super) fn close<T>(mut self, known: &str, read: Option<T>) -> Read<T> {
-        // One more than are listed, so that the list says that there are more.
-        for name in self.fields.into_keys().take(violations::MOST + 1) {
+        for name in self.fields.into_keys() {
             let name = violations::name(&name);
             self.violations.add(Violation {
                 pointer: format!("/{}", escape(&name)),
-                reason: "unknown_name".into(),
+                reason: Reason::UnknownName,
                 got: format!("{name:?}"),
                 expected: format!("one of {known}"),
                 hint: "Check the spelling, or leave it out.".into(),
             });
         }
         match read {
-            Some(read) if self.violations.is_empty() => Ok(read),
-            _ => Err(self.violations.into_vec()),
+            Some(read) => self.violations.into_result(read),
+            None => Err(self.violations.into_violations()),
         }
     }
 }
@@ -146,7 +142,7 @@ fn is_null(raw: &RawValue) -> bool {
 fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
     Violation {
         pointer: pointer.into(),
-        reason: "wrong_type".into(),
+        reason: Reason::WrongType,
         got: violations::name(raw.get()),
         expected: expected.into(),
         hint: "The bodies of all requests are described in /openapi.json.".into(),

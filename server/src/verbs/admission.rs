@@ -1,6 +1,9 @@
 //! How a job that was read becomes one that is queued: fingerprinted, checked in depth, stored.
 
-use solver::{error::Violation, problem::Problem};
+use solver::{
+    error::{Findings, Violation},
+    problem::Problem,
+};
 use tracing::info;
 
 use super::{
@@ -15,14 +18,13 @@ use crate::{
     error::ApiError,
     job::{Job, JobId},
     store::{Accepted, NewJob, RequestKey, StoreError, Submission},
-    violations::Violations,
 };
 
 /// A job that was read, but not yet checked in depth.
 pub(super) struct Prepared {
     envelope: Envelope,
     problem: Result<Problem, Vec<Violation>>,
-    violations: Violations,
+    violations: Findings,
     pub(super) id: Option<JobId>,
     /// Fingerprint of all that was submitted.
     pub(super) payload: String,
@@ -85,13 +87,14 @@ pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJo
         Err(more) => Err(more),
     };
     match admitted {
-        Ok(admitted) if violations.is_empty() => {
+        Ok(admitted) => {
+            let admitted = violations.into_result(admitted);
             let Admitted {
                 title,
                 input_hash,
                 json,
                 mesh,
-            } = admitted;
+            } = admitted.map_err(ApiError::InvalidProblem)?;
             let Envelope {
                 name,
                 labels,
@@ -114,9 +117,9 @@ pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJo
                 payload,
             })
         }
-        refused => {
-            violations.extend(refused.err().into_iter().flatten());
-            Err(ApiError::InvalidProblem(violations.into_vec()))
+        Err(more) => {
+            violations.extend(more);
+            Err(ApiError::InvalidProblem(violations.into_violations()))
         }
     }
 }

@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use solver::{
-    error::{Violation, escape},
+    error::{Findings, Reason, Violation, escape, shortened},
     problem::Problem,
 };
 
 use crate::{
     job::{Cache, Limits},
     parameters::{Values, Whole},
-    violations::{Violations, shortened},
 };
 
 /// Characters of the longest name.
@@ -57,8 +56,8 @@ pub struct JobRequest {
 
 impl Envelope {
     /// What is out of bounds.
-    pub(super) fn violations(&self) -> Violations {
-        let mut found = Violations::default();
+    pub(super) fn violations(&self) -> Findings {
+        let mut found = Findings::default();
         found.extend(self.name.as_deref().and_then(name_violation));
         found.extend(priority_violation(self.priority));
         found.extend(label_violations(&self.labels));
@@ -73,7 +72,7 @@ impl Envelope {
             if !(seconds > 0.0 && seconds <= most) {
                 found.add(Violation {
                     pointer: format!("/limits/{name}"),
-                    reason: "out_of_range".into(),
+                    reason: Reason::OutOfRange,
                     got: seconds.to_string(),
                     expected: format!("more than 0, at most {most} seconds"),
                     hint: "Leave it out for the default.".into(),
@@ -89,7 +88,7 @@ pub(super) fn name_violation(name: &str) -> Option<Violation> {
     let length = name.chars().count();
     (length > MAX_NAME).then(|| Violation {
         pointer: "/name".into(),
-        reason: "out_of_range".into(),
+        reason: Reason::OutOfRange,
         got: format!("{length} characters"),
         expected: format!("at most {MAX_NAME} characters"),
         hint: "Shorten it.".into(),
@@ -100,7 +99,7 @@ pub(super) fn name_violation(name: &str) -> Option<Violation> {
 pub(super) fn priority_violation(priority: i32) -> Option<Violation> {
     (!PRIORITIES.0.contains(&priority.into())).then(|| Violation {
         pointer: "/priority".into(),
-        reason: "out_of_range".into(),
+        reason: Reason::OutOfRange,
         got: priority.to_string(),
         expected: PRIORITIES.expected(),
         hint: "Higher runs first; 0 is usual.".into(),
@@ -111,7 +110,7 @@ pub(super) fn priority_violation(priority: i32) -> Option<Violation> {
 pub(super) fn label_violations(labels: &BTreeMap<String, String>) -> Vec<Violation> {
     let violation = |pointer: String, got: String, expected: String, hint: &str| Violation {
         pointer,
-        reason: "out_of_range".into(),
+        reason: Reason::OutOfRange,
         got,
         expected,
         hint: hint.into(),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde_json::json;
-use solver::problem::Problem;
+use solver::{error::Findings, problem::Problem};
 
 use super::{
     envelope,
@@ -16,7 +16,6 @@ use crate::{
     job::{Job, JobId},
     parameters::{Values, Variable},
     store::{CancelOutcome, Deletion, Edit, Snapshot},
-    violations::Violations,
 };
 
 /// A job in a path.
@@ -92,14 +91,14 @@ pub async fn update(
     edit: Edit,
     version: Option<i64>,
 ) -> Result<Job, ApiError> {
-    let mut violations = Violations::default();
+    let mut violations = Findings::default();
     let name = edit.name.iter().flatten().next();
     violations.extend(name.and_then(|name| envelope::name_violation(name)));
     violations.extend(edit.priority.and_then(envelope::priority_violation));
     violations.extend(edit.labels.iter().flat_map(envelope::label_violations));
-    if !violations.is_empty() {
-        return Err(ApiError::InvalidProblem(violations.into_vec()));
-    }
+    violations
+        .into_result(())
+        .map_err(ApiError::InvalidProblem)?;
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
         let edited = service.store.edit(caller.sees(), id, &edit, version);

@@ -10,7 +10,10 @@ use std::{
 use files::ReadError;
 use futures_util::{Stream, StreamExt};
 use sha2::{Digest, Sha256};
-use solver::{error::Violation, mesh::Mesh};
+use solver::{
+    error::{Reason, Violation},
+    mesh::Mesh,
+};
 use tokio::io::{AsyncReadExt, AsyncSeekExt, AsyncWriteExt};
 use tracing::info;
 
@@ -244,7 +247,7 @@ pub(super) async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mes
 pub(super) fn missing(hash: &str) -> Violation {
     Violation {
         pointer: format!("{}/mesh/stored", violations::AT),
-        reason: "unknown_mesh".to_owned(),
+        reason: Reason::UnknownMesh,
         got: violations::name(hash).to_owned(),
         expected: "the hash of a mesh that this service has stored".to_owned(),
         hint: "Upload it first: POST /v1/meshes, or UploadMesh.".to_owned(),

@@ -2,7 +2,13 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use solver::{Estimate, error::Violation, mesh::Mesh, problem::Problem, solution::Warning};
+use solver::{
+    Estimate,
+    error::{Reason, Violation},
+    mesh::Mesh,
+    problem::Problem,
+    solution::Warning,
+};
 
 use super::{meshes, service::Service};
 use crate::{
@@ -87,7 +93,7 @@ fn too_large(estimate: &Estimate, budget_bytes: u64) -> Violation {
     let (unknowns, memory) = (count(estimate.dofs), size(estimate.memory_bytes));
     Violation {
         pointer: format!("{AT}/mesh"),
-        reason: "too_large".into(),
+        reason: Reason::TooLarge,
         got: format!("{unknowns} unknowns, which need about {memory}"),
         expected: format!("at most {} of memory", size(budget_bytes)),
         hint: "Take a coarser mesh or refine less, or ask the operator for a larger budget.".into(),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use futures_util::{StreamExt, TryStreamExt};
-use solver::error::Violation;
+use solver::error::{Findings, Reason, Violation};
 
 use super::{
     admission::{admit, enqueue, prepare, replayed},
@@ -17,7 +17,7 @@ use crate::{
     error::ApiError,
     job::{Job, JobId},
     store::{Accepted, RequestKey},
-    violations::{Violations, prefixed},
+    violations::prefixed,
 };
 
 /// Most jobs of a batch.
@@ -78,7 +78,7 @@ pub async fn create_batch(
     if requests.is_empty() || requests.len() > MAX_BATCH {
         return Err(ApiError::InvalidProblem(vec![Violation {
             pointer: "/jobs".into(),
-            reason: "out_of_range".into(),
+            reason: Reason::OutOfRange,
             got: format!("{} jobs", requests.len()),
             expected: format!("1 … {MAX_BATCH} jobs"),
             hint: match requests.is_empty() {
@@ -127,7 +127,7 @@ async fn each<A, B, F: Future<Output = Result<B, ApiError>>>(
 ) -> Result<Vec<B>, ApiError> {
     const AT_ONCE: usize = 4;
     let mut done = vec![];
-    let mut violations = Violations::default();
+    let mut violations = Findings::default();
     let numbered = many.into_iter().enumerate();
     let mut results = futures_util::stream::iter(numbered)
         .map(|(n, one)| {
@@ -144,9 +144,7 @@ async fn each<A, B, F: Future<Output = Result<B, ApiError>>>(
             Err(other) => return Err(other),
         }
     }
-    if violations.is_empty() {
-        Ok(done)
-    } else {
-        Err(ApiError::InvalidProblem(violations.into_vec()))
-    }
+    violations
+        .into_result(done)
+        .map_err(ApiError::InvalidProblem)
 }

@@ -2,10 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::faults::Faults;
 use super::{Edge, Mesh, key};
 use crate::element::Element;
-use crate::error::Violation;
+use crate::error::{All, Checked, Findings, Reason, Refused, Violation};
 use crate::solution::Warning;
 
 /// Stands for the midsides of an element that has none yet.
@@ -36,17 +35,21 @@ pub struct RawMesh {
 
 /// The mesh and what was changed on the way, or everything that is wrong with it. Pointers are empty:
 /// only the caller knows where the file came from.
-pub fn build(mut raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
-    let mut found = Faults::new("");
+pub fn build(raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
+    let mut found = Findings::of_mesh("");
+    let built = assemble(raw, &mut found);
+    found.conclude(built)
+}
+
+fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warning>)> {
     if raw.elements.is_empty() {
-        found.say(
+        return Err(found.say(
             "",
-            "too_few",
+            Reason::TooFew,
             "no element of two dimensions",
             "at least one quadrilateral or triangle",
             "Mesh the surface, and save its elements (in Gmsh: put it in a physical group).",
-        );
-        return Err(found.counted());
+        ));
     }
     let mut notes = Vec::new();
     let mut note = |code: &str, message: String| {
@@ -65,8 +68,7 @@ pub fn build(mut raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
             ),
         );
     }
-    distinct(&raw, &mut found);
-    found.end()?;
+    distinct(&raw, found)?;
     let reversed = counter_clockwise(&mut raw);
     if reversed > 0 {
         note(
@@ -84,11 +86,9 @@ pub fn build(mut raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
         );
     }
     drop_unused(&mut raw);
-    let owners = Owners::new(&raw, &mut found);
-    found.end()?;
+    let owners = Owners::new(&raw, found)?;
     let surface = surface(&raw.elements, &owners.count);
-    let by_corners = by_corners(&surface, &owners, &raw, &mut found);
-    found.end()?;
+    let by_corners = by_corners(&surface, &owners, &raw, found)?;
     let mut boundaries = BTreeMap::new();
     for (name, lines) in std::mem::take(&mut raw.lines) {
         let mut edges: Vec<Edge> = Vec::with_capacity(lines.len());
@@ -133,39 +133,41 @@ pub fn build(mut raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
         groups: raw.groups,
         node_sets: raw.node_sets,
     };
+    let mut all = All::default();
     for (e, place, det) in mesh.inverted_elements(true) {
-        found.say(
+        all.refuse(found.say(
             "",
-            "inverted_element",
+            Reason::InvertedElement,
             format!(
                 "element {} with det J = {det:.3e} at {place}",
                 raw.element_labels[e]
             ),
             "det J > 0 at all Gauss points and at the nodes",
             "Move its nodes; a midside far off the middle of its side folds the element.",
-        );
+        ));
     }
-    found.end()?;
-    Ok((mesh, notes))
+    all.then((mesh, notes))
 }
 
-fn distinct(raw: &RawMesh, found: &mut Faults<'_>) {
+fn distinct(raw: &RawMesh, found: &mut Findings) -> Checked {
+    let mut all = All::default();
     for (element, label) in raw.elements.iter().zip(&raw.element_labels) {
         let repeated = (1..element.len())
             .find(|&i| element[i] != NO_NODE && element[..i].contains(&element[i]));
         if let Some(i) = repeated {
-            found.say(
+            all.refuse(found.say(
                 "",
-                "repeated_node",
+                Reason::RepeatedNode,
                 format!(
                     "node {} twice in element {label}",
                     raw.node_labels[element[i] as usize]
                 ),
                 "different nodes",
                 "Collapsed elements are not supported; use triangles.",
-            );
+            ));
         }
     }
+    all.then(())
 }
 
 /// Turns over what runs clockwise; says how many.
@@ -281,7 +283,8 @@ struct Owners {
 }
 
 impl Owners {
-    fn new(raw: &RawMesh, found: &mut Faults<'_>) -> Self {
+    fn new(raw: &RawMesh, found: &mut Findings) -> Checked<Self> {
+        let mut all = All::default();
         let mut owners = Owners {
             count: vec![0; raw.nodes.len()],
             first: vec![0; raw.nodes.len()],
@@ -296,13 +299,13 @@ impl Owners {
                     // the neighbour runs along the same side the other way
                     let shared = raw.elements[first].sides().any(|s| s == [b, a, mid as u32]);
                     if owners.count[mid] >= 2 || !shared {
-                        found.nonconforming(raw, first, e);
+                        all.refuse(nonconforming(raw, first, e, found));
                     }
                 }
                 owners.count[mid] = owners.count[mid].saturating_add(1);
             }
         }
-        owners
+        all.then(owners)
     }
 }
 
@@ -323,21 +326,38 @@ fn by_corners(
     surface: &[Edge],
     owners: &Owners,
     raw: &RawMesh,
-    found: &mut Faults<'_>,
-) -> Vec<((u32, u32), u32)> {
+    found: &mut Findings,
+) -> Checked<Vec<((u32, u32), u32)>> {
     let mut sorted: Vec<((u32, u32), u32)> = surface
         .iter()
         .enumerate()
         .map(|(i, [a, b, _])| (key(*a, *b), i as u32))
         .collect();
     sorted.sort_unstable();
+    let mut all = All::default();
     for pair in sorted.windows(2) {
         if pair[0].0 == pair[1].0 {
             let owner = |i: u32| owners.first[surface[i as usize][2] as usize] as usize;
-            found.nonconforming(raw, owner(pair[0].1), owner(pair[1].1));
+            all.refuse(nonconforming(
+                raw,
+                owner(pair[0].1),
+                owner(pair[1].1),
+                found,
+            ));
         }
     }
-    sorted
+    all.then(sorted)
+}
+
+fn nonconforming(raw: &RawMesh, first: usize, second: usize, found: &mut Findings) -> Refused {
+    let [a, b] = [first, second].map(|e| raw.element_labels[e]);
+    found.say(
+        "",
+        Reason::Nonconforming,
+        format!("elements {a} and {b}, which do not share a whole side"),
+        "at most two elements on a side, with all three of its nodes in common",
+        "Merge coincident nodes (in Gmsh: Coherence), and remove elements that overlap.",
+    )
 }
 
 impl Mesh {
@@ -348,19 +368,6 @@ impl Mesh {
             count[mid as usize] = count[mid as usize].saturating_add(1);
         }
         surface(&self.elements, &count)
-    }
-}
-
-impl Faults<'_> {
-    fn nonconforming(&mut self, raw: &RawMesh, first: usize, second: usize) {
-        let [a, b] = [first, second].map(|e| raw.element_labels[e]);
-        self.say(
-            "",
-            "nonconforming",
-            format!("elements {a} and {b}, which do not share a whole side"),
-            "at most two elements on a side, with all three of its nodes in common",
-            "Merge coincident nodes (in Gmsh: Coherence), and remove elements that overlap.",
-        );
     }
 }
 
@@ -432,14 +439,14 @@ mod tests {
     fn what_cannot_be_a_mesh_is_named_with_the_files_numbers() {
         let said = |raw: RawMesh| {
             let list = build(raw).unwrap_err();
-            (list[0].reason.clone(), list[0].got.clone())
+            (list[0].reason, list[0].got.clone())
         };
         let mut raw = two_squares();
         raw.elements[0] = raw.elements[0].map_nodes(|n| if n == 4 { 1 } else { n });
         assert_eq!(
             said(raw),
             (
-                "repeated_node".to_owned(),
+                Reason::RepeatedNode,
                 "node 11 twice in element 100".to_owned()
             )
         );
@@ -448,12 +455,12 @@ mod tests {
         raw.element_labels.push(300);
         let (reason, got) = said(raw);
         assert!(
-            reason == "nonconforming" && got.contains("100") && got.contains("300"),
+            reason == Reason::Nonconforming && got.contains("100") && got.contains("300"),
             "{got}"
         );
         let mut raw = two_squares();
         raw.nodes[5] = [0.4, 0.1];
-        assert_eq!(said(raw).0, "inverted_element");
-        assert_eq!(said(RawMesh::default()).0, "too_few");
+        assert_eq!(said(raw).0, Reason::InvertedElement);
+        assert_eq!(said(RawMesh::default()).0, Reason::TooFew);
     }
 }

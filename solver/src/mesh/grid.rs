@@ -1,7 +1,7 @@
 //! Grids of lines, and strips between two polylines.
 
 use crate::element::Element;
-use crate::error::Violation;
+use crate::error::{All, Checked, Findings, Reason, Violation};
 use crate::mesh::Mesh;
 use crate::problem::Grid;
 
@@ -128,102 +128,113 @@ pub fn largest_cut(grid: &Grid) -> Option<(f64, f64)> {
     worst
 }
 
-/// What is wrong with a grid; `pointer` is the grid's own.
-pub fn grid_violations(grid: &Grid, pointer: &str) -> Vec<Violation> {
-    let mut found = Vec::new();
-    let mut say = |field: &str, reason: &str, got: String, expected: &str, hint: &str| {
-        found.push(Violation {
-            pointer: format!("{pointer}{field}"),
-            reason: reason.to_owned(),
-            got,
-            expected: expected.to_owned(),
-            hint: hint.to_owned(),
-        });
-    };
+/// Whether a grid can be meshed, or all that is wrong with it; `pointer` is the grid's own.
+pub fn check_grid(grid: &Grid, pointer: &str) -> Result<(), Vec<Violation>> {
+    let mut found = Findings::of_mesh(pointer);
+    let mut all = All::default();
     for (field, lines) in [("/x", &grid.x), ("/y", &grid.y)] {
-        if lines.len() < 2 {
-            say(
-                field,
-                "too_few",
-                format!("{} line(s)", lines.len()),
-                "at least two lines",
-                "Give the first and the last line at least.",
-            );
-        }
-        if let Some(i) = (1..lines.len()).find(|&i| lines[i] <= lines[i - 1]) {
-            say(
-                &format!("{field}/{i}"),
-                "not_increasing",
-                format!("{} after {}", lines[i], lines[i - 1]),
-                "strictly increasing lines",
-                "Sort the lines and remove repeated ones.",
-            );
-        }
+        all.take(check_lines(field, lines, &mut found));
     }
+    let edges = [("/top", &grid.top), ("/bottom", &grid.bottom)].map(|(field, edge)| {
+        let checked = match edge {
+            None => Ok(()),
+            Some(points) => check_edge(field, points, &grid.x, &mut found),
+        };
+        all.take(checked)
+    });
     let strip = grid.top.is_some() || grid.bottom.is_some();
-    let mut usable = !grid.x.is_empty() && !grid.y.is_empty();
-    for (field, line) in [("/top", &grid.top), ("/bottom", &grid.bottom)] {
-        let Some(points) = line else { continue };
-        if points.len() < 2 {
-            say(
-                field,
-                "too_few",
-                format!("{} point(s)", points.len()),
-                "at least two points",
-                "Give the two ends of the edge.",
-            );
-            usable = false;
-        } else if let Some(i) = (1..points.len()).find(|&i| points[i][0] <= points[i - 1][0]) {
-            say(
-                &format!("{field}/{i}"),
-                "not_increasing",
-                format!("x = {} after {}", points[i][0], points[i - 1][0]),
-                "points with strictly increasing x",
-                "A vertical step cannot be meshed; use an inline mesh.",
-            );
-            usable = false;
-        } else if let (Some(first), Some(last)) = (grid.x.first(), grid.x.last())
-            && (points[0][0] > *first || points[points.len() - 1][0] < *last)
-        {
-            say(
-                field,
-                "does_not_span",
-                format!("x from {} to {}", points[0][0], points[points.len() - 1][0]),
-                &format!("a line over all of x, from {first} to {last}"),
-                "Extend the polyline to the first and last grid line.",
-            );
-            usable = false;
-        }
+    let sound = edges == [Some(()); 2] && !grid.x.is_empty() && !grid.y.is_empty();
+    if strip && sound {
+        all.take(check_strip(grid, &mut found));
     }
-    if strip && usable {
-        if grid.y[0] != 0.0 || grid.y[grid.y.len() - 1] != 1.0 {
-            say(
-                "/y",
-                "out_of_range",
-                format!("{} … {}", grid.y[0], grid.y[grid.y.len() - 1]),
-                "fractions of the strip's height from 0 to 1",
-                "With `top` or `bottom`, y counts from 0 at the lower edge to 1 at the upper.",
-            );
-        }
-        for x in &grid.x {
-            let (low, high) = (height(&grid.bottom, *x), height(&grid.top, *x));
-            if high.partial_cmp(&low) != Some(std::cmp::Ordering::Greater) {
-                say(
-                    if grid.top.is_some() {
-                        "/top"
-                    } else {
-                        "/bottom"
-                    },
-                    "out_of_range",
-                    format!("height {} at x = {x}", high - low),
-                    "an upper edge above the lower one everywhere",
-                    "Without `bottom` (or `top`) that edge is y = 0.",
-                );
-                break;
-            }
-        }
+    found.conclude(all.then(()))
+}
+
+/// The lines in one direction.
+fn check_lines(field: &str, lines: &[f64], found: &mut Findings) -> Checked {
+    let mut all = All::default();
+    if lines.len() < 2 {
+        all.refuse(found.say(
+            field,
+            Reason::TooFew,
+            format!("{} line(s)", lines.len()),
+            "at least two lines",
+            "Give the first and the last line at least.",
+        ));
     }
-    found
+    if let Some(i) = (1..lines.len()).find(|&i| lines[i] <= lines[i - 1]) {
+        all.refuse(found.say(
+            format!("{field}/{i}"),
+            Reason::NotIncreasing,
+            format!("{} after {}", lines[i], lines[i - 1]),
+            "strictly increasing lines",
+            "Sort the lines and remove repeated ones.",
+        ));
+    }
+    all.then(())
+}
+
+/// The upper or lower edge of a strip.
+fn check_edge(field: &str, points: &[[f64; 2]], x: &[f64], found: &mut Findings) -> Checked {
+    if points.len() < 2 {
+        return Err(found.say(
+            field,
+            Reason::TooFew,
+            format!("{} point(s)", points.len()),
+            "at least two points",
+            "Give the two ends of the edge.",
+        ));
+    }
+    if let Some(i) = (1..points.len()).find(|&i| points[i][0] <= points[i - 1][0]) {
+        return Err(found.say(
+            format!("{field}/{i}"),
+            Reason::NotIncreasing,
+            format!("x = {} after {}", points[i][0], points[i - 1][0]),
+            "points with strictly increasing x",
+            "A vertical step cannot be meshed; use an inline mesh.",
+        ));
+    }
+    let ([low, _], [high, _]) = (points[0], points[points.len() - 1]);
+    match (x.first(), x.last()) {
+        (Some(first), Some(last)) if low > *first || high < *last => Err(found.say(
+            field,
+            Reason::DoesNotSpan,
+            format!("x from {low} to {high}"),
+            format!("a line over all of x, from {first} to {last}"),
+            "Extend the polyline to the first and last grid line.",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Fractions of the height, and a height everywhere.
+fn check_strip(grid: &Grid, found: &mut Findings) -> Checked {
+    let mut all = All::default();
+    if grid.y[0] != 0.0 || grid.y[grid.y.len() - 1] != 1.0 {
+        all.refuse(found.say(
+            "/y",
+            Reason::OutOfRange,
+            format!("{} … {}", grid.y[0], grid.y[grid.y.len() - 1]),
+            "fractions of the strip's height from 0 to 1",
+            "With `top` or `bottom`, y counts from 0 at the lower edge to 1 at the upper.",
+        ));
+    }
+    let at = |x: f64| height(&grid.top, x) - height(&grid.bottom, x);
+    let flat = grid.x.iter().find(|x| at(**x).is_nan() || at(**x) <= 0.0);
+    if let Some(x) = flat {
+        let field = match grid.top {
+            Some(_) => "/top",
+            None => "/bottom",
+        };
+        all.refuse(found.say(
+            field,
+            Reason::OutOfRange,
+            format!("height {} at x = {x}", at(*x)),
+            "an upper edge above the lower one everywhere",
+            "Without `bottom` (or `top`) that edge is y = 0.",
+        ));
+    }
+    all.then(())
 }
 
 #[cfg(test)]
@@ -268,7 +279,7 @@ mod tests {
     fn a_strip_follows_its_polyline() {
         let mut grid = lines(&[0.0, 1.0, 2.0, 3.0, 5.0], &[0.0, 0.5, 1.0]);
         grid.top = Some(vec![[0.0, 1.0], [1.0, 1.0], [3.0, 0.5], [5.0, 0.5]]);
-        assert!(grid_violations(&grid, "").is_empty());
+        assert_eq!(check_grid(&grid, ""), Ok(()));
         assert_eq!(largest_cut(&grid), None);
         let mesh = grid_mesh(&grid);
         for (x, y) in [(1.0, 1.0), (2.0, 0.75), (3.0, 0.5), (2.5, 0.625)] {
@@ -287,7 +298,8 @@ mod tests {
     fn every_fault_of_a_grid_is_named() {
         let mut grid = lines(&[0.0, 2.0, 1.0], &[0.0]);
         grid.top = Some(vec![[0.0, 1.0]]);
-        let pointers: Vec<_> = grid_violations(&grid, "/mesh/grid")
+        let pointers: Vec<_> = check_grid(&grid, "/mesh/grid")
+            .unwrap_err()
             .into_iter()
             .map(|v| v.pointer)
             .collect();

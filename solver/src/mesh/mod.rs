@@ -1,15 +1,15 @@
 //! The body as nodes, elements and named boundaries.
 
 mod build;
-mod faults;
 mod grid;
 mod inline;
+mod inverted;
 mod refine;
 
 pub use build::{NO_NODE, RawMesh, build};
-pub use faults::inverted;
-pub use grid::{grid_mesh, grid_violations, largest_cut};
+pub use grid::{check_grid, grid_mesh, largest_cut};
 pub use inline::inline_mesh;
+pub use inverted::check_inverted;
 pub use refine::refine;
 
 use std::collections::BTreeMap;

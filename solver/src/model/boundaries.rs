@@ -1,8 +1,8 @@
 //! The mesh with all its names, and values along named boundaries.
 
+use super::checks::{ALIGNED, Checks};
 use super::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
-use super::findings::{ALIGNED, Findings};
-use crate::error::escape;
+use crate::error::{All, Checked, Reason, Refused, escape};
 use crate::mesh::{self, Edge, External, Mesh};
 use crate::problem::{AdaptiveRefine, Analysis, BoundaryPart, BoundaryValue, MeshInput, Refine};
 
@@ -12,64 +12,42 @@ const SAME_DIRECTION: f64 = 1.0;
 /// More refinements than this overflow any machine; the size itself is bounded by the caller.
 const MOST_REFINEMENTS: u32 = 20;
 
-impl Findings {
-    /// The refined mesh with all its names, or `None` after saying why not.
+impl Checks {
+    /// The refined mesh.
     pub(super) fn mesh(
         &mut self,
         input: &MeshInput,
         external: Option<External>,
         analysis: &Analysis,
         contacts: usize,
-    ) -> Option<Mesh> {
-        let before = self.violations.len();
-        let mut mesh = self.source(input, external);
+    ) -> Checked<Mesh> {
+        let mesh = self.source(input, external);
         let refine = match input.refine {
-            Refine::Times(times) => times,
-            Refine::Adaptive(goal) => {
-                self.adaptive(input, &goal, contacts);
-                0
-            }
-        };
-        if refine > MOST_REFINEMENTS {
-            self.say(
+            Refine::Times(times) if times > MOST_REFINEMENTS => Err(self.say(
                 "/mesh/refine",
-                "out_of_range",
-                refine,
+                Reason::OutOfRange,
+                times,
                 format!("0 … {MOST_REFINEMENTS}"),
                 "Each refinement makes four elements of one.",
-            );
-            mesh = None;
-        }
+            )),
+            Refine::Times(times) => Ok(times),
+            Refine::Adaptive(goal) => self.adaptive(input, &goal, contacts).map(|()| 0),
+        };
         let mut mesh = mesh?;
+        let mut all = All::default();
         // what was read from a file was looked at there
-        let faults = if input.grid.is_some() {
+        let upright = if input.grid.is_some() {
             // straight-sided grids need no look at their corners, and stay what they are when refined
-            mesh::inverted(&mesh, false, |_| "/mesh".to_owned(), "")
+            mesh::check_inverted(&mesh, false, |_| "/mesh".to_owned(), "")
         } else if input.inline.is_some() {
             let element = |e| format!("/mesh/inline/elements/{e}");
-            mesh::inverted(&mesh, true, element, "")
+            mesh::check_inverted(&mesh, true, element, "")
         } else {
-            Vec::new()
+            Ok(())
         };
-        self.adopt(faults);
-        if matches!(analysis, Analysis::Axisymmetric {})
-            && let Some(node) = mesh.nodes.iter().position(|[r, _]| *r < 0.0)
-        {
-            self.say(
-                match (&input.inline, &input.grid) {
-                    (Some(_), _) => format!("/mesh/inline/nodes/{node}"),
-                    (None, Some(_)) => "/mesh/grid/x".to_owned(),
-                    _ => "/mesh".to_owned(),
-                },
-                "out_of_range",
-                format!("r = {}", mesh.nodes[node][0]),
-                "r ≥ 0",
-                "In an axisymmetric body x is the radius.",
-            );
-        }
-        if self.violations.len() > before {
-            return None;
-        }
+        all.take(self.found.took(upright));
+        all.take(self.radii(&mesh, input, analysis));
+        let refine = all.then(()).and(refine)?;
         if let Some((x, distance)) = input.grid.as_ref().and_then(mesh::largest_cut) {
             self.warn(
                 "strip_cuts_polyline",
@@ -82,33 +60,59 @@ impl Findings {
         }
         if input.grid.is_none() && refine > 0 {
             let whole = |_| "/mesh".to_owned();
-            self.adopt(mesh::inverted(&mesh, false, whole, " of the refined mesh"));
+            let upright = mesh::check_inverted(&mesh, false, whole, " of the refined mesh");
+            self.found.took(upright)?;
         }
-        if self.violations.len() > before {
-            return None;
-        }
-        self.parts(&mut mesh, input);
-        self.groups(&mut mesh, input);
-        Some(mesh)
+        Ok(mesh)
+    }
+
+    /// Further names for parts of boundaries and groups of elements.
+    pub(super) fn names(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
+        let mut all = All::default();
+        all.take(self.parts(mesh, input));
+        all.take(self.groups(mesh, input));
+        all.then(())
+    }
+
+    /// In an axisymmetric body x is the radius.
+    fn radii(&mut self, mesh: &Mesh, input: &MeshInput, analysis: &Analysis) -> Checked {
+        let inside = |[r, _]: &[f64; 2]| *r < 0.0;
+        let node = match analysis {
+            Analysis::Axisymmetric {} => mesh.nodes.iter().position(inside),
+            _ => None,
+        };
+        let Some(node) = node else { return Ok(()) };
+        Err(self.say(
+            match (&input.inline, &input.grid) {
+                (Some(_), _) => format!("/mesh/inline/nodes/{node}"),
+                (None, Some(_)) => "/mesh/grid/x".to_owned(),
+                _ => "/mesh".to_owned(),
+            },
+            Reason::OutOfRange,
+            format!("r = {}", mesh.nodes[node][0]),
+            "r ≥ 0",
+            "In an axisymmetric body x is the radius.",
+        ))
     }
 
     /// What adaptive refinement needs: a tolerance, a grid to put lines into, a contact to watch.
-    fn adaptive(&mut self, input: &MeshInput, goal: &AdaptiveRefine, contacts: usize) {
-        self.require(
+    fn adaptive(&mut self, input: &MeshInput, goal: &AdaptiveRefine, contacts: usize) -> Checked {
+        let mut all = All::default();
+        all.take(self.require(
             goal.tolerance > 0.0 && goal.tolerance < 1.0,
-            "/mesh/refine/tolerance".into(),
+            "/mesh/refine/tolerance",
             goal.tolerance,
             "0 < tolerance < 1",
             "The relative change that is left; 0.01 is one percent.",
-        );
+        ));
         if input.grid.is_none() {
-            self.say(
+            all.refuse(self.say(
                 "/mesh/refine",
-                "not_used",
+                Reason::NotUsed,
                 "adaptive refinement of a mesh that is no grid",
                 "a `grid`, or a number of refinements",
                 "Lines can be put into a grid only; refine an inline mesh by a number.",
-            );
+            ));
         }
         let lines = input
             .grid
@@ -117,27 +121,29 @@ impl Findings {
         if lines[0] * lines[1] > MOST_ADAPTIVE_ELEMENTS
             || lines[0].max(lines[1]) > MOST_ADAPTIVE_LINES
         {
-            self.say(
+            all.refuse(self.say(
                 "/mesh/refine",
-                "too_large",
+                Reason::TooLarge,
                 format!("a first grid of {} × {} lines", lines[0], lines[1]),
                 format!("at most {MOST_ADAPTIVE_ELEMENTS} elements and {MOST_ADAPTIVE_LINES} lines in a direction"),
                 "Adaptive refinement starts coarse and makes no larger grid; give a coarse one, or a number of refinements.",
-            );
+            ));
         }
         if contacts == 0 {
-            self.say(
+            all.refuse(self.say(
                 "/mesh/refine",
-                "not_used",
+                Reason::NotUsed,
                 "adaptive refinement without a contact",
                 "a contact, or a number of refinements",
                 "It watches the forces and peak stresses of contacts.",
-            );
+            ));
         }
+        all.then(())
     }
 
     /// Names for groups of elements.
-    fn groups(&mut self, mesh: &mut Mesh, input: &MeshInput) {
+    fn groups(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
+        let mut all = All::default();
         let size = [0, 1]
             .map(|axis| mesh.extent(axis))
             .into_iter()
@@ -145,13 +151,13 @@ impl Findings {
         for (name, range) in &input.groups {
             let pointer = format!("/mesh/groups/{}", escape(name));
             if mesh.groups.contains_key(name) {
-                self.say(
+                all.refuse(self.say(
                     &pointer,
-                    "name_taken",
+                    Reason::NameTaken,
                     name,
                     "a name that the mesh does not have yet",
                     "Groups of an inline mesh have names already.",
-                );
+                ));
                 continue;
             }
             let holds = |e: &u32| {
@@ -162,20 +168,21 @@ impl Findings {
             };
             let elements: Vec<u32> = (0..mesh.elements.len() as u32).filter(holds).collect();
             if elements.is_empty() {
-                self.say(
+                all.refuse(self.say(
                     &pointer,
-                    "empty_group",
+                    Reason::EmptyGroup,
                     "no element",
                     "at least one element whose nodes all lie in the range",
                     "Put grid lines on the edges of the group.",
-                );
+                ));
             }
             mesh.groups.insert(name.clone(), elements);
         }
+        all.then(())
     }
 
     /// The mesh as it is given, before it is refined.
-    fn source(&mut self, input: &MeshInput, external: Option<External>) -> Option<Mesh> {
+    fn source(&mut self, input: &MeshInput, external: Option<External>) -> Checked<Mesh> {
         let forms = [
             ("grid", input.grid.is_some()),
             ("inline", input.inline.is_some()),
@@ -193,55 +200,44 @@ impl Findings {
                 0 => "none of them".to_owned(),
                 _ => given.join(" and "),
             };
-            self.say(
+            return Err(self.say(
                 "/mesh",
-                "wrong_count",
+                Reason::WrongCount,
                 got,
                 "exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`",
                 "Give the mesh in one form.",
-            );
-            return None;
+            ));
         }
         if let Some(grid) = &input.grid {
-            let faults = mesh::grid_violations(grid, "/mesh/grid");
-            let sound = faults.is_empty();
-            self.violations.extend(faults);
-            return sound.then(|| mesh::grid_mesh(grid));
+            self.found.took(mesh::check_grid(grid, "/mesh/grid"))?;
+            return Ok(mesh::grid_mesh(grid));
         }
         if let Some(inline) = &input.inline {
-            return mesh::inline_mesh(inline, "/mesh/inline")
-                .map_err(|v| self.violations.extend(v))
-                .ok();
+            return self.found.took(mesh::inline_mesh(inline, "/mesh/inline"));
         }
         match external {
-            Some(Ok(found)) => {
+            Some(found) => {
+                let found = self.found.took(found)?;
                 self.warnings.extend(found.warnings);
-                Some(found.mesh)
+                Ok(found.mesh)
             }
-            Some(Err(faults)) => {
-                self.violations.extend(faults);
-                None
-            }
-            None => {
-                self.absent(input);
-                None
-            }
+            None => Err(self.absent(input)),
         }
     }
 
     /// The caller has no mesh for what the problem names or quotes.
-    fn absent(&mut self, input: &MeshInput) {
+    fn absent(&mut self, input: &MeshInput) -> Refused {
         match &input.stored {
             Some(hash) => self.say(
                 "/mesh/stored",
-                "unknown_mesh",
+                Reason::UnknownMesh,
                 hash,
                 "a mesh that this service has stored",
                 "Upload it first (POST /v1/meshes); `signorini solve` has no store: give the mesh itself.",
             ),
             None => self.say(
                 "/mesh",
-                "unknown_mesh",
+                Reason::UnknownMesh,
                 "a text that nobody has read",
                 "a mesh that was read from it",
                 "Read it before the problem is checked.",
@@ -250,7 +246,8 @@ impl Findings {
     }
 
     /// Names for parts of boundaries.
-    pub(super) fn parts(&mut self, mesh: &mut Mesh, input: &MeshInput) {
+    fn parts(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
+        let mut all = All::default();
         let original = mesh.boundaries.clone();
         let size = [0, 1]
             .map(|axis| mesh.extent(axis))
@@ -260,32 +257,32 @@ impl Findings {
         for (name, part) in &input.boundaries {
             let pointer = format!("/mesh/boundaries/{}", escape(name));
             if original.contains_key(name) {
-                self.say(
+                all.refuse(self.say(
                     &pointer,
-                    "name_taken",
+                    Reason::NameTaken,
                     name,
                     "a name that the mesh does not have yet",
-                    format!("It has {}.", names(original.keys())),
-                );
+                    format!("It has {}.", known(original.keys())),
+                ));
                 continue;
             }
             let edges = match &part.side {
                 None => surface.get_or_insert_with(|| mesh.surface()),
                 Some(side) => {
                     let Some(edges) = original.get(side) else {
-                        self.say(
+                        all.refuse(self.say(
                             format!("{pointer}/side"),
-                            "unknown_boundary",
+                            Reason::UnknownBoundary,
                             side,
-                            format!("one of {}", names(original.keys())),
+                            format!("one of {}", known(original.keys())),
                             "Check the spelling.",
-                        );
+                        ));
                         continue;
                     };
                     edges
                 }
             };
-            if !self.direction(part, &pointer) {
+            if all.take(self.direction(part, &pointer)).is_none() {
                 continue;
             }
             let ranges = part.corners.map(|[[x0, y0], [x1, y1]]| {
@@ -303,52 +300,50 @@ impl Findings {
             };
             let part: Vec<Edge> = edges.iter().filter(holds).copied().collect();
             if part.is_empty() {
-                self.say(
+                all.refuse(self.say(
                     &pointer,
-                    "empty_boundary",
+                    Reason::EmptyBoundary,
                     "no edge",
                     "at least one edge of the surface that fits all conditions at its three nodes",
                     "Put grid lines on the ends of the part; check the direction of the normal.",
-                );
+                ));
             }
             mesh.boundaries.insert(name.clone(), part);
         }
+        all.then(())
     }
 
     /// The conditions of a part that can be wrong by themselves.
-    fn direction(&mut self, part: &BoundaryPart, pointer: &str) -> bool {
+    fn direction(&mut self, part: &BoundaryPart, pointer: &str) -> Checked {
         if part.normal == Some([0.0, 0.0]) {
-            self.say(
+            return Err(self.say(
                 format!("{pointer}/normal"),
-                "out_of_range",
+                Reason::OutOfRange,
                 "[0, 0]",
                 "a direction",
                 "E.g. [0, 1] for sides that face up.",
-            );
-            return false;
+            ));
         }
         if part.normal.is_none() && part.angle.is_some() {
-            self.say(
+            return Err(self.say(
                 format!("{pointer}/angle"),
-                "not_used",
+                Reason::NotUsed,
                 "an angle without a `normal`",
                 "both or neither",
                 "It says how far a side may turn away from `normal`.",
-            );
-            return false;
+            ));
         }
         let angle = part.angle.unwrap_or(SAME_DIRECTION);
         if !(0.0..=180.0).contains(&angle) {
-            self.say(
+            return Err(self.say(
                 format!("{pointer}/angle"),
-                "out_of_range",
+                Reason::OutOfRange,
                 angle,
                 "0 … 180 degrees",
                 "The largest angle between a side's normal and `normal`.",
-            );
-            return false;
+            ));
         }
-        true
+        Ok(())
     }
 
     /// The nodes of a named set.
@@ -357,22 +352,21 @@ impl Findings {
         mesh: &'a Mesh,
         name: &str,
         pointer: String,
-    ) -> Option<&'a [u32]> {
-        let found = mesh.node_sets.get(name);
-        if found.is_none() {
-            let expected = match mesh.node_sets.is_empty() {
-                true => "a set of nodes; this mesh has none".to_owned(),
-                false => format!("one of {}", names(mesh.node_sets.keys())),
-            };
-            self.say(
-                pointer,
-                "unknown_node_set",
-                name,
-                expected,
-                "Inline meshes have `node_sets`, Gmsh files physical points, decks *NSET.",
-            );
+    ) -> Checked<&'a [u32]> {
+        if let Some(nodes) = mesh.node_sets.get(name) {
+            return Ok(nodes);
         }
-        found.map(|nodes| &nodes[..])
+        let expected = match mesh.node_sets.is_empty() {
+            true => "a set of nodes; this mesh has none".to_owned(),
+            false => format!("one of {}", known(mesh.node_sets.keys())),
+        };
+        Err(self.say(
+            pointer,
+            Reason::UnknownNodeSet,
+            name,
+            expected,
+            "Inline meshes have `node_sets`, Gmsh files physical points, decks *NSET.",
+        ))
     }
 
     /// The edges of a named boundary.
@@ -381,18 +375,17 @@ impl Findings {
         mesh: &'a Mesh,
         name: &str,
         pointer: String,
-    ) -> Option<&'a [Edge]> {
-        let found = mesh.boundaries.get(name);
-        if found.is_none() {
-            self.say(
-                pointer,
-                "unknown_boundary",
-                name,
-                format!("one of {}", names(mesh.boundaries.keys())),
-                "Check the spelling, or name a part under /mesh/boundaries.",
-            );
+    ) -> Checked<&'a [Edge]> {
+        if let Some(edges) = mesh.boundaries.get(name) {
+            return Ok(edges);
         }
-        found.map(|edges| &edges[..])
+        Err(self.say(
+            pointer,
+            Reason::UnknownBoundary,
+            name,
+            format!("one of {}", known(mesh.boundaries.keys())),
+            "Check the spelling, or name a part under /mesh/boundaries.",
+        ))
     }
 
     /// A boundary value at start, end and midside of every edge.
@@ -402,32 +395,31 @@ impl Findings {
         edges: &[Edge],
         value: BoundaryValue,
         pointer: String,
-    ) -> Vec<(Edge, [f64; 3])> {
-        match value {
+    ) -> Checked<Vec<(Edge, [f64; 3])>> {
+        let [start, end] = match value {
             BoundaryValue::Constant(value) => {
-                edges.iter().map(|edge| (*edge, [value; 3])).collect()
+                return Ok(edges.iter().map(|edge| (*edge, [value; 3])).collect());
             }
-            BoundaryValue::Linear([start, end]) => {
-                let runs = mesh::runs(edges);
-                let [run] = &runs[..] else {
-                    self.say(
-                        pointer,
-                        "not_a_chain",
-                        format!("a boundary of {} pieces", runs.len()),
-                        "one chain of edges",
-                        "A value from start to end needs a boundary that hangs together.",
-                    );
-                    return Vec::new();
-                };
-                let s = crate::contact::arc_lengths(mesh, run);
-                let length = s[s.len() - 1];
-                let at = |node: usize| start + (end - start) * s[node] / length;
-                run.iter()
-                    .enumerate()
-                    .map(|(k, edge)| (*edge, [at(2 * k), at(2 * k + 2), at(2 * k + 1)]))
-                    .collect()
-            }
-        }
+            BoundaryValue::Linear(ends) => ends,
+        };
+        let runs = mesh::runs(edges);
+        let [run] = &runs[..] else {
+            return Err(self.say(
+                pointer,
+                Reason::NotAChain,
+                format!("a boundary of {} pieces", runs.len()),
+                "one chain of edges",
+                "A value from start to end needs a boundary that hangs together.",
+            ));
+        };
+        let s = crate::contact::arc_lengths(mesh, run);
+        let length = s[s.len() - 1];
+        let at = |node: usize| start + (end - start) * s[node] / length;
+        Ok(run
+            .iter()
+            .enumerate()
+            .map(|(k, edge)| (*edge, [at(2 * k), at(2 * k + 2), at(2 * k + 1)]))
+            .collect())
     }
 }
 
@@ -450,10 +442,10 @@ fn faces(part: &BoundaryPart, nodes: &[[f64; 2]; 3]) -> bool {
 }
 
 /// The names that exist, or the first of them.
-fn names<'a>(known: impl ExactSizeIterator<Item = &'a String>) -> String {
+fn known<'a>(names: impl ExactSizeIterator<Item = &'a String>) -> String {
     const SHOWN: usize = 20;
-    let count = known.len();
-    let shown: Vec<String> = known
+    let count = names.len();
+    let shown: Vec<String> = names
         .take(SHOWN)
         .map(|name| format!("`{name:.80}`"))
         .collect();

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::findings::{ALIGNED, AXIS, Findings};
+use super::checks::{ALIGNED, AXIS, Checks};
 use super::{ContactModel, Held, Level};
 use crate::contact::ContactBoundary;
-use crate::contact::obstacle::{self, FacingRun};
+use crate::contact::obstacle::{self, FacingRun, Profile};
 use crate::elasticity::Section;
+use crate::error::{All, Checked, Reason};
 use crate::mesh::{self, Edge, Mesh};
 use crate::problem::{Condition, Contact, Friction, NormalOf, Obstacle, Problem, Step};
 
@@ -20,89 +21,89 @@ const SHARPEST_CORNER: f64 = 0.7;
 /// of the contact, and between two lines of symmetry its cost grows with the radius.
 const LARGEST_RADIUS: f64 = 10.0;
 
-impl Findings {
+impl Checks {
+    /// Those contacts that are sound, and whether all are. `obstacles`: whether their numbers are.
     pub(super) fn contacts(
         &mut self,
         mesh: &Mesh,
         section: &Section,
         problem: &Problem,
+        obstacles: &[Checked],
         fixed: &BTreeMap<u32, Held>,
-    ) -> Vec<ContactModel> {
-        let contacts = &problem.contacts;
+    ) -> (Vec<ContactModel>, Checked) {
+        let mut all = All::default();
         let mut models: Vec<ContactModel> = Vec::new();
-        for (i, contact) in contacts.iter().enumerate() {
-            let pointer = format!("/contacts/{i}");
-            if contacts[..i]
-                .iter()
-                .any(|other| other.boundary == contact.boundary)
-            {
-                self.say(
-                    format!("{pointer}/boundary"),
-                    "name_taken",
-                    &contact.boundary,
-                    "a boundary of its own for each contact",
-                    "Name parts of it under /mesh/boundaries.",
-                );
-                continue;
-            }
-            let Some(edges) = self.boundary(mesh, &contact.boundary, format!("{pointer}/boundary"))
-            else {
+        for (i, obstacle) in obstacles.iter().enumerate() {
+            let contact = self.contact(mesh, section, &problem.contacts, i, *obstacle);
+            let Some(model) = all.take(contact) else {
                 continue;
             };
-            // an obstacle whose numbers are wrong has been named already
-            let wrong = format!("{pointer}/obstacle");
-            if self
-                .violations
-                .iter()
-                .any(|v| v.pointer.starts_with(&wrong))
-            {
-                continue;
-            }
-            let Some(run) = self.facing_run(mesh, edges, contact, &pointer) else {
-                continue;
-            };
-            let mut boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
-            if !self.sound(&boundary, section, contact, &run, &pointer) {
-                continue;
-            }
-            if let Some((other, node)) = models.iter().find_map(|m| {
-                m.boundary
-                    .nodes
-                    .iter()
-                    .find(|n| boundary.nodes.contains(n))
-                    .map(|n| (m.name.clone(), *n))
-            }) {
-                self.say(
-                    format!("{pointer}/boundary"),
-                    "shared_node",
-                    format!("node {node}, also in contact `{other}`"),
-                    "contacts without common nodes",
-                    "End one of them an edge earlier with `from` or `to`.",
-                );
-            }
-            let push = turn_normals(&mut boundary, &run, contact.normal);
-            let model = ContactModel {
-                name: contact.boundary.clone(),
-                pointer,
-                boundary,
-                profile: run
-                    .profile
-                    .iter()
-                    .zip(&push)
-                    .map(|(p, push)| p.distance * push[0])
-                    .collect(),
-                indentation: contact.indentation,
-                push,
-                tangential_displacement: contact.tangential_displacement,
-                normal: contact.normal,
-                condition: contact.condition,
-                power: power(&contact.obstacle),
-                friction: contact.friction.clone(),
-            };
-            self.supported_contact_nodes(&model, &problem.steps, fixed);
+            all.take(self.shared_nodes(&model, &models));
+            all.take(self.supported_contact_nodes(&model, &problem.steps, fixed));
             models.push(model);
         }
-        models
+        (models, all.then(()))
+    }
+
+    /// Contact number i by itself.
+    fn contact(
+        &mut self,
+        mesh: &Mesh,
+        section: &Section,
+        contacts: &[Contact],
+        i: usize,
+        obstacle: Checked,
+    ) -> Checked<ContactModel> {
+        let (contact, pointer) = (&contacts[i], format!("/contacts/{i}"));
+        let same = |other: &Contact| other.boundary == contact.boundary;
+        if contacts[..i].iter().any(same) {
+            return Err(self.say(
+                format!("{pointer}/boundary"),
+                Reason::NameTaken,
+                &contact.boundary,
+                "a boundary of its own for each contact",
+                "Name parts of it under /mesh/boundaries.",
+            ));
+        }
+        let edges = self.boundary(mesh, &contact.boundary, format!("{pointer}/boundary"))?;
+        obstacle?;
+        let run = self.facing_run(mesh, edges, contact, &pointer)?;
+        let mut boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
+        self.sound(&boundary, section, contact, &run, &pointer)?;
+        let push = turn_normals(&mut boundary, &run, contact.normal);
+        let along = |(profile, push): (&Profile, &[f64; 2])| profile.distance * push[0];
+        Ok(ContactModel {
+            name: contact.boundary.clone(),
+            pointer,
+            boundary,
+            profile: run.profile.iter().zip(&push).map(along).collect(),
+            indentation: contact.indentation,
+            push,
+            tangential_displacement: contact.tangential_displacement,
+            normal: contact.normal,
+            condition: contact.condition,
+            power: power(&contact.obstacle),
+            friction: contact.friction.clone(),
+        })
+    }
+
+    /// Every node belongs to one contact.
+    fn shared_nodes(&mut self, model: &ContactModel, others: &[ContactModel]) -> Checked {
+        let shared = others.iter().find_map(|other| {
+            let nodes = &model.boundary.nodes;
+            let node = other.boundary.nodes.iter().find(|n| nodes.contains(n))?;
+            Some((&other.name, node))
+        });
+        match shared {
+            None => Ok(()),
+            Some((other, node)) => Err(self.say(
+                format!("{}/boundary", model.pointer),
+                Reason::SharedNode,
+                format!("node {node}, also in contact `{other}`"),
+                "contacts without common nodes",
+                "End one of them an edge earlier with `from` or `to`.",
+            )),
+        }
     }
 
     /// Whether the chain can carry a pressure, and its obstacle and friction make sense on it.
@@ -113,17 +114,17 @@ impl Findings {
         contact: &Contact,
         run: &FacingRun,
         pointer: &str,
-    ) -> bool {
-        let before = self.violations.len();
+    ) -> Checked {
+        let mut all = All::default();
         let last = boundary.nodes.len() - 1;
         let at = |i: usize| boundary.positions[i];
         let end_on_axis = |i: usize| {
             section.axisymmetric() && (i == 0 || i == last) && at(i)[0] <= AXIS * boundary.s[last]
         };
         if let Some(i) = (0..=last).find(|&i| !(boundary.weights[i] > 0.0 || end_on_axis(i))) {
-            self.say(
+            all.refuse(self.say(
                 format!("{pointer}/boundary"),
-                "no_area",
+                Reason::NoArea,
                 format!(
                     "node {} at {:?} with a contact area of {:.3e}",
                     boundary.nodes[i],
@@ -132,15 +133,15 @@ impl Findings {
                 ),
                 "a boundary with area at every node (in axisymmetry off the axis, but for an end)",
                 "Choose another boundary; keep midsides near the middle of their sides.",
-            );
+            ));
         }
         if let Some(corner) = (2..last)
             .step_by(2)
             .find(|&corner| turn(boundary, corner) < SHARPEST_CORNER)
         {
-            self.say(
+            all.refuse(self.say(
                 format!("{pointer}/boundary"),
-                "turns_corner",
+                Reason::TurnsCorner,
                 format!(
                     "a boundary that turns by {:.0}° at {:?}",
                     turn(boundary, corner).acos().to_degrees(),
@@ -148,7 +149,7 @@ impl Findings {
                 ),
                 "a boundary without corners: at one there is no normal",
                 "Give each side a contact of its own, with names under /mesh/boundaries.",
-            );
+            ));
         }
         // a flat is the same everywhere, and a curve in space knows no coordinate
         let curved = !matches!(
@@ -159,25 +160,25 @@ impl Findings {
         let falls = |pair: &[f64]| pair[1] < pair[0];
         if curved && !run.coordinate.windows(2).all(grows) && !run.coordinate.windows(2).all(falls)
         {
-            self.say(
+            all.refuse(self.say(
                 format!("{pointer}/obstacle/along"),
-                "not_monotonic",
+                Reason::NotMonotonic,
                 "a coordinate x that does not grow or fall along the boundary",
                 "a coordinate that tells the places of the boundary apart",
                 "Write \"along\": \"arc_length\".",
-            );
+            ));
         }
         if let Some(radius) = contact.friction.as_ref().and_then(|f| f.nonlocal_radius) {
             let most = LARGEST_RADIUS * boundary.s[last];
-            self.require(
+            all.take(self.require(
                 radius <= most,
                 format!("{pointer}/friction/nonlocal_radius"),
                 radius,
                 &format!("at most {most}, ten times the length of the contact boundary"),
                 "The radius is a material length, far below the size of the contact.",
-            );
+            ));
         }
-        self.violations.len() == before
+        all.then(())
     }
 
     /// The part of the boundary that faces the obstacle: one chain.
@@ -187,27 +188,25 @@ impl Findings {
         edges: &[Edge],
         contact: &Contact,
         pointer: &str,
-    ) -> Option<FacingRun> {
+    ) -> Checked<FacingRun> {
         let runs = mesh::runs(edges);
         let [run] = &runs[..] else {
-            self.say(
+            return Err(self.say(
                 format!("{pointer}/boundary"),
-                "not_a_chain",
+                Reason::NotAChain,
                 format!("{} pieces", runs.len()),
                 "one chain of edges",
                 "Name each piece under /mesh/boundaries and give it a contact of its own.",
-            );
-            return None;
+            ));
         };
         if run[0][0] == run[run.len() - 1][1] {
-            self.say(
+            return Err(self.say(
                 format!("{pointer}/boundary"),
-                "not_a_chain",
+                Reason::NotAChain,
                 "a closed loop",
                 "a chain of edges with two ends",
                 "Name a part of it.",
-            );
-            return None;
+            ));
         }
         let mut facing = obstacle::facing(mesh, run, &contact.obstacle);
         for [low, high] in &facing.cut {
@@ -217,8 +216,9 @@ impl Findings {
                 format!("The obstacle ends inside the edge from {low} to {high}, which is left out of the contact. Put a grid line on the obstacle's end."),
             );
         }
-        if facing.runs.len() == 1 {
-            return facing.runs.pop();
+        let pieces = facing.runs.len();
+        if let (Some(run), 1) = (facing.runs.pop(), pieces) {
+            return Ok(run);
         }
         let s = crate::contact::arc_lengths(mesh, run);
         let ([x0, y0], [x1, y1]) = (
@@ -230,27 +230,19 @@ impl Findings {
             "The boundary goes from ({x0}, {y0}) to ({x1}, {y1}) and is {} long.",
             s[s.len() - 1]
         );
-        if facing.runs.is_empty() {
-            self.say(
-                place,
-                "covers_nothing",
-                "an obstacle that covers no edge of the boundary",
+        let (reason, got, expected) = match pieces {
+            0 => (
+                Reason::CoversNothing,
+                "an obstacle that covers no edge of the boundary".to_owned(),
                 "one that covers all three nodes of an edge at least",
-                extent,
-            );
-        } else {
-            self.say(
-                place,
-                "not_a_chain",
-                format!(
-                    "an obstacle that covers {} separate pieces",
-                    facing.runs.len()
-                ),
+            ),
+            _ => (
+                Reason::NotAChain,
+                format!("an obstacle that covers {pieces} separate pieces"),
                 "one piece",
-                extent,
-            );
-        }
-        None
+            ),
+        };
+        Err(self.say(place, reason, got, expected, extent))
     }
 
     /// A supported contact node keeps its two unknowns apart only where a support acts along the
@@ -260,7 +252,8 @@ impl Findings {
         contact: &ContactModel,
         steps: &[Step],
         fixed: &BTreeMap<u32, Held>,
-    ) {
+    ) -> Checked {
+        let mut all = All::default();
         let (boundary, pointer) = (&contact.boundary, &contact.pointer);
         let ends: Vec<Level> = match steps {
             [] => vec![Level::FULL],
@@ -278,13 +271,13 @@ impl Findings {
             );
             let (along_n, along_t) = (held.along(n), held.along(t));
             if along_n.is_none() && along_t.is_none() {
-                self.say(
+                all.refuse(self.say(
                     format!("{pointer}/boundary"),
-                    "oblique_support",
+                    Reason::ObliqueSupport,
                     format!("node {node} at ({x}, {y}), normal ({:.4}, {:.4}), supported along one axis", n[0], n[1]),
                     "a support along the contact's normal or tangent, or along both axes",
                     "End the contact an edge before the support with `from` or `to`.",
-                );
+                ));
             }
             for level in ends.iter().filter(|_| bonded) {
                 let wanted = [contact.gap(i, level.indentation), contact.drag(i, level)];
@@ -293,14 +286,13 @@ impl Findings {
                         continue;
                     };
                     if (u - wanted).abs() > ALIGNED * u.abs().max(wanted.abs()) {
-                        self.say(
+                        return Err(self.say(
                             format!("{pointer}/condition"),
-                            "conflict",
+                            Reason::Conflict,
                             format!("node {node} at ({x}, {y}) held at {u} by a support"),
                             format!("{wanted}, where the bonded obstacle holds it"),
                             "End the contact an edge before the support with `from` or `to`, or let both agree.",
-                        );
-                        return;
+                        ));
                     }
                 }
             }
@@ -309,17 +301,17 @@ impl Findings {
                 let (u_n, gap) = (level.supports * u_n, contact.gap(i, level.indentation));
                 let free = contact.condition == Condition::None;
                 if !free && u_n > gap + ALIGNED * gap.abs() {
-                    self.say(
+                    return Err(self.say(
                         format!("{pointer}/indentation"),
-                        "impossible",
+                        Reason::Impossible,
                         format!("node {node} at ({x}, {y}) held at u_n = {u_n} by a support, {} inside the obstacle", u_n - gap),
                         "supports that leave the body outside the obstacle",
                         "End the obstacle before the support with `from` or `to`.",
-                    );
-                    return;
+                    ));
                 }
             }
         }
+        all.then(())
     }
 
     /// What is accepted, and yet makes the numbers doubtful.

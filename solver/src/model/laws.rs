@@ -1,44 +1,49 @@
 //! Obstacles and friction laws by themselves: every number in its range, no two choices that exclude
 //! each other.
 
-use super::findings::Findings;
+use super::checks::Checks;
+use crate::error::{All, Checked, Reason, Refused};
 use crate::problem::{
     Analysis, Condition, Contact, Friction, History, Measure, Obstacle, PrescribedBound, Transition,
 };
 
-impl Findings {
-    pub(super) fn contact_numbers(
+impl Checks {
+    /// What a contact says of its friction, and whether the two go together.
+    pub(super) fn friction(
         &mut self,
         analysis: &Analysis,
         contact: &Contact,
         pointer: &str,
-    ) {
-        self.obstacle_numbers(&contact.obstacle, &format!("{pointer}/obstacle"));
+    ) -> Checked {
+        let mut all = All::default();
         match (&contact.friction, contact.condition) {
-            (Some(_), Condition::Bonded) => self.say(
-                format!("{pointer}/friction"),
-                "not_used",
+            (Some(_), Condition::Bonded) => all.refuse(self.say(
+                pointer,
+                Reason::NotUsed,
                 "friction on a bonded contact",
                 "none: what is bonded does not slide",
                 "Leave `friction` out, or choose another `condition`.",
-            ),
+            )),
             (friction, Condition::None) if friction.as_ref().is_none_or(|f| f.bound.is_none()) => {
-                self.say(
-                    format!("{pointer}/friction/bound"),
-                    "missing",
+                all.refuse(self.say(
+                    format!("{pointer}/bound"),
+                    Reason::Missing,
                     "nothing",
                     "a prescribed friction bound",
                     "Without an obstacle there is no pressure that a bound could follow from.",
-                );
+                ));
             }
             _ => {}
         }
         if let Some(friction) = &contact.friction {
-            self.friction_numbers(analysis, friction, &format!("{pointer}/friction"));
+            all.take(self.friction_numbers(analysis, friction, pointer));
         }
+        all.then(())
     }
 
-    fn obstacle_numbers(&mut self, obstacle: &Obstacle, pointer: &str) {
+    /// The numbers of an obstacle.
+    pub(super) fn obstacle(&mut self, obstacle: &Obstacle, pointer: &str) -> Checked {
+        let mut all = All::default();
         let at = |field: &str| format!("{pointer}/{field}");
         let lengths = "a length > 0";
         match obstacle {
@@ -46,109 +51,120 @@ impl Findings {
             | Obstacle::Parabola { radius, .. }
             | Obstacle::RoundedFlat { radius, .. } => {
                 let hint = "The obstacle is convex towards the body.";
-                self.require(*radius > 0.0, at("radius"), *radius, lengths, hint);
+                all.take(self.require(*radius > 0.0, at("radius"), *radius, lengths, hint));
             }
-            Obstacle::Wedge { angle, .. } | Obstacle::Cone { angle, .. } => self.require(
-                *angle > 0.0 && *angle < 90.0,
-                at("angle"),
-                *angle,
-                "0 < angle < 90 degrees",
-                "Between the obstacle's face and the surface of the body.",
-            ),
+            Obstacle::Wedge { angle, .. } | Obstacle::Cone { angle, .. } => {
+                all.take(self.require(
+                    *angle > 0.0 && *angle < 90.0,
+                    at("angle"),
+                    *angle,
+                    "0 < angle < 90 degrees",
+                    "Between the obstacle's face and the surface of the body.",
+                ));
+            }
             Obstacle::Power {
                 coefficient,
                 exponent,
                 ..
             } => {
                 let hint = "The obstacle is convex towards the body.";
-                self.require(
+                all.take(self.require(
                     *coefficient > 0.0,
                     at("coefficient"),
                     *coefficient,
                     "> 0",
                     hint,
-                );
-                self.require(*exponent >= 1.0, at("exponent"), *exponent, "≥ 1", hint);
+                ));
+                all.take(self.require(*exponent >= 1.0, at("exponent"), *exponent, "≥ 1", hint));
             }
             Obstacle::Table { x, gap, .. } => {
-                self.table(&at("x"), x, &at("gap"), gap, "profile");
+                all.take(self.table(&at("x"), x, &at("gap"), gap, "profile"));
             }
             Obstacle::Polyline { points, .. } => {
                 if points.len() < 2 {
-                    self.say(
+                    all.refuse(self.say(
                         at("points"),
-                        "too_few",
+                        Reason::TooFew,
                         format!("{} point(s)", points.len()),
                         "at least two points",
                         "Give the two ends of the line.",
-                    );
+                    ));
                 }
                 if let Some(i) = (1..points.len()).find(|&i| points[i] == points[i - 1]) {
-                    self.say(
+                    all.refuse(self.say(
                         format!("{pointer}/points/{i}"),
-                        "repeated_point",
+                        Reason::RepeatedPoint,
                         format!("{:?} twice", points[i]),
                         "points that differ from those before them",
                         "Remove one of them.",
-                    );
+                    ));
                 }
             }
             Obstacle::Flat { .. } | Obstacle::Tilted { .. } | Obstacle::Line { .. } => {}
         }
         if let Obstacle::RoundedFlat { half_width, .. } = obstacle {
-            self.require(
+            all.take(self.require(
                 *half_width >= 0.0,
                 at("half_width"),
                 *half_width,
                 "a length ≥ 0",
                 "Half the width of the flat part.",
-            );
+            ));
         }
         if let (Some(from), Some(to), _) = obstacle.span()
             && from >= to
         {
-            self.say(
+            all.refuse(self.say(
                 at("to"),
-                "out_of_range",
+                Reason::OutOfRange,
                 to,
                 format!("more than `from`, {from}"),
                 "`from` and `to` are the ends of the obstacle.",
-            );
+            ));
         }
+        all.then(())
     }
 
     /// Places that grow, and as many values.
-    fn table(&mut self, x_at: &str, x: &[f64], y_at: &str, y: &[f64], what: &str) {
+    fn table(&mut self, x_at: &str, x: &[f64], y_at: &str, y: &[f64], what: &str) -> Checked {
+        let mut all = All::default();
         if x.len() < 2 {
-            self.say(
+            all.refuse(self.say(
                 x_at,
-                "too_few",
+                Reason::TooFew,
                 format!("{} point(s)", x.len()),
                 "at least two points",
                 format!("The {what} is linear between them."),
-            );
+            ));
         }
         if let Some(i) = (1..x.len()).find(|&i| x[i] <= x[i - 1]) {
-            self.say(
+            all.refuse(self.say(
                 format!("{x_at}/{i}"),
-                "not_increasing",
+                Reason::NotIncreasing,
                 format!("{} after {}", x[i], x[i - 1]),
                 "strictly increasing places",
                 "Sort the points and remove repeated ones.",
-            );
+            ));
         }
         if x.len() != y.len() {
-            self.say(
+            all.refuse(self.say(
                 y_at,
-                "wrong_length",
+                Reason::WrongLength,
                 format!("{} values", y.len()),
                 format!("{}, one for each place", x.len()),
                 "Give one value for each place.",
-            );
+            ));
         }
+        all.then(())
     }
 
-    fn friction_numbers(&mut self, analysis: &Analysis, friction: &Friction, pointer: &str) {
+    fn friction_numbers(
+        &mut self,
+        analysis: &Analysis,
+        friction: &Friction,
+        pointer: &str,
+    ) -> Checked {
+        let mut all = All::default();
         let at = |field: &str| format!("{pointer}/{field}");
         let prescribed = friction.bound.is_some();
         let numbers = [
@@ -167,86 +183,89 @@ impl Findings {
         ];
         for (name, value, expected, hint) in numbers {
             match value {
-                None if !prescribed => self.say(
+                None if !prescribed => all.refuse(self.say(
                     at(name),
-                    "missing",
+                    Reason::Missing,
                     "nothing",
                     format!("{expected}, or a `bound`"),
                     hint,
-                ),
-                Some(_) if prescribed => self.excluded(&at(name)),
-                Some(value) => self.require(value >= 0.0, at(name), value, expected, hint),
+                )),
+                Some(_) if prescribed => all.refuse(self.excluded(&at(name))),
+                Some(value) => {
+                    all.take(self.require(value >= 0.0, at(name), value, expected, hint));
+                }
                 None => {}
             }
         }
-        self.require(
+        all.take(self.require(
             friction.elastic_slip > 0.0,
             at("elastic_slip"),
             friction.elastic_slip,
             "a length > 0",
             "About 1e-4 of the contact's width; below 1e-5 nothing physical changes.",
-        );
-        self.require(
+        ));
+        all.take(self.require(
             friction.cohesion >= 0.0,
             at("cohesion"),
             friction.cohesion,
             "a stress ≥ 0",
             "It is added to the friction bound in contact.",
-        );
+        ));
         if let Some(cap) = friction.shear_cap {
             let hint = "The largest tangential stress that the surface bears.";
-            self.require(cap > 0.0, at("shear_cap"), cap, "a stress > 0", hint);
+            all.take(self.require(cap > 0.0, at("shear_cap"), cap, "a stress > 0", hint));
         }
         if prescribed && friction.cohesion != 0.0 {
-            self.excluded(&at("cohesion"));
+            all.refuse(self.excluded(&at("cohesion")));
         }
         if prescribed && friction.shear_cap.is_some() {
-            self.excluded(&at("shear_cap"));
+            all.refuse(self.excluded(&at("shear_cap")));
         }
         match &friction.bound {
             Some(PrescribedBound::Constant(bound)) => {
                 let hint = "The tangential stress at which the surface slips.";
-                self.require(*bound >= 0.0, at("bound"), *bound, "a stress ≥ 0", hint);
+                all.take(self.require(*bound >= 0.0, at("bound"), *bound, "a stress ≥ 0", hint));
             }
             Some(PrescribedBound::Table(table)) => {
                 let (s, bound) = (at("bound/s"), at("bound/bound"));
-                self.table(&s, &table.s, &bound, &table.bound, "friction bound");
+                all.take(self.table(&s, &table.s, &bound, &table.bound, "friction bound"));
                 if let Some(i) = table.bound.iter().position(|b| *b < 0.0) {
                     let hint = "The tangential stress at which the surface slips.";
                     let place = format!("{bound}/{i}");
-                    self.require(false, place, table.bound[i], "a stress ≥ 0", hint);
+                    all.take(self.require(false, place, table.bound[i], "a stress ≥ 0", hint));
                 }
             }
             None => {}
         }
         if friction.history == History::Incremental && friction.transition != Transition::Linear {
-            self.say(
+            all.refuse(self.say(
                 at("transition"),
-                "not_used",
+                Reason::NotUsed,
                 "`tanh` with the incremental history",
                 "`linear`",
                 "The incremental law is defined for the linear transition only.",
-            );
+            ));
         }
         let round = matches!(analysis, Analysis::Axisymmetric {});
         if friction.measure == Measure::Surface && !round {
-            self.say(
+            all.refuse(self.say(
                 at("measure"),
-                "not_used",
+                Reason::NotUsed,
                 "`surface`",
                 "`line`, but in axisymmetry",
                 "In the plane there is no surface to integrate over.",
-            );
+            ));
         }
+        all.then(())
     }
 
-    fn excluded(&mut self, pointer: &str) {
+    fn excluded(&mut self, pointer: &str) -> Refused {
         self.say(
             pointer,
-            "not_used",
+            Reason::NotUsed,
             "a value beside `bound`",
             "one of the two",
             "A prescribed bound knows nothing of pressure; remove this field or `bound`.",
-        );
+        )
     }
 }

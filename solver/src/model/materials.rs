@@ -2,47 +2,45 @@
 
 use std::collections::BTreeMap;
 
-use super::findings::Findings;
+use super::checks::Checks;
 use crate::elasticity::{self, Moduli, Section};
+use crate::error::{All, Checked, Reason};
 use crate::mesh::Mesh;
 use crate::problem::{Analysis, Material};
 
-impl Findings {
-    /// The theory with the materials of all elements, or `None` after saying why not.
+impl Checks {
+    /// The theory with the materials of all elements.
     pub(super) fn section(
         &mut self,
         analysis: Analysis,
         materials: &[Material],
         mesh: &Mesh,
-    ) -> Option<Section> {
-        let before = self.violations.len();
+    ) -> Checked<Section> {
+        let mut all = All::default();
         if materials.is_empty() {
-            self.say(
+            all.refuse(self.say(
                 "/materials",
-                "too_few",
+                Reason::TooFew,
                 "no material",
                 "at least one",
                 "Give youngs_modulus and poissons_ratio.",
-            );
+            ));
         }
-        let found: Vec<Option<Moduli>> = materials
-            .iter()
-            .enumerate()
-            .map(|(i, material)| self.moduli(&analysis, material, &format!("/materials/{i}")))
-            .collect();
+        let mut moduli = Vec::new();
+        for (i, material) in materials.iter().enumerate() {
+            moduli.extend(all.take(self.moduli(&analysis, material, &format!("/materials/{i}"))));
+        }
         let material_of = self.elements_of(materials, mesh);
-        if self.violations.len() > before {
-            return None;
-        }
-        let moduli: Vec<Moduli> = found.into_iter().flatten().collect();
-        Some(match moduli[..] {
+        all.then(())?;
+        let material_of = material_of?;
+        Ok(match moduli[..] {
             [only] => Section::uniform(analysis, only),
             _ => Section::by_element(analysis, moduli, material_of),
         })
     }
 
-    fn moduli(&mut self, analysis: &Analysis, m: &Material, pointer: &str) -> Option<Moduli> {
-        let before = self.violations.len();
+    fn moduli(&mut self, analysis: &Analysis, m: &Material, pointer: &str) -> Checked<Moduli> {
+        let mut all = All::default();
         let at = |field: &str| format!("{pointer}/{field}");
         if let Some(material) = &m.orthotropic {
             for (name, value) in [
@@ -50,13 +48,13 @@ impl Findings {
                 ("poissons_ratio", m.poissons_ratio),
             ] {
                 if value.is_some() {
-                    self.say(
+                    all.refuse(self.say(
                         at(name),
-                        "wrong_count",
+                        Reason::WrongCount,
                         "an isotropic constant beside `orthotropic`",
                         "one of the two forms",
                         "Remove it, or remove `orthotropic`.",
-                    );
+                    ));
                 }
             }
             let sheet = matches!(analysis, Analysis::PlaneStress { .. });
@@ -66,13 +64,13 @@ impl Findings {
                 ("nu23", material.nu23),
             ] {
                 if value.is_none() && !sheet {
-                    self.say(
+                    all.refuse(self.say(
                         at(&format!("orthotropic/{name}")),
-                        "missing",
+                        Reason::Missing,
                         "nothing",
                         format!("a value for `{name}`"),
                         "Only in plane stress the third direction does not matter.",
-                    );
+                    ));
                 }
             }
             let moduli = [
@@ -84,59 +82,55 @@ impl Findings {
             for (name, value) in moduli {
                 if let Some(value) = value {
                     let place = at(&format!("orthotropic/{name}"));
-                    self.require(value > 0.0, place, value, "a stress > 0", "A modulus.");
+                    all.take(self.require(value > 0.0, place, value, "a stress > 0", "A modulus."));
                 }
             }
-            if self.violations.len() > before {
-                return None;
-            }
-            let moduli = elasticity::orthotropic(analysis, material);
-            if moduli.is_none() {
+            all.then(())?;
+            return elasticity::orthotropic(analysis, material).ok_or_else(|| {
                 self.say(
                     at("orthotropic"),
-                    "out_of_range",
+                    Reason::OutOfRange,
                     format!("nu12 = {}{}{}", material.nu12, named("nu13", material.nu13), named("nu23", material.nu23)),
                     "constants of a stable material, e.g. nu12² < e1/e2",
                     "Some strain would cost no energy. Check which of nu12 and nu21 is meant: nu12 = −ε_2/ε_1 under σ_1.",
-                );
-            }
-            return moduli;
+                )
+            });
         }
         let mut given = |name: &str, value: Option<f64>| {
-            if value.is_none() {
+            value.ok_or_else(|| {
                 self.say(
                     at(name),
-                    "missing",
+                    Reason::Missing,
                     "nothing",
                     format!("a value for `{name}`"),
                     "Or give `orthotropic`.",
-                );
-            }
-            value
+                )
+            })
         };
         let (e, nu) = (
             given("youngs_modulus", m.youngs_modulus),
             given("poissons_ratio", m.poissons_ratio),
         );
-        if let Some(e) = e {
+        if let Ok(e) = e {
             let place = at("youngs_modulus");
-            self.require(e > 0.0, place, e, "a stress > 0", "Young's modulus E.");
+            all.take(self.require(e > 0.0, place, e, "a stress > 0", "Young's modulus E."));
         }
-        if let Some(nu) = nu {
-            self.require(
+        if let Ok(nu) = nu {
+            all.take(self.require(
                 nu > -1.0 && nu < 0.5,
                 at("poissons_ratio"),
                 nu,
                 "−1 < Poisson's ratio < 0.5",
                 "For a nearly incompressible body use a value such as 0.49.",
-            );
+            ));
         }
-        Some(elasticity::isotropic(analysis, e?, nu?))
+        all.then(elasticity::isotropic(analysis, e?, nu?))
     }
 
     /// The material of every element: that of its group, else the one without a group.
-    fn elements_of(&mut self, materials: &[Material], mesh: &Mesh) -> Vec<u16> {
+    fn elements_of(&mut self, materials: &[Material], mesh: &Mesh) -> Checked<Vec<u16>> {
         const NONE: u16 = u16::MAX;
+        let mut all = All::default();
         let mut material_of = vec![NONE; mesh.elements.len()];
         for (i, material) in materials.iter().enumerate() {
             let Some(name) = &material.group else {
@@ -144,27 +138,27 @@ impl Findings {
             };
             let pointer = format!("/materials/{i}/group");
             let Some(elements) = mesh.groups.get(name) else {
-                self.say(
+                all.refuse(self.say(
                     pointer,
-                    "unknown_group",
+                    Reason::UnknownGroup,
                     name,
                     known(&mesh.groups),
                     "Check the spelling, or name a group under /mesh/groups.",
-                );
+                ));
                 continue;
             };
             let taken = elements.iter().find(|&&e| material_of[e as usize] != NONE);
             if let Some(e) = taken {
-                self.say(
+                all.refuse(self.say(
                     pointer,
-                    "overlap",
+                    Reason::Overlap,
                     format!(
                         "element {e}, which is made of material {} already",
                         material_of[*e as usize]
                     ),
                     "one material for every element",
                     "Let the groups of materials not overlap.",
-                );
+                ));
             }
             elements
                 .iter()
@@ -173,13 +167,13 @@ impl Findings {
         let mut rest = (0..materials.len()).filter(|&i| materials[i].group.is_none());
         let (first, second) = (rest.next(), rest.next());
         if let Some(second) = second {
-            self.say(
+            all.refuse(self.say(
                 format!("/materials/{second}/group"),
-                "wrong_count",
+                Reason::WrongCount,
                 "a second material without a group",
                 "one material at most for all that the others do not name",
                 "Name the group of elements that is made of it.",
-            );
+            ));
         }
         let bare = material_of.iter().position(|m| *m == NONE);
         match (first, bare) {
@@ -187,16 +181,16 @@ impl Findings {
                 .iter_mut()
                 .filter(|m| **m == NONE)
                 .for_each(|m| *m = i as u16),
-            (None, Some(e)) if !materials.is_empty() => self.say(
+            (None, Some(e)) if !materials.is_empty() => all.refuse(self.say(
                 "/materials",
-                "missing",
+                Reason::Missing,
                 format!("no material for element {e}"),
                 "a material for every element",
                 "Give one material without `group`: it is taken for the rest.",
-            ),
+            )),
             _ => {}
         }
-        material_of
+        all.then(material_of)
     }
 }
 

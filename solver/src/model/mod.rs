@@ -4,9 +4,9 @@
 //! numbered and can be trusted by every room above.
 
 mod boundaries;
+mod checks;
 mod contacts;
 pub mod estimate;
-mod findings;
 mod laws;
 mod loads;
 mod materials;
@@ -17,11 +17,11 @@ pub use supports::Held;
 
 use std::collections::BTreeMap;
 
-use findings::Findings;
+use checks::Checks;
 
 use crate::contact::ContactBoundary;
 use crate::elasticity::{Loads, Section};
-use crate::error::Violation;
+use crate::error::{All, Checked, Violation};
 use crate::mesh::{External, Mesh};
 use crate::problem::{Condition, Friction, NormalOf, Problem, SolverControls, Step};
 use crate::solution::Warning;
@@ -136,55 +136,56 @@ impl ContactModel {
 impl Model {
     /// Checks and numbers a problem; `external`: the mesh that it only names or quotes, where it does.
     pub fn new(problem: &Problem, external: Option<External>) -> Result<Model, Vec<Violation>> {
-        let mut findings = Findings::default();
-        findings.finite(problem);
+        let mut checks = Checks::default();
+        let model = checks.all(problem, external);
+        checks.found.conclude(model)
+    }
+}
+
+impl Checks {
+    fn all(&mut self, problem: &Problem, external: Option<External>) -> Checked<Model> {
         // numbers that are not finite would make nonsense of every later check
-        if !findings.violations.is_empty() {
-            return Err(findings.into_violations());
-        }
-        findings.counts(problem);
-        if !findings.violations.is_empty() {
-            return Err(findings.into_violations());
-        }
+        self.finite(problem)?;
+        self.counts(problem)?;
         let analysis = problem.analysis;
-        findings.analysis(&analysis);
-        if let Some(units) = &problem.units {
-            findings.units(units);
-        }
-        findings.controls(problem);
-        findings.thesis(problem);
-        findings.steps(&problem.steps);
+        let mut all = All::default();
+        all.take(self.analysis(&analysis));
+        all.take(self.units(problem.units.as_ref()));
+        all.take(self.controls(problem));
+        all.take(self.thesis(problem));
+        all.take(self.steps(&problem.steps));
+        let mut obstacles = Vec::new();
         for (i, contact) in problem.contacts.iter().enumerate() {
-            findings.contact_numbers(&analysis, contact, &format!("/contacts/{i}"));
+            let pointer = format!("/contacts/{i}");
+            obstacles.push(self.obstacle(&contact.obstacle, &format!("{pointer}/obstacle")));
+            all.take(self.friction(&analysis, contact, &format!("{pointer}/friction")));
         }
-        let Some(mesh) = findings.mesh(&problem.mesh, external, &analysis, problem.contacts.len())
-        else {
-            return Err(findings.into_violations());
-        };
-        findings.thesis_elements(problem, &mesh);
+        let mut mesh = self.mesh(&problem.mesh, external, &analysis, problem.contacts.len())?;
+        all.take(self.names(&mut mesh, &problem.mesh));
+        all.take(self.thesis_elements(problem, &mesh));
         // wrong materials have been named; the checks that follow need only the theory
-        let section = findings
-            .section(analysis, &problem.materials, &mesh)
+        let section = all
+            .take(self.section(analysis, &problem.materials, &mesh))
             .unwrap_or_else(|| Section::uniform(analysis, Default::default()));
-        let fixed = findings.supports(&mesh, &section, &problem.supports);
-        let loads = findings.loads(&mesh, &section, &problem.loads);
-        let contacts = findings.contacts(&mesh, &section, problem, &fixed);
-        let held_by_contact = findings.freedom(&mesh, &section, &fixed, &contacts);
-        if !findings.violations.is_empty() {
-            return Err(findings.into_violations());
-        }
-        findings.doubts(&contacts);
+        let (fixed, supported) = self.supports(&mesh, &section, &problem.supports);
+        all.take(supported);
+        let loads = self.loads(&mesh, &section, &problem.loads);
+        let (contacts, sound) = self.contacts(&mesh, &section, problem, &obstacles, &fixed);
+        all.take(sound);
+        let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);
+        all.then(())?;
+        self.doubts(&contacts);
         Ok(Model {
             mesh,
             section,
             quadrature: problem.quadrature,
             fixed,
-            loads,
+            loads: loads?,
             contacts,
-            held_by_contact,
+            held_by_contact: held_by_contact?,
             steps: problem.steps.clone(),
             controls: problem.solver.clone(),
-            warnings: findings.warnings,
+            warnings: std::mem::take(&mut self.warnings),
         })
     }
 }

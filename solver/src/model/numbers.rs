@@ -1,8 +1,8 @@
 //! Numbers by themselves: finite, and in their range.
 
-use super::findings::{Findings, MOST_LISTED};
+use super::checks::Checks;
 use crate::element::{Element, Family};
-use crate::error::escape;
+use crate::error::{All, Checked, MOST_LISTED, Reason, escape};
 use crate::finite::not_finite;
 use crate::mesh::Mesh;
 use crate::problem::{
@@ -10,22 +10,25 @@ use crate::problem::{
     Step, ThesisPressure, Units,
 };
 
-impl Findings {
+impl Checks {
     /// JSON has no other numbers, but protobuf has.
-    pub(super) fn finite(&mut self, problem: &Problem) {
+    pub(super) fn finite(&mut self, problem: &Problem) -> Checked {
+        let mut all = All::default();
         for pointer in not_finite(problem, MOST_LISTED) {
-            self.say(
+            all.refuse(self.say(
                 pointer,
-                "not_finite",
+                Reason::NotFinite,
                 "NaN or infinity",
                 "a finite number",
                 "Check the computation that produced it.",
-            );
+            ));
         }
+        all.then(())
     }
 
     /// Long lists of the same thing are a mistake, and each of them is gone through edge by edge.
-    pub(super) fn counts(&mut self, problem: &Problem) {
+    pub(super) fn counts(&mut self, problem: &Problem) -> Checked {
+        let mut all = All::default();
         const MOST: usize = 1000;
         for (pointer, count) in [
             ("/supports", problem.supports.len()),
@@ -37,258 +40,272 @@ impl Findings {
             ("/mesh/groups", problem.mesh.groups.len()),
         ] {
             if count > MOST {
-                self.say(
+                all.refuse(self.say(
                     pointer,
-                    "too_many",
+                    Reason::TooMany,
                     format!("{count} of them"),
                     format!("at most {MOST}"),
                     "Name boundaries so that fewer are needed.",
-                );
+                ));
             }
         }
+        all.then(())
     }
 
     /// Labels that fit on an axis.
-    pub(super) fn units(&mut self, units: &Units) {
+    pub(super) fn units(&mut self, units: Option<&Units>) -> Checked {
         const MOST: usize = 20;
-        let Units {
+        let Some(Units {
             length,
             force,
             stress,
-        } = units;
+        }) = units
+        else {
+            return Ok(());
+        };
+        let mut all = All::default();
         for (name, label) in [("length", length), ("force", force), ("stress", stress)] {
             let characters = label.as_ref().map_or(0, |label| label.chars().count());
             if characters > MOST {
-                self.say(
+                all.refuse(self.say(
                     format!("/units/{name}"),
-                    "too_long",
+                    Reason::TooLong,
                     format!("{characters} characters"),
                     format!("at most {MOST} characters"),
                     "It is a label on axes, such as mm or MPa.",
-                );
+                ));
             }
         }
+        all.then(())
     }
 
-    pub(super) fn analysis(&mut self, analysis: &Analysis) {
-        if let Analysis::PlaneStress { thickness } = *analysis {
-            self.require(
+    pub(super) fn analysis(&mut self, analysis: &Analysis) -> Checked {
+        match *analysis {
+            Analysis::PlaneStress { thickness } => self.require(
                 thickness > 0.0,
-                "/analysis/thickness".into(),
+                "/analysis/thickness",
                 thickness,
                 "a length > 0",
                 "Forces are proportional to it.",
-            );
+            ),
+            Analysis::PlaneStrain {} | Analysis::Axisymmetric {} => Ok(()),
         }
     }
 
-    pub(super) fn controls(&mut self, problem: &Problem) {
+    pub(super) fn controls(&mut self, problem: &Problem) -> Checked {
+        let mut all = All::default();
         let controls = &problem.solver;
         if problem.quadrature != 2 && problem.quadrature != 3 {
-            self.say(
+            all.refuse(self.say(
                 "/quadrature",
-                "out_of_range",
+                Reason::OutOfRange,
                 problem.quadrature,
                 "3 or 2",
                 "Gauss points of an element in each direction.",
-            );
+            ));
         }
         if controls.check_increments && problem.steps.is_empty() {
-            self.say(
+            all.refuse(self.say(
                 "/solver/check_increments",
-                "not_used",
+                Reason::NotUsed,
                 "true without steps",
                 "true with `steps` only",
                 "Without steps there are no increments to double.",
-            );
+            ));
         }
-        self.require(
+        all.take(self.require(
             controls.tolerance >= 1e-14 && controls.tolerance < 1.0,
-            "/solver/tolerance".into(),
+            "/solver/tolerance",
             controls.tolerance,
             "a number from 1e-14 to below 1",
             "It bounds dimensionless residuals; 1e-10 is the default.",
-        );
-        self.require(
+        ));
+        all.take(self.require(
             (1..=100_000).contains(&controls.max_iterations),
-            "/solver/max_iterations".into(),
+            "/solver/max_iterations",
             f64::from(controls.max_iterations),
             "1 … 100000 sweeps",
             "6 to 25 are usual.",
-        );
+        ));
+        all.then(())
     }
 
-    pub(super) fn steps(&mut self, steps: &[Step]) {
+    pub(super) fn steps(&mut self, steps: &[Step]) -> Checked {
+        let mut all = All::default();
         /// Far beyond any use, and still a bounded time.
         const MOST_INCREMENTS: u32 = 10_000;
         /// Of all steps: each leaves rows of history.
         const MOST_IN_ALL: u64 = 20_000;
-        let all: u64 = steps.iter().map(|step| u64::from(step.increments)).sum();
-        if all > MOST_IN_ALL {
-            self.say(
+        let total: u64 = steps.iter().map(|step| u64::from(step.increments)).sum();
+        if total > MOST_IN_ALL {
+            all.refuse(self.say(
                 "/steps",
-                "too_many",
-                format!("{all} increments in all"),
+                Reason::TooMany,
+                format!("{total} increments in all"),
                 format!("at most {MOST_IN_ALL}"),
                 "Take fewer increments, or make several jobs of it.",
-            );
+            ));
         }
         for (i, step) in steps.iter().enumerate() {
-            self.require(
+            all.take(self.require(
                 (1..=MOST_INCREMENTS).contains(&step.increments),
                 format!("/steps/{i}/increments"),
                 f64::from(step.increments),
                 &format!("1 … {MOST_INCREMENTS}"),
                 "1 is enough for the total law; the incremental law wants a few dozen for curved obstacles.",
-            );
+            ));
         }
+        all.then(())
     }
 
     /// The thesis carries stresses to the boundary along rows of Gauss points, which triangles lack.
-    pub(super) fn thesis_elements(&mut self, problem: &Problem, mesh: &Mesh) {
+    pub(super) fn thesis_elements(&mut self, problem: &Problem, mesh: &Mesh) -> Checked {
         let triangle = |element: &Element| element.family() == Family::Triangle;
         if problem.solver.algorithm == Algorithm::Thesis
             && let Some(e) = mesh.elements.iter().position(triangle)
         {
-            self.say(
+            return Err(self.say(
                 "/solver/algorithm",
-                "not_used",
+                Reason::NotUsed,
                 format!("`thesis` with triangles (element {e} is one)"),
                 "a mesh of quadrilaterals",
                 "Its rows of Gauss points exist in quadrilaterals only; choose another algorithm.",
-            );
+            ));
         }
+        Ok(())
     }
 
     /// Choices of the thesis's own iteration, and what it can be used for.
-    pub(super) fn thesis(&mut self, problem: &Problem) {
+    pub(super) fn thesis(&mut self, problem: &Problem) -> Checked {
+        let mut all = All::default();
         let controls = &problem.solver;
         if controls.algorithm != Algorithm::Thesis {
             if controls.thesis.is_some() {
-                self.say(
+                return Err(self.say(
                     "/solver/thesis",
-                    "not_used",
+                    Reason::NotUsed,
                     "choices for the thesis's iteration",
                     "them with \"algorithm\": \"thesis\" only",
                     "Choose that algorithm, or leave them out.",
-                );
+                ));
             }
-            return;
+            return Ok(());
         }
         for (i, contact) in problem.contacts.iter().enumerate() {
             if contact.condition != Condition::Unilateral {
-                self.say(
+                all.refuse(self.say(
                     format!("/contacts/{i}/condition"),
-                    "not_used",
+                    Reason::NotUsed,
                     "another condition than `unilateral`",
                     "unilateral contact",
                     "The thesis's iteration knows no other; choose another algorithm.",
-                );
+                ));
             }
             let surface = |f: &Friction| f.measure == Measure::Surface;
             if contact.friction.as_ref().is_some_and(surface) {
-                self.say(
+                all.refuse(self.say(
                     format!("/contacts/{i}/friction/measure"),
-                    "not_used",
+                    Reason::NotUsed,
                     "`surface`",
                     "`line`",
                     "The thesis averages along the line of contact (3.4); choose another algorithm.",
-                );
+                ));
             }
             let incremental = |f: &Friction| f.history == History::Incremental;
             if contact.friction.as_ref().is_some_and(incremental) {
-                self.say(
+                all.refuse(self.say(
                     format!("/contacts/{i}/friction/history"),
-                    "not_used",
+                    Reason::NotUsed,
                     "`incremental`",
                     "`total`",
                     "The thesis's law remembers nothing; choose another algorithm.",
-                );
+                ));
             }
         }
         for (i, contact) in problem.contacts.iter().enumerate() {
             if contact.normal == NormalOf::Obstacle {
-                self.say(
+                all.refuse(self.say(
                     format!("/contacts/{i}/normal"),
-                    "not_used",
+                    Reason::NotUsed,
                     "`obstacle`",
                     "`body`",
                     "The thesis knows the body's normal only; choose another algorithm.",
-                );
+                ));
             }
             if contact.friction.as_ref().is_some_and(|f| f.bound.is_some()) {
-                self.say(
+                all.refuse(self.say(
                     format!("/contacts/{i}/friction/bound"),
-                    "not_used",
+                    Reason::NotUsed,
                     "a prescribed bound",
                     "a coefficient and a nonlocal radius",
                     "The thesis's bound follows from the pressure; choose another algorithm.",
-                );
+                ));
             }
             let nodal = |f: &Friction| f.points == FrictionPoints::Nodal;
             if contact.friction.as_ref().is_some_and(nodal) {
-                self.say(
+                all.refuse(self.say(
                     format!("/contacts/{i}/friction/points"),
-                    "not_used",
+                    Reason::NotUsed,
                     "`nodal`",
                     "`gauss3`",
                     "The thesis evaluates friction at Gauss points; choose another algorithm.",
-                );
+                ));
             }
         }
         let Some(options) = &controls.thesis else {
-            return;
+            return all.then(());
         };
-        self.require(
+        all.take(self.require(
             options.relaxation > 0.0 && options.relaxation <= 1.0,
-            "/solver/thesis/relaxation".into(),
+            "/solver/thesis/relaxation",
             options.relaxation,
             "0 < relaxation ≤ 1",
             "1 takes the new friction force as it is.",
-        );
-        self.require(
+        ));
+        all.take(self.require(
             [1, 2].contains(&options.friction_force),
-            "/solver/thesis/friction_force".into(),
+            "/solver/thesis/friction_force",
             f64::from(options.friction_force),
             "1 or 2",
             "The two ways of thesis 3.2.",
-        );
-        self.require(
+        ));
+        all.take(self.require(
             options.local_points <= 100,
-            "/solver/thesis/local_points".into(),
+            "/solver/thesis/local_points",
             f64::from(options.local_points),
             "0 … 100",
             "0 averages nodal values without regard to the mesh.",
-        );
+        ));
         if options.local_points > 0 && options.pressure == ThesisPressure::Lumped {
-            self.say(
+            all.refuse(self.say(
                 "/solver/thesis/local_points",
-                "not_used",
+                Reason::NotUsed,
                 options.local_points,
                 "0 with lumped pressure",
                 "Local Gauss points carry an extrapolated stress; choose that pressure.",
-            );
+            ));
         }
         for (name, [s0, s1]) in &options.contact_guess {
             let pointer = format!("/solver/thesis/contact_guess/{}", escape(name));
             if !problem.contacts.iter().any(|c| c.boundary == *name) {
-                self.say(
+                all.refuse(self.say(
                     &pointer,
-                    "unknown_boundary",
+                    Reason::UnknownBoundary,
                     name,
                     "the boundary of a contact",
                     "Guess for the boundaries named under /contacts.",
-                );
+                ));
             }
             if s0 >= s1 {
-                self.say(
+                all.refuse(self.say(
                     &pointer,
-                    "out_of_range",
+                    Reason::OutOfRange,
                     format!("[{s0}, {s1}]"),
                     "a first end below the second",
                     "Arc length from the first node of Γ_C.",
-                );
+                ));
             }
         }
+        all.then(())
     }
 }

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::findings::{ALIGNED, AXIS, Findings};
+use super::checks::{ALIGNED, AXIS, Checks};
 use super::{ContactModel, Model};
 use crate::elasticity::Section;
+use crate::error::{All, Checked, Reason};
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{BoundaryValue, Condition, Friction, PrescribedBound, Support};
 
@@ -69,15 +70,15 @@ fn parallel(a: [f64; 2], b: [f64; 2]) -> bool {
     (a[0] * b[1] - a[1] * b[0]).abs() <= ALIGNED
 }
 
-impl Findings {
-    /// Prescribed displacements by node. A body of revolution cannot leave its axis: there u_r = 0
-    /// whether a support says so or not.
+impl Checks {
+    /// Prescribed displacements by node, of those supports that are sound; and whether all are. A body of
+    /// revolution cannot leave its axis: there u_r = 0 whether a support says so or not.
     pub(super) fn supports(
         &mut self,
         mesh: &Mesh,
         section: &Section,
         supports: &[Support],
-    ) -> BTreeMap<u32, Held> {
+    ) -> (BTreeMap<u32, Held>, Checked) {
         let mut fixed: BTreeMap<u32, Held> = BTreeMap::new();
         if section.axisymmetric() {
             let radius = mesh.nodes.iter().map(|[r, _]| *r).fold(0.0, f64::max);
@@ -93,93 +94,113 @@ impl Findings {
             .flatten()
             .map(largest)
             .fold(0.0, f64::max);
+        let mut all = All::default();
         for (i, support) in supports.iter().enumerate() {
             let pointer = format!("/supports/{i}");
-            let fields = [
-                ("ux", support.ux),
-                ("uy", support.uy),
-                ("un", support.un),
-                ("ut", support.ut),
-            ];
-            let named = fields.map(|(_, value)| value.is_some());
-            if named == [false; 4] {
-                self.say(
-                    &pointer,
-                    "empty",
-                    "neither `ux` nor `uy` nor `un` nor `ut`",
-                    "at least one of them",
-                    "Prescribe a displacement or remove the support.",
-                );
+            all.take(self.support(mesh, support, &pointer, ALIGNED * size, &mut fixed));
+        }
+        (fixed, all.then(()))
+    }
+
+    /// Adds what one support prescribes to what is `fixed` already; two values agree to `rounding`.
+    fn support(
+        &mut self,
+        mesh: &Mesh,
+        support: &Support,
+        pointer: &str,
+        rounding: f64,
+        fixed: &mut BTreeMap<u32, Held>,
+    ) -> Checked {
+        let mut all = All::default();
+        let fields = [
+            ("ux", support.ux),
+            ("uy", support.uy),
+            ("un", support.un),
+            ("ut", support.ut),
+        ];
+        let named = fields.map(|(_, value)| value.is_some());
+        if named == [false; 4] {
+            all.refuse(self.say(
+                pointer,
+                Reason::TooFew,
+                "neither `ux` nor `uy` nor `un` nor `ut`",
+                "at least one of them",
+                "Prescribe a displacement or remove the support.",
+            ));
+        }
+        if (named[0] || named[1]) && (named[2] || named[3]) {
+            return Err(self.say(
+                pointer,
+                Reason::WrongCount,
+                "displacements along x, y and along normal, tangent",
+                "one pair of directions",
+                "Write two supports where both are meant.",
+            ));
+        }
+        let place = self.place(mesh, support, pointer)?;
+        let normals = match place {
+            Place::Edges(edges) if named[2] || named[3] => {
+                let normals = self.normals(mesh, edges, &format!("{pointer}/boundary"));
+                all.take(normals).unwrap_or_default()
             }
-            if (named[0] || named[1]) && (named[2] || named[3]) {
-                self.say(
-                    &pointer,
-                    "wrong_count",
-                    "displacements along x, y and along normal, tangent",
-                    "one pair of directions",
-                    "Write two supports where both are meant.",
-                );
-                continue;
+            Place::Nodes(_) if named[2] || named[3] => {
+                return Err(self.say(
+                    format!("{pointer}/nodes"),
+                    Reason::NotUsed,
+                    "`un` or `ut` on a set of nodes",
+                    "`ux` and `uy`",
+                    "A set of nodes has no normal; name a boundary.",
+                ));
             }
-            let Some(place) = self.place(mesh, support, &pointer) else {
+            _ => BTreeMap::new(),
+        };
+        for (field, value) in fields {
+            let Some(value) = value else { continue };
+            let at = format!("{pointer}/{field}");
+            let mut conflict = None;
+            let Some(values) = all.take(self.at_nodes(mesh, &place, value, &at)) else {
                 continue;
             };
-            let normals = match place {
-                Place::Edges(edges) if named[2] || named[3] => {
-                    self.normals(mesh, edges, &format!("{pointer}/boundary"))
+            for (node, value) in values {
+                let direction = match (field, normals.get(&node)) {
+                    ("ux", _) => [1.0, 0.0],
+                    ("uy", _) => [0.0, 1.0],
+                    ("un", Some(n)) => *n,
+                    ("ut", Some([x, y])) => [*y, -x],
+                    _ => continue,
+                };
+                let held = match fixed.get(&node) {
+                    None => Ok(Held::Along { direction, value }),
+                    Some(held) => held.and(direction, value, rounding),
+                };
+                match held {
+                    Ok(held) => drop(fixed.insert(node, held)),
+                    Err(known) => conflict = Some((node, known, value)),
                 }
-                Place::Nodes(_) if named[2] || named[3] => {
-                    self.say(
-                        format!("{pointer}/nodes"),
-                        "not_used",
-                        "`un` or `ut` on a set of nodes",
-                        "`ux` and `uy`",
-                        "A set of nodes has no normal; name a boundary.",
-                    );
-                    continue;
-                }
-                _ => BTreeMap::new(),
-            };
-            for (field, value) in fields {
-                let Some(value) = value else { continue };
-                let at = format!("{pointer}/{field}");
-                let mut conflict = None;
-                for (node, value) in self.at_nodes(mesh, &place, value, &at) {
-                    let direction = match (field, normals.get(&node)) {
-                        ("ux", _) => [1.0, 0.0],
-                        ("uy", _) => [0.0, 1.0],
-                        ("un", Some(n)) => *n,
-                        ("ut", Some([x, y])) => [*y, -x],
-                        _ => continue,
-                    };
-                    let held = match fixed.get(&node) {
-                        None => Ok(Held::Along { direction, value }),
-                        Some(held) => held.and(direction, value, ALIGNED * size),
-                    };
-                    match held {
-                        Ok(held) => drop(fixed.insert(node, held)),
-                        Err(known) => conflict = Some((node, known, value)),
-                    }
-                }
-                if let Some((node, known, value)) = conflict {
-                    let [x, y] = mesh.nodes[node as usize];
-                    self.say(
-                        at,
-                        "conflict",
-                        value,
-                        format!(
-                            "{known}, which another support (or the axis) prescribes at node {node} ({x}, {y})"
-                        ),
-                        "Two supports that share a node must agree there.",
-                    );
-                }
+            }
+            if let Some((node, known, value)) = conflict {
+                let [x, y] = mesh.nodes[node as usize];
+                all.refuse(self.say(
+                    at,
+                    Reason::Conflict,
+                    value,
+                    format!(
+                        "{known}, which another support (or the axis) prescribes at node {node} ({x}, {y})"
+                    ),
+                    "Two supports that share a node must agree there.",
+                ));
             }
         }
-        fixed
+        all.then(())
     }
 
     /// The boundary or the set of nodes that a support names.
-    fn place<'a>(&mut self, mesh: &'a Mesh, support: &Support, pointer: &str) -> Option<Place<'a>> {
+    fn place<'a>(
+        &mut self,
+        mesh: &'a Mesh,
+        support: &Support,
+        pointer: &str,
+    ) -> Checked<Place<'a>> {
         match (&support.boundary, &support.nodes) {
             (Some(name), None) => self
                 .boundary(mesh, name, format!("{pointer}/boundary"))
@@ -192,14 +213,13 @@ impl Findings {
                     Some(_) => "both `boundary` and `nodes`",
                     None => "neither `boundary` nor `nodes`",
                 };
-                self.say(
+                Err(self.say(
                     pointer,
-                    "wrong_count",
+                    Reason::WrongCount,
                     got,
                     "exactly one of `boundary` and `nodes`",
                     "Say where the support is.",
-                );
-                None
+                ))
             }
         }
     }
@@ -211,32 +231,34 @@ impl Findings {
         place: &Place<'_>,
         value: BoundaryValue,
         pointer: &str,
-    ) -> Vec<(u32, f64)> {
+    ) -> Checked<Vec<(u32, f64)>> {
         match (place, value) {
-            (Place::Edges(edges), _) => self
-                .along(mesh, edges, value, pointer.to_owned())
+            (Place::Edges(edges), _) => Ok(self
+                .along(mesh, edges, value, pointer.to_owned())?
                 .into_iter()
                 .flat_map(|(edge, values)| edge.into_iter().zip(values))
-                .collect(),
+                .collect()),
             (Place::Nodes(nodes), BoundaryValue::Constant(value)) => {
-                nodes.iter().map(|node| (*node, value)).collect()
+                Ok(nodes.iter().map(|node| (*node, value)).collect())
             }
-            (Place::Nodes(_), BoundaryValue::Linear(_)) => {
-                self.say(
-                    pointer,
-                    "not_used",
-                    "a value from start to end on a set of nodes",
-                    "one number",
-                    "A set of nodes has no start; name a boundary.",
-                );
-                Vec::new()
-            }
+            (Place::Nodes(_), BoundaryValue::Linear(_)) => Err(self.say(
+                pointer,
+                Reason::NotUsed,
+                "a value from start to end on a set of nodes",
+                "one number",
+                "A set of nodes has no start; name a boundary.",
+            )),
         }
     }
 
     /// Unit outward normals at the nodes of a boundary; the mean of both edges at a corner that is
     /// hardly one.
-    fn normals(&mut self, mesh: &Mesh, edges: &[Edge], pointer: &str) -> BTreeMap<u32, [f64; 2]> {
+    fn normals(
+        &mut self,
+        mesh: &Mesh,
+        edges: &[Edge],
+        pointer: &str,
+    ) -> Checked<BTreeMap<u32, [f64; 2]>> {
         /// |n₁ + n₂|/2 at a turn of 45°.
         const SHARPEST: f64 = 0.923;
         let mut sums: BTreeMap<u32, ([f64; 2], f64)> = BTreeMap::new();
@@ -260,15 +282,15 @@ impl Findings {
         }
         if let Some(node) = corner {
             let [x, y] = mesh.nodes[node as usize];
-            self.say(
+            return Err(self.say(
                 pointer,
-                "turns_corner",
+                Reason::TurnsCorner,
                 format!("a boundary that turns by more than 45° at ({x}, {y})"),
                 "a boundary without corners: at one there is no normal",
                 "Give each side a support of its own, with names under /mesh/boundaries.",
-            );
+            ));
         }
-        normals
+        Ok(normals)
     }
 
     /// Every part of the body must be held against its rigid motions, by supports or at least by
@@ -279,7 +301,8 @@ impl Findings {
         section: &Section,
         fixed: &BTreeMap<u32, Held>,
         contacts: &[ContactModel],
-    ) -> bool {
+    ) -> Checked<bool> {
+        let mut all = All::default();
         let held = directions(fixed);
         let touched: Vec<(u32, [f64; 2])> = contacts.iter().flat_map(hindered).collect();
         let mut by_contact = false;
@@ -287,22 +310,22 @@ impl Findings {
             if free_motion(mesh, section, &held, &part).is_none() {
                 continue;
             }
-            let all: Vec<_> = held.iter().chain(&touched).copied().collect();
-            match free_motion(mesh, section, &all, &part) {
+            let both: Vec<_> = held.iter().chain(&touched).copied().collect();
+            match free_motion(mesh, section, &both, &part) {
                 None => by_contact = true,
                 Some((direction, node)) => {
                     let [x, y] = mesh.nodes[node as usize];
-                    self.say(
+                    all.refuse(self.say(
                         "/supports",
-                        "free_body",
+                        Reason::FreeBody,
                         format!("a body free to move: {direction}, e.g. node {node} at ({x}, {y})"),
                         "supports or contacts against every rigid motion",
                         "Add a support with `ux` or `uy`. Parts that touch in a corner only do not hold each other.",
-                    );
+                    ));
                 }
             }
         }
-        by_contact
+        all.then(by_contact)
     }
 }
 

@@ -2,6 +2,12 @@
 //!
 //! Not converging is neither: it is an [`Outcome`](crate::solution::Outcome) with its history.
 
+mod findings;
+mod reason;
+
+pub use findings::{All, Checked, Findings, MOST_LISTED, Refused, shortened};
+pub use reason::Reason;
+
 use std::fmt;
 
 use schemars::JsonSchema;
@@ -13,14 +19,33 @@ use serde::{Deserialize, Serialize};
 pub struct Violation {
     /// JSON Pointer (RFC 6901) into the problem, e.g. `/contacts/0/friction/elastic_slip`.
     pub pointer: String,
-    /// A short name of the kind of violation, e.g. `out_of_range`, stable for programs.
-    pub reason: String,
+    /// The kind of violation, stable for programs.
+    pub reason: Reason,
     /// What was found there.
     pub got: String,
     /// What would have been right.
     pub expected: String,
     /// What to do about it.
     pub hint: String,
+}
+
+impl Violation {
+    /// From its parts, in their order.
+    pub fn new(
+        pointer: impl Into<String>,
+        reason: Reason,
+        got: impl ToString,
+        expected: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Self {
+        Violation {
+            pointer: pointer.into(),
+            reason,
+            got: got.to_string(),
+            expected: expected.into(),
+            hint: hint.into(),
+        }
+    }
 }
 
 /// A name as a token of a JSON Pointer (RFC 6901).

@@ -1,0 +1,260 @@
+//! What is wrong, gathered: all of it is counted, and as much is kept as helps.
+
+use std::collections::BTreeMap;
+
+use super::{Reason, Violation};
+
+/// More violations than this are counted, not listed: nobody reads them, and the answer stays small.
+pub const MOST_LISTED: usize = 100;
+
+/// In one mesh the same thing may be wrong thousands of times; more of a kind would hide the others.
+const MOST_OF_A_KIND: usize = 20;
+
+/// Characters of each text: a name from a request may be as long as the request.
+const LONGEST: usize = 2000;
+
+/// Gathers violations.
+///
+/// No check asks it whether something failed: each answers by itself, as [`Checked`].
+#[derive(Debug)]
+pub struct Findings {
+    /// Where all pointers begin.
+    at: String,
+    listed: Vec<Violation>,
+    /// Violations by reason, while there is room for more.
+    of_a_kind: BTreeMap<Reason, usize>,
+    most_of_a_kind: usize,
+    /// Violations that came when the list was full.
+    more: usize,
+}
+
+/// Something is wrong, and it has been said what: only [`Findings`] makes one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[must_use]
+pub struct Refused(());
+
+/// What a check answers, with what it has found good.
+pub type Checked<T = ()> = Result<T, Refused>;
+
+impl Default for Findings {
+    fn default() -> Self {
+        Findings {
+            at: String::new(),
+            listed: Vec::new(),
+            of_a_kind: BTreeMap::new(),
+            most_of_a_kind: MOST_LISTED,
+            more: 0,
+        }
+    }
+}
+
+impl Findings {
+    /// Of one mesh; `pointer` is its own.
+    pub fn of_mesh(pointer: &str) -> Self {
+        Findings {
+            at: pointer.to_owned(),
+            most_of_a_kind: MOST_OF_A_KIND,
+            ..Findings::default()
+        }
+    }
+
+    /// One more, which a check fails for. `place`: the rest of its pointer.
+    pub fn say(
+        &mut self,
+        place: impl AsRef<str>,
+        reason: Reason,
+        got: impl ToString,
+        expected: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Refused {
+        self.add(Violation::new(place.as_ref(), reason, got, expected, hint));
+        Refused(())
+    }
+
+    /// One more, where the list itself is the answer.
+    pub fn add(&mut self, violation: Violation) {
+        if !self.has_room(violation.reason) {
+            return;
+        }
+        let Violation {
+            pointer,
+            reason,
+            got,
+            expected,
+            hint,
+        } = violation;
+        self.listed.push(Violation {
+            pointer: shortened(&format!("{}{pointer}", self.at), LONGEST),
+            reason,
+            got: shortened(&got, LONGEST),
+            expected: shortened(&expected, LONGEST),
+            hint: shortened(&hint, LONGEST),
+        });
+    }
+
+    /// Whether any further violation would only be counted.
+    pub fn is_full(&self) -> bool {
+        self.listed.len() >= MOST_LISTED
+    }
+
+    /// Counts more of them.
+    pub fn count(&mut self, more: usize) {
+        self.more += more;
+    }
+
+    /// What was checked elsewhere, with all that was wrong there.
+    pub fn took<T>(&mut self, checked: Result<T, Vec<Violation>>) -> Checked<T> {
+        checked.map_err(|violations| {
+            self.extend(violations);
+            Refused(())
+        })
+    }
+
+    /// Counts one more; whether it is listed.
+    fn has_room(&mut self, reason: Reason) -> bool {
+        if self.is_full() {
+            self.more += 1;
+            return false;
+        }
+        let count = self.of_a_kind.entry(reason).or_default();
+        *count += 1;
+        *count <= self.most_of_a_kind
+    }
+
+    /// The list; what is not listed is counted in the last hints.
+    pub fn into_violations(mut self) -> Vec<Violation> {
+        for (reason, count) in self.of_a_kind {
+            let more = count.saturating_sub(self.most_of_a_kind);
+            let last = self.listed.iter_mut().rfind(|v| v.reason == reason);
+            if let Some(last) = last.filter(|_| more > 0) {
+                last.hint.push_str(&format!(" ({more} more of this kind.)"));
+            }
+        }
+        if let Some(last) = self.listed.last_mut().filter(|_| self.more > 0) {
+            let plural = if self.more == 1 { "" } else { "s" };
+            last.hint
+                .push_str(&format!(" ({} more violation{plural}.)", self.more));
+        }
+        self.listed
+    }
+
+    /// What was checked, or all that is wrong with it.
+    pub fn conclude<T>(self, checked: Checked<T>) -> Result<T, Vec<Violation>> {
+        checked.map_err(|_| self.into_violations())
+    }
+
+    /// What was gathered beside `value`, or `value` where there is nothing.
+    pub fn into_result<T>(self, value: T) -> Result<T, Vec<Violation>> {
+        match self.into_violations() {
+            list if list.is_empty() => Ok(value),
+            list => Err(list),
+        }
+    }
+}
+
+impl Extend<Violation> for Findings {
+    fn extend<I: IntoIterator<Item = Violation>>(&mut self, violations: I) {
+        violations
+            .into_iter()
+            .for_each(|violation| self.add(violation));
+    }
+}
+
+/// What several checks answer together: all of them are made, and one that fails fails them all.
+#[derive(Debug)]
+#[must_use]
+pub struct All(Checked);
+
+impl Default for All {
+    fn default() -> Self {
+        All(Ok(()))
+    }
+}
+
+impl All {
+    /// One more check: what it found good.
+    pub fn take<T>(&mut self, checked: Checked<T>) -> Option<T> {
+        checked.map_err(|refused| self.0 = Err(refused)).ok()
+    }
+
+    /// One more failure.
+    pub fn refuse(&mut self, refused: Refused) {
+        self.0 = Err(refused);
+    }
+
+    /// `value`, where every check held.
+    pub fn then<T>(self, value: T) -> Checked<T> {
+        self.0.map(|()| value)
+    }
+}
+
+/// The first `most` characters of a text, with a sign where some are missing.
+pub fn shortened(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(mut findings: Findings, count: usize) -> Vec<Violation> {
+        for i in 0..count {
+            let (place, hint) = (format!("/{i}"), "Leave it out.");
+            let _ = findings.say(place, Reason::UnknownName, "it", "nothing", hint);
+        }
+        findings.into_violations()
+    }
+
+    #[test]
+    fn a_hundred_violations_are_listed_and_the_others_counted() {
+        assert_eq!(found(Findings::default(), 100)[99].hint, "Leave it out.");
+        let list = found(Findings::default(), 1000);
+        assert_eq!(list.len(), 100);
+        assert_eq!(list[99].hint, "Leave it out. (900 more violations.)");
+    }
+
+    #[test]
+    fn of_a_mesh_twenty_of_a_kind_are_listed_and_the_others_leave_room() {
+        let mut findings = Findings::of_mesh("/mesh/inline");
+        for place in ["/nodes/7", "/nodes/8"] {
+            let _ = findings.say(place, Reason::UnusedNode, "it", "another", "Move it.");
+        }
+        let list = found(findings, 1000);
+        assert_eq!(
+            (list.len(), &list[0].pointer[..]),
+            (22, "/mesh/inline/nodes/7")
+        );
+        assert_eq!(list[1].hint, "Move it.");
+        assert_eq!(list[21].hint, "Leave it out. (980 more of this kind.)");
+    }
+
+    #[test]
+    fn a_hostile_text_is_cut_between_characters() {
+        let mut findings = Findings::default();
+        let long = "ä".repeat(1 << 20);
+        let _ = findings.say(&long, Reason::UnknownName, &long, &long, &long);
+        let size = |v: &Violation| v.pointer.len() + v.got.len() + v.expected.len() + v.hint.len();
+        assert!(size(&findings.into_violations()[0]) < 1 << 15);
+        assert_eq!(shortened("top", 3), "top");
+        assert_eq!(
+            shortened(&"ä".repeat(81), 80),
+            format!("{}…", "ä".repeat(80))
+        );
+    }
+
+    #[test]
+    fn one_failure_fails_all() {
+        let mut findings = Findings::default();
+        let mut all = All::default();
+        assert_eq!(all.take(Ok(3)), Some(3));
+        assert_eq!(All::default().then(1), Ok(1));
+        let refused = findings.say("", Reason::Missing, "nothing", "it", "Give it.");
+        assert_eq!(all.take::<u8>(Err(refused)), None);
+        assert_eq!(all.take(Ok(3)), Some(3));
+        assert_eq!(all.then(1), Err(refused));
+        assert!(findings.into_result(1).is_err());
+    }
+}

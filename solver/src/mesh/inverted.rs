@@ -1,0 +1,26 @@
+//! Elements that are folded or numbered the wrong way round, as violations.
+
+use super::Mesh;
+use crate::error::{All, Findings, Reason, Violation};
+
+/// Whether no element of a mesh that is otherwise sound is inverted. `pointer`: to an element by its
+/// number; `of`: which mesh, after that number. For [`Mesh::inverted_elements`] `at_nodes`.
+pub fn check_inverted(
+    mesh: &Mesh,
+    at_nodes: bool,
+    pointer: impl Fn(usize) -> String,
+    of: &str,
+) -> Result<(), Vec<Violation>> {
+    let mut found = Findings::of_mesh("");
+    let mut all = All::default();
+    for (e, place, det) in mesh.inverted_elements(at_nodes) {
+        all.refuse(found.say(
+            pointer(e),
+            Reason::InvertedElement,
+            format!("element {e}{of} with det J = {det:.3e} at {place}"),
+            "det J > 0 at all Gauss points and at the nodes",
+            "List corners counter-clockwise, and keep midsides near the middle of their sides.",
+        ));
+    }
+    found.conclude(all.then(()))
+}

@@ -1,0 +1,55 @@
+//! The checks of one problem: what they have found so far.
+
+use crate::error::{Checked, Findings, Reason, Refused};
+use crate::solution::Warning;
+
+/// Directions count as equal to an axis, and prescribed values as equal, to this.
+pub(super) const ALIGNED: f64 = 1e-9;
+
+/// A radius below this part of the largest is the axis: a mesh generator may miss 0 by rounding.
+pub(super) const AXIS: f64 = 1e-12;
+
+/// Every check is a method; each answers whether it held.
+#[derive(Default)]
+pub(super) struct Checks {
+    pub(super) found: Findings,
+    pub(super) warnings: Vec<Warning>,
+}
+
+impl Checks {
+    /// Something is wrong.
+    pub(super) fn say(
+        &mut self,
+        pointer: impl AsRef<str>,
+        reason: Reason,
+        got: impl ToString,
+        expected: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Refused {
+        self.found.say(pointer, reason, got, expected, hint)
+    }
+
+    /// A number is in its range, or something is wrong.
+    pub(super) fn require(
+        &mut self,
+        holds: bool,
+        pointer: impl AsRef<str>,
+        got: f64,
+        expected: &str,
+        hint: &str,
+    ) -> Checked {
+        match holds {
+            true => Ok(()),
+            false => Err(self.say(pointer, Reason::OutOfRange, got, expected, hint)),
+        }
+    }
+
+    /// Something is accepted, and yet worth knowing.
+    pub(super) fn warn(&mut self, code: &str, pointer: &str, message: String) {
+        self.warnings.push(Warning {
+            code: code.to_owned(),
+            pointer: pointer.to_owned(),
+            message,
+        });
+    }
+}
