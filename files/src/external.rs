@@ -1,7 +1,7 @@
 //! The mesh that a problem only names or quotes.
 
 use solver::mesh::{External, ExternalMesh, Mesh};
-use solver::problem::Problem;
+use solver::problem::{MeshSource, Problem};
 use solver::solution::Warning;
 
 use crate::{ReadError, abaqus, gmsh};
@@ -10,13 +10,11 @@ use crate::{ReadError, abaqus, gmsh};
 /// that the problem quotes. `None` where it needs none. What is wrong with it, and what was changed on the
 /// way, points to its place in the problem.
 pub fn external_mesh(problem: &Problem, stored: Option<Mesh>) -> Option<External> {
-    let mesh = &problem.mesh;
-    match (&mesh.gmsh, &mesh.abaqus) {
-        (Some(text), None) => Some(at("/mesh/gmsh", gmsh::read(text.as_bytes()))),
-        (None, Some(text)) => Some(at("/mesh/abaqus", abaqus::read(text.as_bytes()))),
-        (None, None) => stored.map(|mesh| Ok(mesh.into())),
-        // the problem is refused as it stands
-        (Some(_), Some(_)) => None,
+    match &problem.mesh.source {
+        MeshSource::Grid(_) | MeshSource::Inline(_) => None,
+        MeshSource::Gmsh(text) => Some(at("/mesh/gmsh", gmsh::read(text.as_bytes()))),
+        MeshSource::Abaqus(text) => Some(at("/mesh/abaqus", abaqus::read(text.as_bytes()))),
+        MeshSource::Stored(_) => stored.map(|mesh| Ok(mesh.into())),
     }
 }
 

@@ -110,9 +110,21 @@ fn gather(error: &ValidationError<'_>, found: &mut Findings) {
             };
             return found.extend(unexpected.iter().map(unknown));
         }
-        ValidationErrorKind::AnyOf { context } | ValidationErrorKind::OneOfNotValid { context } => {
-            return alternatives(error, context, found);
+        ValidationErrorKind::AnyOf { context }
+        | ValidationErrorKind::OneOfNotValid { context }
+        | ValidationErrorKind::OneOfMultipleValid { context } => {
+            return match forms(error) {
+                Some(forms) => one_form(error, context, &forms, found),
+                None => alternatives(error, context, found),
+            };
         }
+        ValidationErrorKind::FalseSchema => Violation::new(
+            pointer,
+            Reason::NotUsed,
+            got(),
+            "nothing: it does not go with what stands beside it",
+            "Leave it out, or choose another form.",
+        ),
         ValidationErrorKind::Required { property } => {
             let name = property.as_str().unwrap_or_default();
             Violation::new(
@@ -155,6 +167,70 @@ fn gather(error: &ValidationError<'_>, found: &mut Findings) {
             "See /v1/schema/problem.json.",
         ),
     });
+}
+
+/// The names that make up each form of an object, where its schema tells forms apart by what they require:
+/// those that no other form requires.
+fn forms(error: &ValidationError<'_>) -> Option<Vec<Vec<&'static str>>> {
+    let branches = SCHEMA.pointer(error.schema_path().as_str())?.as_array()?;
+    let required: Vec<Vec<&str>> = branches
+        .iter()
+        .map(|branch| match branch.get("type") {
+            None => required(branch),
+            Some(_) => Vec::new(),
+        })
+        .collect();
+    let own = |(i, names): (usize, &Vec<&'static str>)| {
+        let others = || required.iter().enumerate().filter(|(j, _)| *j != i);
+        let alone = |name: &&&str| !others().any(|(_, other)| other.contains(name));
+        names.iter().filter(alone).copied().collect()
+    };
+    let own: Vec<Vec<&str>> = required.iter().enumerate().map(own).collect();
+    own.iter().all(|names| !names.is_empty()).then_some(own)
+}
+
+/// What a branch of the schema requires, all of it or one of several.
+fn required(branch: &'static Value) -> Vec<&'static str> {
+    let list = |branch: &'static Value, name: &str| {
+        let list = branch.get(name).and_then(Value::as_array);
+        list.into_iter().flatten()
+    };
+    let either = list(branch, "anyOf").flat_map(required);
+    let all = list(branch, "required").filter_map(Value::as_str);
+    all.chain(either).collect()
+}
+
+/// Of several forms one was meant, and has errors; or it must be said that it is exactly one.
+fn one_form(
+    error: &ValidationError<'_>,
+    branches: &[Vec<ValidationError<'static>>],
+    forms: &[Vec<&str>],
+    found: &mut Findings,
+) {
+    let given = |name: &&&str| error.instance().get(**name).is_some_and(|v| !v.is_null());
+    let meant =
+        |form: &&(&Vec<&str>, &Vec<ValidationError<'static>>)| form.0.iter().any(|n| given(&n));
+    let all: Vec<_> = forms.iter().zip(branches).collect();
+    let meant: Vec<_> = all.iter().filter(meant).collect();
+    if let [(_, errors)] = meant[..] {
+        return errors.iter().for_each(|error| gather(error, found));
+    }
+    let quoted = |names: &mut dyn Iterator<Item = &&str>| -> String {
+        let names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
+        names.join(" and ")
+    };
+    let got = match meant.is_empty() {
+        true => "none of them".to_owned(),
+        false => quoted(&mut forms.iter().flatten().filter(given)),
+    };
+    let offers: Vec<String> = forms.iter().map(|form| quoted(&mut form.iter())).collect();
+    found.add(Violation::new(
+        error.instance_path().as_str(),
+        Reason::WrongCount,
+        got,
+        format!("exactly one of {}", offers.join(", ")),
+        "Choose one of the forms.",
+    ));
 }
 
 /// The branch that was meant, judged by its `kind` and its type; or, when none was, what all offer.
@@ -385,6 +461,175 @@ mod tests {
             (found.len(), &found[0].0[..]),
             (1, "/contacts/0/obstacle/radius")
         );
+    }
+
+    #[test]
+    fn what_has_several_forms_is_given_in_exactly_one() {
+        let said = |from: &str, to: &str| -> Vec<(String, Reason, String)> {
+            assert!(GOOD.contains(from), "{from}");
+            let list =
+                parse(&GOOD.replacen(from, to, 1)).expect_err("a faulty problem was accepted");
+            list.into_iter()
+                .map(|v| (v.pointer, v.reason, v.got))
+                .collect()
+        };
+        let one =
+            |pointer: &str, reason, got: &str| vec![(pointer.to_owned(), reason, got.to_owned())];
+        let (grid, count) = (r#""grid": {"x": [0, 1], "y": [0, 1]}"#, Reason::WrongCount);
+        assert_eq!(said(grid, ""), one("/mesh", count, "none of them"));
+        let both = format!(r#"{grid}, "stored": "sha256:0""#);
+        assert_eq!(
+            said(grid, &both),
+            one("/mesh", count, "`grid` and `stored`")
+        );
+        let expected = &faults(grid, "")[0].2;
+        assert_eq!(
+            expected,
+            "exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`"
+        );
+
+        let load = |load: &str| {
+            said(
+                r#""materials""#,
+                &format!(r#""loads": [{load}], "materials""#),
+            )
+        };
+        assert_eq!(
+            load(r#"{"boundary": "top"}"#),
+            one("/loads/0", count, "none of them")
+        );
+        assert_eq!(
+            load(r#"{"boundary": "top", "pressure": 1, "traction": [0, 1]}"#),
+            one("/loads/0", count, "`pressure` and `traction`")
+        );
+        assert_eq!(
+            load(r#"{"tangential": 1}"#),
+            one("/loads/0/boundary", Reason::Missing, "nothing")
+        );
+        assert_eq!(
+            load(r#"{"boundary": "top", "body_force": [0, 1]}"#),
+            one("/loads/0/boundary", Reason::NotUsed, "\"top\"")
+        );
+        assert_eq!(
+            load(r#"{"boundary": "top", "force": [0, 1]}"#),
+            [
+                one("/loads/0/boundary", Reason::NotUsed, "\"top\""),
+                one("/loads/0/nodes", Reason::Missing, "nothing")
+            ]
+            .concat()
+        );
+        assert_eq!(
+            said(r#""youngs_modulus": 1000, "#, ""),
+            one("/materials/0/youngs_modulus", Reason::Missing, "nothing")
+        );
+        let wood = r#""orthotropic": {"e1": 1, "e2": 1, "nu12": 0.3, "g12": 1}, "youngs_modulus""#;
+        let found = said(r#""youngs_modulus""#, wood);
+        let places: Vec<_> = found.iter().map(|v| (&v.0[..], v.1)).collect();
+        let excluded = ["/materials/0/youngs_modulus", "/materials/0/poissons_ratio"];
+        assert_eq!(places, excluded.map(|place| (place, Reason::NotUsed)));
+    }
+
+    /// What the schema says of forms and what the types accept is the same.
+    #[test]
+    fn the_schema_refuses_what_is_refused_and_accepts_what_is_accepted() {
+        let names = [
+            "boundary",
+            "nodes",
+            "pressure",
+            "traction",
+            "normal",
+            "tangential",
+            "nodal",
+            "force",
+            "body_force",
+        ];
+        let value = |name: &str| match name {
+            "boundary" | "nodes" => serde_json::json!("top"),
+            "pressure" | "normal" | "tangential" => serde_json::json!(1.0),
+            "nodal" => serde_json::json!([[0.0, 1.0]]),
+            _ => serde_json::json!([0.0, 1.0]),
+        };
+        let validator = |definition: &str| {
+            let mut schema = SCHEMA.clone();
+            let root = serde_json::json!({"$ref": format!("#/$defs/{definition}"), "$defs": schema["$defs"].take()});
+            jsonschema::validator_for(&root).unwrap()
+        };
+        let subsets = |names: &[&str], value: &dyn Fn(&str) -> Value| -> Vec<Value> {
+            let object = |bits: usize| {
+                let chosen = names.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1);
+                chosen
+                    .map(|(_, name)| (name.to_string(), value(name)))
+                    .collect()
+            };
+            (0..1 << names.len())
+                .map(object)
+                .map(Value::Object)
+                .collect()
+        };
+        let loads = validator("Load");
+        for load in subsets(&names, &value) {
+            let read = serde_json::from_value::<solver::problem::Load>(load.clone());
+            assert_eq!(loads.is_valid(&load), read.is_ok(), "{load}");
+            // and what was read is written as it was
+            if let Ok(read) = read {
+                assert_eq!(serde_json::to_value(read).unwrap(), load);
+            }
+        }
+        let wood = serde_json::json!({"e1": 1.0, "e2": 1.0, "nu12": 0.3, "g12": 1.0, "angle": 0.0});
+        let constant = |name: &str| match name {
+            "orthotropic" => wood.clone(),
+            "group" | "name" => serde_json::json!("wood"),
+            _ => serde_json::json!(0.25),
+        };
+        let materials = validator("Material");
+        for material in subsets(
+            &[
+                "youngs_modulus",
+                "poissons_ratio",
+                "orthotropic",
+                "group",
+                "name",
+            ],
+            &constant,
+        ) {
+            let read = serde_json::from_value::<solver::problem::Material>(material.clone());
+            assert_eq!(materials.is_valid(&material), read.is_ok(), "{material}");
+            if let Ok(read) = read {
+                assert_eq!(serde_json::to_value(read).unwrap(), material);
+            }
+        }
+        let source = |name: &str| match name {
+            "grid" => serde_json::json!({"x": [0.0, 1.0], "y": [0.0, 1.0]}),
+            "inline" => serde_json::json!({"nodes": [], "elements": [], "boundaries": {}}),
+            "refine" => serde_json::json!(1),
+            "boundaries" => serde_json::json!({"a": {"side": "top"}}),
+            _ => serde_json::json!("text"),
+        };
+        let meshes = validator("MeshInput");
+        for mesh in subsets(
+            &[
+                "grid",
+                "inline",
+                "gmsh",
+                "abaqus",
+                "stored",
+                "refine",
+                "boundaries",
+            ],
+            &source,
+        ) {
+            let read = serde_json::from_value::<solver::problem::MeshInput>(mesh.clone());
+            assert_eq!(meshes.is_valid(&mesh), read.is_ok(), "{mesh}");
+            if let Ok(read) = read {
+                let mut written = mesh.clone();
+                written
+                    .as_object_mut()
+                    .unwrap()
+                    .entry("refine")
+                    .or_insert(serde_json::json!(0));
+                assert_eq!(serde_json::to_value(read).unwrap(), written);
+            }
+        }
     }
 
     #[test]

@@ -103,7 +103,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::fake;
-    use solver::solution::StepSolution;
+    use solver::{problem::Elasticity, solution::StepSolution};
 
     #[test]
     fn a_title_does_not_change_the_input() {
@@ -114,7 +114,10 @@ mod tests {
         };
         assert_eq!(input_hash(&problem).unwrap(), input_hash(&titled).unwrap());
         let mut other = problem.clone();
-        other.materials[0].youngs_modulus = Some(1001.0);
+        other.materials[0].elasticity = Elasticity::Isotropic {
+            youngs_modulus: 1001.0,
+            poissons_ratio: 0.3,
+        };
         assert_ne!(input_hash(&problem).unwrap(), input_hash(&other).unwrap());
         let named = Problem {
             units: Some(solver::problem::Units::default()),

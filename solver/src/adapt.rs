@@ -9,8 +9,9 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use crate::error::SolveError;
+use crate::model::ContactModel;
 use crate::model::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
-use crate::problem::{AdaptiveRefine, Grid, Problem, Refine};
+use crate::problem::{AdaptiveRefine, Grid, MeshInput, Problem, Refine};
 use crate::solution::{Observer, Progress, Refinement, Solution, Warning};
 
 /// Part of the squared error that the columns and rows to be split hold.
@@ -30,16 +31,17 @@ const SETTLED: f64 = 0.1;
 
 /// Solves on finer and finer grids; the finest solution comes back with the sequence of them.
 ///
-/// `solve` solves one problem without adaptive refinement. The observer sees the phases of every
+/// `contacts` are the problem's own, on whatever mesh; `solve` solves one problem without adaptive refinement. The observer sees the phases of every
 /// mesh, and the iterations (but no load steps) of the last one only, when it is known to be the last.
 pub fn run(
     problem: &Problem,
     goal: &AdaptiveRefine,
+    contacts: &[ContactModel],
     solve: &dyn Fn(&Problem, &mut Observer<'_>) -> Result<Solution, SolveError>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     let mut problem = Problem {
-        mesh: crate::problem::MeshInput {
+        mesh: MeshInput {
             refine: Refine::Times(0),
             ..problem.mesh.clone()
         },
@@ -61,14 +63,11 @@ pub fn run(
             stopped |= answer.is_break();
             answer
         })?;
-        let reached = Reached::new(&problem, &solution);
+        let reached = Reached::new(contacts, &solution);
         let change = sequence.last().map(|before| reached.change(before));
         sequence.push(reached.row(change));
-        let split = problem
-            .mesh
-            .grid
-            .as_ref()
-            .map(|grid| finer(grid, &problem, &solution));
+        let grid = problem.mesh.grid();
+        let split = grid.map(|grid| finer(grid, contacts, &solution));
         let elements = split.as_ref().map_or(0, |grid| grid.x.len() * grid.y.len());
         let lines = split
             .as_ref()
@@ -89,7 +88,9 @@ pub fn run(
             }
             return Ok(solution);
         }
-        problem.mesh.grid = split;
+        if let (Some(grid), Some(split)) = (problem.mesh.grid_mut(), split) {
+            *grid = split;
+        }
     }
 }
 
@@ -130,15 +131,15 @@ struct Reached<'a> {
 }
 
 impl<'a> Reached<'a> {
-    fn new(problem: &Problem, solution: &'a Solution) -> Self {
+    fn new(contacts: &[ContactModel], solution: &'a Solution) -> Self {
         let warnings = &solution.summary.warnings;
         let normal_peak = !warnings
             .iter()
             .any(|w| w.code == "contact_reaches_obstacle_end");
-        let frictions = problem.contacts.iter().filter_map(|c| c.friction.as_ref());
-        let averages = frictions
+        let laws = contacts.iter().filter_map(|c| c.friction.as_ref());
+        let averages = laws
             .into_iter()
-            .all(|f| f.nonlocal_radius.is_some_and(|r| r > 0.0));
+            .all(|law| law.bound.radius().is_some_and(|r| r > 0.0));
         Reached {
             solution,
             normal_peak,
@@ -206,7 +207,7 @@ impl<'a> Reached<'a> {
 }
 
 /// The grid with more lines where the error lies.
-fn finer(grid: &Grid, problem: &Problem, solution: &Solution) -> Grid {
+fn finer(grid: &Grid, contacts: &[ContactModel], solution: &Solution) -> Grid {
     let (columns, rows) = (grid.x.len() - 1, grid.y.len() - 1);
     let (mut by_column, mut by_row) = (vec![0.0; columns], vec![0.0; rows]);
     // elements come row by row
@@ -216,7 +217,7 @@ fn finer(grid: &Grid, problem: &Problem, solution: &Solution) -> Grid {
     }
     let (mut split_columns, mut split_rows) = (bulk(&by_column), bulk(&by_row));
     under_peaks(
-        problem,
+        contacts,
         solution,
         columns,
         &mut split_columns,
@@ -249,19 +250,19 @@ fn bulk(squares: &[f64]) -> BTreeSet<usize> {
 
 /// Columns and rows with an edge within ρ of a peak of σ_t that is longer than a part of ρ.
 fn under_peaks(
-    problem: &Problem,
+    contacts: &[ContactModel],
     solution: &Solution,
     columns: usize,
     split_columns: &mut BTreeSet<usize>,
     split_rows: &mut BTreeSet<usize>,
 ) {
     let fields = &solution.fields;
-    for contact in &problem.contacts {
-        let radius = contact.friction.as_ref().and_then(|f| f.nonlocal_radius);
+    for contact in contacts {
+        let radius = contact.friction.as_ref().and_then(|f| f.bound.radius());
         let peak = solution
             .summary
             .contacts
-            .get(&contact.boundary)
+            .get(&contact.name)
             .and_then(|c| c.peak_tangential_stress);
         let (Some(radius), Some(peak)) = (radius.filter(|r| *r > 0.0), peak) else {
             continue;

@@ -62,11 +62,12 @@ pub fn solve_on(
     match problem.mesh.refine {
         Refine::Times(_) => solve_once(problem, external, observe),
         Refine::Adaptive(goal) => {
-            check(problem, external).map_err(SolveError::Invalid)?;
+            let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
+            let contacts = model.contacts;
             // only grids are refined so, and a grid stands in the problem itself
             let solve =
                 |problem: &Problem, observe: &mut Observer<'_>| solve_once(problem, None, observe);
-            adapt::run(problem, &goal, &solve, observe)
+            adapt::run(problem, &goal, &contacts, &solve, observe)
         }
     }
 }

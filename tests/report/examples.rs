@@ -261,7 +261,7 @@ fn gauss_row() -> String {
         let solution = solve(&problem);
         let gauss = &solution.fields.gauss;
         let order = gauss.order as usize;
-        let columns = problem.mesh.grid.as_ref().unwrap().x.len() - 1;
+        let columns = problem.mesh.grid().unwrap().x.len() - 1;
         let elements = solution.fields.elements.len();
         let mut points = Vec::new();
         for e in elements - columns..elements {

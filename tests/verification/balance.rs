@@ -5,9 +5,10 @@ use std::ops::ControlFlow;
 use solver::algorithm::{Finished, Place, State, System, run};
 use solver::body::ElasticBody;
 use solver::elasticity::{Dof, assemble_stiffness};
-use solver::friction::{Averaging, Chain};
+use solver::friction::{Average, Averaging, Chain};
 use solver::linear::Graph;
 use solver::model::Model;
+use solver::problem::{Kernel, Measure, Normalization};
 
 use crate::record::held;
 use crate::support::{example, quiet, solve};
@@ -306,8 +307,12 @@ fn a_solution_restarted_from_itself_stays() {
 /// element smaller than ρ. Forty points per piece leave 1.4e-11 of its integral.
 #[test]
 fn the_averaging_operator_has_the_moments_of_its_kernel() {
-    let friction = r#"{"coefficient": 0.3, "nonlocal_radius": 0.3, "elastic_slip": 1e-4}"#;
-    let friction: solver::problem::Friction = serde_json::from_str(friction).unwrap();
+    let average = Average {
+        radius: 0.3,
+        kernel: Kernel::default(),
+        normalization: Normalization::default(),
+        measure: Measure::default(),
+    };
     let even = |edges: usize| -> Vec<f64> {
         (0..=2 * edges)
             .map(|k| 2.0 * k as f64 / (2 * edges) as f64)
@@ -316,7 +321,7 @@ fn the_averaging_operator_has_the_moments_of_its_kernel() {
     let (rho, x) = (0.3f64, 1.03f64);
     for (edges, mesh) in [(1, "one element of 7 ρ"), (600, "elements of ρ/90")] {
         let s = even(edges);
-        let row = Averaging::new(&friction, Chain::plain(s.clone())).row(x);
+        let row = Averaging::new(&average, Chain::plain(s.clone())).row(x);
         let moment =
             |f: &dyn Fn(f64) -> f64| row.apply(&s.iter().map(|y| f(*y)).collect::<Vec<_>>());
         held(21, "S(1)", mesh, moment(&|_| 1.0), 1.0, 1e-10);
@@ -333,7 +338,7 @@ fn the_averaging_operator_has_the_moments_of_its_kernel() {
         mirror_start: true,
         ..Chain::plain(s.clone())
     };
-    let row = Averaging::new(&friction, chain).row(0.0);
+    let row = Averaging::new(&average, chain).row(0.0);
     let mean = row.apply(&s.iter().map(|y| 1.0 + y * y).collect::<Vec<_>>());
     held(
         21,

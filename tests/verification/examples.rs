@@ -78,7 +78,7 @@ fn the_sheet_touches_with_one_node_and_then_with_three() {
 /// Grid lines of example 1, graded to h = 1e-4 at the punch's edge and to .01 at the clamped corner.
 fn graded_punch() -> Problem {
     let mut problem = example("rectangular_punch");
-    let grid = problem.mesh.grid.as_mut().unwrap();
+    let grid = problem.mesh.grid_mut().unwrap();
     let (edge, growth) = (1e-4, 1.2);
     grid.x = union(&[
         graded(0.5, 0.0, edge, growth),

@@ -1,12 +1,16 @@
 //! What `Model::new` refuses, all at once, and what the solver says of what it accepts.
 
 use solver::error::{SolveError, Violation};
-use solver::problem::{Contact, Problem};
+use solver::problem::{Contact, Elasticity, MeshSource, Problem};
 
 use crate::support::{example, problem, solve};
 
 pub(crate) fn violations(problem: &Problem) -> Vec<(String, String)> {
-    let list = solver::check(problem, None).expect_err("a faulty problem was accepted");
+    pairs(solver::check(problem, None).expect_err("a faulty problem was accepted"))
+}
+
+/// Pointer and reason of each.
+pub(crate) fn pairs(list: Vec<Violation>) -> Vec<(String, String)> {
     list.iter().for_each(|Violation { expected, hint, .. }| {
         assert!(!expected.is_empty() && !hint.is_empty())
     });
@@ -44,9 +48,7 @@ fn what_fails_after_a_full_list_still_fails() {
     for contact in &mut p.contacts {
         contact.friction.as_mut().unwrap().elastic_slip = -1.0;
     }
-    let Some(grid) = &mut p.mesh.grid else {
-        panic!("the example is a grid");
-    };
+    let grid = p.mesh.grid_mut().unwrap();
     grid.x.iter_mut().for_each(|x| *x -= 100.0);
     let list = solver::check(&p, None).unwrap_err();
     // the mesh is the last that is looked at: without one nothing else can be
@@ -60,8 +62,10 @@ fn what_fails_after_a_full_list_still_fails() {
 #[test]
 fn every_number_out_of_range_is_named_at_once() {
     let mut p = example("rectangular_punch");
-    p.materials[0].youngs_modulus = Some(-1.0);
-    p.materials[0].poissons_ratio = Some(0.5);
+    p.materials[0].elasticity = Elasticity::Isotropic {
+        youngs_modulus: -1.0,
+        poissons_ratio: 0.5,
+    };
     p.solver.tolerance = 2.0;
     p.solver.max_iterations = 0;
     let friction = p.contacts[0].friction.as_mut().unwrap();
@@ -94,7 +98,7 @@ fn every_number_out_of_range_is_named_at_once() {
 fn numbers_that_are_not_finite_are_refused_wherever_they_stand() {
     let mut p = example("cylinder");
     p.contacts[0].indentation = f64::NAN;
-    p.mesh.grid.as_mut().unwrap().x[3] = f64::INFINITY;
+    p.mesh.grid_mut().unwrap().x[3] = f64::INFINITY;
     assert_eq!(
         violations(&p),
         [
@@ -237,7 +241,7 @@ fn an_obstacle_that_covers_no_node_is_refused_and_one_that_cuts_an_edge_is_warne
 fn a_contact_that_turns_a_corner_is_warned_of() {
     let mut p = example("sheet");
     let part = p.mesh.boundaries.get_mut("taper").unwrap();
-    (part.x, p.mesh.grid.as_mut().unwrap().top) =
+    (part.x, p.mesh.grid_mut().unwrap().top) =
         (None, Some(vec![[0.0, 1.0], [2.0, 0.4], [5.0, 1.0]]));
     p.contacts[0].obstacle =
         serde_json::from_str(r#"{"kind": "flat", "from": 0.5, "to": 4}"#).unwrap();
@@ -553,7 +557,9 @@ fn contacts_without_area_normal_or_coordinate_are_refused() {
     );
 
     let mut corner = square_with_midside(0.5, 0);
-    let inline = corner.mesh.inline.as_mut().unwrap();
+    let MeshSource::Inline(inline) = &mut corner.mesh.source else {
+        panic!("it is written out");
+    };
     inline
         .boundaries
         .insert("top".to_owned(), vec![[3, 2, 6], [2, 1, 5]]);
@@ -586,7 +592,7 @@ fn endless_lists_of_faults_are_cut_short() {
 fn a_body_far_from_the_origin_is_solved_without_endless_inner_steps() {
     let mut p = example("rectangular_punch");
     let shift = 1e5;
-    let grid = p.mesh.grid.as_mut().unwrap();
+    let grid = p.mesh.grid_mut().unwrap();
     grid.x
         .iter_mut()
         .chain(&mut grid.y)

@@ -1,7 +1,7 @@
 //! docs/verification.md, row 24: units, mirrors and numbering change nothing.
 
 use serde_json::{Value, json};
-use solver::problem::{Algorithm, Problem};
+use solver::problem::{Algorithm, Elasticity, Problem};
 
 use crate::record::held;
 use crate::support::{Lattice, example, problem, solve};
@@ -48,7 +48,7 @@ fn scaled(problem: &Problem, length: f64, stress: f64) -> Problem {
         apply(pointer, length);
     }
     // the y lines of a strip are fractions of its height
-    if problem.mesh.grid.as_ref().unwrap().top.is_none() {
+    if problem.mesh.grid().unwrap().top.is_none() {
         apply("/mesh/grid/y", length);
     }
     apply("/materials/0/youngs_modulus", stress);
@@ -102,7 +102,10 @@ fn units_change_no_iteration_and_scale_the_result() {
 fn loads_scale_with_the_modulus() {
     let loaded = |stress: f64| {
         let mut p = example("rectangular_punch");
-        p.materials[0].youngs_modulus = Some(1000.0 * stress);
+        p.materials[0].elasticity = Elasticity::Isotropic {
+            youngs_modulus: 1000.0 * stress,
+            poissons_ratio: 0.3,
+        };
         let load = json!({"boundary": "right", "pressure": [3.0 * stress, 1.0 * stress]});
         p.loads = vec![serde_json::from_value(load).unwrap()];
         solve(&p).summary

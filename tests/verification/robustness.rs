@@ -105,7 +105,7 @@ fn dragged_sheet(pull: f64, drag: f64, mu: f64) -> Problem {
     let mut x = vec![0.0, 0.5];
     x.extend((10..=26).map(|k| f64::from(k) / 10.0));
     x.extend([2.8, 3.0, 3.5, 4.0, 5.0]);
-    sheet.mesh.grid.as_mut().unwrap().x = x;
+    sheet.mesh.grid_mut().unwrap().x = x;
     sheet.supports[1].ux = Some(BoundaryValue::Constant(pull));
     sheet.contacts[0].tangential_displacement = drag;
     sheet.contacts[0].friction.as_mut().unwrap().coefficient = Some(mu);

@@ -4,8 +4,8 @@ use super::deck::{Deck, Elastic, ElementType, Section, Theory};
 use crate::source::ReadError;
 use solver::error::Violation;
 use solver::problem::{
-    Analysis, BoundaryValue, Load, Material, MeshInput, Orthotropic, Problem, SolverControls,
-    Support,
+    Analysis, BoundaryValue, Elasticity, Load, Material, MeshInput, MeshSource, Orthotropic,
+    Problem, SolverControls, Support,
 };
 
 /// The problem that a deck states: one linear static step, without contact. The text itself becomes
@@ -32,10 +32,7 @@ pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
     faults.into_result(Problem {
         title,
         analysis,
-        mesh: MeshInput {
-            abaqus: Some(text.to_owned()),
-            ..MeshInput::default()
-        },
+        mesh: MeshInput::new(MeshSource::Abaqus(text.to_owned())),
         materials,
         supports,
         loads,
@@ -133,37 +130,33 @@ fn materials(deck: &mut Deck) -> Vec<Material> {
 }
 
 fn material(section: &Section, elastic: &Elastic) -> Option<Material> {
-    let named = Material {
-        group: Some(section.elements.clone()),
-        name: Some(section.material.clone()),
-        ..Material::default()
-    };
     // a temperature may follow
-    match (elastic.engineering_constants, &elastic.values[..]) {
-        (false, [e, nu] | [e, nu, _]) => Some(Material {
-            youngs_modulus: Some(*e),
-            poissons_ratio: Some(*nu),
-            ..named
-        }),
+    let elasticity = match (elastic.engineering_constants, &elastic.values[..]) {
+        (false, [e, nu] | [e, nu, _]) => Elasticity::Isotropic {
+            youngs_modulus: *e,
+            poissons_ratio: *nu,
+        },
         (
             true,
             [e1, e2, e3, nu12, nu13, nu23, g12, _, _]
             | [e1, e2, e3, nu12, nu13, nu23, g12, _, _, _],
-        ) => Some(Material {
-            orthotropic: Some(Orthotropic {
-                e1: *e1,
-                e2: *e2,
-                nu12: *nu12,
-                g12: *g12,
-                angle: 0.0,
-                e3: Some(*e3),
-                nu13: Some(*nu13),
-                nu23: Some(*nu23),
-            }),
-            ..named
+        ) => Elasticity::Orthotropic(Orthotropic {
+            e1: *e1,
+            e2: *e2,
+            nu12: *nu12,
+            g12: *g12,
+            angle: 0.0,
+            e3: Some(*e3),
+            nu13: Some(*nu13),
+            nu23: Some(*nu23),
         }),
-        _ => None,
-    }
+        _ => return None,
+    };
+    Some(Material {
+        elasticity,
+        group: Some(section.elements.clone()),
+        name: Some(section.material.clone()),
+    })
 }
 
 /// One support for each row; a later row for the same nodes and component takes the earlier one's place.
@@ -197,10 +190,9 @@ fn loads(deck: &mut Deck, analysis: &Analysis) -> Vec<Load> {
     let mut loads: Vec<Load> = deck
         .pressures
         .iter()
-        .map(|row| Load {
-            boundary: Some(Deck::name_of(&row.target, row.side)),
-            pressure: Some(BoundaryValue::Constant(row.value)),
-            ..Load::default()
+        .map(|row| {
+            let boundary = Deck::name_of(&row.target, row.side);
+            Load::Pressure(boundary, BoundaryValue::Constant(row.value))
         })
         .collect();
     for row in deck.forces.clone() {
@@ -217,11 +209,7 @@ fn loads(deck: &mut Deck, analysis: &Analysis) -> Vec<Load> {
         } else {
             [0.0, row.value]
         };
-        loads.push(Load {
-            nodes: Some(Deck::name_of(&row.target, None)),
-            force: Some(force),
-            ..Load::default()
-        });
+        loads.push(Load::Force(Deck::name_of(&row.target, None), force));
     }
     loads
 }

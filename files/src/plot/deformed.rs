@@ -347,7 +347,7 @@ mod tests {
     #[test]
     fn a_small_contact_has_a_window_of_its_own() {
         let mut problem = problem();
-        let grid = problem.mesh.grid.as_mut().unwrap();
+        let grid = problem.mesh.grid_mut().unwrap();
         grid.x = (0..=40).map(f64::from).collect();
         grid.y = vec![-40.0, -20.0, -10.0, -5.0, -2.0, 0.0];
         let solution = solution(&problem);
@@ -390,7 +390,7 @@ mod tests {
     #[test]
     fn a_figure_of_five_thousand_elements_stays_below_two_megabytes() {
         let mut problem = problem();
-        let grid = problem.mesh.grid.as_mut().unwrap();
+        let grid = problem.mesh.grid_mut().unwrap();
         grid.x = (0..=100).map(|k| 0.04 * f64::from(k)).collect();
         grid.y = (0..=50).map(|k| 0.04 * f64::from(k) - 2.0).collect();
         let mesh = solver::mesh::grid_mesh(grid);

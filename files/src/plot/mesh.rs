@@ -168,10 +168,7 @@ fn label(problem: &Problem, name: &str) -> String {
         .supports
         .iter()
         .any(|s| s.boundary.as_deref() == Some(name));
-    let load = problem
-        .loads
-        .iter()
-        .any(|l| l.boundary.as_deref() == Some(name));
+    let load = problem.loads.iter().any(|l| l.boundary() == Some(name));
     let said = [(contact, "contact"), (support, "support"), (load, "load")];
     let roles: Vec<&str> = said
         .into_iter()
@@ -206,7 +203,7 @@ fn places(labels: &[String]) -> Vec<(i32, i32)> {
 mod tests {
     use super::*;
     use crate::plot::tests::problem;
-    use solver::problem::Refine;
+    use solver::problem::{MeshInput, MeshSource, Refine};
 
     #[test]
     fn of_a_very_fine_mesh_the_outline_is_drawn() {
@@ -241,7 +238,7 @@ mod tests {
     #[test]
     fn a_mesh_that_is_none_is_said_to_be_so() {
         let mut problem = problem();
-        problem.mesh.grid = None;
+        problem.mesh = MeshInput::new(MeshSource::Stored("sha256:0".to_owned()));
         assert!(
             mesh_svg(Theme::Light, &problem, None, &Fields::default())
                 .unwrap_err()

@@ -59,6 +59,8 @@ macro_rules! defaulted {
 
 written!(problem::BoundaryValue => pb::BoundaryValue);
 required!(pb::BoundaryValue => problem::BoundaryValue, "a value");
+written!(problem::Material => pb::Material);
+written!(problem::Load => pb::Load);
 written!(problem::MeshInput => pb::Mesh);
 required!(pb::Mesh => problem::MeshInput, "a mesh");
 written!(Summary => pb::Summary);

@@ -4,7 +4,10 @@
 use solver::{
     element::Element,
     error::Reason,
-    problem::{BoundaryValue, MeshInput, PrescribedBound, Refine},
+    problem::{
+        BoundaryValue, Load, LoadFields, Material, MaterialFields, MeshInput, MeshSource,
+        PrescribedBound, Refine,
+    },
 };
 
 use super::{FromMessage, IntoMessage, Reader};
@@ -18,28 +21,14 @@ impl FromMessage<pb::Mesh> for MeshInput {
             boundaries,
             groups,
         } = message;
-        let from = MeshInput::default();
         let source = match source {
-            Some(mesh::Source::Grid(grid)) => {
-                let grid = read.field("grid", grid).map(Some);
-                grid.map(|grid| MeshInput { grid, ..from })
-            }
+            Some(mesh::Source::Grid(grid)) => read.field("grid", grid).map(MeshSource::Grid),
             Some(mesh::Source::Inline(inline)) => {
-                let inline = read.field("inline", inline).map(Some);
-                inline.map(|inline| MeshInput { inline, ..from })
+                read.field("inline", inline).map(MeshSource::Inline)
             }
-            Some(mesh::Source::Gmsh(text)) => {
-                let gmsh = Some(text);
-                Some(MeshInput { gmsh, ..from })
-            }
-            Some(mesh::Source::Abaqus(text)) => {
-                let abaqus = Some(text);
-                Some(MeshInput { abaqus, ..from })
-            }
-            Some(mesh::Source::Stored(hash)) => {
-                let stored = Some(hash);
-                Some(MeshInput { stored, ..from })
-            }
+            Some(mesh::Source::Gmsh(text)) => Some(MeshSource::Gmsh(text)),
+            Some(mesh::Source::Abaqus(text)) => Some(MeshSource::Abaqus(text)),
+            Some(mesh::Source::Stored(hash)) => Some(MeshSource::Stored(hash)),
             None => read.missing("one of grid, inline, gmsh, abaqus, stored"),
         };
         let refine = match refinement {
@@ -52,10 +41,10 @@ impl FromMessage<pb::Mesh> for MeshInput {
         let boundaries = read.field("boundaries", boundaries);
         let groups = read.field("groups", groups);
         Some(MeshInput {
+            source: source?,
             refine: refine?,
             boundaries: boundaries?,
             groups: groups?,
-            ..source?
         })
     }
 }
@@ -63,34 +52,50 @@ impl FromMessage<pb::Mesh> for MeshInput {
 impl From<MeshInput> for pb::Mesh {
     fn from(ours: MeshInput) -> Self {
         let MeshInput {
-            grid,
-            inline,
-            gmsh,
-            abaqus,
-            stored,
+            source,
             refine,
             boundaries,
             groups,
         } = ours;
-        let sources = [
-            grid.map(|grid| mesh::Source::Grid(grid.into())),
-            inline.map(|inline| mesh::Source::Inline(inline.into())),
-            gmsh.map(mesh::Source::Gmsh),
-            abaqus.map(mesh::Source::Abaqus),
-            stored.map(mesh::Source::Stored),
-        ];
+        let source = match source {
+            MeshSource::Grid(grid) => mesh::Source::Grid(grid.into()),
+            MeshSource::Inline(inline) => mesh::Source::Inline(inline.into()),
+            MeshSource::Gmsh(text) => mesh::Source::Gmsh(text),
+            MeshSource::Abaqus(text) => mesh::Source::Abaqus(text),
+            MeshSource::Stored(hash) => mesh::Source::Stored(hash),
+        };
         let refinement = match refine {
             Refine::Times(times) => mesh::Refinement::Refine(times),
             Refine::Adaptive(goal) => mesh::Refinement::Adaptive(goal.into()),
         };
         pb::Mesh {
-            source: sources.into_iter().flatten().next(),
+            source: Some(source),
             refinement: Some(refinement),
             boundaries: boundaries.into_message(),
             groups: groups.into_message(),
         }
     }
 }
+
+/// What is written with fields of which not all may stand together.
+macro_rules! checked {
+    ($($message:ty => $fields:ty => $ours:ty),*) => { $(
+        impl FromMessage<$message> for $ours {
+            fn from_message(message: $message, read: &mut Reader) -> Option<Self> {
+                let fields = <$fields>::from_message(message, read)?;
+                <$ours>::try_from(fields).map_or_else(|violation| read.violation(violation), Some)
+            }
+        }
+
+        impl From<$ours> for $message {
+            fn from(ours: $ours) -> Self {
+                <$fields>::from(ours).into()
+            }
+        }
+    )* };
+}
+
+checked!(pb::Material => MaterialFields => Material, pb::Load => LoadFields => Load);
 
 /// A number, or two of them.
 impl FromMessage<pb::BoundaryValue> for BoundaryValue {

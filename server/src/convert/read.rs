@@ -89,17 +89,21 @@ impl Reader {
 
     /// Something is wrong where we are.
     pub fn wrong<T>(&mut self, reason: Reason, got: impl ToString, expected: &str) -> Option<T> {
+        let hint = "See the comments in signorini.proto.";
+        self.violation(Violation::new("", reason, got, expected, hint))
+    }
+
+    /// Something is wrong at or below where we are.
+    pub fn violation<T>(&mut self, violation: Violation) -> Option<T> {
         let token = |token: &Token| match token {
             Token::Name(name) => format!("/{name}"),
             Token::Key(name) => format!("/{}", escape(name)),
             Token::Index(index) => format!("/{index}"),
         };
+        let place: String = self.place.iter().map(token).collect();
         self.found.add(Violation {
-            pointer: self.place.iter().map(token).collect(),
-            reason,
-            got: got.to_string(),
-            expected: expected.into(),
-            hint: "See the comments in signorini.proto.".into(),
+            pointer: format!("{place}{}", violation.pointer),
+            ..violation
         });
         None
     }

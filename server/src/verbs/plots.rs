@@ -98,7 +98,7 @@ pub async fn plot(
             title,
             ..read(problem.as_bytes())?
         };
-        let stored = match &problem.mesh.stored {
+        let stored = match problem.mesh.stored() {
             Some(hash) if plot == Plot::Mesh => {
                 let gone = || {
                     ApiError::NotFound(format!(

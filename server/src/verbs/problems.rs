@@ -118,7 +118,7 @@ async fn stored(
     service: &Service,
     problem: &Problem,
 ) -> Result<Option<(MeshInfo, Mesh)>, ApiError> {
-    match &problem.mesh.stored {
+    match problem.mesh.stored() {
         Some(hash) => Ok(Some(meshes::load(service, hash).await?)),
         None => Ok(None),
     }
@@ -144,7 +144,7 @@ pub(super) async fn admit(service: &Service, mut problem: Problem) -> Result<Adm
             title,
             input_hash,
             json,
-            mesh: problem.mesh.stored,
+            mesh: problem.mesh.stored().map(str::to_owned),
         })
     };
     service.work(admit).await?

@@ -3,10 +3,10 @@
 
 use crate::body::ElasticBody;
 use crate::elasticity::Dof;
-use crate::friction::{Chain, FrictionLaw, Source};
+use crate::friction::{Average, BoundLaw, Chain, FrictionLaw, Source};
 use crate::linear::Dense;
 use crate::model::{ContactModel, Level, Model};
-use crate::problem::{Condition, Friction, FrictionPoints, History, Measure};
+use crate::problem::{Condition, FrictionPoints, History, Measure};
 
 /// A radius below this part of the contact's length is the axis: a mesh generator may miss 0 by
 /// rounding, and the weight of such a node is nothing but rounding.
@@ -91,13 +91,6 @@ pub struct Point {
     pub anchor: f64,
     /// The slip at the end of the increment before, for the work done.
     past_displacement: f64,
-}
-
-/// Whether a friction does anything: with a bound of zero there is nothing to average or iterate.
-fn acts(friction: &Friction) -> bool {
-    friction.bound.is_some()
-        || friction.coefficient.is_some_and(|mu| mu > 0.0)
-        || friction.cohesion > 0.0
 }
 
 /// One contact of the model in the system.
@@ -188,7 +181,10 @@ impl<'a> System<'a> {
                 follows,
             });
         }
-        let surface = |f: &Friction| f.measure == Measure::Surface;
+        let surface = |law: &FrictionLaw<Average>| match &law.bound {
+            BoundLaw::Pressure { average, .. } => average.measure == Measure::Surface,
+            BoundLaw::Prescribed(_) => false,
+        };
         // over a surface the rings themselves lead round the axis
         let round = contact.friction.as_ref().is_some_and(surface);
         let symmetric = |i: usize| {
@@ -201,9 +197,9 @@ impl<'a> System<'a> {
             mirror_start: symmetric(0),
             mirror_end: symmetric(count - 1),
         };
-        let friction = contact.friction.as_ref().filter(|f| acts(f));
-        let law = friction.map(|f| FrictionLaw::new(f, chain));
-        if let (Some(law), Some(friction)) = (&law, friction) {
+        let friction = contact.friction.as_ref().filter(|law| law.bound.acts());
+        let law = friction.map(|law| law.along(chain));
+        if let Some(law) = &law {
             let patch = self.patches.len();
             let point = |s: f64, nodes: [usize; 3], shape: [f64; 3], weight: f64| Point {
                 patch,
@@ -215,7 +211,7 @@ impl<'a> System<'a> {
                 anchor: 0.0,
                 past_displacement: 0.0,
             };
-            match friction.points {
+            match law.points {
                 FrictionPoints::Gauss3 => self.points.extend(
                     boundary
                         .friction_points

@@ -1,11 +1,11 @@
 //! The friction bound τ: from the averaged pressure, or prescribed.
 
-use crate::friction::{Averaging, Chain, Row};
-use crate::problem::{Friction, PrescribedBound};
+use crate::friction::{Average, Averaging, Chain, Row};
+use crate::problem::PrescribedBound;
 
-/// How the friction bound comes about.
-#[derive(Clone, Debug)]
-pub enum BoundLaw {
+/// How the friction bound comes about; `A` as in [`FrictionLaw`](crate::friction::FrictionLaw).
+#[derive(Clone, Debug, PartialEq)]
+pub enum BoundLaw<A = Averaging> {
     /// τ = min(cap, cohesion + μ S) where S > 0, else 0: thesis (1.3) with an offset and a cap.
     Pressure {
         /// μ.
@@ -15,7 +15,7 @@ pub enum BoundLaw {
         /// Largest τ (stress); infinite without one.
         shear_cap: f64,
         /// S_ρ.
-        averaging: Averaging,
+        average: A,
     },
     /// Tresca's law: τ is given.
     Prescribed(PrescribedBound),
@@ -48,24 +48,76 @@ impl Source {
     }
 }
 
-impl BoundLaw {
+impl BoundLaw<Average> {
     /// The law on a chain of contact edges.
-    pub fn new(friction: &Friction, chain: Chain) -> Self {
-        match &friction.bound {
-            Some(bound) => BoundLaw::Prescribed(bound.clone()),
-            None => BoundLaw::Pressure {
-                coefficient: friction.coefficient.unwrap_or(0.0),
-                cohesion: friction.cohesion,
-                shear_cap: friction.shear_cap.unwrap_or(f64::INFINITY),
-                averaging: Averaging::new(friction, chain),
+    pub fn along(&self, chain: Chain) -> BoundLaw {
+        match self {
+            BoundLaw::Prescribed(bound) => BoundLaw::Prescribed(bound.clone()),
+            BoundLaw::Pressure {
+                coefficient,
+                cohesion,
+                shear_cap,
+                average,
+            } => BoundLaw::Pressure {
+                coefficient: *coefficient,
+                cohesion: *cohesion,
+                shear_cap: *shear_cap,
+                average: Averaging::new(average, chain),
             },
         }
     }
 
+    /// ρ (length); `None` where the bound is given.
+    pub fn radius(&self) -> Option<f64> {
+        match self {
+            BoundLaw::Pressure { average, .. } => Some(average.radius),
+            BoundLaw::Prescribed(_) => None,
+        }
+    }
+
+    /// ρ > 0 (length), where the bound depends on an average at all: μ > 0.
+    pub fn averaged_over(&self) -> Option<f64> {
+        match self {
+            BoundLaw::Pressure {
+                coefficient,
+                average,
+                ..
+            } if *coefficient > 0.0 && average.radius > 0.0 => Some(average.radius),
+            _ => None,
+        }
+    }
+}
+
+impl<A> BoundLaw<A> {
+    /// Whether there is anything to average or to iterate: with μ = 0 and no cohesion the bound is zero.
+    pub fn acts(&self) -> bool {
+        match self {
+            BoundLaw::Pressure {
+                coefficient,
+                cohesion,
+                ..
+            } => *coefficient > 0.0 || *cohesion > 0.0,
+            BoundLaw::Prescribed(_) => true,
+        }
+    }
+
+    /// Whether it can be above zero anywhere, so that friction can hold a body.
+    pub fn holds(&self) -> bool {
+        match self {
+            BoundLaw::Pressure { .. } => self.acts(),
+            BoundLaw::Prescribed(PrescribedBound::Constant(bound)) => *bound > 0.0,
+            BoundLaw::Prescribed(PrescribedBound::Table(table)) => {
+                table.bound.iter().any(|bound| *bound > 0.0)
+            }
+        }
+    }
+}
+
+impl BoundLaw {
     /// Where the bound at arc length s comes from.
     pub fn source(&self, s: f64) -> Source {
         match self {
-            BoundLaw::Pressure { averaging, .. } => Source::Average(averaging.row(s)),
+            BoundLaw::Pressure { average, .. } => Source::Average(average.row(s)),
             BoundLaw::Prescribed(PrescribedBound::Constant(bound)) => Source::Given(*bound),
             BoundLaw::Prescribed(PrescribedBound::Table(table)) => {
                 Source::Given(interpolate(&table.s, &table.bound, s))
@@ -131,17 +183,18 @@ fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::friction::tests::friction;
+    use crate::friction::tests::average;
     use crate::problem::BoundTable;
 
     #[test]
     fn cohesion_and_cap_bound_the_bound() {
-        let friction = Friction {
+        let law = BoundLaw::Pressure {
+            coefficient: 0.3,
             cohesion: 2.0,
-            shear_cap: Some(4.0),
-            ..friction(0.0)
+            shear_cap: 4.0,
+            average: average(0.0),
         };
-        let law = BoundLaw::new(&friction, Chain::plain(vec![0.0, 0.5, 1.0]));
+        let law = law.along(Chain::plain(vec![0.0, 0.5, 1.0]));
         let tau = |s: f64| (law.of_average(s), law.slope(s));
         assert_eq!(tau(-1.0), (0.0, 0.0));
         assert_eq!(tau(0.0), (0.0, 0.0));
@@ -155,11 +208,8 @@ mod tests {
             s: vec![0.0, 1.0, 3.0],
             bound: vec![2.0, 4.0, 0.0],
         };
-        let friction = Friction {
-            bound: Some(PrescribedBound::Table(table)),
-            ..friction(0.0)
-        };
-        let law = BoundLaw::new(&friction, Chain::plain(vec![0.0, 2.0, 4.0]));
+        let law: BoundLaw<Average> = BoundLaw::Prescribed(PrescribedBound::Table(table));
+        let law = law.along(Chain::plain(vec![0.0, 2.0, 4.0]));
         for (s, tau) in [
             (-0.1, 0.0),
             (0.0, 2.0),

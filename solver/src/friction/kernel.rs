@@ -9,7 +9,7 @@
 use std::sync::LazyLock;
 
 use crate::element::{edge3, gauss};
-use crate::problem::{Friction, Kernel, Measure, Normalization};
+use crate::problem::{Kernel, Measure, Normalization};
 
 /// ∫ exp(1/(x² − 1)) dx over (−1, 1).
 const BUMP_INTEGRAL: f64 = 0.443_993_816_168_079;
@@ -51,8 +51,21 @@ impl Chain {
     }
 }
 
+/// S_ρ in numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Average {
+    /// ρ ≥ 0 (length); 0: Coulomb's local law.
+    pub radius: f64,
+    /// Shape of ω_ρ.
+    pub kernel: Kernel,
+    /// Scale of ω_ρ.
+    pub normalization: Normalization,
+    /// What ω_ρ is integrated over.
+    pub measure: Measure,
+}
+
 /// The averaging operator of one chain.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Averaging {
     chain: Chain,
     radius: f64,
@@ -83,15 +96,15 @@ impl Row {
 }
 
 impl Averaging {
-    /// The operator with the radius, kernel and normalization of `friction`.
-    pub fn new(friction: &Friction, chain: Chain) -> Self {
+    /// The operator of an average.
+    pub fn new(average: &Average, chain: Chain) -> Self {
         let length = chain.s[chain.s.len() - 1] - chain.s[0];
-        let radius = match friction.nonlocal_radius.unwrap_or(0.0) {
+        let radius = match average.radius {
             radius if radius < LOCAL * length => 0.0,
             radius => radius,
         };
         let disc = radius * radius;
-        let scale = match (friction.normalization, friction.kernel, friction.measure) {
+        let scale = match (average.normalization, average.kernel, average.measure) {
             (Normalization::UnitIntegral, Kernel::Bump, Measure::Line) => {
                 1.0 / (BUMP_INTEGRAL * radius)
             }
@@ -106,8 +119,8 @@ impl Averaging {
         Averaging {
             chain,
             radius,
-            kernel: friction.kernel,
-            measure: friction.measure,
+            kernel: average.kernel,
+            measure: average.measure,
             scale,
         }
     }
@@ -279,7 +292,7 @@ impl Averaging {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::friction::tests::friction;
+    use crate::friction::tests::average;
 
     fn averaging(
         radius: f64,
@@ -288,12 +301,12 @@ mod tests {
         mirror_start: bool,
         mirror_end: bool,
     ) -> Averaging {
-        let friction = Friction {
+        let average = Average {
             kernel,
-            ..friction(radius)
+            ..average(radius)
         };
         Averaging::new(
-            &friction,
+            &average,
             Chain {
                 s,
                 radius: Vec::new(),
@@ -418,9 +431,9 @@ mod tests {
         let m = moment(2) / moment(0);
         let rho = 0.3;
         let s = with_midsides(&[0.0, 0.1, 0.25, 0.6, 1.1, 1.7, 2.5]);
-        let surface = Friction {
+        let surface = Average {
             measure: Measure::Surface,
-            ..friction(rho)
+            ..average(rho)
         };
         let chain = Chain {
             radius: s.clone(),

@@ -5,37 +5,45 @@ mod kernel;
 mod transition;
 
 pub use bound::{BoundLaw, Source};
-pub use kernel::{Averaging, Chain, Row};
+pub use kernel::{Average, Averaging, Chain, Row};
 pub use transition::{phi, phi_slope, psi};
 
-use crate::problem::{Friction, History, Transition};
+use crate::problem::{FrictionPoints, History, Transition};
 
 /// From pressure and tangential displacement along Γ_C to the tangential traction,
 /// σ_t = −τ φ_ε(|e|) sign(e): thesis (1.3), (1.8). e = u_t − d in the total law; in the incremental
 /// law e = u_t − d − g with the anchor g of the point, formulation 1.5.
-#[derive(Clone, Debug)]
-pub struct FrictionLaw {
+///
+/// `A`: its average over the pressure, which a model holds in numbers ([`Average`]) and a system laid along
+/// Γ_C ([`Averaging`]).
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrictionLaw<A = Averaging> {
     /// τ.
-    pub bound: BoundLaw,
+    pub bound: BoundLaw<A>,
     /// ε (length).
     pub elastic_slip: f64,
     /// φ_ε.
     pub transition: Transition,
     /// Whether points keep an anchor.
     pub history: History,
+    /// Where it is evaluated.
+    pub points: FrictionPoints,
 }
 
-impl FrictionLaw {
+impl FrictionLaw<Average> {
     /// The law on a chain of contact edges.
-    pub fn new(friction: &Friction, chain: Chain) -> Self {
+    pub fn along(&self, chain: Chain) -> FrictionLaw {
         FrictionLaw {
-            bound: BoundLaw::new(friction, chain),
-            elastic_slip: friction.elastic_slip,
-            transition: friction.transition,
-            history: friction.history,
+            bound: self.bound.along(chain),
+            elastic_slip: self.elastic_slip,
+            transition: self.transition,
+            history: self.history,
+            points: self.points,
         }
     }
+}
 
+impl<A> FrictionLaw<A> {
     /// φ_ε with the sign of `slip`, e above (length).
     pub fn phi(&self, slip: f64) -> f64 {
         phi(self.transition, slip / self.elastic_slip)
@@ -65,37 +73,39 @@ impl FrictionLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::problem::{FrictionPoints, Kernel, Measure, Normalization};
+    use crate::problem::{Kernel, Measure, Normalization};
 
-    /// The law that most tests start from.
-    pub(super) fn friction(radius: f64) -> Friction {
-        Friction {
-            coefficient: Some(0.3),
-            nonlocal_radius: Some(radius),
-            elastic_slip: 1e-4,
+    /// The average that most tests start from.
+    pub(super) fn average(radius: f64) -> Average {
+        Average {
+            radius,
             kernel: Kernel::Bump,
             normalization: Normalization::UnitIntegral,
-            transition: Transition::Linear,
-            history: History::Incremental,
-            points: FrictionPoints::Gauss3,
             measure: Measure::Line,
-            cohesion: 0.0,
-            shear_cap: None,
-            bound: None,
         }
     }
 
     #[test]
     fn an_anchor_follows_what_slips_and_what_is_open() {
-        let chain = Chain::plain(vec![0.0, 0.5, 1.0]);
-        let law = FrictionLaw::new(&friction(0.0), chain.clone());
+        let law = FrictionLaw {
+            bound: BoundLaw::Pressure {
+                coefficient: 0.3,
+                cohesion: 0.0,
+                shear_cap: f64::INFINITY,
+                average: average(0.0),
+            },
+            elastic_slip: 1e-4,
+            transition: Transition::Linear,
+            history: History::Incremental,
+            points: FrictionPoints::Gauss3,
+        };
         assert_eq!(law.anchor_move(0.5e-4, false), 0.0);
         assert!((law.anchor_move(-3e-4, false) + 2e-4).abs() < 1e-18);
         assert_eq!(law.anchor_move(0.5e-4, true), 0.5e-4);
-        let total = Friction {
+        let total = FrictionLaw {
             history: History::Total,
-            ..friction(0.0)
+            ..law
         };
-        assert_eq!(FrictionLaw::new(&total, chain).anchor_move(1.0, true), 0.0);
+        assert_eq!(total.anchor_move(1.0, true), 0.0);
     }
 }

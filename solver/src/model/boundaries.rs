@@ -4,7 +4,9 @@ use super::checks::{ALIGNED, Checks};
 use super::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
 use crate::error::{All, Checked, Reason, Refused, escape};
 use crate::mesh::{self, Edge, External, Mesh};
-use crate::problem::{AdaptiveRefine, Analysis, BoundaryPart, BoundaryValue, MeshInput, Refine};
+use crate::problem::{
+    AdaptiveRefine, Analysis, BoundaryPart, BoundaryValue, MeshInput, MeshSource, Refine,
+};
 
 /// Sides face one way when their normals differ by no more (degrees).
 const SAME_DIRECTION: f64 = 1.0;
@@ -21,7 +23,7 @@ impl Checks {
         analysis: &Analysis,
         contacts: usize,
     ) -> Checked<Mesh> {
-        let mesh = self.source(input, external);
+        let mesh = self.source(&input.source, external);
         let refine = match input.refine {
             Refine::Times(times) if times > MOST_REFINEMENTS => Err(self.say(
                 "/mesh/refine",
@@ -34,21 +36,12 @@ impl Checks {
             Refine::Adaptive(goal) => self.adaptive(input, &goal, contacts).map(|()| 0),
         };
         let mut mesh = mesh?;
-        let mut all = All::default();
-        // what was read from a file was looked at there
-        let upright = if input.grid.is_some() {
-            // straight-sided grids need no look at their corners, and stay what they are when refined
-            mesh::check_inverted(&mesh, false, |_| "/mesh".to_owned(), "")
-        } else if input.inline.is_some() {
-            let element = |e| format!("/mesh/inline/elements/{e}");
-            mesh::check_inverted(&mesh, true, element, "")
-        } else {
-            Ok(())
-        };
-        all.take(self.found.took(upright));
-        all.take(self.radii(&mesh, input, analysis));
-        let refine = all.then(()).and(refine)?;
-        if let Some((x, distance)) = input.grid.as_ref().and_then(mesh::largest_cut) {
+        let (upright, radii) = (
+            self.upright(&mesh, &input.source),
+            self.radii(&mesh, input, analysis),
+        );
+        let refine = upright.and(radii).and(refine)?;
+        if let Some((x, distance)) = input.grid().and_then(mesh::largest_cut) {
             self.warn(
                 "strip_cuts_polyline",
                 "/mesh/grid",
@@ -58,7 +51,7 @@ impl Checks {
         for _ in 0..refine {
             mesh = mesh::refine(&mesh);
         }
-        if input.grid.is_none() && refine > 0 {
+        if input.grid().is_none() && refine > 0 {
             let whole = |_| "/mesh".to_owned();
             let upright = mesh::check_inverted(&mesh, false, whole, " of the refined mesh");
             self.found.took(upright)?;
@@ -83,9 +76,9 @@ impl Checks {
         };
         let Some(node) = node else { return Ok(()) };
         Err(self.say(
-            match (&input.inline, &input.grid) {
-                (Some(_), _) => format!("/mesh/inline/nodes/{node}"),
-                (None, Some(_)) => "/mesh/grid/x".to_owned(),
+            match &input.source {
+                MeshSource::Inline(_) => format!("/mesh/inline/nodes/{node}"),
+                MeshSource::Grid(_) => "/mesh/grid/x".to_owned(),
                 _ => "/mesh".to_owned(),
             },
             Reason::OutOfRange,
@@ -105,7 +98,7 @@ impl Checks {
             "0 < tolerance < 1",
             "The relative change that is left; 0.01 is one percent.",
         ));
-        if input.grid.is_none() {
+        if input.grid().is_none() {
             all.refuse(self.say(
                 "/mesh/refine",
                 Reason::NotUsed,
@@ -115,8 +108,7 @@ impl Checks {
             ));
         }
         let lines = input
-            .grid
-            .as_ref()
+            .grid()
             .map_or([0; 2], |grid| [grid.x.len(), grid.y.len()]);
         if lines[0] * lines[1] > MOST_ADAPTIVE_ELEMENTS
             || lines[0].max(lines[1]) > MOST_ADAPTIVE_LINES
@@ -182,60 +174,51 @@ impl Checks {
     }
 
     /// The mesh as it is given, before it is refined.
-    fn source(&mut self, input: &MeshInput, external: Option<External>) -> Checked<Mesh> {
-        let forms = [
-            ("grid", input.grid.is_some()),
-            ("inline", input.inline.is_some()),
-            ("gmsh", input.gmsh.is_some()),
-            ("abaqus", input.abaqus.is_some()),
-            ("stored", input.stored.is_some()),
-        ];
-        let given: Vec<String> = forms
-            .iter()
-            .filter(|form| form.1)
-            .map(|form| format!("`{}`", form.0))
-            .collect();
-        if given.len() != 1 {
-            let got = match given.len() {
-                0 => "none of them".to_owned(),
-                _ => given.join(" and "),
-            };
-            return Err(self.say(
-                "/mesh",
-                Reason::WrongCount,
-                got,
-                "exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`",
-                "Give the mesh in one form.",
-            ));
-        }
-        if let Some(grid) = &input.grid {
-            self.found.took(mesh::check_grid(grid, "/mesh/grid"))?;
-            return Ok(mesh::grid_mesh(grid));
-        }
-        if let Some(inline) = &input.inline {
-            return self.found.took(mesh::inline_mesh(inline, "/mesh/inline"));
-        }
-        match external {
-            Some(found) => {
-                let found = self.found.took(found)?;
-                self.warnings.extend(found.warnings);
-                Ok(found.mesh)
+    fn source(&mut self, source: &MeshSource, external: Option<External>) -> Checked<Mesh> {
+        match source {
+            MeshSource::Grid(grid) => {
+                self.found.took(mesh::check_grid(grid, "/mesh/grid"))?;
+                Ok(mesh::grid_mesh(grid))
             }
-            None => Err(self.absent(input)),
+            MeshSource::Inline(inline) => {
+                self.found.took(mesh::inline_mesh(inline, "/mesh/inline"))
+            }
+            MeshSource::Gmsh(_) | MeshSource::Abaqus(_) | MeshSource::Stored(_) => match external {
+                Some(found) => {
+                    let found = self.found.took(found)?;
+                    self.warnings.extend(found.warnings);
+                    Ok(found.mesh)
+                }
+                None => Err(self.absent(source)),
+            },
         }
     }
 
+    /// No element is folded or numbered clockwise.
+    fn upright(&mut self, mesh: &Mesh, source: &MeshSource) -> Checked {
+        self.found.took(match source {
+            // straight-sided grids need no look at their corners, and stay what they are when refined
+            MeshSource::Grid(_) => mesh::check_inverted(mesh, false, |_| "/mesh".to_owned(), ""),
+            MeshSource::Inline(_) => {
+                let element = |e| format!("/mesh/inline/elements/{e}");
+                mesh::check_inverted(mesh, true, element, "")
+            }
+            // what was read from a file was looked at there
+            MeshSource::Gmsh(_) | MeshSource::Abaqus(_) | MeshSource::Stored(_) => Ok(()),
+        })
+    }
+
     /// The caller has no mesh for what the problem names or quotes.
-    fn absent(&mut self, input: &MeshInput) -> Refused {
-        match &input.stored {
-            Some(hash) => self.say(
+    fn absent(&mut self, source: &MeshSource) -> Refused {
+        match source {
+            MeshSource::Stored(hash) => self.say(
                 "/mesh/stored",
                 Reason::UnknownMesh,
                 hash,
                 "a mesh that this service has stored",
                 "Upload it first (POST /v1/meshes); `signorini solve` has no store: give the mesh itself.",
             ),
-            None => self.say(
+            _ => self.say(
                 "/mesh",
                 Reason::UnknownMesh,
                 "a text that nobody has read",

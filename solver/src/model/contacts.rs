@@ -8,8 +8,9 @@ use crate::contact::ContactBoundary;
 use crate::contact::obstacle::{self, FacingRun, Profile};
 use crate::elasticity::Section;
 use crate::error::{All, Checked, Reason};
+use crate::friction::{Average, FrictionLaw};
 use crate::mesh::{self, Edge, Mesh};
-use crate::problem::{Condition, Contact, Friction, NormalOf, Obstacle, Problem, Step};
+use crate::problem::{Condition, Contact, NormalOf, Obstacle, Problem, Step};
 
 /// Cosine of the sharpest turn between two contact edges that goes without a warning: 20°.
 const SHARPEST_TURN: f64 = 0.94;
@@ -22,19 +23,20 @@ const SHARPEST_CORNER: f64 = 0.7;
 const LARGEST_RADIUS: f64 = 10.0;
 
 impl Checks {
-    /// Those contacts that are sound, and whether all are. `obstacles`: whether their numbers are.
+    /// Those contacts that are sound, and whether all are. `numbers`: whether those of its obstacle are, and
+    /// its friction law, for each of them.
     pub(super) fn contacts(
         &mut self,
         mesh: &Mesh,
         section: &Section,
         problem: &Problem,
-        obstacles: &[Checked],
+        numbers: Vec<(Checked, Option<FrictionLaw<Average>>)>,
         fixed: &BTreeMap<u32, Held>,
     ) -> (Vec<ContactModel>, Checked) {
         let mut all = All::default();
         let mut models: Vec<ContactModel> = Vec::new();
-        for (i, obstacle) in obstacles.iter().enumerate() {
-            let contact = self.contact(mesh, section, &problem.contacts, i, *obstacle);
+        for (i, numbers) in numbers.into_iter().enumerate() {
+            let contact = self.contact(mesh, section, &problem.contacts, i, numbers);
             let Some(model) = all.take(contact) else {
                 continue;
             };
@@ -52,7 +54,7 @@ impl Checks {
         section: &Section,
         contacts: &[Contact],
         i: usize,
-        obstacle: Checked,
+        (obstacle, friction): (Checked, Option<FrictionLaw<Average>>),
     ) -> Checked<ContactModel> {
         let (contact, pointer) = (&contacts[i], format!("/contacts/{i}"));
         let same = |other: &Contact| other.boundary == contact.boundary;
@@ -69,7 +71,8 @@ impl Checks {
         obstacle?;
         let run = self.facing_run(mesh, edges, contact, &pointer)?;
         let mut boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
-        self.sound(&boundary, section, contact, &run, &pointer)?;
+        let radius = friction.as_ref().and_then(|law| law.bound.radius());
+        self.sound(&boundary, section, contact, radius, &run, &pointer)?;
         let push = turn_normals(&mut boundary, &run, contact.normal);
         let along = |(profile, push): (&Profile, &[f64; 2])| profile.distance * push[0];
         Ok(ContactModel {
@@ -83,7 +86,7 @@ impl Checks {
             normal: contact.normal,
             condition: contact.condition,
             power: power(&contact.obstacle),
-            friction: contact.friction.clone(),
+            friction,
         })
     }
 
@@ -112,6 +115,7 @@ impl Checks {
         boundary: &ContactBoundary,
         section: &Section,
         contact: &Contact,
+        radius: Option<f64>,
         run: &FacingRun,
         pointer: &str,
     ) -> Checked {
@@ -168,7 +172,7 @@ impl Checks {
                 "Write \"along\": \"arc_length\".",
             ));
         }
-        if let Some(radius) = contact.friction.as_ref().and_then(|f| f.nonlocal_radius) {
+        if let Some(radius) = radius {
             let most = LARGEST_RADIUS * boundary.s[last];
             all.take(self.require(
                 radius <= most,
@@ -340,10 +344,8 @@ impl Checks {
     }
 
     fn coarseness(&mut self, contact: &ContactModel) {
-        let averages = |f: &&Friction| f.coefficient.is_some_and(|mu| mu > 0.0);
-        let friction = contact.friction.as_ref().filter(averages);
-        let radius = friction.and_then(|f| f.nonlocal_radius);
-        let Some(radius) = radius.filter(|radius| *radius > 0.0) else {
+        let law = contact.friction.as_ref();
+        let Some(radius) = law.and_then(|law| law.bound.averaged_over()) else {
             return;
         };
         let boundary = &contact.boundary;

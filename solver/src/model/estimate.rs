@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::problem::{MeshInput, Problem, Refine};
+use crate::problem::{MeshInput, MeshSource, Problem, Refine};
 
 /// The cost of solving a problem on one core.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -46,17 +46,13 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Estimate {
     let mesh = &problem.mesh;
     let split = 4f64.powi(halvings(mesh));
     let adaptive = matches!(mesh.refine, Refine::Adaptive(_));
-    let text = mesh.gmsh.as_ref().or(mesh.abaqus.as_ref());
-    let elements = match (&mesh.grid, &mesh.inline) {
-        (Some(grid), _) => {
+    let elements = match &mesh.source {
+        MeshSource::Grid(grid) => {
             grid.x.len().saturating_sub(1) as f64 * grid.y.len().saturating_sub(1) as f64
         }
-        (None, Some(inline)) => inline.elements.len() as f64,
-        (None, None) => match (text, stored) {
-            (Some(text), _) => text.len() as f64 / BYTES_PER_ELEMENT,
-            (None, Some(size)) => size.elements as f64,
-            (None, None) => 0.0,
-        },
+        MeshSource::Inline(inline) => inline.elements.len() as f64,
+        MeshSource::Gmsh(text) | MeshSource::Abaqus(text) => text.len() as f64 / BYTES_PER_ELEMENT,
+        MeshSource::Stored(_) => stored.map_or(0.0, |size| size.elements as f64),
     };
     // A large mesh has three nodes an element, a small one up to eight.
     let n = match adaptive {
@@ -99,16 +95,17 @@ fn halvings(mesh: &MeshInput) -> i32 {
 fn contact_dofs(problem: &Problem, stored: Option<&MeshSize>, side: f64) -> f64 {
     let mesh = &problem.mesh;
     let split = 2f64.powi(halvings(mesh));
-    let edges = |name: &str| match (&mesh.grid, &mesh.inline) {
-        (Some(grid), _) if name == "left" || name == "right" => grid.y.len() as f64 * split,
-        (Some(grid), _) => grid.x.len() as f64 * split,
-        (None, Some(inline)) => inline
-            .boundaries
-            .get(name)
-            .map_or(side, |edges| edges.len() as f64 * split),
-        (None, None) => stored
-            .and_then(|size| size.boundaries.get(name))
-            .map_or(side, |edges| *edges as f64 * split),
+    let edges = |name: &str| {
+        let given = match &mesh.source {
+            MeshSource::Grid(grid) if name == "left" || name == "right" => Some(grid.y.len()),
+            MeshSource::Grid(grid) => Some(grid.x.len()),
+            MeshSource::Inline(inline) => inline.boundaries.get(name).map(Vec::len),
+            MeshSource::Gmsh(_) | MeshSource::Abaqus(_) => None,
+            MeshSource::Stored(_) => stored
+                .and_then(|size| size.boundaries.get(name))
+                .map(|edges| *edges as usize),
+        };
+        given.map_or(side, |edges| edges as f64 * split)
     };
     let name = |boundary: &str| {
         mesh.boundaries

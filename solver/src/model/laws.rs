@@ -2,45 +2,13 @@
 //! each other.
 
 use super::checks::Checks;
-use crate::error::{All, Checked, Reason, Refused};
+use crate::error::{All, Checked, Reason};
+use crate::friction::{Average, BoundLaw, FrictionLaw};
 use crate::problem::{
     Analysis, Condition, Contact, Friction, History, Measure, Obstacle, PrescribedBound, Transition,
 };
 
 impl Checks {
-    /// What a contact says of its friction, and whether the two go together.
-    pub(super) fn friction(
-        &mut self,
-        analysis: &Analysis,
-        contact: &Contact,
-        pointer: &str,
-    ) -> Checked {
-        let mut all = All::default();
-        match (&contact.friction, contact.condition) {
-            (Some(_), Condition::Bonded) => all.refuse(self.say(
-                pointer,
-                Reason::NotUsed,
-                "friction on a bonded contact",
-                "none: what is bonded does not slide",
-                "Leave `friction` out, or choose another `condition`.",
-            )),
-            (friction, Condition::None) if friction.as_ref().is_none_or(|f| f.bound.is_none()) => {
-                all.refuse(self.say(
-                    format!("{pointer}/bound"),
-                    Reason::Missing,
-                    "nothing",
-                    "a prescribed friction bound",
-                    "Without an obstacle there is no pressure that a bound could follow from.",
-                ));
-            }
-            _ => {}
-        }
-        if let Some(friction) = &contact.friction {
-            all.take(self.friction_numbers(analysis, friction, pointer));
-        }
-        all.then(())
-    }
-
     /// The numbers of an obstacle.
     pub(super) fn obstacle(&mut self, obstacle: &Obstacle, pointer: &str) -> Checked {
         let mut all = All::default();
@@ -158,15 +126,61 @@ impl Checks {
         all.then(())
     }
 
-    fn friction_numbers(
+    /// The friction law of a contact, where all its parts are there; and whether its numbers are in their
+    /// range and go with the contact.
+    pub(super) fn friction(
         &mut self,
         analysis: &Analysis,
+        contact: &Contact,
+        pointer: &str,
+    ) -> (Option<FrictionLaw<Average>>, Checked) {
+        let mut all = All::default();
+        match (&contact.friction, contact.condition) {
+            (Some(_), Condition::Bonded) => all.refuse(self.say(
+                pointer,
+                Reason::NotUsed,
+                "friction on a bonded contact",
+                "none: what is bonded does not slide",
+                "Leave `friction` out, or choose another `condition`.",
+            )),
+            (friction, Condition::None) if friction.as_ref().is_none_or(|f| f.bound.is_none()) => {
+                all.refuse(self.say(
+                    format!("{pointer}/bound"),
+                    Reason::Missing,
+                    "nothing",
+                    "a prescribed friction bound",
+                    "Without an obstacle there is no pressure that a bound could follow from.",
+                ));
+            }
+            _ => {}
+        }
+        let Some(friction) = &contact.friction else {
+            return (None, all.then(()));
+        };
+        let (bound, sound) = match &friction.bound {
+            Some(bound) => self.prescribed_bound(friction, bound, pointer),
+            None => self.pressure_bound(friction, pointer),
+        };
+        all.take(sound);
+        all.take(self.slip(analysis, friction, pointer));
+        let law = bound.map(|bound| FrictionLaw {
+            bound,
+            elastic_slip: friction.elastic_slip,
+            transition: friction.transition,
+            history: friction.history,
+            points: friction.points,
+        });
+        (law, all.then(()))
+    }
+
+    /// A bound that follows from the pressure.
+    fn pressure_bound(
+        &mut self,
         friction: &Friction,
         pointer: &str,
-    ) -> Checked {
+    ) -> (Option<BoundLaw<Average>>, Checked) {
         let mut all = All::default();
         let at = |field: &str| format!("{pointer}/{field}");
-        let prescribed = friction.bound.is_some();
         let numbers = [
             (
                 "coefficient",
@@ -182,28 +196,17 @@ impl Checks {
             ),
         ];
         for (name, value, expected, hint) in numbers {
-            match value {
-                None if !prescribed => all.refuse(self.say(
+            all.take(match value {
+                Some(value) => self.require(value >= 0.0, at(name), value, expected, hint),
+                None => Err(self.say(
                     at(name),
                     Reason::Missing,
                     "nothing",
                     format!("{expected}, or a `bound`"),
                     hint,
                 )),
-                Some(_) if prescribed => all.refuse(self.excluded(&at(name))),
-                Some(value) => {
-                    all.take(self.require(value >= 0.0, at(name), value, expected, hint));
-                }
-                None => {}
-            }
+            });
         }
-        all.take(self.require(
-            friction.elastic_slip > 0.0,
-            at("elastic_slip"),
-            friction.elastic_slip,
-            "a length > 0",
-            "About 1e-4 of the contact's width; below 1e-5 nothing physical changes.",
-        ));
         all.take(self.require(
             friction.cohesion >= 0.0,
             at("cohesion"),
@@ -215,28 +218,79 @@ impl Checks {
             let hint = "The largest tangential stress that the surface bears.";
             all.take(self.require(cap > 0.0, at("shear_cap"), cap, "a stress > 0", hint));
         }
-        if prescribed && friction.cohesion != 0.0 {
-            all.refuse(self.excluded(&at("cohesion")));
-        }
-        if prescribed && friction.shear_cap.is_some() {
-            all.refuse(self.excluded(&at("shear_cap")));
-        }
-        match &friction.bound {
-            Some(PrescribedBound::Constant(bound)) => {
-                let hint = "The tangential stress at which the surface slips.";
-                all.take(self.require(*bound >= 0.0, at("bound"), *bound, "a stress ≥ 0", hint));
+        let law = match (friction.coefficient, friction.nonlocal_radius) {
+            (Some(coefficient), Some(radius)) => Some(BoundLaw::Pressure {
+                coefficient,
+                cohesion: friction.cohesion,
+                shear_cap: friction.shear_cap.unwrap_or(f64::INFINITY),
+                average: Average {
+                    radius,
+                    kernel: friction.kernel,
+                    normalization: friction.normalization,
+                    measure: friction.measure,
+                },
+            }),
+            _ => None,
+        };
+        (law, all.then(()))
+    }
+
+    /// A bound that is given, alone.
+    fn prescribed_bound(
+        &mut self,
+        friction: &Friction,
+        bound: &PrescribedBound,
+        pointer: &str,
+    ) -> (Option<BoundLaw<Average>>, Checked) {
+        let mut all = All::default();
+        let at = |field: &str| format!("{pointer}/{field}");
+        for (name, given) in [
+            ("coefficient", friction.coefficient.is_some()),
+            ("nonlocal_radius", friction.nonlocal_radius.is_some()),
+            ("cohesion", friction.cohesion != 0.0),
+            ("shear_cap", friction.shear_cap.is_some()),
+        ] {
+            if given {
+                all.refuse(self.say(
+                    at(name),
+                    Reason::NotUsed,
+                    "a value beside `bound`",
+                    "one of the two",
+                    "A prescribed bound knows nothing of pressure; remove this field or `bound`.",
+                ));
             }
-            Some(PrescribedBound::Table(table)) => {
+        }
+        let (stress, hint) = (
+            "a stress ≥ 0",
+            "The tangential stress at which the surface slips.",
+        );
+        match bound {
+            PrescribedBound::Constant(bound) => {
+                all.take(self.require(*bound >= 0.0, at("bound"), *bound, stress, hint));
+            }
+            PrescribedBound::Table(table) => {
                 let (s, bound) = (at("bound/s"), at("bound/bound"));
                 all.take(self.table(&s, &table.s, &bound, &table.bound, "friction bound"));
                 if let Some(i) = table.bound.iter().position(|b| *b < 0.0) {
-                    let hint = "The tangential stress at which the surface slips.";
                     let place = format!("{bound}/{i}");
-                    all.take(self.require(false, place, table.bound[i], "a stress ≥ 0", hint));
+                    all.take(self.require(false, place, table.bound[i], stress, hint));
                 }
             }
-            None => {}
         }
+        (Some(BoundLaw::Prescribed(bound.clone())), all.then(()))
+    }
+
+    /// How a law goes from stick to slip.
+    fn slip(&mut self, analysis: &Analysis, friction: &Friction, pointer: &str) -> Checked {
+        let mut all = All::default();
+        let at = |field: &str| format!("{pointer}/{field}");
+        all.take(self.require(
+            friction.elastic_slip > 0.0,
+            at("elastic_slip"),
+            friction.elastic_slip,
+            "a length > 0",
+            "About 1e-4 of the contact's width; below 1e-5 nothing physical changes.",
+        ));
         if friction.history == History::Incremental && friction.transition != Transition::Linear {
             all.refuse(self.say(
                 at("transition"),
@@ -257,15 +311,5 @@ impl Checks {
             ));
         }
         all.then(())
-    }
-
-    fn excluded(&mut self, pointer: &str) -> Refused {
-        self.say(
-            pointer,
-            Reason::NotUsed,
-            "a value beside `bound`",
-            "one of the two",
-            "A prescribed bound knows nothing of pressure; remove this field or `bound`.",
-        )
     }
 }

@@ -6,7 +6,7 @@ use super::checks::Checks;
 use crate::elasticity::{self, Moduli, Section};
 use crate::error::{All, Checked, Reason};
 use crate::mesh::Mesh;
-use crate::problem::{Analysis, Material};
+use crate::problem::{Analysis, Elasticity, Material, Orthotropic};
 
 impl Checks {
     /// The theory with the materials of all elements.
@@ -39,92 +39,92 @@ impl Checks {
         })
     }
 
-    fn moduli(&mut self, analysis: &Analysis, m: &Material, pointer: &str) -> Checked<Moduli> {
-        let mut all = All::default();
-        let at = |field: &str| format!("{pointer}/{field}");
-        if let Some(material) = &m.orthotropic {
-            for (name, value) in [
-                ("youngs_modulus", m.youngs_modulus),
-                ("poissons_ratio", m.poissons_ratio),
-            ] {
-                if value.is_some() {
-                    all.refuse(self.say(
-                        at(name),
-                        Reason::WrongCount,
-                        "an isotropic constant beside `orthotropic`",
-                        "one of the two forms",
-                        "Remove it, or remove `orthotropic`.",
-                    ));
-                }
-            }
-            let sheet = matches!(analysis, Analysis::PlaneStress { .. });
-            for (name, value) in [
-                ("e3", material.e3),
-                ("nu13", material.nu13),
-                ("nu23", material.nu23),
-            ] {
-                if value.is_none() && !sheet {
-                    all.refuse(self.say(
-                        at(&format!("orthotropic/{name}")),
-                        Reason::Missing,
-                        "nothing",
-                        format!("a value for `{name}`"),
-                        "Only in plane stress the third direction does not matter.",
-                    ));
-                }
-            }
-            let moduli = [
-                ("e1", Some(material.e1)),
-                ("e2", Some(material.e2)),
-                ("g12", Some(material.g12)),
-                ("e3", material.e3),
-            ];
-            for (name, value) in moduli {
-                if let Some(value) = value {
-                    let place = at(&format!("orthotropic/{name}"));
-                    all.take(self.require(value > 0.0, place, value, "a stress > 0", "A modulus."));
-                }
-            }
-            all.then(())?;
-            return elasticity::orthotropic(analysis, material).ok_or_else(|| {
-                self.say(
-                    at("orthotropic"),
-                    Reason::OutOfRange,
-                    format!("nu12 = {}{}{}", material.nu12, named("nu13", material.nu13), named("nu23", material.nu23)),
-                    "constants of a stable material, e.g. nu12² < e1/e2",
-                    "Some strain would cost no energy. Check which of nu12 and nu21 is meant: nu12 = −ε_2/ε_1 under σ_1.",
-                )
-            });
+    fn moduli(
+        &mut self,
+        analysis: &Analysis,
+        material: &Material,
+        pointer: &str,
+    ) -> Checked<Moduli> {
+        match &material.elasticity {
+            Elasticity::Isotropic {
+                youngs_modulus,
+                poissons_ratio,
+            } => self.isotropic(analysis, *youngs_modulus, *poissons_ratio, pointer),
+            Elasticity::Orthotropic(constants) => self.orthotropic(analysis, constants, pointer),
         }
-        let mut given = |name: &str, value: Option<f64>| {
-            value.ok_or_else(|| {
-                self.say(
+    }
+
+    fn isotropic(
+        &mut self,
+        analysis: &Analysis,
+        e: f64,
+        nu: f64,
+        pointer: &str,
+    ) -> Checked<Moduli> {
+        let mut all = All::default();
+        all.take(self.require(
+            e > 0.0,
+            format!("{pointer}/youngs_modulus"),
+            e,
+            "a stress > 0",
+            "Young's modulus E.",
+        ));
+        all.take(self.require(
+            nu > -1.0 && nu < 0.5,
+            format!("{pointer}/poissons_ratio"),
+            nu,
+            "−1 < Poisson's ratio < 0.5",
+            "For a nearly incompressible body use a value such as 0.49.",
+        ));
+        all.then(elasticity::isotropic(analysis, e, nu))
+    }
+
+    fn orthotropic(
+        &mut self,
+        analysis: &Analysis,
+        constants: &Orthotropic,
+        pointer: &str,
+    ) -> Checked<Moduli> {
+        let mut all = All::default();
+        let at = |field: &str| format!("{pointer}/orthotropic/{field}");
+        let sheet = matches!(analysis, Analysis::PlaneStress { .. });
+        for (name, value) in [
+            ("e3", constants.e3),
+            ("nu13", constants.nu13),
+            ("nu23", constants.nu23),
+        ] {
+            if value.is_none() && !sheet {
+                all.refuse(self.say(
                     at(name),
                     Reason::Missing,
                     "nothing",
                     format!("a value for `{name}`"),
-                    "Or give `orthotropic`.",
-                )
-            })
-        };
-        let (e, nu) = (
-            given("youngs_modulus", m.youngs_modulus),
-            given("poissons_ratio", m.poissons_ratio),
-        );
-        if let Ok(e) = e {
-            let place = at("youngs_modulus");
-            all.take(self.require(e > 0.0, place, e, "a stress > 0", "Young's modulus E."));
+                    "Only in plane stress the third direction does not matter.",
+                ));
+            }
         }
-        if let Ok(nu) = nu {
-            all.take(self.require(
-                nu > -1.0 && nu < 0.5,
-                at("poissons_ratio"),
-                nu,
-                "−1 < Poisson's ratio < 0.5",
-                "For a nearly incompressible body use a value such as 0.49.",
-            ));
+        let moduli = [
+            ("e1", Some(constants.e1)),
+            ("e2", Some(constants.e2)),
+            ("g12", Some(constants.g12)),
+            ("e3", constants.e3),
+        ];
+        for (name, value) in moduli {
+            if let Some(value) = value {
+                all.take(self.require(value > 0.0, at(name), value, "a stress > 0", "A modulus."));
+            }
         }
-        all.then(elasticity::isotropic(analysis, e?, nu?))
+        all.then(())?;
+        elasticity::orthotropic(analysis, constants).ok_or_else(|| {
+            let (nu13, nu23) = (named("nu13", constants.nu13), named("nu23", constants.nu23));
+            self.say(
+                format!("{pointer}/orthotropic"),
+                Reason::OutOfRange,
+                format!("nu12 = {}{nu13}{nu23}", constants.nu12),
+                "constants of a stable material, e.g. nu12² < e1/e2",
+                "Some strain would cost no energy. Check which of nu12 and nu21 is meant: nu12 = −ε_2/ε_1 under σ_1.",
+            )
+        })
     }
 
     /// The material of every element: that of its group, else the one without a group.

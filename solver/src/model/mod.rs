@@ -22,8 +22,9 @@ use checks::Checks;
 use crate::contact::ContactBoundary;
 use crate::elasticity::{Loads, Section};
 use crate::error::{All, Checked, Violation};
+use crate::friction::{Average, FrictionLaw};
 use crate::mesh::{External, Mesh};
-use crate::problem::{Condition, Friction, NormalOf, Problem, SolverControls, Step};
+use crate::problem::{Condition, NormalOf, Problem, SolverControls, Step};
 use crate::solution::Warning;
 
 /// A problem that can be solved.
@@ -117,7 +118,7 @@ pub struct ContactModel {
     /// m where the profile is a power |c|^m: a contact's width then grows like δ^(1/m).
     pub power: Option<f64>,
     /// Absent: frictionless.
-    pub friction: Option<Friction>,
+    pub friction: Option<FrictionLaw<Average>>,
 }
 
 impl ContactModel {
@@ -154,11 +155,13 @@ impl Checks {
         all.take(self.controls(problem));
         all.take(self.thesis(problem));
         all.take(self.steps(&problem.steps));
-        let mut obstacles = Vec::new();
+        let mut numbers = Vec::new();
         for (i, contact) in problem.contacts.iter().enumerate() {
-            let pointer = format!("/contacts/{i}");
-            obstacles.push(self.obstacle(&contact.obstacle, &format!("{pointer}/obstacle")));
-            all.take(self.friction(&analysis, contact, &format!("{pointer}/friction")));
+            let at = |field: &str| format!("/contacts/{i}/{field}");
+            let obstacle = self.obstacle(&contact.obstacle, &at("obstacle"));
+            let (friction, sound) = self.friction(&analysis, contact, &at("friction"));
+            all.take(sound);
+            numbers.push((obstacle, friction));
         }
         let mut mesh = self.mesh(&problem.mesh, external, &analysis, problem.contacts.len())?;
         all.take(self.names(&mut mesh, &problem.mesh));
@@ -170,7 +173,7 @@ impl Checks {
         let (fixed, supported) = self.supports(&mesh, &section, &problem.supports);
         all.take(supported);
         let loads = self.loads(&mesh, &section, &problem.loads);
-        let (contacts, sound) = self.contacts(&mesh, &section, problem, &obstacles, &fixed);
+        let (contacts, sound) = self.contacts(&mesh, &section, problem, numbers, &fixed);
         all.take(sound);
         let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);
         all.then(())?;

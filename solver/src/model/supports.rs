@@ -6,8 +6,9 @@ use super::checks::{ALIGNED, AXIS, Checks};
 use super::{ContactModel, Model};
 use crate::elasticity::Section;
 use crate::error::{All, Checked, Reason};
+use crate::friction::{Average, FrictionLaw};
 use crate::mesh::{Edge, Mesh};
-use crate::problem::{BoundaryValue, Condition, Friction, PrescribedBound, Support};
+use crate::problem::{BoundaryValue, Condition, Support};
 
 /// Where a support holds.
 enum Place<'a> {
@@ -356,18 +357,10 @@ fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<(u32, [f64; 2])> {
 
 /// The motions of its nodes that a contact hinders while it touches.
 fn hindered(contact: &ContactModel) -> Vec<(u32, [f64; 2])> {
-    let acts = |f: &Friction| {
-        f.coefficient.is_some_and(|mu| mu > 0.0)
-            || f.cohesion > 0.0
-            || match &f.bound {
-                Some(PrescribedBound::Constant(bound)) => *bound > 0.0,
-                Some(PrescribedBound::Table(table)) => table.bound.iter().any(|b| *b > 0.0),
-                None => false,
-            }
-    };
+    let holds = |law: &FrictionLaw<Average>| law.bound.holds();
     let normal = contact.condition != Condition::None;
     let tangent =
-        contact.condition == Condition::Bonded || contact.friction.as_ref().is_some_and(acts);
+        contact.condition == Condition::Bonded || contact.friction.as_ref().is_some_and(holds);
     let boundary = &contact.boundary;
     let mut hindered = Vec::new();
     for (i, &node) in boundary.nodes.iter().enumerate() {

@@ -3,42 +3,177 @@
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::ser::SerializeStruct;
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::element::Element;
+use crate::error::{Reason, Violation};
 
-/// Where the elements come from: exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+/// The body cut into elements: exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`; and names for
+/// parts of it.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(try_from = "MeshFields")]
+#[schemars(with = "MeshFields", extend("oneOf" = [
+    {"required": ["grid"]},
+    {"required": ["inline"]},
+    {"required": ["gmsh"]},
+    {"required": ["abaqus"]},
+    {"required": ["stored"]},
+]))]
 pub struct MeshInput {
-    /// A grid of lines, with the boundaries `left`, `right`, `bottom`, `top`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub grid: Option<Grid>,
+    /// Where the elements come from.
+    pub source: MeshSource,
+    /// How often every element is split into four, or the tolerance that a grid is refined to.
+    pub refine: Refine,
+    /// Further names for parts of boundaries.
+    pub boundaries: BTreeMap<String, BoundaryPart>,
+    /// Names for groups of elements.
+    pub groups: BTreeMap<String, ElementRange>,
+}
+
+/// Where the elements come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MeshSource {
+    /// A grid of lines.
+    Grid(Grid),
     /// Nodes and elements, written out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub inline: Option<InlineMesh>,
+    Inline(InlineMesh),
+    /// The text of a Gmsh mesh.
+    Gmsh(String),
+    /// The text of an Abaqus or CalculiX deck.
+    Abaqus(String),
+    /// The hash of a mesh that was uploaded to the service, `sha256:…`.
+    Stored(String),
+}
+
+impl MeshInput {
+    /// Elements from one source, as they are.
+    pub fn new(source: MeshSource) -> Self {
+        MeshInput {
+            source,
+            refine: Refine::default(),
+            boundaries: BTreeMap::new(),
+            groups: BTreeMap::new(),
+        }
+    }
+
+    /// The grid, where it is one.
+    pub fn grid(&self) -> Option<&Grid> {
+        match &self.source {
+            MeshSource::Grid(grid) => Some(grid),
+            _ => None,
+        }
+    }
+
+    /// The grid, where it is one, to be changed.
+    pub fn grid_mut(&mut self) -> Option<&mut Grid> {
+        match &mut self.source {
+            MeshSource::Grid(grid) => Some(grid),
+            _ => None,
+        }
+    }
+
+    /// The hash of the stored mesh, where it is one.
+    pub fn stored(&self) -> Option<&str> {
+        match &self.source {
+            MeshSource::Stored(hash) => Some(hash),
+            _ => None,
+        }
+    }
+}
+
+/// A mesh as it is written: one source must be there, for [`MeshInput`] to say.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct MeshFields {
+    /// A grid of lines, with the boundaries `left`, `right`, `bottom`, `top`.
+    #[serde(default)]
+    grid: Option<Grid>,
+    /// Nodes and elements, written out.
+    #[serde(default)]
+    inline: Option<InlineMesh>,
     /// The text of a Gmsh mesh (MSH 2.2 or 4.1, ASCII): physical curves become boundaries, physical
     /// surfaces groups, physical points node sets.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub gmsh: Option<String>,
+    #[serde(default)]
+    gmsh: Option<String>,
     /// The text of an Abaqus or CalculiX deck: surfaces and, where their nodes span edges, node sets
     /// become boundaries, element sets groups, node sets node sets. What it says of the analysis is
     /// not used.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub abaqus: Option<String>,
+    #[serde(default)]
+    abaqus: Option<String>,
     /// The hash of a mesh that was uploaded to the service, `sha256:…`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stored: Option<String>,
+    #[serde(default)]
+    stored: Option<String>,
     /// How often every element is split into four (each time that many more unknowns), or the tolerance that a
     /// grid is refined to.
     #[serde(default)]
-    pub refine: Refine,
+    refine: Refine,
     /// Further names for parts of boundaries, e.g. `{"taper": {"side": "top", "x": [1, 3]}}`.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub boundaries: BTreeMap<String, BoundaryPart>,
+    #[serde(default)]
+    boundaries: BTreeMap<String, BoundaryPart>,
     /// Names for groups of elements, e.g. `{"inclusion": {"x": [1, 2], "y": [-1, 0]}}`.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub groups: BTreeMap<String, ElementRange>,
+    #[serde(default)]
+    groups: BTreeMap<String, ElementRange>,
+}
+
+impl TryFrom<MeshFields> for MeshInput {
+    type Error = Violation;
+
+    #[rustfmt::skip] // a source in a row
+    fn try_from(fields: MeshFields) -> Result<MeshInput, Violation> {
+        let MeshFields { grid, inline, gmsh, abaqus, stored, refine, boundaries, groups } = fields;
+        let given = [
+            ("grid", grid.is_some()),
+            ("inline", inline.is_some()),
+            ("gmsh", gmsh.is_some()),
+            ("abaqus", abaqus.is_some()),
+            ("stored", stored.is_some()),
+        ];
+        let source = match (grid, inline, gmsh, abaqus, stored) {
+            (Some(grid), None,         None,       None,       None)       => MeshSource::Grid(grid),
+            (None,       Some(inline), None,       None,       None)       => MeshSource::Inline(inline),
+            (None,       None,         Some(text), None,       None)       => MeshSource::Gmsh(text),
+            (None,       None,         None,       Some(text), None)       => MeshSource::Abaqus(text),
+            (None,       None,         None,       None,       Some(hash)) => MeshSource::Stored(hash),
+            _ => return Err(Violation::new(
+                "",
+                Reason::WrongCount,
+                super::given(&given),
+                "exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`",
+                "Give the mesh in one form.",
+            )),
+        };
+        Ok(MeshInput { source, refine, boundaries, groups })
+    }
+}
+
+/// By hand: into fields of its own it would be copied first, and it may be large.
+impl Serialize for MeshInput {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let MeshInput {
+            source,
+            refine,
+            boundaries,
+            groups,
+        } = self;
+        let count = 2 + usize::from(!boundaries.is_empty()) + usize::from(!groups.is_empty());
+        let mut fields = serializer.serialize_struct("MeshInput", count)?;
+        match source {
+            MeshSource::Grid(grid) => fields.serialize_field("grid", grid)?,
+            MeshSource::Inline(inline) => fields.serialize_field("inline", inline)?,
+            MeshSource::Gmsh(text) => fields.serialize_field("gmsh", text)?,
+            MeshSource::Abaqus(text) => fields.serialize_field("abaqus", text)?,
+            MeshSource::Stored(hash) => fields.serialize_field("stored", hash)?,
+        }
+        fields.serialize_field("refine", refine)?;
+        if !boundaries.is_empty() {
+            fields.serialize_field("boundaries", boundaries)?;
+        }
+        if !groups.is_empty() {
+            fields.serialize_field("groups", groups)?;
+        }
+        fields.end()
+    }
 }
 
 /// Refinement of a mesh.

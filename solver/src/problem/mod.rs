@@ -1,10 +1,12 @@
 //! What a client asks for: plain data, the JSON of the API word for word.
 //!
-//! Strict: unknown names are refused everywhere. Only `analysis`, `mesh` and `materials` are
-//! required, and in `friction` its three numbers. What the fields *mean together* is checked in
-//! [`Model::new`](crate::model::Model::new); nothing here computes.
+//! Strict: unknown names are refused everywhere, and so is what has not exactly one of its forms. Only
+//! `analysis`, `mesh` and `materials` are required, and in `friction` its three numbers. What the fields
+//! *mean together* is checked in [`Model::new`](crate::model::Model::new); nothing here computes.
 
 mod contact;
+mod load;
+mod material;
 mod mesh;
 mod solver;
 
@@ -12,7 +14,11 @@ pub use contact::{
     Along, BoundTable, Condition, Contact, Friction, FrictionPoints, History, Kernel, Measure,
     NormalOf, Normalization, Obstacle, PrescribedBound, Transition,
 };
-pub use mesh::{AdaptiveRefine, BoundaryPart, ElementRange, Grid, InlineMesh, MeshInput, Refine};
+pub use load::{Load, LoadFields};
+pub use material::{Elasticity, Material, MaterialFields, Orthotropic};
+pub use mesh::{
+    AdaptiveRefine, BoundaryPart, ElementRange, Grid, InlineMesh, MeshInput, MeshSource, Refine,
+};
 pub use solver::{Algorithm, SolverControls, Spacing, Step, ThesisOptions, ThesisPressure};
 
 use schemars::JsonSchema;
@@ -86,53 +92,6 @@ pub enum Analysis {
     /// Nodes on the axis stay there (u_r = 0) without a support.
     Axisymmetric {},
 }
-/// Linear elasticity: isotropic (`youngs_modulus` and `poissons_ratio`) or `orthotropic`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Material {
-    /// E > 0 (stress).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub youngs_modulus: Option<f64>,
-    /// −1 < ν < 0.5. Not the friction coefficient, which the thesis calls ν.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub poissons_ratio: Option<f64>,
-    /// Three axes of symmetry, two of them in the plane.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub orthotropic: Option<Orthotropic>,
-    /// The group of elements that is made of it; absent: all that no other material names.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub group: Option<String>,
-    /// A name for people.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-}
-
-/// Orthotropic elasticity with the axes 1 and 2 in the plane and 3 across it (the hoop direction in
-/// axisymmetry). ε_1 = σ_1/e1 − nu12 σ_2/e1 − nu13 σ_3/e1, and so on; nu_ij/e_i = nu_ji/e_j.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Orthotropic {
-    /// Modulus along axis 1, > 0 (stress).
-    pub e1: f64,
-    /// Modulus along axis 2, > 0 (stress).
-    pub e2: f64,
-    /// −ε_2/ε_1 under σ_1 alone.
-    pub nu12: f64,
-    /// Shear modulus in the plane, > 0 (stress).
-    pub g12: f64,
-    /// Angle from x to axis 1, counter-clockwise (degrees).
-    #[serde(default)]
-    pub angle: f64,
-    /// Modulus along axis 3, > 0 (stress); needed but in plane stress.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub e3: Option<f64>,
-    /// −ε_3/ε_1 under σ_1 alone; needed but in plane stress.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub nu13: Option<f64>,
-    /// −ε_3/ε_2 under σ_2 alone; needed but in plane stress.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub nu23: Option<f64>,
-}
 
 /// A value on a boundary: constant, or linear by arc length from the boundary's start to its end.
 /// A boundary runs with the body on its right (a top edge runs along +x).
@@ -170,42 +129,17 @@ pub struct Support {
     pub ut: Option<BoundaryValue>,
 }
 
-/// A load in one of its forms: on a boundary `pressure`, or `traction`, or `normal` and
-/// `tangential`, or `nodal`; on a set of nodes `force`; on the whole body `body_force`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Load {
-    /// Name of the boundary; none for a body force.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub boundary: Option<String>,
-    /// Name of a set of nodes, for `force`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub nodes: Option<String>,
-    /// Stress against the outward normal: positive pushes into the body.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pressure: Option<BoundaryValue>,
-    /// Stress along x and along y.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub traction: Option<[BoundaryValue; 2]>,
-    /// Stress along the outward normal: positive pulls.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub normal: Option<BoundaryValue>,
-    /// Stress along t, the outward normal turned clockwise.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tangential: Option<BoundaryValue>,
-    /// Forces `[fx, fy]` on the boundary's nodes (corner, midside, corner, …) from its start; in
-    /// axisymmetry on the whole ring.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub nodal: Option<Vec<[f64; 2]>>,
-    /// Force `[fx, fy]` on each node of the set; in axisymmetry on the whole ring.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub force: Option<[f64; 2]>,
-    /// Force per volume along x and y.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub body_force: Option<[f64; 2]>,
-}
-
 /// Gauss points of an element in each direction, where a problem says nothing of them.
 pub fn default_quadrature() -> u32 {
     3
+}
+
+/// What is given where exactly one should be, for a violation.
+fn given(fields: &[(&str, bool)]) -> String {
+    let given = fields.iter().filter(|(_, given)| *given);
+    let names: Vec<String> = given.map(|(name, _)| format!("`{name}`")).collect();
+    match names.is_empty() {
+        true => "none of them".to_owned(),
+        false => names.join(" and "),
+    }
 }

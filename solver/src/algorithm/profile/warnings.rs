@@ -3,7 +3,8 @@
 use super::PatchView;
 use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
-use crate::problem::{Condition, Friction};
+use crate::friction::{Average, BoundLaw, FrictionLaw};
+use crate::problem::Condition;
 use crate::solution::{Outcome, Warning};
 
 /// Error of a smooth peak times the square of the number of elements across.
@@ -33,7 +34,12 @@ impl PatchView<'_> {
                 message,
             });
         };
-        let jumps = |f: &Friction| f.cohesion > 0.0 && f.nonlocal_radius == Some(0.0);
+        let jumps = |law: &FrictionLaw<Average>| match &law.bound {
+            BoundLaw::Pressure {
+                cohesion, average, ..
+            } => *cohesion > 0.0 && average.radius == 0.0,
+            BoundLaw::Prescribed(_) => false,
+        };
         let settled = matches!(
             self.finished.outcome,
             Outcome::Converged | Outcome::Canceled
@@ -111,11 +117,7 @@ impl PatchView<'_> {
                 ),
             );
         }
-        let radius = contact
-            .friction
-            .as_ref()
-            .and_then(|f| f.nonlocal_radius)
-            .unwrap_or(0.0);
+        let radius = contact.friction.as_ref().and_then(|f| f.bound.radius());
         let first = (0..self.count()).find(|&i| self.active(i));
         let last = (0..self.count()).rfind(|&i| self.active(i));
         if let (Some(first), Some(last)) = (first, last) {
@@ -124,7 +126,7 @@ impl PatchView<'_> {
                 .filter(|&i| self.symmetric(i))
                 .count();
             let width = (s[last] - s[first]) * (1 + mirrored) as f64;
-            if radius > width && width > 0.0 {
+            if let Some(radius) = radius.filter(|radius| *radius > width && width > 0.0) {
                 warn(
                     "radius_exceeds_contact",
                     format!(
@@ -208,8 +210,9 @@ impl PatchView<'_> {
 
     /// The largest |σ_t| that a prescribed bound exerts on edges of which no node touches.
     fn bound_beyond_contact(&self) -> Option<f64> {
-        let friction = self.patch.contact.friction.as_ref()?;
-        friction.bound.as_ref()?;
+        let BoundLaw::Prescribed(_) = self.patch.contact.friction.as_ref()?.bound else {
+            return None;
+        };
         let open = |node: usize| !self.active(node - self.patch.first);
         let points = self.system.points.iter().zip(&self.finished.tractions);
         let largest = points
@@ -222,9 +225,7 @@ impl PatchView<'_> {
     /// before the solution.
     fn unresolved_radius(&self) -> Option<(f64, f64)> {
         let contact = &self.patch.contact;
-        let friction = contact.friction.as_ref()?;
-        friction.coefficient.filter(|mu| *mu > 0.0)?;
-        let radius = friction.nonlocal_radius.filter(|radius| *radius > 0.0)?;
+        let radius = contact.friction.as_ref()?.bound.averaged_over()?;
         let boundary = &contact.boundary;
         let length = |edge: usize| boundary.edge_arc(edge)[1] - boundary.edge_arc(edge)[0];
         let edges = || 0..boundary.edge_count();

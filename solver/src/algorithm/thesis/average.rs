@@ -24,14 +24,14 @@ pub(super) fn nonlocal(
     local_points: u32,
     s: f64,
 ) -> f64 {
-    let BoundLaw::Pressure { averaging, .. } = law else {
+    let BoundLaw::Pressure { average, .. } = law else {
         return 0.0;
     };
     let value = |stretch: &Stretch<'_>, y: f64| {
         let zeta = (2.0 * y - stretch.from - stretch.to) / (stretch.to - stretch.from);
         super::rows::linear(rule, stretch.values, zeta)
     };
-    let radius = averaging.radius();
+    let radius = average.radius();
     if radius == 0.0 {
         let own = stretches.iter().find(|t| t.from <= s && s <= t.to);
         return own.map_or(0.0, |own| value(own, s));
@@ -45,7 +45,7 @@ pub(super) fn nonlocal(
         }
         for (zeta, w) in &local {
             let y = low + 0.5 * (high - low) * (1.0 + zeta);
-            sum += 0.5 * (high - low) * w * averaging.omega(y - s) * value(stretch, y);
+            sum += 0.5 * (high - low) * w * average.omega(y - s) * value(stretch, y);
         }
     }
     sum
@@ -54,17 +54,24 @@ pub(super) fn nonlocal(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::friction::Chain;
-    use crate::problem::Friction;
+    use crate::friction::{Average, Chain};
+    use crate::problem::{Kernel, Measure, Normalization};
 
     /// A linear stress over two elements; the kernel within both: the average is the value itself.
     #[test]
     fn a_linear_stress_is_averaged_to_itself_within_two_elements() {
-        let friction: Friction = serde_json::from_str(
-            r#"{"coefficient": 0.3, "nonlocal_radius": 0.4, "elastic_slip": 1e-4}"#,
-        )
-        .unwrap();
-        let law = BoundLaw::new(&friction, Chain::plain(vec![0.0, 0.5, 1.0, 1.5, 2.0]));
+        let law = BoundLaw::Pressure {
+            coefficient: 0.3,
+            cohesion: 0.0,
+            shear_cap: f64::INFINITY,
+            average: Average {
+                radius: 0.4,
+                kernel: Kernel::Bump,
+                normalization: Normalization::UnitIntegral,
+                measure: Measure::Line,
+            },
+        };
+        let law = law.along(Chain::plain(vec![0.0, 0.5, 1.0, 1.5, 2.0]));
         let rule = gauss::of_order(3);
         let stress = |from: f64, to: f64| -> Vec<f64> {
             let at = |(zeta, _): &(f64, f64)| 5.0 - (from + 0.5 * (to - from) * (1.0 + zeta));

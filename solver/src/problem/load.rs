@@ -1,0 +1,209 @@
+//! Prescribed tractions and forces: each in exactly one form.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::BoundaryValue;
+use crate::error::{Reason, Violation};
+
+/// A load in exactly one form: on a boundary `pressure`, or `traction`, or `normal` and `tangential`
+/// (or one of them), or `nodal`; on a set of nodes `force`; on the whole body `body_force`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "LoadFields", into = "LoadFields")]
+#[schemars(extend("oneOf" = [
+    {"required": ["boundary", "pressure"], "properties": {"nodes": false}},
+    {"required": ["boundary", "traction"], "properties": {"nodes": false}},
+    {"required": ["boundary"], "anyOf": [{"required": ["normal"]}, {"required": ["tangential"]}], "properties": {"nodes": false}},
+    {"required": ["boundary", "nodal"], "properties": {"nodes": false}},
+    {"required": ["nodes", "force"], "properties": {"boundary": false}},
+    {"required": ["body_force"], "properties": {"boundary": false, "nodes": false}},
+]))]
+pub enum Load {
+    /// A stress against the outward normal of a boundary: positive pushes into the body.
+    Pressure(String, BoundaryValue),
+    /// A stress along x and along y on a boundary.
+    Traction(String, [BoundaryValue; 2]),
+    /// A stress along the outward normal of a boundary, positive pulls; and one along t, the outward normal
+    /// turned clockwise, where it is given.
+    Normal(String, BoundaryValue, Option<BoundaryValue>),
+    /// A stress along t on a boundary.
+    Tangential(String, BoundaryValue),
+    /// Forces on the nodes of a boundary (corner, midside, corner, …) from its start; in axisymmetry on the
+    /// whole ring.
+    Nodal(String, Vec<[f64; 2]>),
+    /// A force on each node of a set; in axisymmetry on the whole ring.
+    Force(String, [f64; 2]),
+    /// A force per volume on the whole body.
+    BodyForce([f64; 2]),
+}
+
+impl Load {
+    /// The boundary that it acts on, where it acts on one.
+    pub fn boundary(&self) -> Option<&str> {
+        match self {
+            Load::Pressure(boundary, _)
+            | Load::Traction(boundary, _)
+            | Load::Normal(boundary, _, _)
+            | Load::Tangential(boundary, _)
+            | Load::Nodal(boundary, _) => Some(boundary),
+            Load::Force(..) | Load::BodyForce(_) => None,
+        }
+    }
+}
+
+/// A load as it is written: what of it may stand together is for [`Load`] to say.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LoadFields {
+    /// Name of the boundary; absent for `force` and `body_force`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub boundary: Option<String>,
+    /// Name of a set of nodes, for `force`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nodes: Option<String>,
+    /// Stress against the outward normal: positive pushes into the body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure: Option<BoundaryValue>,
+    /// Stress along x and along y.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traction: Option<[BoundaryValue; 2]>,
+    /// Stress along the outward normal: positive pulls.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<BoundaryValue>,
+    /// Stress along t, the outward normal turned clockwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tangential: Option<BoundaryValue>,
+    /// Forces `[fx, fy]` on the boundary's nodes (corner, midside, corner, …) from its start; in
+    /// axisymmetry on the whole ring.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nodal: Option<Vec<[f64; 2]>>,
+    /// Force `[fx, fy]` on each node of the set; in axisymmetry on the whole ring.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force: Option<[f64; 2]>,
+    /// Force per volume along x and y.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_force: Option<[f64; 2]>,
+}
+
+impl TryFrom<LoadFields> for Load {
+    type Error = Violation;
+
+    #[rustfmt::skip] // a form in a row
+    fn try_from(fields: LoadFields) -> Result<Load, Violation> {
+        let LoadFields { boundary, nodes, pressure, traction, normal, tangential, nodal, force, body_force } = fields;
+        let given = [
+            ("pressure", pressure.is_some()),
+            ("traction", traction.is_some()),
+            ("normal", normal.is_some()),
+            ("tangential", tangential.is_some()),
+            ("nodal", nodal.is_some()),
+            ("force", force.is_some()),
+            ("body_force", body_force.is_some()),
+        ];
+        let on = || on_boundary(&boundary, &nodes);
+        match (pressure, traction, normal, tangential, nodal, force, body_force) {
+            (Some(p), None,    None,    None,    None,    None,    None)    => Ok(Load::Pressure(on()?, p)),
+            (None,    Some(t), None,    None,    None,    None,    None)    => Ok(Load::Traction(on()?, t)),
+            (None,    None,    Some(n), t,       None,    None,    None)    => Ok(Load::Normal(on()?, n, t)),
+            (None,    None,    None,    Some(t), None,    None,    None)    => Ok(Load::Tangential(on()?, t)),
+            (None,    None,    None,    None,    Some(f), None,    None)    => Ok(Load::Nodal(on()?, f)),
+            (None,    None,    None,    None,    None,    Some(f), None)    => Ok(Load::Force(on_nodes(&boundary, &nodes)?, f)),
+            (None,    None,    None,    None,    None,    None,    Some(f)) => {
+                nowhere(&boundary, &nodes)?;
+                Ok(Load::BodyForce(f))
+            }
+            _ => Err(Violation::new(
+                "",
+                Reason::WrongCount,
+                super::given(&given),
+                "exactly one of `pressure`, `traction`, `normal` and `tangential`, `nodal`, `force`, `body_force`",
+                "Write a load for each.",
+            )),
+        }
+    }
+}
+
+fn on_boundary(boundary: &Option<String>, nodes: &Option<String>) -> Result<String, Violation> {
+    let hint = "Stresses act on a boundary, a `force` on `nodes`, a body force on the whole body.";
+    let (place, reason, got) = match (boundary, nodes) {
+        (Some(boundary), None) => return Ok(boundary.clone()),
+        (_, Some(_)) => (
+            "/nodes",
+            Reason::NotUsed,
+            "a set of nodes for a load that is no `force`",
+        ),
+        (None, None) => ("/boundary", Reason::Missing, "nothing"),
+    };
+    let expected = "the name of a boundary";
+    Err(Violation::new(place, reason, got, expected, hint))
+}
+
+fn on_nodes(boundary: &Option<String>, nodes: &Option<String>) -> Result<String, Violation> {
+    match (boundary, nodes) {
+        (None, Some(nodes)) => Ok(nodes.clone()),
+        _ => Err(Violation::new(
+            "/nodes",
+            Reason::Missing,
+            "no set of nodes, or a boundary beside it",
+            "the name of a set of nodes, and no boundary",
+            "A `force` acts on each node of a set; on a boundary give `nodal` forces or a traction.",
+        )),
+    }
+}
+
+fn nowhere(boundary: &Option<String>, nodes: &Option<String>) -> Result<(), Violation> {
+    let place = match (boundary, nodes) {
+        (None, None) => return Ok(()),
+        (Some(_), _) => "/boundary",
+        (None, Some(_)) => "/nodes",
+    };
+    Err(Violation::new(
+        place,
+        Reason::NotUsed,
+        "a place for a body force",
+        "none: it acts on the whole body",
+        "Remove it, or give a traction.",
+    ))
+}
+
+impl From<Load> for LoadFields {
+    fn from(load: Load) -> LoadFields {
+        let empty = LoadFields::default();
+        let on = |boundary: String| LoadFields {
+            boundary: Some(boundary),
+            ..LoadFields::default()
+        };
+        match load {
+            Load::Pressure(boundary, pressure) => LoadFields {
+                pressure: Some(pressure),
+                ..on(boundary)
+            },
+            Load::Traction(boundary, traction) => LoadFields {
+                traction: Some(traction),
+                ..on(boundary)
+            },
+            Load::Normal(boundary, normal, tangential) => LoadFields {
+                normal: Some(normal),
+                tangential,
+                ..on(boundary)
+            },
+            Load::Tangential(boundary, tangential) => LoadFields {
+                tangential: Some(tangential),
+                ..on(boundary)
+            },
+            Load::Nodal(boundary, nodal) => LoadFields {
+                nodal: Some(nodal),
+                ..on(boundary)
+            },
+            Load::Force(nodes, force) => LoadFields {
+                nodes: Some(nodes),
+                force: Some(force),
+                ..empty
+            },
+            Load::BodyForce(body_force) => LoadFields {
+                body_force: Some(body_force),
+                ..empty
+            },
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Linear elasticity, and which elements are made of it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Reason, Violation};
+
+/// Linear elasticity: isotropic (`youngs_modulus` and `poissons_ratio`) or `orthotropic`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "MaterialFields", into = "MaterialFields")]
+#[schemars(extend(
+    "if" = {"required": ["orthotropic"]},
+    "then" = {"properties": {"youngs_modulus": false, "poissons_ratio": false}},
+    "else" = {"required": ["youngs_modulus", "poissons_ratio"]},
+))]
+pub struct Material {
+    /// Its constants.
+    pub elasticity: Elasticity,
+    /// The group of elements that is made of it; absent: all that no other material names.
+    pub group: Option<String>,
+    /// A name for people.
+    pub name: Option<String>,
+}
+
+/// Constants of linear elasticity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Elasticity {
+    /// The same in all directions.
+    Isotropic {
+        /// E > 0 (stress).
+        youngs_modulus: f64,
+        /// −1 < ν < 0.5.
+        poissons_ratio: f64,
+    },
+    /// Three axes of symmetry, two of them in the plane.
+    Orthotropic(Orthotropic),
+}
+
+/// A material as it is written: what of it may stand together is for [`Material`] to say.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialFields {
+    /// E > 0 (stress).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub youngs_modulus: Option<f64>,
+    /// −1 < ν < 0.5. Not the friction coefficient, which the thesis calls ν.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poissons_ratio: Option<f64>,
+    /// Three axes of symmetry, two of them in the plane.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orthotropic: Option<Orthotropic>,
+    /// The group of elements that is made of it; absent: all that no other material names.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
+    /// A name for people.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+}
+
+impl TryFrom<MaterialFields> for Material {
+    type Error = Violation;
+
+    fn try_from(fields: MaterialFields) -> Result<Material, Violation> {
+        let MaterialFields {
+            youngs_modulus,
+            poissons_ratio,
+            orthotropic,
+            group,
+            name,
+        } = fields;
+        let elasticity = match (youngs_modulus, poissons_ratio, orthotropic) {
+            (Some(youngs_modulus), Some(poissons_ratio), None) => Elasticity::Isotropic {
+                youngs_modulus,
+                poissons_ratio,
+            },
+            (None, None, Some(orthotropic)) => Elasticity::Orthotropic(orthotropic),
+            (None, _, None) => return Err(missing("youngs_modulus")),
+            (Some(_), None, None) => return Err(missing("poissons_ratio")),
+            (Some(_), _, Some(_)) => return Err(not_used("youngs_modulus")),
+            (None, Some(_), Some(_)) => return Err(not_used("poissons_ratio")),
+        };
+        Ok(Material {
+            elasticity,
+            group,
+            name,
+        })
+    }
+}
+
+fn missing(name: &str) -> Violation {
+    Violation::new(
+        format!("/{name}"),
+        Reason::Missing,
+        "nothing",
+        format!("a value for `{name}`"),
+        "Or give `orthotropic`.",
+    )
+}
+
+fn not_used(name: &str) -> Violation {
+    Violation::new(
+        format!("/{name}"),
+        Reason::NotUsed,
+        "an isotropic constant beside `orthotropic`",
+        "one of the two forms",
+        "Remove it, or remove `orthotropic`.",
+    )
+}
+
+impl From<Material> for MaterialFields {
+    fn from(material: Material) -> MaterialFields {
+        let Material {
+            elasticity,
+            group,
+            name,
+        } = material;
+        let named = MaterialFields {
+            group,
+            name,
+            ..MaterialFields::default()
+        };
+        match elasticity {
+            Elasticity::Isotropic {
+                youngs_modulus,
+                poissons_ratio,
+            } => MaterialFields {
+                youngs_modulus: Some(youngs_modulus),
+                poissons_ratio: Some(poissons_ratio),
+                ..named
+            },
+            Elasticity::Orthotropic(orthotropic) => MaterialFields {
+                orthotropic: Some(orthotropic),
+                ..named
+            },
+        }
+    }
+}
+
+/// Orthotropic elasticity with the axes 1 and 2 in the plane and 3 across it (the hoop direction in
+/// axisymmetry). ε_1 = σ_1/e1 − nu12 σ_2/e1 − nu13 σ_3/e1, and so on; nu_ij/e_i = nu_ji/e_j.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Orthotropic {
+    /// Modulus along axis 1, > 0 (stress).
+    pub e1: f64,
+    /// Modulus along axis 2, > 0 (stress).
+    pub e2: f64,
+    /// −ε_2/ε_1 under σ_1 alone.
+    pub nu12: f64,
+    /// Shear modulus in the plane, > 0 (stress).
+    pub g12: f64,
+    /// Angle from x to axis 1, counter-clockwise (degrees).
+    #[serde(default)]
+    pub angle: f64,
+    /// Modulus along axis 3, > 0 (stress); needed but in plane stress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub e3: Option<f64>,
+    /// −ε_3/ε_1 under σ_1 alone; needed but in plane stress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nu13: Option<f64>,
+    /// −ε_3/ε_2 under σ_2 alone; needed but in plane stress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nu23: Option<f64>,
+}
