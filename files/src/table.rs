@@ -76,12 +76,13 @@ impl Table {
 
     /// One row per iteration; what stands inside another object of the JSON has both names.
     #[rustfmt::skip]
-    pub fn of_history(rows: &[Iteration]) -> Table {
-        let real = |name, value: fn(&Iteration) -> f64| column(name, Values::Real(rows.iter().map(value).collect()));
-        let whole = |name, value: fn(&Iteration) -> u32| column(name, Values::Whole(rows.iter().map(value).collect()));
+    pub fn of_history<'a>(rows: impl IntoIterator<Item = &'a Iteration, IntoIter: Clone>) -> Table {
+        let rows = rows.into_iter();
+        let real = |name, value: fn(&Iteration) -> f64| column(name, Values::Real(rows.clone().map(value).collect()));
+        let whole = |name, value: fn(&Iteration) -> u32| column(name, Values::Whole(rows.clone().map(value).collect()));
         Table { columns: vec![
             whole("k",                 |row| row.k),
-            column("stage", Values::Text(rows.iter().map(|row| row.stage.as_str()).collect())),
+            column("stage", Values::Text(rows.clone().map(|row| row.stage.as_str()).collect())),
             whole("step",              |row| row.step),
             whole("increment",         |row| row.increment),
             real("residual",           |row| row.residual),
@@ -97,7 +98,6 @@ impl Table {
             real("force_tangential",   |row| row.force.tangential),
             real("contraction",        |row| row.contraction.unwrap_or(f64::NAN)),
             whole("inner",             |row| row.inner),
-            real("wall_s",             |row| row.wall_s),
         ] }
     }
 
@@ -224,7 +224,6 @@ pub(crate) mod tests {
             },
             contraction: None,
             inner: 2,
-            wall_s: 0.125,
         };
         vec![row(1), row(2)]
     }

@@ -112,7 +112,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
         "contact: solution::ContactCount { active, entered, left }",
         "friction: solution::FrictionCount { slip, stick }",
         "force: solution::ForcePair { normal: normal_force, tangential: tangential_force }",
-    ]),
+    ]).theirs(&["wall_s: 0.0"]),
     fields("Result", "results::JobResult").answer(),
     fields("StepResult", "results::StepResult").answer(),
     fields("Summary", "solution::Summary").answer()

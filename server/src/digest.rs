@@ -4,7 +4,7 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::json;
 use sha2::{Digest, Sha256};
 use solver::{problem::Problem, solution::Solution};
 
@@ -26,22 +26,17 @@ pub fn of_json(value: &impl Serialize) -> serde_json::Result<String> {
 }
 
 /// Fingerprint of a result: equal digests mean equal bits. Times and the program's version have
-/// no part. All numbers must be finite (see `finite`): others have no canonical form.
+/// no part. All numbers must be finite: others have no canonical form.
 pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<String> {
     let mut summary = serde_json::to_value(&solution.summary)?;
     summary["input_hash"] = json!(input_hash);
-    let history = untimed(serde_json::to_value(&solution.history)?);
-    let mut steps = serde_json::to_value(&solution.steps)?;
-    for step in steps.as_array_mut().into_iter().flatten() {
-        step["history"] = untimed(step["history"].take());
-    }
     // The outermost object is written by hand, its keys in canonical order: the canonical writer
     // holds every object it is inside of in memory, and fields can be large.
     let mut hash = Hash::default();
     hash.text_of(r#"{"fields":"#).json(&solution.fields)?;
-    hash.text_of(r#","history":"#).json(&history)?;
+    hash.text_of(r#","history":"#).json(&solution.history)?;
     hash.text_of(r#","profiles":"#).json(&solution.profiles)?;
-    hash.text_of(r#","steps":"#).json(&steps)?;
+    hash.text_of(r#","steps":"#).json(&solution.steps)?;
     hash.text_of(r#","summary":"#).json(&summary)?;
     hash.text_of("}");
     Ok(hash.text())
@@ -55,15 +50,6 @@ pub fn sha256_text(hash: Sha256) -> String {
 /// Two lower-case hexadecimal digits for each byte.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// A history without its times.
-fn untimed(mut history: Value) -> Value {
-    let rows = history.as_array_mut().into_iter().flatten();
-    for row in rows.filter_map(Value::as_object_mut) {
-        row.remove("wall_s");
-    }
-    history
 }
 
 /// SHA-256 as something to write canonical JSON to.
@@ -127,14 +113,8 @@ mod tests {
     }
 
     #[test]
-    fn wall_time_does_not_change_a_digest_but_the_last_bit_of_a_field_does() {
+    fn the_last_bit_of_a_field_changes_a_digest() {
         let solution = fake::solution();
-        let mut later = solution.clone();
-        later.history[0].wall_s = 7.0;
-        assert_eq!(
-            digest(&solution, "h").unwrap(),
-            digest(&later, "h").unwrap()
-        );
         let mut other = solution.clone();
         other.fields.ux[0] = f64::from_bits(other.fields.ux[0].to_bits() + 1);
         assert_ne!(
@@ -159,12 +139,6 @@ mod tests {
         });
         let mut document = serde_json::to_value(&solution).unwrap();
         document["summary"]["input_hash"] = json!("h");
-        for rows in ["/history", "/steps/0/history"] {
-            let rows = document.pointer_mut(rows).unwrap().as_array_mut();
-            for row in rows.unwrap() {
-                row.as_object_mut().unwrap().remove("wall_s");
-            }
-        }
         let mut whole = Hash::default();
         whole.json(&document).unwrap();
         assert_eq!(digest(&solution, "h").unwrap(), whole.text());

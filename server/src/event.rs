@@ -43,7 +43,7 @@ pub enum Payload {
         stage: Phase,
     },
     /// One more iteration.
-    Iteration(Iteration),
+    Iteration(TimedIteration),
     /// A warning about the problem or its solution.
     Warning(Warning),
     /// The end, and the job as it ended. There is exactly one of these, and it is the last.
@@ -51,6 +51,17 @@ pub enum Payload {
         /// The terminal job.
         job: Box<Job>,
     },
+}
+
+/// A row of history, and when it was computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "Iteration")]
+pub struct TimedIteration {
+    /// The row.
+    #[serde(flatten)]
+    pub row: Iteration,
+    /// Seconds from the start of the solver to the end of this iteration.
+    pub wall_s: f64,
 }
 
 impl Payload {
@@ -97,7 +108,7 @@ mod tests {
             Payload::Stage {
                 stage: Phase::Factor,
             },
-            Payload::Iteration(crate::fake::iteration(1)),
+            Payload::Iteration(crate::fake::timed(1)),
         ] {
             let json = serde_json::to_value(&payload).unwrap_or_default();
             assert_eq!(json["type"], payload.kind());

@@ -12,6 +12,8 @@ use solver::{
     },
 };
 
+use crate::event::TimedIteration;
+
 /// A small problem.
 pub(crate) fn problem() -> Problem {
     serde_json::from_value(serde_json::json!({
@@ -113,7 +115,14 @@ pub(crate) fn iteration(k: u32) -> Iteration {
         },
         contraction: (k > 2).then_some(0.1),
         inner: 2,
-        wall_s: 0.0,
+    }
+}
+
+/// The same after `k` half seconds.
+pub(crate) fn timed(k: u32) -> TimedIteration {
+    TimedIteration {
+        row: iteration(k),
+        wall_s: 0.5 * f64::from(k),
     }
 }
 
@@ -129,7 +138,7 @@ pub(crate) fn solve(
             return Err(SolveError::Stopped);
         }
     }
-    for row in &mut solution.history {
+    for row in &solution.history {
         if observe(Progress::Iteration(row)).is_break() {
             solution.summary.outcome = Outcome::Canceled;
             solution.summary.converged = false;
@@ -147,7 +156,7 @@ pub(crate) fn solve_until_stopped(
 ) -> Result<Solution, SolveError> {
     let mut solution = solution();
     for k in 1.. {
-        if observe(Progress::Iteration(&mut iteration(k))) == ControlFlow::Break(()) {
+        if observe(Progress::Iteration(&iteration(k))) == ControlFlow::Break(()) {
             break;
         }
         std::thread::sleep(std::time::Duration::from_millis(1));

@@ -1,11 +1,14 @@
 //! What a result can be written as: one list of formats, and one way to write each, for the data
 //! routes and for `signorini solve -o`.
 
-use files::{npz::Npz, table::Table};
+use files::{
+    npz::Npz,
+    table::{Column, Table, Values},
+};
 use serde::Serialize;
-use solver::solution::{ContactProfile, Fields, Iteration};
+use solver::solution::{ContactProfile, Fields};
 
-use crate::run::Document;
+use crate::{event::TimedIteration, run::Document};
 
 /// How data are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,8 +84,18 @@ pub fn profile(profile: &ContactProfile, format: Format) -> Result<Vec<u8>, Stri
 }
 
 /// A history in that format.
-pub fn history(history: &[Iteration], format: Format) -> Result<Vec<u8>, String> {
-    rows(history, Table::of_history, format)
+pub fn history(history: &[TimedIteration], format: Format) -> Result<Vec<u8>, String> {
+    rows(history, history_table, format)
+}
+
+/// The solver's columns, and the times.
+fn history_table(history: &[TimedIteration]) -> Table {
+    let mut table = Table::of_history(history.iter().map(|timed| &timed.row));
+    table.columns.push(Column {
+        name: "wall_s",
+        values: Values::Real(history.iter().map(|timed| timed.wall_s).collect()),
+    });
+    table
 }
 
 fn rows<T: Serialize + ?Sized>(
@@ -117,7 +130,7 @@ pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
 pub fn everything_as_npz(document: &Document) -> Result<Vec<u8>, String> {
     let mut npz = Npz::new();
     files::fields::add(&mut npz, "fields/", &document.fields)?;
-    npz.table("history/", &Table::of_history(&document.history))?;
+    npz.table("history/", &history_table(&document.history))?;
     for (boundary, profile) in &document.profiles {
         npz.table(
             &format!("profiles/{boundary}/"),
@@ -147,7 +160,8 @@ mod tests {
             let name = format.name();
             let top = profile(&solution.profiles["top"], *format);
             assert_eq!(top.is_ok(), expected, "{name}");
-            assert_eq!(history(&solution.history, *format).is_ok(), expected);
+            let rows = [fake::timed(1), fake::timed(2)];
+            assert_eq!(history(&rows, *format).is_ok(), expected);
         }
         let csv = profile(&solution.profiles["top"], Format::Csv).unwrap();
         let line = String::from_utf8(csv)
@@ -159,6 +173,19 @@ mod tests {
         assert_eq!(
             line,
             "0.0,0.0,0.0,-0.1,-0.1,0.0,-20.0,0.1,19.0,5.7,0.02,stick"
+        );
+    }
+
+    #[test]
+    fn a_row_of_history_ends_with_its_time() {
+        let rows = [fake::timed(1), fake::timed(2)];
+        let jsonl = String::from_utf8(history(&rows, Format::Jsonl).unwrap()).unwrap();
+        assert!(jsonl.lines().next().unwrap().ends_with(r#""wall_s":0.5}"#));
+        let json: serde_json::Value =
+            serde_json::from_slice(&history(&rows, Format::Json).unwrap()).unwrap();
+        assert_eq!(
+            (&json[1]["k"], &json[1]["wall_s"]),
+            (&2.into(), &1.0.into())
         );
     }
 

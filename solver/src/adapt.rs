@@ -31,8 +31,9 @@ const SETTLED: f64 = 0.1;
 
 /// Solves on finer and finer grids; the finest solution comes back with the sequence of them.
 ///
-/// `contacts` are the problem's own, on whatever mesh; `solve` solves one problem without adaptive refinement. The observer sees the phases of every
-/// mesh, and the iterations (but no load steps) of the last one only, when it is known to be the last.
+/// `contacts` are the problem's own, on whatever mesh; `solve` solves one problem without adaptive
+/// refinement. The observer sees the phases of every mesh, its iterations (but no load steps) as tentative
+/// ones, and those of the last one again when it is known to be the last.
 pub fn run(
     problem: &Problem,
     goal: &AdaptiveRefine,
@@ -53,7 +54,8 @@ pub fn run(
         let mut stopped = false;
         let mut solution = solve(&problem, &mut |progress| {
             let answer = match progress {
-                Progress::Iteration(_) | Progress::Step(_) => observe(Progress::Pulse),
+                Progress::Iteration(row) => observe(Progress::Tentative(row)),
+                Progress::Step(_) => observe(Progress::Pulse),
                 Progress::Warning(warning) => {
                     warnings.push(warning.clone());
                     ControlFlow::Continue(())
@@ -83,7 +85,7 @@ pub fn run(
             for warning in &warnings {
                 let _ = observe(Progress::Warning(warning));
             }
-            for row in &mut solution.history {
+            for row in &solution.history {
                 let _ = observe(Progress::Iteration(row));
             }
             return Ok(solution);

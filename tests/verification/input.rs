@@ -399,10 +399,8 @@ fn an_observer_is_told_the_solution_so_far_after_every_step_but_the_last() {
     p.steps = vec![step(0.3, 2), step(0.6, 1), step(1.0, 1)];
     let mut told = Vec::new();
     let solution = solver::solve(&p, &mut |progress| {
-        match progress {
-            solver::solution::Progress::Step(so_far) => told.push(so_far.clone()),
-            solver::solution::Progress::Iteration(row) => row.wall_s = 1.5,
-            _ => {}
+        if let solver::solution::Progress::Step(so_far) = progress {
+            told.push(so_far.clone());
         }
         std::ops::ControlFlow::Continue(())
     })
@@ -413,7 +411,6 @@ fn an_observer_is_told_the_solution_so_far_after_every_step_but_the_last() {
         assert_eq!(so_far.steps, solution.steps[..=k]);
         let rows = so_far.history.len();
         assert_eq!(so_far.history, solution.history[..rows]);
-        assert!(so_far.history.iter().all(|row| row.wall_s == 1.5));
         let mut p = p.clone();
         p.steps.truncate(k + 1);
         let shorter = solve(&p);

@@ -155,7 +155,7 @@ impl Rest {
         while let Some(event) = events.next().await {
             let event: Event = serde_json::from_str(&event?.data)?;
             match event.payload {
-                Payload::Iteration(row) => line.step(&row)?,
+                Payload::Iteration(timed) => line.step(&timed.row)?,
                 Payload::Done { job } => {
                     let Job {
                         status,

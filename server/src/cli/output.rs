@@ -8,7 +8,7 @@ use std::{
 
 use anyhow::Context;
 use files::plot::{self, Parts, Plot, Theme};
-use solver::problem::Problem;
+use solver::{problem::Problem, solution::Iteration};
 
 use crate::{
     formats::{self, Format},
@@ -119,8 +119,13 @@ impl Output {
             Part::History => formats::history(&document.history, self.format),
             Part::Fields => formats::fields(&document.fields, self.format),
             Part::Plot(plot) => {
+                let history: Vec<Iteration> = document
+                    .history
+                    .iter()
+                    .map(|timed| timed.row.clone())
+                    .collect();
                 let parts = Parts {
-                    history: &document.history,
+                    history: &history,
                     profiles: &document.profiles,
                     fields: &document.fields,
                     stored: None,

@@ -10,10 +10,7 @@ use std::{
 use anyhow::Context;
 use clap::Args;
 use files::plot::Theme;
-use solver::{
-    error::{SolveError, Violation},
-    solution::Progress,
-};
+use solver::error::{SolveError, Violation};
 
 use super::{
     Exit,
@@ -23,7 +20,7 @@ use super::{
 use crate::{
     config::MemoryBudget,
     error::ApiError,
-    run::{self, Said},
+    run::{self, Update},
 };
 
 #[derive(Debug, Args)]
@@ -85,15 +82,15 @@ pub(super) fn run(
         eprintln!("{}: {too_large}", file.display());
         return Ok(Exit::Invalid);
     }
-    let solved = run::run(&problem, None, parse_s, solver::solve_on, &mut |said| {
-        match said {
-            Said::Progress(Progress::Phase(phase)) => eprintln!("{} …", run::phase_name(phase)),
-            Said::Progress(Progress::Iteration(row)) => eprintln!("{}", report::iteration(row)),
-            Said::Progress(Progress::Warning(warning)) => {
+    let solved = run::run(&problem, None, parse_s, solver::solve_on, &mut |update| {
+        match update {
+            Update::Phase(phase) => eprintln!("{} …", phase.as_str()),
+            Update::Iteration(timed) => eprintln!("{}", report::iteration(&timed.row)),
+            Update::Warning(warning) => {
                 eprintln!("warning: {}: {}", warning.pointer, warning.message)
             }
             // Ctrl-C ends the process
-            Said::Progress(Progress::Step(_) | Progress::Pulse) | Said::Step(_) => {}
+            Update::Step(_) | Update::Pulse => {}
         }
         ControlFlow::Continue(())
     });

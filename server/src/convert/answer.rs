@@ -2,15 +2,15 @@
 //! what the service adds to a summary.
 
 use prost_types::Timestamp;
-use solver::solution::Stage;
+use solver::solution::{Phase, Stage};
 
 use super::IntoMessage;
 use crate::{
     caller::Caller,
-    event::{Event, Payload},
+    event::{Event, Payload, TimedIteration},
     job::{JobId, Reason, Waiting},
     pb,
-    run::{Summary, phase_name},
+    run::Summary,
     time::Time,
 };
 
@@ -56,7 +56,7 @@ macro_rules! words {
     };
 }
 
-words!(solver::error::Reason, Reason, Stage, Waiting);
+words!(solver::error::Reason, Phase, Reason, Stage, Waiting);
 
 impl From<Caller> for pb::Caller {
     fn from(caller: Caller) -> Self {
@@ -83,7 +83,7 @@ impl From<Event> for pb::Event {
                 reason,
             }),
             Payload::Stage { stage } => Out::Stage(pb::StageEvent {
-                stage: phase_name(stage).into(),
+                stage: stage.into_message(),
             }),
             Payload::Iteration(row) => Out::Iteration(row.into()),
             Payload::Warning(warning) => Out::Warning(warning.into()),
@@ -96,6 +96,15 @@ impl From<Event> for pb::Event {
             attempt,
             t: t.into_message(),
             payload: Some(payload),
+        }
+    }
+}
+
+impl From<TimedIteration> for pb::Iteration {
+    fn from(TimedIteration { row, wall_s }: TimedIteration) -> Self {
+        pb::Iteration {
+            wall_s,
+            ..row.into()
         }
     }
 }

@@ -230,7 +230,7 @@ impl JobService for Grpc {
         let max_points = request.max_points.map(|most| MAX_POINTS.check(most));
         let (id, most) = (ID.read(&request.id)?, max_points.transpose()?);
         let mut rows = history::history(&self.service, &caller, id, most).await?;
-        rows.retain(|row| row.k > request.after);
+        rows.retain(|timed| timed.row.k > request.after);
         let more = rows.len() > MAX_ROWS;
         rows.truncate(MAX_ROWS);
         Ok(Response::new(pb::ListIterationsResponse {

@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use solver::solution::Iteration;
 use tokio::{
     sync::mpsc,
     time::{Instant, sleep_until},
@@ -15,9 +14,8 @@ use super::{
     state::Queue,
 };
 use crate::{
-    event::Payload,
+    event::{Payload, TimedIteration},
     job::{Job, Progress},
-    run::phase_name,
     store::{FinalBatch, Parts, Result},
     time::Time,
 };
@@ -164,10 +162,11 @@ impl Batch {
 fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) {
     match payload {
         Payload::Stage { stage } => {
-            progress.stage = phase_name(*stage).to_string();
+            progress.stage = stage.as_str().to_owned();
             progress.eta_s = None; // nothing is known about how long a phase takes
         }
-        Payload::Iteration(row) => {
+        Payload::Iteration(timed) => {
+            let row = &timed.row;
             *progress = Progress {
                 stage: progress.stage.clone(),
                 iteration: row.k,
@@ -176,7 +175,7 @@ fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) 
                 contact_changes: Some(row.contact.entered + row.contact.left),
                 rate: row.contraction,
                 // with several levels the end of these iterations is not that of the job
-                eta_s: eta_s(row).filter(|_| one_level),
+                eta_s: eta_s(timed).filter(|_| one_level),
             }
         }
         Payload::Status { .. } | Payload::Warning(_) | Payload::Done { .. } => {}
@@ -186,7 +185,7 @@ fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) 
 /// Seconds to the end: the iterations still to do, if each reduces the residual by the factor q and takes as long as
 /// those before:
 /// n = ln(tolerance / residual) / ln q.
-fn eta_s(row: &Iteration) -> Option<f64> {
+fn eta_s(TimedIteration { row, wall_s }: &TimedIteration) -> Option<f64> {
     let q = row.contraction.filter(|q| (1e-6..1.0).contains(q))?;
     let residual = row.residual.max(row.friction_residual);
     let iterations = if residual <= row.tolerance {
@@ -194,7 +193,7 @@ fn eta_s(row: &Iteration) -> Option<f64> {
     } else {
         (row.tolerance / residual).ln() / q.ln()
     };
-    Some(iterations.ceil() * row.wall_s / f64::from(row.k.max(1)))
+    Some(iterations.ceil() * wall_s / f64::from(row.k.max(1)))
 }
 
 #[cfg(test)]
@@ -211,7 +210,7 @@ mod tests {
             sender
                 .send(Report::Event(
                     Time::now(),
-                    Payload::Iteration(fake::iteration(k)),
+                    Payload::Iteration(fake::timed(k)),
                 ))
                 .await
                 .unwrap();
@@ -225,15 +224,17 @@ mod tests {
 
     #[test]
     fn the_time_to_the_end_follows_from_the_rate() {
-        let mut row = fake::iteration(4);
+        let mut timed = fake::timed(4);
+        timed.wall_s = 8.0;
+        let row = &mut timed.row;
         (row.residual, row.friction_residual, row.tolerance) = (1e-12, 1e-6, 1e-10);
-        (row.contraction, row.wall_s) = (Some(0.1), 8.0);
+        row.contraction = Some(0.1);
         assert!(
-            (eta_s(&row).unwrap() - 8.0).abs() < 1e-9,
+            (eta_s(&timed).unwrap() - 8.0).abs() < 1e-9,
             "four iterations of two seconds"
         );
         let mut progress = Progress::default();
-        let row = Payload::Iteration(row);
+        let row = Payload::Iteration(timed);
         update_progress(&mut progress, &row, false);
         assert_eq!(progress.eta_s, None, "there are more steps");
         update_progress(&mut progress, &row, true);

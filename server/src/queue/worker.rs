@@ -6,7 +6,7 @@ use solver::{
     error::SolveError,
     mesh::Mesh,
     problem::{Problem, Refine, Step},
-    solution::{Outcome, Progress},
+    solution::Outcome,
 };
 use tokio::{sync::mpsc, task::JoinError};
 use tracing::{error, info, warn};
@@ -21,7 +21,7 @@ use super::{
 use crate::{
     event::Payload,
     job::{Failure, Job, Reason, ResultAvailable, Status},
-    run::{self, Document, Said, SoFar, Solve},
+    run::{self, Document, PartialSolution, Solve, Update},
     store::{Claim, Ending, FinalBatch, Parts, Store},
     time::Time,
 };
@@ -130,15 +130,13 @@ fn solve_and_report(
     }
     let event = |payload| Some(Report::Event(Time::now(), payload));
     let mut partials = Partials::default();
-    let document = run::run(&problem, mesh, parse_s, solve, &mut |said| {
-        report(match said {
-            Said::Step(so_far) => partials.next(&so_far),
-            Said::Progress(progress) => match progress {
-                Progress::Phase(stage) => event(Payload::Stage { stage }),
-                Progress::Iteration(row) => event(Payload::Iteration(row.clone())),
-                Progress::Warning(warning) => event(Payload::Warning(warning.clone())),
-                Progress::Step(_) | Progress::Pulse => None,
-            },
+    let document = run::run(&problem, mesh, parse_s, solve, &mut |update| {
+        report(match update {
+            Update::Phase(stage) => event(Payload::Stage { stage }),
+            Update::Iteration(row) => event(Payload::Iteration(row)),
+            Update::Warning(warning) => event(Payload::Warning(warning.clone())),
+            Update::Step(partial) => partials.next(&partial),
+            Update::Pulse => None,
         })
     })?;
     let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite { phase: "recover" })?;
@@ -159,7 +157,7 @@ struct Partials {
 
 impl Partials {
     /// The partial result, if it is time to store it.
-    fn next(&mut self, so_far: &SoFar<'_>) -> Option<Report> {
+    fn next(&mut self, partial: &PartialSolution<'_>) -> Option<Report> {
         /// It is written in one transaction, which holds up the single writer for some 40 ms.
         const MOST_BYTES: usize = 4 << 20;
         /// It takes at most a tenth of the time, and happens at most once a second.
@@ -170,7 +168,7 @@ impl Partials {
             return None;
         }
         // numbers that are not finite, and so have no JSON, are reported at the end
-        let parts = Parts::of(&so_far.document().ok()?).ok();
+        let parts = Parts::of(&partial.document().ok()?).ok();
         self.next = Some(start + (start.elapsed() * SHARE).max(PAUSE));
         let parts = parts.filter(|parts| parts.bytes() <= MOST_BYTES)?;
         Some(Report::Partial(Box::new(parts)))

@@ -1,12 +1,10 @@
 //! The iterations of a job, a row each.
 
-use solver::solution::Iteration;
-
 use super::{jobs, service::Service};
 use crate::{
     caller::Caller,
     error::ApiError,
-    event::Payload,
+    event::{Payload, TimedIteration},
     job::{JobId, ResultAvailable},
     parameters::{Parameter, Whole},
     store::Snapshot,
@@ -26,7 +24,7 @@ pub async fn history(
     caller: &Caller,
     id: JobId,
     max_points: Option<i64>,
-) -> Result<Vec<Iteration>, ApiError> {
+) -> Result<Vec<TimedIteration>, ApiError> {
     let load = async {
         let mut found = jobs::snapshot(service, caller, id).await?;
         StoredHistory::load(service, &mut found).await
@@ -64,7 +62,7 @@ impl StoredHistory {
         Ok(StoredHistory::Events(lines))
     }
 
-    pub(super) fn read(self) -> Result<Vec<Iteration>, ApiError> {
+    pub(super) fn read(self) -> Result<Vec<TimedIteration>, ApiError> {
         let rows = match self {
             StoredHistory::Whole(bytes) => serde_json::from_slice(&bytes),
             StoredHistory::Events(lines) => lines.iter().map(|line| row(line)).collect(),
@@ -73,7 +71,7 @@ impl StoredHistory {
     }
 }
 
-fn row(line: &str) -> serde_json::Result<Iteration> {
+fn row(line: &str) -> serde_json::Result<TimedIteration> {
     match serde_json::from_str(line)? {
         Payload::Iteration(row) => Ok(row),
         other => Err(serde::de::Error::custom(format!(
@@ -84,7 +82,7 @@ fn row(line: &str) -> serde_json::Result<Iteration> {
 }
 
 /// Leaves at most `most` rows (2 or more), evenly spread, the first and the last among them.
-fn downsample(rows: &mut Vec<Iteration>, most: usize) {
+fn downsample(rows: &mut Vec<TimedIteration>, most: usize) {
     let count = rows.len();
     if count <= most || most < 2 {
         return;
@@ -111,9 +109,9 @@ mod tests {
         for count in 0..40 {
             for most in 2..45 {
                 let all: Vec<u32> = (1..=count).collect();
-                let mut rows: Vec<_> = all.iter().map(|k| fake::iteration(*k)).collect();
+                let mut rows: Vec<_> = all.iter().map(|k| fake::timed(*k)).collect();
                 downsample(&mut rows, most);
-                let kept: Vec<u32> = rows.iter().map(|row| row.k).collect();
+                let kept: Vec<u32> = rows.iter().map(|timed| timed.row.k).collect();
                 assert_eq!(kept.len(), most.min(all.len()), "{count} {most}");
                 assert_eq!((kept.first(), kept.last()), (all.first(), all.last()));
                 assert!(kept.is_sorted());
@@ -123,9 +121,9 @@ mod tests {
 
     #[test]
     fn the_event_of_an_iteration_holds_the_row_itself() {
-        let event = Payload::Iteration(fake::iteration(3));
+        let event = Payload::Iteration(fake::timed(3));
         let line = serde_json::to_string(&event).unwrap();
-        assert_eq!(row(&line).unwrap(), fake::iteration(3));
+        assert_eq!(row(&line).unwrap(), fake::timed(3));
         assert!(row(r#"{"type":"stage","stage":"mesh"}"#).is_err());
     }
 }

@@ -116,7 +116,8 @@ pub async fn plot(
         for (boundary, bytes) in columns {
             profiles.insert(boundary, read(&bytes)?);
         }
-        let history: Vec<Iteration> = history.map_or(Ok(vec![]), StoredHistory::read)?;
+        let history = history.map_or(Ok(vec![]), StoredHistory::read)?;
+        let history: Vec<Iteration> = history.into_iter().map(|timed| timed.row).collect();
         if plot == Plot::Convergence && history.is_empty() {
             return Err(results::no_result(&job));
         }

@@ -151,7 +151,7 @@ impl<'s, 'a> Track<'s, 'a> {
             .map(|(point, traction)| point.weight * traction)
             .sum();
         let held: f64 = system.tangential_reactions(&measured.state).iter().sum();
-        let mut iteration = Iteration {
+        let iteration = Iteration {
             k: self.place.rows + self.history.len() as u32 + 1,
             stage: row.stage,
             step: self.place.step,
@@ -168,9 +168,8 @@ impl<'s, 'a> Track<'s, 'a> {
             },
             contraction: row.contraction,
             inner: row.inner,
-            wall_s: 0.0,
         };
-        let answer = observe(Progress::Iteration(&mut iteration));
+        let answer = observe(Progress::Iteration(&iteration));
         self.history.push(iteration);
         self.contact_changed = contact.entered + contact.left > 0;
         self.before = Some((active.clone(), measured.pressures.clone()));

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use strum::IntoStaticStr;
+use strum::{IntoStaticStr, VariantArray};
 
 use crate::element::Element;
 use crate::finite::is_finite;
@@ -295,8 +295,6 @@ pub struct Iteration {
     pub contraction: Option<f64>,
     /// Newton steps of the convex problem.
     pub inner: u32,
-    /// Seconds since the start, stamped by the caller; the solver has no clock and writes 0.
-    pub wall_s: f64,
 }
 
 /// Nodes in contact and their changes since the row before.
@@ -473,9 +471,21 @@ pub struct GaussFields {
 
 /// Phases of a solution, in their order; the caller times them.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+    VariantArray,
 )]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Phase {
     /// Reading the JSON (the caller's own).
     Parse,
@@ -495,13 +505,23 @@ pub enum Phase {
     Recover,
 }
 
+impl Phase {
+    /// The name that the API has for it.
+    pub fn as_str(self) -> &'static str {
+        self.into()
+    }
+}
+
 /// What the solver tells its observer.
 #[derive(Debug)]
 pub enum Progress<'a> {
     /// A phase begins.
     Phase(Phase),
-    /// An iteration is done; the observer may stamp `wall_s`.
-    Iteration(&'a mut Iteration),
+    /// An iteration is done.
+    Iteration(&'a Iteration),
+    /// One is done on a mesh that is the last only if its results have settled; then all of its
+    /// iterations are told again. The next mesh counts from 1.
+    Tentative(&'a Iteration),
     /// A finding, as soon as it is known; all stand in the summary again.
     Warning(&'a Warning),
     /// A load step that is not the last has ended: the solution so far, without fields. Only of

@@ -278,10 +278,7 @@ async fn events_of_an_earlier_attempt_are_not_recorded() {
     rig.store.claim_next().await.unwrap().0.unwrap();
     rig.store.requeue_interrupted().await.unwrap();
     let again = rig.store.claim_next().await.unwrap().0.unwrap();
-    let events = [(
-        crate::time::Time::now(),
-        Payload::Iteration(fake::iteration(1)),
-    )];
+    let events = [(crate::time::Time::now(), Payload::Iteration(fake::timed(1)))];
     assert!(
         !rig.store
             .append_events(job.key, 1, &events, &Default::default())

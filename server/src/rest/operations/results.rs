@@ -1,6 +1,6 @@
 //! What a job has computed, as data and as figures.
 
-use solver::solution::{ContactProfile, Fields, Iteration};
+use solver::solution::{ContactProfile, Fields};
 
 use super::{
     content::{bytes, data, json, nothing},
@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     catalog::Code,
+    event::TimedIteration,
     formats::Format,
     rest::{
         accept::FormatOf,
@@ -40,7 +41,7 @@ pub(super) fn operations() -> Vec<Operation> {
         )
         .rpcs(&["ListIterations"])
         .summary("Returns the iterations of a job's last attempt, a row each")
-        .file("The rows", data::<Vec<Iteration>>(Format::OF_TABLES)),
+        .file("The rows", data::<Vec<TimedIteration>>(Format::OF_TABLES)),
         get(
             "/v1/jobs/{id}/profiles/{boundary}",
             (ID, BOUNDARY, TABLE, STEP, POINTS, PART),

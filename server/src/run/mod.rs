@@ -1,0 +1,245 @@
+//! Solves one problem and measures it: the one place with a clock, used by the worker and by
+//! `signorini solve` alike, so that both write the same document.
+
+mod document;
+mod stopwatch;
+
+use std::ops::ControlFlow;
+
+use solver::{
+    error::SolveError,
+    finite::is_finite,
+    mesh::{External, Mesh},
+    problem::Problem,
+    solution::{Fields, Observer, Outcome, Phase, Progress, Solution, Warning},
+};
+
+use crate::event::TimedIteration;
+pub use document::{Document, Step, Summary, Timings};
+use stopwatch::{Stopwatch, Times};
+
+/// The solver, or what stands in for it in a test.
+pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Solution, SolveError>;
+
+/// What a run reports while it goes on.
+#[derive(Debug)]
+pub enum Update<'a> {
+    /// A phase begins.
+    Phase(Phase),
+    /// An iteration of the solution.
+    Iteration(TimedIteration),
+    /// A finding.
+    Warning(&'a Warning),
+    /// A load step has ended, while others are to come.
+    Step(PartialSolution<'a>),
+    /// Nothing new: the solver is at work, and asks whether to go on.
+    Pulse,
+}
+
+/// The solution at the end of a load step that is not the last.
+#[derive(Debug)]
+pub struct PartialSolution<'a> {
+    problem: &'a Problem,
+    solution: &'a Solution,
+    times: Times,
+}
+
+impl PartialSolution<'_> {
+    /// As a document without fields. It costs as much as all that it holds: not for every one of many steps.
+    pub fn document(&self) -> Result<Document, SolveError> {
+        Document::new(self.problem, self.solution.clone(), &self.times)
+    }
+}
+
+/// Solves `problem`, notes when each iteration was done and measures the phases. `stored`: the mesh that it
+/// names by its hash. `parse_s`: seconds that reading the problem took, the caller's own phase.
+pub fn run(
+    problem: &Problem,
+    stored: Option<Mesh>,
+    parse_s: f64,
+    solve: Solve,
+    report: &mut dyn FnMut(Update<'_>) -> ControlFlow<()>,
+) -> Result<Document, SolveError> {
+    let mut watch = Stopwatch::new(parse_s);
+    let mut non_finite = false;
+    // reading the mesh is a part of meshing, which the solver begins with
+    watch.enter(Phase::Mesh);
+    let external = files::external_mesh(problem, stored);
+    let solved = solve(problem, external, &mut |progress| {
+        let update = match progress {
+            Progress::Phase(phase) => {
+                watch.enter(phase);
+                Update::Phase(phase)
+            }
+            Progress::Tentative(row) => {
+                non_finite |= !is_finite(row);
+                watch.done_tentatively(row);
+                Update::Pulse
+            }
+            Progress::Iteration(row) => {
+                // JSON cannot write such a number, and going on is pointless
+                non_finite |= !is_finite(row);
+                let wall_s = watch.done(row);
+                let row = row.clone();
+                Update::Iteration(TimedIteration { row, wall_s })
+            }
+            Progress::Warning(warning) => Update::Warning(warning),
+            Progress::Step(solution) => Update::Step(PartialSolution {
+                problem,
+                solution,
+                times: watch.times(),
+            }),
+            Progress::Pulse => Update::Pulse,
+        };
+        match non_finite {
+            true => ControlFlow::Break(()),
+            false => report(update),
+        }
+    });
+    if non_finite {
+        return Err(SolveError::NonFinite { phase: "iterate" });
+    }
+    let mut solution = solved?;
+    if solution.summary.outcome == Outcome::Canceled {
+        // Who cancels wants the end, not fifty megabytes of it: a canceled job must be terminal
+        // within half a second, and writing the fields of a large one takes longer.
+        solution.fields = Fields::default();
+    }
+    Document::new(problem, solution, &watch.times())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::time::Instant;
+
+    use solver::problem::{AdaptiveRefine, Refine, Step};
+
+    use super::*;
+    use crate::fake;
+
+    #[test]
+    fn every_iteration_is_stamped_and_every_phase_has_a_time() {
+        let mut stamps = vec![];
+        let document = run(&fake::problem(), None, 0.5, fake::solve, &mut |update| {
+            if let Update::Iteration(row) = update {
+                stamps.push(row.wall_s);
+            }
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert_eq!(stamps.len(), 3);
+        assert!(stamps.is_sorted() && stamps[0] > 0.0);
+        assert_eq!(document.summary.timings.len(), 8);
+        assert_eq!(document.summary.timings["parse"], 0.5);
+    }
+
+    /// On the meshes of adaptive refinement, and in load steps, as anywhere else.
+    #[test]
+    fn every_row_has_the_time_at_which_it_was_computed() {
+        let mut problem = fake::problem();
+        problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.05 });
+        let whole = Step::whole();
+        problem.steps = [0.5, 1.0]
+            .map(|indentation| Step {
+                indentation,
+                ..whole.clone()
+            })
+            .into();
+        let (start, mut recovers_s) = (Instant::now(), 0.0);
+        let mut told = vec![];
+        let document = run(&problem, None, 0.0, solver::solve_on, &mut |update| {
+            match update {
+                Update::Phase(Phase::Recover) => recovers_s = start.elapsed().as_secs_f64(),
+                Update::Iteration(row) => told.push(row),
+                _ => {}
+            }
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        let history = &document.history;
+        assert!(document.summary.solution.refinements.len() > 1 && history.len() > 2);
+        assert!(history.iter().zip(1..).all(|(row, k)| row.row.k == k));
+        assert!(history.is_sorted_by(|a, b| a.wall_s < b.wall_s));
+        // all were done before the stresses of the last mesh were recovered
+        assert!(history.iter().all(|row| row.wall_s < recovers_s));
+        assert_eq!(&told, history);
+        let by_step = document.steps.iter().flat_map(|step| &step.history);
+        assert!(by_step.eq(history) && document.steps.len() == 2);
+    }
+
+    #[test]
+    fn what_finished_steps_have_found_has_the_times_of_the_whole() {
+        let mut problem = fake::problem();
+        problem.steps = vec![Step::whole(); 2];
+        let mut first = None;
+        let document = run(&problem, None, 0.0, solver::solve_on, &mut |update| {
+            if let Update::Step(partial) = update {
+                first = Some(partial.document().unwrap());
+            }
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        let first = first.unwrap().history;
+        assert!(!first.is_empty() && document.history.starts_with(&first));
+    }
+
+    #[test]
+    fn one_bad_number_anywhere_is_found() {
+        assert!(fake::solution().is_finite());
+        for spoil in [
+            |s: &mut Solution| s.summary.energy = f64::NAN,
+            |s: &mut Solution| s.summary.contraction = Some(f64::NAN),
+            |s: &mut Solution| s.history[0].residual = f64::INFINITY,
+            |s: &mut Solution| s.fields.ux[0] = f64::NAN,
+            |s: &mut Solution| s.fields.gauss.x.push(f64::NAN),
+            |s: &mut Solution| {
+                s.profiles
+                    .values_mut()
+                    .for_each(|p| p.gap[1] = f64::NEG_INFINITY)
+            },
+            // no part of the document, and yet it is served
+            |s: &mut Solution| {
+                s.friction_profiles = s.profiles.clone();
+                s.friction_profiles
+                    .values_mut()
+                    .for_each(|p| p.gap[1] = f64::NAN)
+            },
+        ] {
+            let mut spoiled = fake::solution();
+            spoil(&mut spoiled);
+            assert!(!spoiled.is_finite());
+        }
+    }
+
+    #[test]
+    fn the_same_problem_has_the_same_digest_and_another_one_another() {
+        let solved = |problem: &Problem| {
+            let go_on = &mut |_: Update<'_>| ControlFlow::Continue(());
+            let document = run(problem, None, 0.0, solver::solve_on, go_on).unwrap();
+            assert!(document.summary.solution.converged);
+            document.summary
+        };
+        let problem = fake::problem();
+        let here = solved(&problem);
+        let there = std::thread::scope(|scope| scope.spawn(|| solved(&problem)).join().unwrap());
+        assert_eq!(here.digest, there.digest);
+        let mut deeper = problem.clone();
+        deeper.contacts[0].indentation *= 1.5;
+        let deeper = solved(&deeper);
+        assert!(deeper.solution.normal_force > here.solution.normal_force);
+        assert_ne!(here.digest, deeper.digest);
+    }
+
+    #[test]
+    fn a_summary_is_read_back_as_it_was_written() {
+        let summary = run(&fake::problem(), None, 0.0, fake::solve, &mut |_| {
+            ControlFlow::Continue(())
+        })
+        .unwrap()
+        .summary;
+        let text = serde_json::to_string(&summary).unwrap();
+        let back: Summary = serde_json::from_str(&text).unwrap();
+        assert_eq!(serde_json::to_string(&back).unwrap(), text);
+    }
+}

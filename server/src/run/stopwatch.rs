@@ -1,0 +1,93 @@
+//! How long each phase took, and when each iteration was done.
+
+use std::time::Instant;
+
+use solver::solution::{Iteration, Phase};
+use strum::VariantArray;
+
+use super::Timings;
+use crate::event::TimedIteration;
+
+/// Runs from the start of the solver.
+pub(super) struct Stopwatch {
+    start: Instant,
+    current: Option<(Phase, Instant)>,
+    times: Times,
+}
+
+/// What it shows.
+#[derive(Clone, Debug)]
+pub(super) struct Times {
+    /// Every phase, also one that was not reached.
+    pub(super) phases: Timings,
+    /// Seconds from the start to the end of each iteration, in the order of their numbers.
+    iterations: Vec<f64>,
+}
+
+impl Stopwatch {
+    pub(super) fn new(parse_s: f64) -> Self {
+        let phases = Phase::VARIANTS.iter();
+        let mut phases: Timings = phases.map(|phase| (phase.as_str().into(), 0.0)).collect();
+        phases.insert(Phase::Parse.as_str().into(), parse_s);
+        Stopwatch {
+            start: Instant::now(),
+            current: None,
+            times: Times {
+                phases,
+                iterations: vec![],
+            },
+        }
+    }
+
+    /// A phase begins, and with it the one before ends.
+    pub(super) fn enter(&mut self, phase: Phase) {
+        let now = Instant::now();
+        if let Some((before, since)) = self.current.replace((phase, now)) {
+            let seconds = self.times.phases.entry(before.as_str().into());
+            *seconds.or_default() += (now - since).as_secs_f64();
+        }
+    }
+
+    /// An iteration is done that may yet be repeated on another mesh, under the same number.
+    pub(super) fn done_tentatively(&mut self, row: &Iteration) {
+        self.times.iterations.truncate(place(row));
+        self.done(row);
+    }
+
+    /// An iteration is done: when that was, which is now if it was not known before.
+    pub(super) fn done(&mut self, row: &Iteration) -> f64 {
+        let known = self.times.iterations.get(place(row));
+        known.copied().unwrap_or_else(|| {
+            let now = self.start.elapsed().as_secs_f64();
+            self.times.iterations.push(now);
+            now
+        })
+    }
+
+    /// What it shows now.
+    pub(super) fn times(&mut self) -> Times {
+        if let Some((phase, _)) = self.current {
+            self.enter(phase);
+        }
+        self.times.clone()
+    }
+}
+
+impl Times {
+    /// Rows with their times.
+    pub(super) fn of(&self, rows: Vec<Iteration>) -> Vec<TimedIteration> {
+        let timed = |row: Iteration| {
+            let wall_s = self.iterations.get(place(&row)).copied();
+            TimedIteration {
+                row,
+                wall_s: wall_s.unwrap_or_default(),
+            }
+        };
+        rows.into_iter().map(timed).collect()
+    }
+}
+
+/// Rows are numbered from 1.
+fn place(row: &Iteration) -> usize {
+    (row.k as usize).saturating_sub(1)
+}
