@@ -265,7 +265,8 @@ mod tests {
 
     /// What a body may have, by the violation that reports an unknown name.
     fn known(found: Vec<Violation>) -> Vec<String> {
-        let unknown = found.iter().find(|v| v.reason == "unknown_name").unwrap();
+        let unknown = |v: &&Violation| v.reason == Reason::UnknownName;
+        let unknown = found.iter().find(unknown).unwrap();
         let names = unknown.expected.strip_prefix("one of ").unwrap();
         names.split(", ").map(str::to_owned).collect()
     }
