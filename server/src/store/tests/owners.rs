@@ -281,3 +281,26 @@ async fn nobody_changes_or_deletes_a_job_of_another() {
         );
     }
 }
+
+/// Results are found by their input alone: whether owners share them is a policy that does not exist yet.
+#[tokio::test]
+async fn a_result_answers_jobs_of_the_same_input_whoever_their_owner() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let submit = async |owner| {
+        let job = NewJob {
+            cache: Cache::Use,
+            ..new("1")
+        };
+        let accepted = store.submit(by(owner, vec![job], None), false).await;
+        accepted.unwrap().jobs.into_iter().next().unwrap()
+    };
+    let (ada, bob) = (submit("ada").await, submit("bob").await);
+    assert_eq!(bob.coalesced_into, Some(ada.key));
+    run_all(&store).await;
+    let later = submit("eve").await;
+    assert_eq!(later.result_key, ada.key);
+    let bob = store.job(BOB, bob.id).await.unwrap().unwrap();
+    assert_eq!((bob.status, bob.result_key), (Status::Succeeded, ada.key));
+    assert!(store.job(BOB, ada.id).await.unwrap().is_none());
+}
