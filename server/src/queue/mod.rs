@@ -17,7 +17,9 @@ mod watchers;
 
 mod state;
 
+mod ending;
 mod recorder;
+mod solving;
 mod worker;
 
 mod cancel;

@@ -1,0 +1,150 @@
+//! How a job ends, by what its solver has left.
+
+use std::any::Any;
+
+use solver::{error::SolveError, solution::Outcome};
+use tokio::task::JoinError;
+use tracing::{error, info};
+use uuid::Uuid;
+
+use crate::{
+    job::{Failure, Job, Reason, ResultAvailable, Status},
+    run::Document,
+    store::{Ending, Parts},
+};
+
+/// A solution ready to be stored.
+pub(super) struct Solved {
+    pub(super) ending: Ending,
+    pub(super) iterations: usize,
+    pub(super) parts: Parts,
+}
+
+/// Why there is no solution.
+pub(super) enum Unsolved {
+    Solve(SolveError),
+    /// The mesh, which was there when the job was accepted, cannot be read.
+    Mesh(String),
+}
+
+/// What the outcome of a solution means for its job.
+pub(super) fn ending_of_solution(document: &Document) -> Ending {
+    let (summary, partial) = (&document.summary.solution, ResultAvailable::Partial);
+    let residuals = &summary.residuals;
+    let failed = |reason, found: String| {
+        let detail = format!(
+            "after {} iterations {found}; the last state and the history are kept",
+            summary.iterations
+        );
+        Ending {
+            result: partial,
+            ..Ending::failed(reason, detail)
+        }
+    };
+    let unsettled = || {
+        format!(
+            "the residual is {:.3e} and the friction residual {:.3e}",
+            residuals.kkt, residuals.friction
+        )
+    };
+    let unbalanced = || {
+        format!(
+            "the forces on the body are out of balance by {:.3e} of their size",
+            residuals.equilibrium
+        )
+    };
+    match summary.outcome {
+        Outcome::Converged => Ending {
+            status: Status::Succeeded,
+            reason: None,
+            failure: None,
+            result: ResultAvailable::Final,
+        },
+        Outcome::NotConverged => failed(Reason::NotConverged, unsettled()),
+        Outcome::ContactCycling => failed(Reason::ContactCycling, unsettled()),
+        Outcome::FalseConvergence => failed(Reason::FalseConvergence, unbalanced()),
+        Outcome::Canceled => Ending {
+            result: partial,
+            ..Ending::canceled()
+        },
+    }
+}
+
+/// How the job ends, by what its solver has returned, or its panic; with the result that is to be stored.
+pub(super) fn ending_of_attempt(
+    job: &Job,
+    solved: Result<Result<Solved, Unsolved>, JoinError>,
+    out_of_time: bool,
+) -> (Ending, Option<Parts>) {
+    match solved {
+        Ok(Ok(Solved {
+            ending,
+            iterations,
+            parts,
+        })) => {
+            let ending = match ending.status {
+                // the solver was asked to stop, and does not know why
+                Status::Canceled if out_of_time => Ending {
+                    result: ending.result,
+                    ..timed_out(job)
+                },
+                _ => ending,
+            };
+            let status = ending.status;
+            info!(job.id = %job.id, %status, iterations, "job {} solved: {status} after {iterations} iterations", job.id);
+            (ending, Some(parts))
+        }
+        Ok(Err(Unsolved::Mesh(cause))) => (internal(job, &cause), None),
+        Ok(Err(Unsolved::Solve(error))) => (ending_of_error(job, &error, out_of_time), None),
+        Err(panic) => (internal(job, &panicked(panic)), None),
+    }
+}
+
+fn ending_of_error(job: &Job, error: &SolveError, out_of_time: bool) -> Ending {
+    let failed = |reason| Ending::failed(reason, error.to_string());
+    match error {
+        SolveError::Stopped if out_of_time => timed_out(job),
+        SolveError::Stopped => Ending::canceled(),
+        SolveError::SingularSystem { .. } | SolveError::Unheld { .. } => {
+            failed(Reason::SingularSystem)
+        }
+        SolveError::NonFinite { .. } => failed(Reason::NonFinite),
+        SolveError::ResourceExhausted => failed(Reason::ResourceExhausted),
+        // it was checked before it was accepted: an error of the service, not of the client
+        SolveError::Invalid(_) => internal(job, error),
+    }
+}
+
+/// Failed at its time limit, without a result.
+pub(super) fn timed_out(job: &Job) -> Ending {
+    let detail = format!(
+        "it was stopped after {} s; see limits.timeout_s",
+        job.limits.timeout_s
+    );
+    Ending::failed(Reason::TimedOut, detail)
+}
+
+/// Logs the cause under an incident number, and tells the client only that number.
+fn internal(job: &Job, cause: &dyn std::fmt::Display) -> Ending {
+    let incident = Uuid::now_v7();
+    error!(job.id = %job.id, %incident, %cause, "job {} failed, incident {incident}: {cause}", job.id);
+    let detail = format!("an unexpected error, logged as incident {incident}");
+    let failure = Failure::new(Reason::Internal, detail);
+    Ending {
+        failure: Some(failure),
+        ..Ending::failed(Reason::Internal, "")
+    }
+}
+
+fn panicked(error: JoinError) -> String {
+    let Ok(panic) = error.try_into_panic() else {
+        return "the solver's thread was lost".into();
+    };
+    let text = |panic: &(dyn Any + Send)| {
+        panic
+            .downcast_ref::<String>()
+            .cloned()
+            .or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()))
+    };
+    format!("the solver panicked: {}", text(&*panic).unwrap_or_default())
+}

@@ -1,0 +1,95 @@
+//! Solving a problem on a blocking thread, and reporting it.
+
+use std::{ops::ControlFlow, time::Duration, time::Instant};
+
+use solver::{
+    error::SolveError,
+    mesh::Mesh,
+    problem::{Problem, Refine, Step},
+};
+
+use super::{
+    ending::{Solved, Unsolved, ending_of_solution},
+    recorder::Report,
+};
+use crate::{
+    event::Payload,
+    run::{self, PartialSolution, Solve, Update},
+    store::{Parts, Store},
+    time::Time,
+};
+
+/// Reads a mesh from the store. On a blocking thread.
+pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Mesh, Unsolved> {
+    let failed = |cause: &dyn std::fmt::Display| Unsolved::Mesh(format!("mesh {hash}: {cause}"));
+    let body = tokio::runtime::Handle::current().block_on(store.mesh_body(hash));
+    let body = body.map_err(|error| failed(&error))?;
+    let body = body.ok_or_else(|| failed(&"it is not stored"))?;
+    postcard::from_bytes(&body).map_err(|error| failed(&error))
+}
+
+/// Reads the problem and solves it. `report` is called with everything that is to be recorded, and with nothing where
+/// the solver only asks whether to go on. On a blocking thread.
+pub(super) fn solve_and_report(
+    problem: &str,
+    mesh: Option<Mesh>,
+    solve: Solve,
+    mut report: impl FnMut(Option<Report>) -> ControlFlow<()>,
+) -> Result<Solved, SolveError> {
+    let start = Instant::now();
+    let problem: Problem = files::parse(problem).map_err(SolveError::Invalid)?;
+    let parse_s = start.elapsed().as_secs_f64();
+    let single = |step: &Step| step.increments == 1;
+    if problem.steps.len() <= 1
+        && problem.steps.iter().all(single)
+        && matches!(problem.mesh.refine, Refine::Times(_))
+    {
+        // whether to stop is asked again at the next report
+        let _ = report(Some(Report::OneLevel));
+    }
+    let event = |payload| Some(Report::Event(Time::now(), payload));
+    let mut partials = Partials::default();
+    let document = run::run(&problem, mesh, parse_s, solve, &mut |update| {
+        report(match update {
+            Update::Phase(stage) => event(Payload::Stage { stage }),
+            Update::Iteration(row) => event(Payload::Iteration(row)),
+            Update::Warning(warning) => event(Payload::Warning(warning.clone())),
+            Update::Step(partial) => partials.next(&partial),
+            Update::Pulse => None,
+        })
+    })?;
+    let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite { phase: "recover" })?;
+    Ok(Solved {
+        ending: ending_of_solution(&document),
+        iterations: document.history.len(),
+        parts,
+    })
+}
+
+/// Decides when the results of finished load steps are stored as a partial result: not after each, since all of it is
+/// written each time and a problem may have a thousand steps; and no longer once it has grown large.
+#[derive(Default)]
+struct Partials {
+    /// Not before this time.
+    next: Option<Instant>,
+}
+
+impl Partials {
+    /// The partial result, if it is time to store it.
+    fn next(&mut self, partial: &PartialSolution<'_>) -> Option<Report> {
+        /// It is written in one transaction, which holds up the single writer for some 40 ms.
+        const MOST_BYTES: usize = 4 << 20;
+        /// It takes at most a tenth of the time, and happens at most once a second.
+        const SHARE: u32 = 10;
+        const PAUSE: Duration = Duration::from_secs(1);
+        let start = Instant::now();
+        if self.next.is_some_and(|next| start < next) {
+            return None;
+        }
+        // numbers that are not finite, and so have no JSON, are reported at the end
+        let parts = Parts::of(&partial.document().ok()?).ok();
+        self.next = Some(start + (start.elapsed() * SHARE).max(PAUSE));
+        let parts = parts.filter(|parts| parts.bytes() <= MOST_BYTES)?;
+        Some(Report::Partial(Box::new(parts)))
+    }
+}
