@@ -9,7 +9,7 @@ use jsonschema::error::{TypeKind, ValidationErrorKind};
 use jsonschema::{ValidationError, Validator};
 use serde_json::Value;
 
-use solver::error::{Findings, Reason, Violation, escape, shortened};
+use solver::error::{Findings, Reason, Violation, either, escape, shortened};
 use solver::problem::Problem;
 
 /// The JSON Schema of a problem (draft 2020-12).
@@ -207,27 +207,27 @@ fn one_form(
     forms: &[Vec<&str>],
     found: &mut Findings,
 ) {
-    let given = |name: &&&str| error.instance().get(**name).is_some_and(|v| !v.is_null());
-    let meant =
-        |form: &&(&Vec<&str>, &Vec<ValidationError<'static>>)| form.0.iter().any(|n| given(&n));
+    let instance = error.instance();
+    let given = |name: &str| instance.get(name).is_some_and(|value| !value.is_null());
     let all: Vec<_> = forms.iter().zip(branches).collect();
-    let meant: Vec<_> = all.iter().filter(meant).collect();
+    let meant: Vec<_> = all
+        .iter()
+        .filter(|(form, _)| form.iter().any(|name| given(name)))
+        .collect();
     if let [(_, errors)] = meant[..] {
         return errors.iter().for_each(|error| gather(error, found));
     }
-    let quoted = |names: &mut dyn Iterator<Item = &&str>| -> String {
-        let names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
+    let names = forms.iter().flatten();
+    let got: Vec<(&str, bool)> = names.map(|name| (*name, given(name))).collect();
+    let form = |names: &Vec<&str>| {
+        let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
         names.join(" and ")
     };
-    let got = match meant.is_empty() {
-        true => "none of them".to_owned(),
-        false => quoted(&mut forms.iter().flatten().filter(given)),
-    };
-    let offers: Vec<String> = forms.iter().map(|form| quoted(&mut form.iter())).collect();
+    let offers: Vec<String> = forms.iter().map(form).collect();
     found.add(Violation::new(
         error.instance_path().as_str(),
         Reason::WrongCount,
-        got,
+        either(&got),
         format!("exactly one of {}", offers.join(", ")),
         "Choose one of the forms.",
     ));

@@ -39,6 +39,7 @@ pub mod steps;
 // Finer and finer grids until the results settle.
 pub mod adapt;
 
+use body::ElasticBody;
 use error::{SolveError, Violation};
 use mesh::External;
 use model::Model;
@@ -60,31 +61,50 @@ pub fn solve_on(
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     match problem.mesh.refine {
-        Refine::Times(_) => solve_once(problem, external, observe),
+        Refine::Times(_) => prepare(problem, external, observe)?.solve(observe),
         Refine::Adaptive(goal) => {
             let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
             let contacts = model.contacts;
             // only grids are refined so, and a grid stands in the problem itself
-            let solve =
-                |problem: &Problem, observe: &mut Observer<'_>| solve_once(problem, None, observe);
+            let solve = |problem: &Problem, observe: &mut Observer<'_>| {
+                prepare(problem, None, observe)?.solve(observe)
+            };
             adapt::run(problem, &goal, &contacts, &solve, observe)
         }
     }
 }
 
-/// On one mesh.
-fn solve_once(
+/// A problem up to its iterations: checked, and its body factored and condensed onto its contacts.
+///
+/// What comes before the iterations is most of the work, and problems that differ in obstacles, friction, load
+/// steps or tolerances only have the same body: [`steps::run`] solves any of their models on it.
+pub struct Prepared {
+    /// What is to be solved.
+    pub model: Model,
+    /// The body as felt from its contacts.
+    pub body: ElasticBody,
+}
+
+/// Prepares a problem on the one mesh that it gives; adaptive refinement goes through several.
+pub fn prepare(
     problem: &Problem,
     external: Option<External>,
     observe: &mut Observer<'_>,
-) -> Result<Solution, SolveError> {
-    begin(observe, Phase::Mesh)?;
+) -> Result<Prepared, SolveError> {
+    tell(observe, Progress::Phase(Phase::Mesh))?;
     let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
     for warning in &model.warnings {
-        begin_warning(observe, warning)?;
+        tell(observe, Progress::Warning(warning))?;
     }
-    let body = body::ElasticBody::new(&model, observe)?;
-    steps::run(&model, &body, observe)
+    let body = ElasticBody::new(&model, observe)?;
+    Ok(Prepared { model, body })
+}
+
+impl Prepared {
+    /// Contact and friction, load step by load step.
+    pub fn solve(&self, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
+        steps::run(&self.model, &self.body, observe)
+    }
 }
 
 /// Checks a problem without solving it: its warnings, or everything that is wrong with it.
@@ -95,19 +115,10 @@ pub fn check(
     Model::new(problem, external).map(|model| model.warnings)
 }
 
-fn begin(observe: &mut Observer<'_>, phase: Phase) -> Result<(), SolveError> {
-    if observe(Progress::Phase(phase)).is_break() {
-        Err(SolveError::Stopped)
-    } else {
-        Ok(())
-    }
-}
-
-fn begin_warning(observe: &mut Observer<'_>, warning: &Warning) -> Result<(), SolveError> {
-    if observe(Progress::Warning(warning)).is_break() {
-        Err(SolveError::Stopped)
-    } else {
-        Ok(())
+fn tell(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
+    match observe(progress).is_break() {
+        true => Err(SolveError::Stopped),
+        false => Ok(()),
     }
 }
 

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 use solver::problem::{Algorithm, BoundaryValue, FrictionPoints, Problem, Refine};
-use solver::solution::Summary;
+use solver::solution::{Solution, Summary};
 
 use crate::record::{held, keep_table};
-use crate::support::{example, solve};
+use crate::support::{example, problem, solve};
 
 const EXAMPLES: [(&str, f64); 4] = [
     ("rectangular_punch", 0.01),
@@ -187,5 +187,35 @@ fn newton_and_the_sweeps_find_what_auto_finds() {
                 );
             }
         }
+    }
+}
+
+/// A mesh generator misses the axis by rounding of the body's size, which is much for a small contact. The
+/// node is on the axis for supports, contact and friction alike, and the results are those of r = 0.
+#[test]
+fn a_node_that_misses_the_axis_by_rounding_is_on_it_however_small_the_contact() {
+    let pressed = |first: f64| {
+        let text = json!({
+            "analysis": {"kind": "axisymmetric"},
+            "mesh": {"grid": {"x": [first, 0.002, 0.004, 0.01, 0.1, 1], "y": [-1, -0.1, -0.01, -0.002, 0]},
+                "boundaries": {"tip": {"side": "top", "x": [0, 0.01]}}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "bottom", "uy": 0}],
+            "contacts": [{"boundary": "tip", "obstacle": {"kind": "parabola", "radius": 0.05}, "indentation": 1e-4,
+                "friction": {"coefficient": 0.3, "nonlocal_radius": 1e-3, "elastic_slip": 1e-7}}],
+        });
+        solve(&problem(&text.to_string()))
+    };
+    // 5e-14 is the axis beside a radius of 1, and was none beside a contact of 0.01
+    let (exact, rounded) = (pressed(0.0), pressed(5e-14));
+    let forces = |s: &Solution| [s.summary.normal_force, s.summary.friction_force];
+    for (a, b) in forces(&exact).into_iter().zip(forces(&rounded)) {
+        assert!((a / b - 1.0).abs() < 1e-9, "{a}, {b}");
+    }
+    let pressures = |s: &Solution| s.profiles["tip"].normal_stress.clone();
+    let (exact, rounded) = (pressures(&exact), pressures(&rounded));
+    let most = exact.iter().fold(0.0f64, |most, p| most.max(-p));
+    for (a, b) in exact.iter().zip(&rounded) {
+        assert!((a - b).abs() < 1e-6 * most, "{exact:?}, {rounded:?}");
     }
 }

@@ -1,11 +1,8 @@
-//! A deck as it is read, line by line: what was understood, and what was not.
+//! A deck in our terms: what was understood of it, and what was not.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::BufRead;
 
-use super::block::Block;
-use super::keyword::Keyword;
-use crate::source::{Labels, Plane, ReadError, Source};
+use crate::source::{Labels, Plane};
 use solver::element::Family;
 use solver::error::{Findings, Reason, Violation};
 use solver::mesh::RawMesh;
@@ -115,43 +112,6 @@ pub(super) struct Deck {
 }
 
 impl Deck {
-    pub(super) fn read(reader: impl BufRead) -> Result<Self, ReadError> {
-        let mut source = Source::new(reader);
-        let mut deck = Deck::default();
-        let mut block = Block::NoData("the first keyword");
-        let mut material: Option<String> = None;
-        while source.advance()? {
-            let line = source.line;
-            let mut text = source.text().trim().to_owned();
-            if text.is_empty() || text.starts_with("**") {
-                continue;
-            }
-            if !text.starts_with('*') {
-                deck.data(&mut block, line, &text);
-                continue;
-            }
-            // a keyword goes on in the next line where it ends in a comma
-            while text.ends_with(',') && source.advance()? {
-                text.push_str(source.text().trim());
-            }
-            deck.end(block, line);
-            block = deck.begin(&Keyword::new(&text), line, &mut material);
-        }
-        let line = source.line;
-        deck.end(block, line);
-        if deck.raw.nodes.is_empty() {
-            deck.fault(
-                line,
-                Reason::TooFew,
-                "a deck without *NODE",
-                "nodes and elements",
-                "Is it an Abaqus or CalculiX deck (.inp)?",
-            );
-        }
-        deck.faults.extend(deck.plane.fault());
-        Ok(deck)
-    }
-
     pub(super) fn fault(
         &mut self,
         line: u64,

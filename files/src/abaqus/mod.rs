@@ -10,6 +10,7 @@ mod deck;
 mod keyword;
 mod names;
 mod problem;
+mod read;
 
 pub use problem::problem;
 
@@ -23,7 +24,7 @@ use solver::solution::Warning;
 /// not looked at, but that the sets and faces it loads have names: `SET P3` for a pressure on the third
 /// sides of the elements of SET, `7` for the node 7.
 pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
-    let deck = deck::Deck::read(reader)?;
+    let deck = read::read(reader)?;
     let (raw, faults) = deck.into_raw();
     let raw = faults.into_result(raw);
     raw.and_then(mesh::build).map_err(ReadError::Invalid)

@@ -1,6 +1,7 @@
 //! A deck as a whole problem: what is not understood is an error with its line.
 
 use super::deck::{Deck, Elastic, ElementType, Section, Theory};
+use super::read::read;
 use crate::source::ReadError;
 use solver::error::Violation;
 use solver::problem::{
@@ -11,7 +12,7 @@ use solver::problem::{
 /// The problem that a deck states: one linear static step, without contact. The text itself becomes
 /// the problem's mesh.
 pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
-    let mut deck = Deck::read(text.as_bytes()).map_err(ReadError::into_violations)?;
+    let mut deck = read(text.as_bytes()).map_err(ReadError::into_violations)?;
     let analysis = analysis(&mut deck);
     let quadrature = quadrature(&mut deck);
     let materials = materials(&mut deck);

@@ -4,8 +4,8 @@
 
 use std::ops::ControlFlow;
 
-use crate::algorithm::End;
 use crate::algorithm::convex::{Minimum, minimise};
+use crate::algorithm::finished::End;
 use crate::algorithm::system::{State, System};
 use crate::algorithm::track::{Measured, Row, Track};
 use crate::elasticity::Dof;

@@ -4,6 +4,7 @@
 //! time to the observer. [`run`] chooses among them.
 
 mod convex;
+mod finished;
 mod fixed_point;
 mod newton;
 mod profile;
@@ -14,56 +15,22 @@ mod track;
 mod uniqueness;
 
 pub use convex::{Minimum, minimise};
+pub use finished::Finished;
 pub use report::{Reported, report};
 pub use system::{ContactNode, Patch, Point, State, System, Work};
-pub use track::Cycle;
+pub use track::{Cycle, Place};
 pub use uniqueness::{compared, note_doubled_increments, note_uniqueness, other_solution};
 
 use std::ops::ControlFlow;
 
 use crate::problem::{Algorithm, SolverControls};
-use crate::solution::{Iteration, Observer, Outcome, Residuals, Stage};
+use crate::solution::{Observer, Outcome, Stage};
+use finished::{End, finish};
 use fixed_point::{stuck, sweep};
 use track::{Measured, Track};
 
 /// Newton steps before giving up.
 const NEWTON_STEPS: u32 = 60;
-
-/// The end of the iterations at one load level.
-#[derive(Clone)]
-pub struct Finished {
-    /// The final state.
-    pub state: State,
-    /// The friction bound that it was solved with, at every friction point.
-    pub bound: Vec<f64>,
-    /// σ_t at every friction point.
-    pub tractions: Vec<f64>,
-    /// The tractions are those of the thesis's own iteration, not what the law says of the state.
-    pub own_tractions: bool,
-    /// How it ended.
-    pub outcome: Outcome,
-    /// What produced the final state.
-    pub stage: Stage,
-    /// kkt, friction and monolithic; equilibrium is the body's to say.
-    pub residuals: Residuals,
-    /// Last q = |Δτ_k|/|Δτ_{k−1}| of plain sweeps.
-    pub contraction: Option<f64>,
-    /// All rows.
-    pub history: Vec<Iteration>,
-    /// Period and nodes of a cycle.
-    pub cycle: Option<Cycle>,
-}
-
-/// Where the iterations stand in the load history.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Place {
-    /// Load step, from 0.
-    pub step: u32,
-    /// Increment within the step, from 0.
-    pub increment: u32,
-    /// Rows told before.
-    pub rows: u32,
-}
 
 /// Solves a system at its load level with the algorithm asked for, from the end of the increment
 /// before where there is one.
@@ -213,49 +180,5 @@ fn both(track: &mut Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) 
     End {
         contraction,
         ..nearest.with_cycle_of(&other)
-    }
-}
-
-/// Where a method ended.
-struct End {
-    measured: Measured,
-    stage: Stage,
-    outcome: Outcome,
-    cycle: Option<Cycle>,
-    /// Last q of sweeps that were not accelerated.
-    contraction: Option<f64>,
-    /// All iterations that were allowed are done.
-    exhausted: bool,
-}
-
-impl End {
-    /// What does not converge is told with the cycle that another way ran into, if it has none itself.
-    fn with_cycle_of(mut self, other: &End) -> Self {
-        if self.outcome == Outcome::NotConverged && other.cycle.is_some() {
-            self.cycle.clone_from(&other.cycle);
-            self.outcome = Outcome::ContactCycling;
-        }
-        self
-    }
-
-    /// Nothing else is to be tried: it converged, or the observer or the limit put an end to it.
-    fn ended(&self) -> bool {
-        matches!(self.outcome, Outcome::Converged | Outcome::Canceled) || self.exhausted
-    }
-}
-
-fn finish(track: Track<'_, '_>, end: End) -> Finished {
-    let measured = end.measured;
-    Finished {
-        tractions: track.system.tractions(&measured.state.v, &measured.bound),
-        own_tractions: false,
-        outcome: end.outcome,
-        stage: end.stage,
-        residuals: measured.residuals,
-        contraction: end.contraction,
-        history: track.history,
-        cycle: end.cycle,
-        state: measured.state,
-        bound: measured.bound,
     }
 }

@@ -11,10 +11,10 @@
 //! the friction bound before it; beyond that there is no safeguard. Where it converges it takes four
 //! to twenty steps.
 
-use crate::algorithm::End;
 use crate::algorithm::convex::{
     close, follow, free_dofs, least_along, semidefinite_shift, update_active,
 };
+use crate::algorithm::finished::End;
 use crate::algorithm::system::{Point, State, System};
 use crate::algorithm::track::{Measured, Row, Track};
 use crate::elasticity::Dof;

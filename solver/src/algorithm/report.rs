@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::algorithm::Finished;
+use crate::algorithm::finished::Finished;
 use crate::algorithm::profile::{Forces, PatchView};
 use crate::algorithm::system::System;
 use crate::body::ElasticBody;

@@ -8,10 +8,6 @@ use crate::linear::Dense;
 use crate::model::{ContactModel, Level, Model};
 use crate::problem::{Condition, FrictionPoints, History, Measure};
 
-/// A radius below this part of the contact's length is the axis: a mesh generator may miss 0 by
-/// rounding, and the weight of such a node is nothing but rounding.
-const AXIS: f64 = 1e-12;
-
 /// A friction point whose bound is below this part of the largest is open: its anchor follows it.
 const OPEN: f64 = 1e-12;
 
@@ -43,7 +39,11 @@ pub struct System<'a> {
     pub(super) model: &'a Model,
 }
 
-/// One contact node.
+/// One contact node: two unknowns and a bound on the first of them.
+///
+/// A constraint is a bound on one unknown, and not a row of coefficients on several, also where two bodies would
+/// meet: `body` would turn the condensed unknowns so that the displacement relative to the other body is one of
+/// them (docs/theory.md, "Where a second body would enter").
 #[derive(Clone, Copy, Debug)]
 pub struct ContactNode {
     /// u_n.
@@ -159,9 +159,7 @@ impl<'a> System<'a> {
     fn add(&mut self, model: &Model, contact: &'a ContactModel) {
         let (first, boundary) = (self.nodes.len(), &contact.boundary);
         let count = boundary.nodes.len();
-        let on_axis = |i: usize| {
-            model.section.axisymmetric() && boundary.positions[i][0] <= AXIS * boundary.s[count - 1]
-        };
+        let on_axis = |i: usize| model.axis.holds(boundary.positions[i]);
         for i in 0..count {
             let [normal, tangent] = self.body.contact_dofs[first + i];
             let towards = |step: [usize; 2]| Some(step.map(|s| first + s));

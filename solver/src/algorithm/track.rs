@@ -3,12 +3,22 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
-use crate::algorithm::Place;
 use crate::algorithm::system::{State, System};
 use crate::problem::SolverControls;
 use crate::solution::{
     ContactCount, ForcePair, FrictionCount, Iteration, Observer, Progress, Residuals, Stage,
 };
+
+/// Where the iterations stand in the load history.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Place {
+    /// Load step, from 0.
+    pub step: u32,
+    /// Increment within the step, from 0.
+    pub increment: u32,
+    /// Rows told before.
+    pub rows: u32,
+}
 
 /// A state with the friction bound it was found for, and what the two imply.
 #[derive(Clone)]

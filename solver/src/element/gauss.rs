@@ -1,6 +1,13 @@
 //! Gauss–Legendre integration on [−1, 1], thesis 2.3, and on the master elements.
 
-use super::GaussPoint;
+/// A place of integration in master coordinates, with its weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GaussPoint {
+    /// ξ and η.
+    pub place: [f64; 2],
+    /// The weights of all points add up to the area of the master element.
+    pub weight: f64,
+}
 
 /// Points and weights of the 3-point rule, exact for polynomials of degree 5.
 #[rustfmt::skip]

@@ -5,6 +5,8 @@ pub mod gauss;
 pub mod quad8;
 pub mod tri6;
 
+pub use gauss::GaussPoint;
+
 use std::ops::Deref;
 
 use schemars::JsonSchema;
@@ -31,15 +33,6 @@ pub enum Family {
     Quad,
     /// Six nodes, ξ, η ≥ 0 and ξ + η ≤ 1.
     Triangle,
-}
-
-/// A place of integration in master coordinates, with its weight.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GaussPoint {
-    /// ξ and η.
-    pub place: [f64; 2],
-    /// The weights of all points add up to the area of the master element.
-    pub weight: f64,
 }
 
 /// What an integral over a real element needs at one of its points.

@@ -11,8 +11,6 @@
 //! Corners counter-clockwise, then midsides, as Gmsh and Abaqus number it. The thesis has no
 //! triangles.
 
-use super::AtNodes;
-
 /// Master coordinates of the nodes.
 #[rustfmt::skip]
 pub const NODES: [[f64; 2]; 6] = [
@@ -25,7 +23,7 @@ pub const SIDES: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [2, 0, 5]];
 
 /// h_i(ξ, η); two zeros follow.
 #[rustfmt::skip]
-pub fn shape(xi: f64, eta: f64) -> AtNodes<f64> {
+pub fn shape(xi: f64, eta: f64) -> [f64; 8] {
     let zeta = 1.0 - xi - eta;
     [
         zeta * (2.0 * zeta - 1.0), xi * (2.0 * xi - 1.0), eta * (2.0 * eta - 1.0),
@@ -36,7 +34,7 @@ pub fn shape(xi: f64, eta: f64) -> AtNodes<f64> {
 
 /// dh_i/dξ and dh_i/dη; two zeros follow.
 #[rustfmt::skip]
-pub fn derivative(xi: f64, eta: f64) -> AtNodes<[f64; 2]> {
+pub fn derivative(xi: f64, eta: f64) -> [[f64; 2]; 8] {
     let zeta = 1.0 - xi - eta;
     [
         [1.0 - 4.0 * zeta,   1.0 - 4.0 * zeta],

@@ -48,6 +48,16 @@ impl Violation {
     }
 }
 
+/// What was given of alternatives, of which exactly one was asked for.
+pub fn either(given: &[(&str, bool)]) -> String {
+    let given = given.iter().filter(|(_, given)| *given);
+    let names: Vec<String> = given.map(|(name, _)| format!("`{name}`")).collect();
+    match names.is_empty() {
+        true => "none of them".to_owned(),
+        false => names.join(" and "),
+    }
+}
+
 /// A name as a token of a JSON Pointer (RFC 6901).
 pub fn escape(name: &str) -> String {
     name.replace('~', "~0").replace('/', "~1")

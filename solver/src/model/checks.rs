@@ -6,9 +6,6 @@ use crate::solution::Warning;
 /// Directions count as equal to an axis, and prescribed values as equal, to this.
 pub(super) const ALIGNED: f64 = 1e-9;
 
-/// A radius below this part of the largest is the axis: a mesh generator may miss 0 by rounding.
-pub(super) const AXIS: f64 = 1e-12;
-
 /// Every check is a method; each answers whether it held.
 #[derive(Default)]
 pub(super) struct Checks {

@@ -2,8 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::checks::{ALIGNED, AXIS, Checks};
-use super::{ContactModel, Held, Level};
+use super::axis::Axis;
+use super::checks::{ALIGNED, Checks};
+use super::contact_model::ContactModel;
+use super::level::Level;
+use super::supports::Held;
 use crate::contact::ContactBoundary;
 use crate::contact::obstacle::{self, FacingRun, Profile};
 use crate::elasticity::Section;
@@ -29,6 +32,7 @@ impl Checks {
         &mut self,
         mesh: &Mesh,
         section: &Section,
+        axis: &Axis,
         problem: &Problem,
         numbers: Vec<(Checked, Option<FrictionLaw<Average>>)>,
         fixed: &BTreeMap<u32, Held>,
@@ -36,7 +40,7 @@ impl Checks {
         let mut all = All::default();
         let mut models: Vec<ContactModel> = Vec::new();
         for (i, numbers) in numbers.into_iter().enumerate() {
-            let contact = self.contact(mesh, section, &problem.contacts, i, numbers);
+            let contact = self.contact(mesh, section, axis, &problem.contacts, i, numbers);
             let Some(model) = all.take(contact) else {
                 continue;
             };
@@ -52,6 +56,7 @@ impl Checks {
         &mut self,
         mesh: &Mesh,
         section: &Section,
+        axis: &Axis,
         contacts: &[Contact],
         i: usize,
         (obstacle, friction): (Checked, Option<FrictionLaw<Average>>),
@@ -72,7 +77,7 @@ impl Checks {
         let run = self.facing_run(mesh, edges, contact, &pointer)?;
         let mut boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
         let radius = friction.as_ref().and_then(|law| law.bound.radius());
-        self.sound(&boundary, section, contact, radius, &run, &pointer)?;
+        self.sound(&boundary, axis, contact, radius, &run, &pointer)?;
         let push = turn_normals(&mut boundary, &run, contact.normal);
         let along = |(profile, push): (&Profile, &[f64; 2])| profile.distance * push[0];
         Ok(ContactModel {
@@ -113,7 +118,7 @@ impl Checks {
     fn sound(
         &mut self,
         boundary: &ContactBoundary,
-        section: &Section,
+        axis: &Axis,
         contact: &Contact,
         radius: Option<f64>,
         run: &FacingRun,
@@ -122,9 +127,7 @@ impl Checks {
         let mut all = All::default();
         let last = boundary.nodes.len() - 1;
         let at = |i: usize| boundary.positions[i];
-        let end_on_axis = |i: usize| {
-            section.axisymmetric() && (i == 0 || i == last) && at(i)[0] <= AXIS * boundary.s[last]
-        };
+        let end_on_axis = |i: usize| (i == 0 || i == last) && axis.holds(at(i));
         if let Some(i) = (0..=last).find(|&i| !(boundary.weights[i] > 0.0 || end_on_axis(i))) {
             all.refuse(self.say(
                 format!("{pointer}/boundary"),

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::checks::{ALIGNED, AXIS, Checks};
-use super::{ContactModel, Model};
+use super::axis::Axis;
+use super::checks::{ALIGNED, Checks};
+use super::contact_model::ContactModel;
 use crate::elasticity::Section;
 use crate::error::{All, Checked, Reason};
 use crate::friction::{Average, FrictionLaw};
@@ -77,17 +78,14 @@ impl Checks {
     pub(super) fn supports(
         &mut self,
         mesh: &Mesh,
-        section: &Section,
+        axis: &Axis,
         supports: &[Support],
     ) -> (BTreeMap<u32, Held>, Checked) {
         let mut fixed: BTreeMap<u32, Held> = BTreeMap::new();
-        if section.axisymmetric() {
-            let radius = mesh.nodes.iter().map(|[r, _]| *r).fold(0.0, f64::max);
-            let on_axis = |n: &u32| mesh.nodes[*n as usize][0] <= AXIS * radius;
-            for node in (0..mesh.nodes.len() as u32).filter(on_axis) {
-                let (direction, value) = ([1.0, 0.0], 0.0);
-                fixed.insert(node, Held::Along { direction, value });
-            }
+        let on_axis = |n: &u32| axis.holds(mesh.nodes[*n as usize]);
+        for node in (0..mesh.nodes.len() as u32).filter(on_axis) {
+            let (direction, value) = ([1.0, 0.0], 0.0);
+            fixed.insert(node, Held::Along { direction, value });
         }
         let size = supports
             .iter()
@@ -330,19 +328,6 @@ impl Checks {
     }
 }
 
-impl Model {
-    /// A rigid motion that neither supports nor the given nodes and directions hinder, in words, and
-    /// a node that moves.
-    pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(&'static str, u32)> {
-        let mut held = directions(&self.fixed);
-        held.extend(hindered);
-        let parts = self.mesh.connected_parts();
-        parts
-            .iter()
-            .find_map(|part| free_motion(&self.mesh, &self.section, &held, part))
-    }
-}
-
 /// Nodes and the directions they are held along.
 fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<(u32, [f64; 2])> {
     let mut held = Vec::new();
@@ -383,6 +368,22 @@ fn largest(value: BoundaryValue) -> f64 {
 
 /// Displacement of a node.
 type Motion<'a> = Box<dyn Fn(u32) -> [f64; 2] + 'a>;
+
+/// A rigid motion of a part of the body that neither supports nor the given nodes and directions hinder, in
+/// words, and a node that moves.
+pub(super) fn motion_left(
+    mesh: &Mesh,
+    section: &Section,
+    fixed: &BTreeMap<u32, Held>,
+    hindered: &[(u32, [f64; 2])],
+) -> Option<(&'static str, u32)> {
+    let mut held = directions(fixed);
+    held.extend(hindered);
+    let parts = mesh.connected_parts();
+    parts
+        .iter()
+        .find_map(|part| free_motion(mesh, section, &held, part))
+}
 
 /// A rigid motion of the nodes `part` that is not `held` (nodes and directions), and the node that it moves most.
 fn free_motion(

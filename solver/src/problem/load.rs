@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::BoundaryValue;
-use crate::error::{Reason, Violation};
+use super::support::BoundaryValue;
+use crate::error::{Reason, Violation, either};
 
 /// A load in exactly one form: on a boundary `pressure`, or `traction`, or `normal` and `tangential`
 /// (or one of them), or `nodal`; on a set of nodes `force`; on the whole body `body_force`.
@@ -115,7 +115,7 @@ impl TryFrom<LoadFields> for Load {
             _ => Err(Violation::new(
                 "",
                 Reason::WrongCount,
-                super::given(&given),
+                either(&given),
                 "exactly one of `pressure`, `traction`, `normal` and `tangential`, `nodal`, `force`, `body_force`",
                 "Write a load for each.",
             )),

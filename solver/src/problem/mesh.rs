@@ -7,7 +7,7 @@ use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::element::Element;
-use crate::error::{Reason, Violation};
+use crate::error::{Reason, Violation, either};
 
 /// The body cut into elements: exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`; and names for
 /// parts of it.
@@ -138,7 +138,7 @@ impl TryFrom<MeshFields> for MeshInput {
             _ => return Err(Violation::new(
                 "",
                 Reason::WrongCount,
-                super::given(&given),
+                either(&given),
                 "exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`",
                 "Give the mesh in one form.",
             )),

@@ -9,6 +9,7 @@ mod load;
 mod material;
 mod mesh;
 mod solver;
+mod support;
 
 pub use contact::{
     Along, BoundTable, Condition, Contact, Friction, FrictionPoints, History, Kernel, Measure,
@@ -20,6 +21,7 @@ pub use mesh::{
     AdaptiveRefine, BoundaryPart, ElementRange, Grid, InlineMesh, MeshInput, MeshSource, Refine,
 };
 pub use solver::{Algorithm, SolverControls, Spacing, Step, ThesisOptions, ThesisPressure};
+pub use support::{BoundaryValue, Support};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -93,53 +95,7 @@ pub enum Analysis {
     Axisymmetric {},
 }
 
-/// A value on a boundary: constant, or linear by arc length from the boundary's start to its end.
-/// A boundary runs with the body on its right (a top edge runs along +x).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum BoundaryValue {
-    /// The same everywhere.
-    Constant(f64),
-    /// `[start, end]`.
-    Linear([f64; 2]),
-}
-
-/// Prescribed displacements on a boundary or a set of nodes, along x and y or (on a boundary) along
-/// normal and tangent; what is not named stays free.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Support {
-    /// Name of the boundary.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub boundary: Option<String>,
-    /// Name of a set of nodes instead.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub nodes: Option<String>,
-    /// Displacement along x (length).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ux: Option<BoundaryValue>,
-    /// Displacement along y (length).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub uy: Option<BoundaryValue>,
-    /// Displacement along the outward normal (length).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub un: Option<BoundaryValue>,
-    /// Displacement along t, the outward normal turned clockwise (length).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ut: Option<BoundaryValue>,
-}
-
 /// Gauss points of an element in each direction, where a problem says nothing of them.
 pub fn default_quadrature() -> u32 {
     3
-}
-
-/// What is given where exactly one should be, for a violation.
-fn given(fields: &[(&str, bool)]) -> String {
-    let given = fields.iter().filter(|(_, given)| *given);
-    let names: Vec<String> = given.map(|(name, _)| format!("`{name}`")).collect();
-    match names.is_empty() {
-        true => "none of them".to_owned(),
-        false => names.join(" and "),
-    }
 }

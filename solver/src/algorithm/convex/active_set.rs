@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::{AIM, Minimum, close, follow, free_dofs, gradient, newton_direction};
+use super::step::{AIM, Minimum, close, follow, free_dofs, gradient, newton_direction};
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 

@@ -4,8 +4,8 @@
 mod extents;
 mod warnings;
 
-use super::Finished;
 use super::system::{Patch, System};
+use crate::algorithm::finished::Finished;
 use crate::contact::edge_nodes;
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;

@@ -29,7 +29,7 @@ pub(super) fn nonlocal(
     };
     let value = |stretch: &Stretch<'_>, y: f64| {
         let zeta = (2.0 * y - stretch.from - stretch.to) / (stretch.to - stretch.from);
-        super::rows::linear(rule, stretch.values, zeta)
+        linear(rule, stretch.values, zeta)
     };
     let radius = average.radius();
     if radius == 0.0 {
@@ -49,6 +49,13 @@ pub(super) fn nonlocal(
         }
     }
     sum
+}
+
+/// A line through the values at the Gauss points nearest to ζ.
+pub(super) fn linear(rule: &[(f64, f64)], values: &[f64], zeta: f64) -> f64 {
+    let k = usize::from(rule.len() > 2 && zeta > 0.0);
+    let (a, b) = (rule[k].0, rule[k + 1].0);
+    values[k] + (zeta - a) / (b - a) * (values[k + 1] - values[k])
 }
 
 #[cfg(test)]

@@ -13,26 +13,19 @@
 //! the relaxation factor.
 
 mod average;
+mod friction;
 mod rows;
 
-use crate::algorithm::End;
 use crate::algorithm::convex::{close, follow, free_dofs};
-use crate::algorithm::system::{State, System};
+use crate::algorithm::finished::End;
+use crate::algorithm::system::{ContactNode, State, System};
 use crate::algorithm::track::{Measured, Row, Track, relative_change};
 use crate::elasticity::Dof;
 use crate::linear::solve_positive_definite;
 use crate::problem::{ThesisOptions, ThesisPressure};
 use crate::solution::{Observer, Outcome, Stage};
+use friction::{Friction, relax, sense};
 use rows::Rows;
-
-/// Friction at every friction point.
-#[derive(Clone)]
-struct Friction {
-    /// τ = μ max(S, 0) (stress).
-    bound: Vec<f64>,
-    /// σ_t on the body, along t (stress); F̂ is its load with the opposite sign.
-    traction: Vec<f64>,
-}
 
 /// Iterates; the tractions that the final state was solved with come back beside it.
 pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End, Vec<f64>) {
@@ -157,7 +150,7 @@ fn solve(system: &System<'_>, active: &[bool], traction: &[f64]) -> Option<Vec<f
 
 /// Step 4. A node of Γ_C* with σ_n > 0 leaves it; a node off it with u_n ≥ s enters.
 fn next_contact(system: &System<'_>, state: &State, node_stress: &[f64]) -> Vec<bool> {
-    let stays = |(i, node): (usize, &crate::algorithm::ContactNode)| match node.normal {
+    let stays = |(i, node): (usize, &ContactNode)| match node.normal {
         Dof::Fixed(_) => false,
         _ if state.active[i] => node_stress[i] <= 0.0,
         Dof::Free(dof) => state.v[dof] >= node.gap,
@@ -212,20 +205,4 @@ fn averaged(
         traction: traction.collect(),
         bound,
     }
-}
-
-/// σ_t / τ from φ with the sign of the motion.
-fn sense(phi: f64, options: &ThesisOptions) -> f64 {
-    if options.signed { -phi } else { phi.abs() }
-}
-
-/// Takes over a part of the new friction force.
-fn relax(friction: &mut Friction, new: Friction, part: f64) {
-    let mix = |old: &mut Vec<f64>, new: Vec<f64>| {
-        old.iter_mut()
-            .zip(new)
-            .for_each(|(old, new)| *old += part * (new - *old));
-    };
-    mix(&mut friction.bound, new.bound);
-    mix(&mut friction.traction, new.traction);
 }

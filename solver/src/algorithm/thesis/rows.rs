@@ -14,7 +14,8 @@
 //! to it, the midside from the middle point (from both with the 2 × 2 rule). A node that two edges
 //! share has the mean of both.
 
-use super::{Friction, average, sense};
+use super::average::{self, linear};
+use super::friction::{Friction, sense};
 use crate::algorithm::system::{State, System};
 use crate::contact::edge_nodes;
 use crate::elasticity::{self, Dof};
@@ -196,13 +197,6 @@ fn to_boundary(rule: &[(f64, f64)], [near, far]: &[Vec<f64>; 2]) -> Vec<f64> {
         .zip(far)
         .map(|(a, b)| a + part * (a - b))
         .collect()
-}
-
-/// A line through the values at the Gauss points nearest to ζ.
-pub(super) fn linear(rule: &[(f64, f64)], values: &[f64], zeta: f64) -> f64 {
-    let k = usize::from(rule.len() > 2 && zeta > 0.0);
-    let (a, b) = (rule[k].0, rule[k + 1].0);
-    values[k] + (zeta - a) / (b - a) * (values[k + 1] - values[k])
 }
 
 impl Seen {

@@ -1,0 +1,48 @@
+//! A deck, read line by line.
+
+use std::io::BufRead;
+
+use solver::error::Reason;
+
+use super::block::Block;
+use super::deck::Deck;
+use super::keyword::Keyword;
+use crate::source::{ReadError, Source};
+
+/// Reads all of a deck; what is wrong with it is noted there.
+pub(super) fn read(reader: impl BufRead) -> Result<Deck, ReadError> {
+    let mut source = Source::new(reader);
+    let mut deck = Deck::default();
+    let mut block = Block::NoData("the first keyword");
+    let mut material: Option<String> = None;
+    while source.advance()? {
+        let line = source.line;
+        let mut text = source.text().trim().to_owned();
+        if text.is_empty() || text.starts_with("**") {
+            continue;
+        }
+        if !text.starts_with('*') {
+            deck.data(&mut block, line, &text);
+            continue;
+        }
+        // a keyword goes on in the next line where it ends in a comma
+        while text.ends_with(',') && source.advance()? {
+            text.push_str(source.text().trim());
+        }
+        deck.end(block, line);
+        block = deck.begin(&Keyword::new(&text), line, &mut material);
+    }
+    let line = source.line;
+    deck.end(block, line);
+    if deck.raw.nodes.is_empty() {
+        deck.fault(
+            line,
+            Reason::TooFew,
+            "a deck without *NODE",
+            "nodes and elements",
+            "Is it an Abaqus or CalculiX deck (.inp)?",
+        );
+    }
+    deck.faults.extend(deck.plane.fault());
+    Ok(deck)
+}

@@ -1,0 +1,119 @@
+//! What both ways to the minimum share: the gradient of J, a Newton step, and nodes that are held.
+
+use crate::algorithm::system::{State, System};
+use crate::elasticity::Dof;
+use crate::linear::solve_positive_definite;
+
+/// The minimiser, as near as it was reached.
+pub struct Minimum {
+    /// The state.
+    pub state: State,
+    /// Newton steps taken.
+    pub steps: u32,
+    /// Its KKT residual.
+    pub residual: f64,
+}
+
+/// How far to go: the residual to reach, and a tenth of it to aim at, so that what the inner problem
+/// leaves does not blur the outer residuals. Where rounding allows no more, the first is enough.
+pub(super) const AIM: f64 = 0.1;
+
+/// Puts the nodes that are in contact onto the obstacle, and what is held along t where it is held.
+pub(in crate::algorithm) fn close(system: &System<'_>, state: &mut State) {
+    for (node, active) in system.nodes.iter().zip(&state.active) {
+        if let (true, Dof::Free(dof)) = (active, node.normal) {
+            state.v[dof] = node.gap;
+        }
+        if let (Dof::Free(dof), Some(held)) = (node.tangent, node.held_tangent) {
+            state.v[dof] = held;
+        }
+    }
+}
+
+/// Nodes on the axis take the state of their neighbours; true on any change.
+pub(in crate::algorithm) fn follow(system: &System<'_>, active: &mut [bool]) -> bool {
+    let mut changed = false;
+    for (i, node) in system.nodes.iter().enumerate() {
+        if let Some([next, _]) = node.follows {
+            changed |= active[i] != active[next];
+            active[i] = active[next];
+        }
+    }
+    changed
+}
+
+/// ∇J.
+pub(super) fn gradient(system: &System<'_>, v: &[f64], bound: &[f64]) -> Vec<f64> {
+    let mut force = system.elastic_force(v);
+    system.add_traction_force(&system.tractions(v, bound), &mut force);
+    force
+}
+
+/// Unknowns that are not held: the normal ones of nodes not `held`, and the tangential ones.
+pub(in crate::algorithm) fn free_dofs(
+    system: &System<'_>,
+    held: impl Fn(usize) -> bool,
+) -> Vec<usize> {
+    let mut free = Vec::with_capacity(system.load.len());
+    for (i, node) in system.nodes.iter().enumerate() {
+        if let (Dof::Free(dof), false) = (node.normal, held(i)) {
+            free.push(dof);
+        }
+        if let (Dof::Free(dof), None) = (node.tangent, node.held_tangent) {
+            free.push(dof);
+        }
+    }
+    free
+}
+
+/// Added to the diagonal of H where Ŝ leaves rigid motions free: a step along one is then long but
+/// finite, until contact ends it. Where contact holds the body it costs a step or two, no accuracy:
+/// the gradient knows nothing of it.
+pub(in crate::algorithm) fn semidefinite_shift(system: &System<'_>) -> f64 {
+    let size = system.stiffness.size().max(1);
+    let diagonal: f64 = (0..system.stiffness.size())
+        .map(|i| system.stiffness.at(i, i))
+        .sum();
+    1e-9 * diagonal / size as f64
+}
+
+/// −H⁻¹ ∇J on the free unknowns, H = Ŝ + Σ w τ φ′ h hᵀ.
+pub(super) fn newton_direction(
+    system: &System<'_>,
+    bound: &[f64],
+    v: &[f64],
+    force: &[f64],
+    free: &[usize],
+) -> Option<Vec<f64>> {
+    let mut place = vec![usize::MAX; system.load.len()];
+    free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
+    // friction couples the nodes of one edge only: a few additions to a dense matrix
+    let mut friction = Vec::new();
+    for (point, tau) in system.points.iter().zip(bound) {
+        let slope = point.weight * tau * system.law(point).phi_slope(system.slip(v, point));
+        if slope == 0.0 {
+            continue;
+        }
+        let dofs = point.nodes.map(|n| system.nodes[n].tangent);
+        for a in 0..3 {
+            for b in 0..3 {
+                if let (Dof::Free(row), Dof::Free(column)) = (dofs[a], dofs[b]) {
+                    let value = slope * point.shape[a] * point.shape[b];
+                    friction.push((place[row], place[column], value));
+                }
+            }
+        }
+    }
+    let shift = if system.semidefinite {
+        semidefinite_shift(system)
+    } else {
+        0.0
+    };
+    let elastic = |i: usize, j: usize| {
+        let shift = if i == j { shift } else { 0.0 };
+        system.stiffness.at(free[i], free[j]) + shift
+    };
+    let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
+    let direction = solve_positive_definite(free.len(), elastic, &friction, &rhs)?;
+    direction.iter().all(|d| d.is_finite()).then_some(direction)
+}

@@ -1,0 +1,28 @@
+//! The friction of the thesis's iteration: a load that is one iteration old.
+
+use crate::problem::ThesisOptions;
+
+/// Friction at every friction point.
+#[derive(Clone)]
+pub(super) struct Friction {
+    /// τ = μ max(S, 0) (stress).
+    pub(super) bound: Vec<f64>,
+    /// σ_t on the body, along t (stress); F̂ is its load with the opposite sign.
+    pub(super) traction: Vec<f64>,
+}
+
+/// σ_t / τ from φ with the sign of the motion.
+pub(super) fn sense(phi: f64, options: &ThesisOptions) -> f64 {
+    if options.signed { -phi } else { phi.abs() }
+}
+
+/// Takes over a part of the new friction force.
+pub(super) fn relax(friction: &mut Friction, new: Friction, part: f64) {
+    let mix = |old: &mut Vec<f64>, new: Vec<f64>| {
+        old.iter_mut()
+            .zip(new)
+            .for_each(|(old, new)| *old += part * (new - *old));
+    };
+    mix(&mut friction.bound, new.bound);
+    mix(&mut friction.traction, new.traction);
+}

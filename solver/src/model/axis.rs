@@ -1,0 +1,28 @@
+//! What counts as the axis of a body of revolution: decided once, for supports, contacts and friction alike.
+
+use crate::elasticity::Section;
+use crate::mesh::Mesh;
+
+/// A radius below this part of the body's largest is the axis: a mesh generator may miss 0 by rounding, and
+/// the contact area of such a node is nothing but rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// The axis of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    /// The largest radius on it; none in the plane.
+    reach: Option<f64>,
+}
+
+impl Axis {
+    pub(super) fn new(section: &Section, mesh: &Mesh) -> Self {
+        let largest = || mesh.nodes.iter().map(|[r, _]| *r).fold(0.0, f64::max);
+        let reach = section.axisymmetric().then(|| ROUNDING * largest());
+        Axis { reach }
+    }
+
+    /// Whether a place (r, z) lies on the axis; in the plane nothing does.
+    pub fn holds(&self, [r, _]: [f64; 2]) -> bool {
+        self.reach.is_some_and(|reach| r <= reach)
+    }
+}

@@ -1,0 +1,47 @@
+//! A contact as it can be solved.
+
+use super::level::Level;
+use crate::contact::ContactBoundary;
+use crate::friction::{Average, FrictionLaw};
+use crate::problem::{Condition, NormalOf};
+
+/// A contact boundary and what it faces.
+#[derive(Clone, Debug)]
+pub struct ContactModel {
+    /// Name of the boundary.
+    pub name: String,
+    /// JSON Pointer to the contact.
+    pub pointer: String,
+    /// Γ_C, with the normals that the contact uses.
+    pub boundary: ContactBoundary,
+    /// Profile of the obstacle at each node, along the contact's normal (length).
+    pub profile: Vec<f64>,
+    /// How far the obstacle is pushed against the body (length).
+    pub indentation: f64,
+    /// The parts of that push along the contact's normal and along its t, at each node: 1 and 0 with
+    /// the body's normal; with the obstacle's the cosine and minus the sine of the slope.
+    pub push: Vec<[f64; 2]>,
+    /// The obstacle's own displacement along the contact's t (length).
+    pub tangential_displacement: f64,
+    /// Whose normal it is.
+    pub normal: NormalOf,
+    /// What the obstacle does.
+    pub condition: Condition,
+    /// m where the profile is a power |c|^m: a contact's width then grows like δ^(1/m).
+    pub power: Option<f64>,
+    /// Absent: frictionless.
+    pub friction: Option<FrictionLaw<Average>>,
+}
+
+impl ContactModel {
+    /// Gap at a node (length) when the obstacle is pushed by `factor` times its indentation.
+    pub fn gap(&self, node: usize, factor: f64) -> f64 {
+        self.profile[node] - factor * self.indentation * self.push[node][0]
+    }
+
+    /// d: the obstacle's displacement along the contact's t at a node (length).
+    pub fn drag(&self, node: usize, level: &Level) -> f64 {
+        level.tangential_displacement * self.tangential_displacement
+            + level.indentation * self.indentation * self.push[node][1]
+    }
+}

@@ -1,0 +1,44 @@
+//! How far along its load history a problem is.
+
+use crate::problem::Step;
+
+/// A load level: factors on the values of the problem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Level {
+    /// On every indentation.
+    pub indentation: f64,
+    /// On every tangential displacement of an obstacle.
+    pub tangential_displacement: f64,
+    /// On all loads.
+    pub loads: f64,
+    /// On all prescribed displacements.
+    pub supports: f64,
+}
+
+impl Level {
+    /// Nothing.
+    pub const NOTHING: Level = Level {
+        indentation: 0.0,
+        tangential_displacement: 0.0,
+        loads: 0.0,
+        supports: 0.0,
+    };
+
+    /// The end of a load step.
+    pub fn end_of(step: &Step) -> Level {
+        Level {
+            indentation: step.indentation,
+            tangential_displacement: step.tangential_displacement,
+            loads: step.loads,
+            supports: step.supports,
+        }
+    }
+
+    /// Everything as given.
+    pub const FULL: Level = Level {
+        indentation: 1.0,
+        tangential_displacement: 1.0,
+        loads: 1.0,
+        supports: 1.0,
+    };
+}

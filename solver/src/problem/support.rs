@@ -1,0 +1,40 @@
+//! Prescribed displacements, and values along a boundary.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A value on a boundary: constant, or linear by arc length from the boundary's start to its end.
+/// A boundary runs with the body on its right (a top edge runs along +x).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum BoundaryValue {
+    /// The same everywhere.
+    Constant(f64),
+    /// `[start, end]`.
+    Linear([f64; 2]),
+}
+
+/// Prescribed displacements on a boundary or a set of nodes, along x and y or (on a boundary) along
+/// normal and tangent; what is not named stays free.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Support {
+    /// Name of the boundary.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub boundary: Option<String>,
+    /// Name of a set of nodes instead.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nodes: Option<String>,
+    /// Displacement along x (length).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ux: Option<BoundaryValue>,
+    /// Displacement along y (length).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uy: Option<BoundaryValue>,
+    /// Displacement along the outward normal (length).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub un: Option<BoundaryValue>,
+    /// Displacement along t, the outward normal turned clockwise (length).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ut: Option<BoundaryValue>,
+}
