@@ -76,6 +76,28 @@ fn with_links(mut answer: Json) -> Json {
     answer
 }
 
+/// Fields that are alternatives although no `oneof` says so. Each round has those of one of the lines, beside all
+/// fields that stand in none.
+const FORMS: &[(&str, &[&[&str]])] = &[
+    (
+        "Material",
+        &[&["youngs_modulus", "poissons_ratio"], &["orthotropic"]],
+    ),
+    (
+        "Load",
+        &[
+            &["boundary", "pressure"],
+            &["boundary", "traction"],
+            &["boundary", "normal", "tangential"],
+            &["boundary", "normal"],
+            &["boundary", "tangential"],
+            &["boundary", "nodal"],
+            &["nodes", "force"],
+            &["body_force"],
+        ],
+    ),
+];
+
 /// Fills messages, each field with the next value.
 struct Filler {
     round: usize,
@@ -86,17 +108,29 @@ impl Filler {
     fn message(&mut self, of: &MessageDescriptor) -> DynamicMessage {
         let mut message = DynamicMessage::new(of.clone());
         for field in of.fields() {
-            if let Some(alternatives) = field.containing_oneof() {
-                let count = alternatives.fields().len();
-                let chosen = alternatives.fields().nth(self.round % count);
-                if chosen != Some(field.clone()) {
-                    continue;
-                }
+            if self.is_chosen(of.name(), &field) {
+                let value = self.field(of.name(), &field);
+                message.set_field(&field, value);
             }
-            let value = self.field(of.name(), &field);
-            message.set_field(&field, value);
         }
         message
+    }
+
+    /// Whether the field, if it is one of several alternatives, is that of this round.
+    fn is_chosen(&self, message: &str, field: &FieldDescriptor) -> bool {
+        if let Some(alternatives) = field.containing_oneof() {
+            let mut alternatives = alternatives.fields();
+            let count = alternatives.len();
+            if alternatives.nth(self.round % count).as_ref() != Some(field) {
+                return false;
+            }
+        }
+        let forms = FORMS.iter().find(|(name, _)| *name == message);
+        forms.is_none_or(|(_, forms)| {
+            let chosen = forms[self.round % forms.len()];
+            let in_a_form = forms.iter().any(|form| form.contains(&field.name()));
+            chosen.contains(&field.name()) || !in_a_form
+        })
     }
 
     fn field(&mut self, message: &str, field: &FieldDescriptor) -> Value {
@@ -167,6 +201,7 @@ fn text(message: &str, field: &str, count: usize) -> String {
         }
         ("Job", "reason") => "timed_out".into(),
         ("QueuePosition", "reason") => "paused".into(),
+        ("Violation", "reason") => "missing".into(),
         ("StageEvent", "stage") => "factor".into(),
         ("Iteration" | "Summary", "stage") => "inner".into(),
         _ => format!("text {count}"),

@@ -24,7 +24,7 @@ fn every_example_survives_the_way_through_grpc() {
 
 #[test]
 fn what_a_message_leaves_out_has_the_defaults_of_the_json() {
-    let json = r#"{ "analysis": { "kind": "plane_strain" }, "mesh": { "grid": { "x": [0, 1], "y": [0, 1] } }, "materials": [{}],
+    let json = r#"{ "analysis": { "kind": "plane_strain" }, "mesh": { "grid": { "x": [0, 1], "y": [0, 1] } }, "materials": [{ "youngs_modulus": 1, "poissons_ratio": 0.5 }],
                     "steps": [{}], "contacts": [{ "boundary": "top", "obstacle": { "kind": "flat" }, "friction": { "elastic_slip": 1 } }],
                     "solver": { "thesis": {} } }"#;
     let grid = pb::Grid {
@@ -40,7 +40,11 @@ fn what_a_message_leaves_out_has_the_defaults_of_the_json() {
             source: Some(pb::mesh::Source::Grid(grid)),
             ..Default::default()
         }),
-        materials: vec![pb::Material::default()],
+        materials: vec![pb::Material {
+            youngs_modulus: Some(1.0),
+            poissons_ratio: Some(0.5),
+            ..Default::default()
+        }],
         steps: vec![pb::Step::default()],
         contacts: vec![pb::Contact {
             boundary: "top".into(),
