@@ -2,6 +2,7 @@
 
 mod demo;
 pub mod examples;
+mod exit;
 mod explain;
 mod output;
 mod report;
@@ -14,20 +15,8 @@ use clap::{Parser, Subcommand};
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::EnvFilter;
 
+use self::exit::Exit;
 use crate::{config::Config, rest};
-
-/// Exit codes of the process.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Exit {
-    /// Success.
-    Ok = 0,
-    /// Something failed.
-    Failed = 1,
-    /// The input is invalid.
-    Invalid = 2,
-    /// The solution did not converge.
-    NotConverged = 9,
-}
 
 /// Solves frictional contact problems, one at a time or as jobs of a service
 #[derive(Debug, Parser)]

@@ -10,7 +10,7 @@ use solver::{
     solution::{ContactProfile, Fields, Solution, StepSolution},
 };
 
-use super::stopwatch::Times;
+use super::stopwatch::{Times, Timings};
 use crate::{digest, event::TimedIteration};
 
 /// What a solved problem is stored, served and written as.
@@ -62,9 +62,6 @@ pub struct Summary {
     /// Fingerprint of the result.
     pub digest: String,
 }
-
-/// Seconds by phase.
-pub type Timings = BTreeMap<String, f64>;
 
 impl Document {
     /// A solution with what only its caller knows.

@@ -15,7 +15,8 @@ use solver::{
 };
 
 use crate::event::TimedIteration;
-pub use document::{Document, Step, Summary, Timings};
+pub use document::{Document, Step, Summary};
+pub use stopwatch::Timings;
 use stopwatch::{Stopwatch, Times};
 
 /// The solver, or what stands in for it in a test.

@@ -1,12 +1,14 @@
 //! How long each phase took, and when each iteration was done.
 
-use std::time::Instant;
+use std::{collections::BTreeMap, time::Instant};
 
 use solver::solution::{Iteration, Phase};
 use strum::VariantArray;
 
-use super::Timings;
 use crate::event::TimedIteration;
+
+/// Seconds by phase.
+pub type Timings = BTreeMap<String, f64>;
 
 /// Runs from the start of the solver.
 pub(super) struct Stopwatch {

@@ -1,0 +1,229 @@
+//! The rules themselves, on crates of a few lines.
+
+use super::{
+    floors::Floors,
+    rules,
+    tree::{Sources, Tree},
+};
+
+const PAGE: &str = "
+## Rooms and directions
+```
+server   main           starts
+         lib            nothing
+         high           on top
+         store          below
+         pb             generated
+
+solver   lib            nothing
+         top            on top
+         linear left    side by side
+         low            below
+```
+";
+
+/// A sound pair of crates in which some files are others.
+fn broken(changes: &[(&str, &str)]) -> Vec<String> {
+    let sound = [
+        ("server/src/main.rs", "fn main() { service::high::go() }"),
+        (
+            "server/src/lib.rs",
+            "pub mod high; pub mod store; pub mod pb { pub struct Job; }",
+        ),
+        (
+            "server/src/high.rs",
+            "use crate::store; pub fn go() { store::look() }",
+        ),
+        (
+            "server/src/store/mod.rs",
+            "mod rows; mod list; pub use list::{look, List}; #[cfg(test)] use crate::high;",
+        ),
+        (
+            "server/src/store/rows.rs",
+            "use solver::top::Top; use sqlx::Row;",
+        ),
+        (
+            "server/src/store/list.rs",
+            "pub struct List; pub fn look() { super::rows::x() }",
+        ),
+        (
+            "solver/src/lib.rs",
+            "pub mod top; pub mod linear; mod left; mod low; pub use low::Low;",
+        ),
+        (
+            "solver/src/top.rs",
+            "use crate::left::{self, Left}; pub struct Top;",
+        ),
+        (
+            "solver/src/left.rs",
+            "pub struct Left; use crate::low::Low;",
+        ),
+        (
+            "solver/src/linear/mod.rs",
+            "use faer::Mat; use std::{fmt, iter};",
+        ),
+        (
+            "solver/src/low.rs",
+            "pub struct Low; #[cfg(test)] mod tests { use crate::top::Top; }",
+        ),
+    ];
+    let sources = sound.iter().chain(changes);
+    let sources: Sources = sources
+        .map(|(file, text)| (file.to_string(), text.to_string()))
+        .collect();
+    let tree = Tree::read(&sources, &[("server", "service"), ("solver", "solver")]);
+    rules::broken(&tree, &Floors::read(PAGE).unwrap())
+}
+
+#[test]
+fn a_sound_tree_has_no_faults() {
+    assert_eq!(broken(&[]), [""; 0]);
+}
+
+#[test]
+fn an_import_upward_or_sideways_is_found_with_its_line() {
+    let found = broken(&[(
+        "solver/src/low.rs",
+        "pub struct Low;\nuse crate::{\n  top::Top};",
+    )]);
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(
+        found[0].starts_with("solver/src/: a circle of left, low, top"),
+        "{found:?}"
+    );
+    assert_eq!(
+        found[1],
+        "solver/src/low.rs:3: `crate::top::Top` leads from `low` of `solver` to `top` of `solver`, which is no lower floor"
+    );
+    for text in [
+        "fn f() { crate::linear::g() }",
+        "use super::linear as l;",
+        "use super::*; fn f() { linear::g() }",
+    ] {
+        let found = broken(&[("solver/src/left.rs", text)]);
+        assert_eq!(
+            found.len(),
+            1 + usize::from(text.contains('*')),
+            "{text}: {found:?}"
+        );
+        assert!(found[0].starts_with("solver/src/left.rs:1: "), "{found:?}");
+    }
+}
+
+#[test]
+fn a_higher_crate_cannot_be_used_even_by_a_path_in_code() {
+    let found = broken(&[(
+        "solver/src/low.rs",
+        "pub struct Low; fn f() { service::store::look() }",
+    )]);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(
+        found[0].contains("from `low` of `solver` to `store` of `server`"),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn a_circle_of_files_is_found_even_by_what_their_folder_shows() {
+    let found = broken(&[("server/src/store/rows.rs", "use super::List;")]);
+    assert_eq!(found.len(), 1, "{found:?}");
+    let expected = [
+        "server/src/store/: a circle of list, rows",
+        "    server/src/store/list.rs:1: list uses rows (`super::rows::x`)",
+        "    server/src/store/rows.rs:1: rows uses list (`super::List`)",
+    ];
+    assert_eq!(found[0].lines().collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn a_front_door_with_code_of_its_own_is_a_file_like_others() {
+    let door = "mod rows; mod list; pub use list::{look, List}; pub struct Door(rows::Row);";
+    assert_eq!(broken(&[("server/src/store/mod.rs", door)]), [""; 0]);
+    let child = ("server/src/store/rows.rs", "use super::Door;");
+    let found = broken(&[("server/src/store/mod.rs", door), child]);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(
+        found[0].starts_with("server/src/store/: a circle of mod.rs, rows"),
+        "{found:?}"
+    );
+    // what it shows and also works with, it uses
+    let door = "mod rows; mod list; pub use rows::Row; pub struct Door(Row); pub use list::look;";
+    let found = broken(&[("server/src/store/mod.rs", door), child]);
+    assert!(
+        found[0].starts_with("server/src/store/: a circle of mod.rs, rows"),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn what_only_some_may_name_is_found_elsewhere() {
+    for (file, text, rule) in [
+        (
+            "solver/src/top.rs",
+            "use faer::Mat;",
+            "`faer` is for solver/src/linear/ alone",
+        ),
+        (
+            "server/src/high.rs",
+            "fn f() { sqlx::query() }",
+            "`sqlx` is for server/src/store/ alone",
+        ),
+        (
+            "solver/src/low.rs",
+            "use std::{fmt, time::Instant};",
+            "`std::time` is for nobody in solver/ alone",
+        ),
+        (
+            "solver/src/low.rs",
+            "use std::thread as t;",
+            "`std::thread` is for nobody in solver/ alone",
+        ),
+        (
+            "server/src/high.rs",
+            "use crate::pb::Job;",
+            "`crate::pb` is for server/src/grpc/",
+        ),
+    ] {
+        let found = broken(&[(file, text)]);
+        assert_eq!(found.len(), 1, "{text}: {found:?}");
+        assert!(
+            found[0].starts_with(&format!("{file}:1: {rule}")),
+            "{found:?}"
+        );
+    }
+}
+
+#[test]
+fn rooms_that_only_the_page_or_only_the_code_has_are_found() {
+    let found = broken(&[
+        (
+            "solver/src/lib.rs",
+            "pub mod top; pub mod linear; mod left; mod new; pub struct Low;",
+        ),
+        ("solver/src/left.rs", ""),
+        ("solver/src/new.rs", ""),
+    ]);
+    assert_eq!(
+        found,
+        [
+            "ARCHITECTURE.md: `new` of `solver` is missing",
+            "ARCHITECTURE.md: `solver` has no `low`"
+        ]
+    );
+}
+
+#[test]
+fn a_macro_that_is_called_by_its_bare_name_counts() {
+    let found = broken(&[
+        (
+            "solver/src/top.rs",
+            "macro_rules! most { () => {} } use crate::left::Left;",
+        ),
+        ("solver/src/low.rs", "pub struct Low; most!();"),
+    ]);
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(
+        found[1].contains("`crate::top::most` leads from `low`"),
+        "{found:?}"
+    );
+}
