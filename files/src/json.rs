@@ -398,6 +398,7 @@ mod tests {
                 "/contacts/0/friction/elastic_slip",
                 "/contacts/0/friction/kernel",
                 "/materials/0/young",
+                "/materials/0/youngs_modulus",
                 "/mesh/grid/x/1",
             ]
         );
@@ -467,8 +468,9 @@ mod tests {
     fn what_has_several_forms_is_given_in_exactly_one() {
         let said = |from: &str, to: &str| -> Vec<(String, Reason, String)> {
             assert!(GOOD.contains(from), "{from}");
-            let list =
+            let mut list =
                 parse(&GOOD.replacen(from, to, 1)).expect_err("a faulty problem was accepted");
+            list.sort_by(|a, b| a.pointer.cmp(&b.pointer));
             list.into_iter()
                 .map(|v| (v.pointer, v.reason, v.got))
                 .collect()
@@ -525,7 +527,7 @@ mod tests {
         let wood = r#""orthotropic": {"e1": 1, "e2": 1, "nu12": 0.3, "g12": 1}, "youngs_modulus""#;
         let found = said(r#""youngs_modulus""#, wood);
         let places: Vec<_> = found.iter().map(|v| (&v.0[..], v.1)).collect();
-        let excluded = ["/materials/0/youngs_modulus", "/materials/0/poissons_ratio"];
+        let excluded = ["/materials/0/poissons_ratio", "/materials/0/youngs_modulus"];
         assert_eq!(places, excluded.map(|place| (place, Reason::NotUsed)));
     }
 

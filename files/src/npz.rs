@@ -198,7 +198,7 @@ pub(crate) mod tests {
         let bytes = file(&table).unwrap();
         assert_eq!(bytes, file(&table).unwrap());
         let arrays = read(bytes);
-        assert_eq!(arrays.len(), 18);
+        assert_eq!(arrays.len(), 17);
         assert!(f64::from_le_bytes(arrays["r_f"].1[..8].try_into().unwrap()).is_nan());
         let mut npz = Npz::new();
         npz.table("top/", &Table::of_profile(&profile())).unwrap();

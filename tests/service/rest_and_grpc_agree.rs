@@ -4,7 +4,10 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 use service::pb;
-use suite::{example, example_json, harness::Server};
+use suite::{
+    example, example_json,
+    harness::{Server, soon},
+};
 
 use crate::{
     SIGNORINI,
@@ -237,6 +240,13 @@ async fn both_protocols_say_the_same_of_the_service_of_meshes_and_of_problems() 
     // alone: the queue must stand still between the two questions
     let server = Server::start_alone(SIGNORINI, &[]).await;
     let mut grpc = connect(&server).await;
+    // right after the start the dispatcher holds a worker while it looks for a job
+    soon("all workers are idle", async {
+        while server.json("/v1/queue").await["idle"] != 2 {
+            tokio::task::yield_now().await;
+        }
+    })
+    .await;
     let queue = grpc.get_queue(pb::GetQueueRequest {}).await.unwrap();
     agree(
         &server.json("/v1/queue").await,

@@ -99,11 +99,12 @@ fn numbers_that_are_not_finite_are_refused_wherever_they_stand() {
     let mut p = example("cylinder");
     p.contacts[0].indentation = f64::NAN;
     p.mesh.grid_mut().unwrap().x[3] = f64::INFINITY;
+    // in the order of the problem's fields
     assert_eq!(
         violations(&p),
         [
-            pair("/contacts/0/indentation", "not_finite"),
-            pair("/mesh/grid/x/3", "not_finite")
+            pair("/mesh/grid/x/3", "not_finite"),
+            pair("/contacts/0/indentation", "not_finite")
         ]
     );
 }

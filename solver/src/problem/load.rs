@@ -1,6 +1,8 @@
 //! Prescribed tractions and forces: each in exactly one form.
 
-use schemars::JsonSchema;
+use std::collections::BTreeMap;
+
+use schemars::{JsonSchema, Schema, json_schema};
 use serde::{Deserialize, Serialize};
 
 use super::support::BoundaryValue;
@@ -10,14 +12,7 @@ use crate::error::{Reason, Violation, either};
 /// (or one of them), or `nodal`; on a set of nodes `force`; on the whole body `body_force`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "LoadFields", into = "LoadFields")]
-#[schemars(extend("oneOf" = [
-    {"required": ["boundary", "pressure"], "properties": {"nodes": false}},
-    {"required": ["boundary", "traction"], "properties": {"nodes": false}},
-    {"required": ["boundary"], "anyOf": [{"required": ["normal"]}, {"required": ["tangential"]}], "properties": {"nodes": false}},
-    {"required": ["boundary", "nodal"], "properties": {"nodes": false}},
-    {"required": ["nodes", "force"], "properties": {"boundary": false}},
-    {"required": ["body_force"], "properties": {"boundary": false, "nodes": false}},
-]))]
+#[schemars(extend("oneOf" = forms()))]
 pub enum Load {
     /// A stress against the outward normal of a boundary: positive pushes into the body.
     Pressure(String, BoundaryValue),
@@ -49,6 +44,42 @@ impl Load {
             Load::Force(..) | Load::BodyForce(_) => None,
         }
     }
+}
+
+/// The forms as JSON Schema, each by what it requires and by what it excludes: all that makes up the others.
+fn forms() -> [Schema; 6] {
+    const FORMS: [(Option<&str>, &[&str]); 6] = [
+        (Some("boundary"), &["pressure"]),
+        (Some("boundary"), &["traction"]),
+        (Some("boundary"), &["normal", "tangential"]),
+        (Some("boundary"), &["nodal"]),
+        (Some("nodes"), &["force"]),
+        (None, &["body_force"]),
+    ];
+    FORMS.map(|(place, values)| {
+        let own = |name: &&str| place == Some(*name) || values.contains(name);
+        let names = FORMS.iter().flat_map(|(_, values)| *values).copied();
+        let excluded: BTreeMap<&str, bool> = ["boundary", "nodes"]
+            .into_iter()
+            .chain(names)
+            .filter(|name| !own(name))
+            .map(|name| (name, false))
+            .collect();
+        let place: Vec<&str> = place.into_iter().collect();
+        match values {
+            [only] => {
+                let required = [&place[..], &[only]].concat();
+                json_schema!({"required": required, "properties": excluded})
+            }
+            several => {
+                let one: Vec<Schema> = several
+                    .iter()
+                    .map(|name| json_schema!({"required": [name]}))
+                    .collect();
+                json_schema!({"required": place, "anyOf": one, "properties": excluded})
+            }
+        }
+    })
 }
 
 /// A load as it is written: what of it may stand together is for [`Load`] to say.
