@@ -4,7 +4,7 @@
 use reqwest::Method;
 use serde_json::{Value, json};
 use service::pb;
-use suite::{example, example_json};
+use suite::{example, example_json, harness::soon};
 use tonic::{Response, Status};
 use tonic_types::StatusExt;
 
@@ -298,7 +298,16 @@ async fn what_both_protocols_answer_about_the_service_is_the_same() {
         me,
         json!({ "owner": caller.owner, "scopes": caller.scopes })
     );
-    let queue = server.json("/v1/queue").await;
+    // right after the start the dispatcher holds a worker while it looks for a job
+    let queue = soon("all workers are idle", async {
+        loop {
+            let queue = server.json("/v1/queue").await;
+            if queue["idle"] == queue["workers"] {
+                return queue;
+            }
+        }
+    })
+    .await;
     let twin = grpc
         .get_queue(pb::GetQueueRequest {})
         .await
