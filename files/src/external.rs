@@ -4,7 +4,7 @@ use solver::mesh::{External, ExternalMesh, Mesh};
 use solver::problem::{MeshSource, Problem};
 use solver::solution::Warning;
 
-use crate::{ReadError, abaqus, gmsh};
+use crate::{abaqus, gmsh, source::ReadError};
 
 /// The mesh that a problem does not hold itself: `stored`, where its caller has it, or read from the text
 /// that the problem quotes. `None` where it needs none. What is wrong with it, and what was changed on the

@@ -5,7 +5,7 @@ use std::io::BufRead;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{ReadError, abaqus, gmsh};
+use crate::{abaqus, gmsh, source::ReadError};
 use solver::error::{Reason, Violation};
 use solver::mesh::{Mesh, check_inverted, inline_mesh};
 use solver::problem::InlineMesh;

@@ -12,7 +12,7 @@ use solver::solution::Fields;
 use super::body::{self, Path, Sides, Window};
 use super::page::{self, WIDTH, px, say, with_unit};
 use super::theme::{Theme, hex};
-use crate::external_mesh;
+use crate::external::external_mesh;
 
 /// Height of one line of the legend (pixels).
 const LEGEND: i32 = 22;

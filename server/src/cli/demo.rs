@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use solver::solution::{ContactProfile, Iteration};
 use tonic::transport::Channel;
 
-use super::{Exit, examples, report};
+use super::{examples, exit::Exit, report};
 use crate::{
     app::App,
     config::{Config, MemoryBudget},

@@ -3,7 +3,7 @@
 use clap::Args;
 use strum::VariantArray;
 
-use super::Exit;
+use super::exit::Exit;
 use crate::catalog::{Code, Kind};
 
 #[derive(Debug, Args)]

@@ -6,7 +6,7 @@ use anyhow::Context;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::info;
 
-use super::Exit;
+use super::exit::Exit;
 use crate::{app::App, config::Config};
 
 /// Serves until SIGTERM or SIGINT.

@@ -13,7 +13,7 @@ use files::plot::Theme;
 use solver::error::{SolveError, Violation};
 
 use super::{
-    Exit,
+    exit::Exit,
     output::{self, Output},
     report,
 };
