@@ -41,7 +41,7 @@ fn message_of(mirror: &Mirror, message: &MessageDescriptor) -> String {
     };
     let Mirror { message, rust, .. } = mirror;
     let write = format!(
-        "/// {message} ↔ {rust}
+        "/// `{message}` ↔ `{rust}`
         impl From<{rust}> for pb::{message} {{
             fn from(ours: {rust}) -> Self {{ {write} }}
         }}
@@ -56,7 +56,7 @@ fn message_of(mirror: &Mirror, message: &MessageDescriptor) -> String {
     };
     format!(
         "{write}
-        /// {message} ↔ {rust}
+        /// `{message}` ↔ `{rust}`
         impl FromMessage<pb::{message}> for {rust} {{
             fn from_message(message: pb::{message}, read: &mut Reader) -> Option<Self> {{ {read} }}
         }}
@@ -183,7 +183,7 @@ fn names_of(mirror: &Mirror, names: &EnumDescriptor) -> String {
         .collect();
     let arms = list(&values, |value| format!("{rust}::{value} => Self::{value}"));
     let write = format!(
-        "/// {message} ↔ {rust}
+        "/// `{message}` ↔ `{rust}`
         impl From<{rust}> for {path} {{
             fn from(ours: {rust}) -> Self {{ match ours {{ {arms} }} }}
         }}
@@ -203,7 +203,7 @@ fn names_of(mirror: &Mirror, names: &EnumDescriptor) -> String {
     };
     format!(
         "{write}
-        /// {message} ↔ {rust}
+        /// `{message}` ↔ `{rust}`
         impl FromMessage<i32> for {rust} {{
             fn from_message(number: i32, read: &mut Reader) -> Option<Self> {{
                 match {path}::try_from(number) {{
