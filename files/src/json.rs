@@ -3,24 +3,11 @@
 //! serde is the judge; it stops at the first fault, and inside an enum it forgets where it was. So
 //! when it refuses a text, our own JSON Schema is asked for all the reasons.
 
-use std::sync::LazyLock;
-
-use jsonschema::error::{TypeKind, ValidationErrorKind};
-use jsonschema::{ValidationError, Validator};
 use serde_json::Value;
 
-use solver::error::{Findings, Reason, Violation, either, escape, shortened};
+use crate::schema::violations;
+use solver::error::{Reason, Violation, escape};
 use solver::problem::Problem;
-
-/// The JSON Schema of a problem (draft 2020-12).
-pub fn schema() -> Value {
-    schemars::schema_for!(Problem).to_value()
-}
-
-static SCHEMA: LazyLock<Value> = LazyLock::new(schema);
-
-static VALIDATOR: LazyLock<Option<Validator>> =
-    LazyLock::new(|| jsonschema::validator_for(&SCHEMA).ok());
 
 /// Reads a problem, or says everything that is wrong with its structure. Pointers are relative to
 /// the problem.
@@ -50,17 +37,7 @@ fn explain(text: &str, first: &serde_json::Error) -> Vec<Violation> {
             )];
         }
     };
-    let mut found = Findings::default();
-    if let Some(validator) = &*VALIDATOR {
-        let mut errors = validator.iter_errors(&value);
-        while !found.is_full()
-            && let Some(error) = errors.next()
-        {
-            gather(&error, &mut found);
-        }
-        found.count(errors.count());
-    }
-    match found.into_violations() {
+    match violations(&value) {
         list if list.is_empty() => vec![beyond_the_schema(text, first)],
         list => list,
     }
@@ -89,268 +66,10 @@ fn pointer_of(path: &serde_path_to_error::Path) -> String {
         .collect()
 }
 
-/// One schema error as one violation or more.
-fn gather(error: &ValidationError<'_>, found: &mut Findings) {
-    let pointer = error.instance_path().as_str();
-    let got = || quoted(error.instance());
-    found.add(match error.kind() {
-        ValidationErrorKind::AdditionalProperties { unexpected } => {
-            let expected = match known_names(error) {
-                known if known.is_empty() => "a name that the schema has".to_owned(),
-                known => format!("one of {}", known.join(", ")),
-            };
-            let unknown = |name: &String| {
-                Violation::new(
-                    format!("{pointer}/{:.80}", escape(name)),
-                    Reason::UnknownName,
-                    format!("`{name:.80}`"),
-                    &expected,
-                    "Check the spelling; names that mean nothing here are refused.",
-                )
-            };
-            return found.extend(unexpected.iter().map(unknown));
-        }
-        ValidationErrorKind::AnyOf { context }
-        | ValidationErrorKind::OneOfNotValid { context }
-        | ValidationErrorKind::OneOfMultipleValid { context } => {
-            return match forms(error) {
-                Some(forms) => one_form(error, context, &forms, found),
-                None => alternatives(error, context, found),
-            };
-        }
-        ValidationErrorKind::FalseSchema => Violation::new(
-            pointer,
-            Reason::NotUsed,
-            got(),
-            "nothing: it does not go with what stands beside it",
-            "Leave it out, or choose another form.",
-        ),
-        ValidationErrorKind::Required { property } => {
-            let name = property.as_str().unwrap_or_default();
-            Violation::new(
-                format!("{pointer}/{name}"),
-                Reason::Missing,
-                "nothing",
-                format!("a value for `{name}`"),
-                "It has no default.",
-            )
-        }
-        ValidationErrorKind::Minimum { limit } => Violation::new(
-            pointer,
-            Reason::OutOfRange,
-            got(),
-            format!("a number of at least {limit}"),
-            "Correct the number.",
-        ),
-        ValidationErrorKind::MinItems { limit } | ValidationErrorKind::MaxItems { limit } => {
-            let items = error.instance().as_array().map_or(0, Vec::len);
-            Violation::new(
-                pointer,
-                Reason::WrongLength,
-                format!("{items} item(s)"),
-                format!("{limit} items"),
-                "Correct the list.",
-            )
-        }
-        ValidationErrorKind::Type { kind } => Violation::new(
-            pointer,
-            Reason::WrongType,
-            got(),
-            type_names(kind),
-            "Write the value in that form.",
-        ),
-        _ => Violation::new(
-            pointer,
-            Reason::Malformed,
-            got(),
-            error.to_string(),
-            "See /v1/schema/problem.json.",
-        ),
-    });
-}
-
-/// The names that make up each form of an object, where its schema tells forms apart by what they require:
-/// those that no other form requires.
-fn forms(error: &ValidationError<'_>) -> Option<Vec<Vec<&'static str>>> {
-    let branches = SCHEMA.pointer(error.schema_path().as_str())?.as_array()?;
-    let required: Vec<Vec<&str>> = branches
-        .iter()
-        .map(|branch| match branch.get("type") {
-            None => required(branch),
-            Some(_) => Vec::new(),
-        })
-        .collect();
-    let own = |(i, names): (usize, &Vec<&'static str>)| {
-        let others = || required.iter().enumerate().filter(|(j, _)| *j != i);
-        let alone = |name: &&&str| !others().any(|(_, other)| other.contains(name));
-        names.iter().filter(alone).copied().collect()
-    };
-    let own: Vec<Vec<&str>> = required.iter().enumerate().map(own).collect();
-    own.iter().all(|names| !names.is_empty()).then_some(own)
-}
-
-/// What a branch of the schema requires, all of it or one of several.
-fn required(branch: &'static Value) -> Vec<&'static str> {
-    let list = |branch: &'static Value, name: &str| {
-        let list = branch.get(name).and_then(Value::as_array);
-        list.into_iter().flatten()
-    };
-    let either = list(branch, "anyOf").flat_map(required);
-    let all = list(branch, "required").filter_map(Value::as_str);
-    all.chain(either).collect()
-}
-
-/// Of several forms one was meant, and has errors; or it must be said that it is exactly one.
-fn one_form(
-    error: &ValidationError<'_>,
-    branches: &[Vec<ValidationError<'static>>],
-    forms: &[Vec<&str>],
-    found: &mut Findings,
-) {
-    let instance = error.instance();
-    let given = |name: &str| instance.get(name).is_some_and(|value| !value.is_null());
-    let all: Vec<_> = forms.iter().zip(branches).collect();
-    let meant: Vec<_> = all
-        .iter()
-        .filter(|(form, _)| form.iter().any(|name| given(name)))
-        .collect();
-    if let [(_, errors)] = meant[..] {
-        return errors.iter().for_each(|error| gather(error, found));
-    }
-    let names = forms.iter().flatten();
-    let got: Vec<(&str, bool)> = names.map(|name| (*name, given(name))).collect();
-    let form = |names: &Vec<&str>| {
-        let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
-        names.join(" and ")
-    };
-    let offers: Vec<String> = forms.iter().map(form).collect();
-    found.add(Violation::new(
-        error.instance_path().as_str(),
-        Reason::WrongCount,
-        either(&got),
-        format!("exactly one of {}", offers.join(", ")),
-        "Choose one of the forms.",
-    ));
-}
-
-/// The branch that was meant, judged by its `kind` and its type; or, when none was, what all offer.
-fn alternatives(
-    error: &ValidationError<'_>,
-    branches: &[Vec<ValidationError<'static>>],
-    found: &mut Findings,
-) {
-    let pointer = error.instance_path().as_str();
-    let kind = format!("{pointer}/kind");
-    let excludes = |e: &ValidationError<'_>| {
-        let place = e.instance_path().as_str();
-        match e.kind() {
-            ValidationErrorKind::Type { .. } => place == pointer,
-            ValidationErrorKind::Constant { .. } | ValidationErrorKind::Enum { .. } => {
-                place == pointer || place == kind
-            }
-            ValidationErrorKind::Required { property } => place == pointer && property == "kind",
-            _ => false,
-        }
-    };
-    let meant: Vec<_> = branches
-        .iter()
-        .filter(|errors| !errors.iter().any(excludes))
-        .collect();
-    if let [errors] = meant[..] {
-        return errors.iter().for_each(|error| gather(error, found));
-    }
-    let mut offers = Vec::new();
-    let mut tagged = false;
-    for e in branches.iter().flatten() {
-        match e.kind() {
-            ValidationErrorKind::Constant { expected_value } => {
-                tagged |= e.instance_path().as_str() == kind;
-                offers.push(expected_value.to_string());
-            }
-            ValidationErrorKind::Enum { options } => offers.push(options.to_string()),
-            ValidationErrorKind::Type { kind } if e.instance_path().as_str() == pointer => {
-                offers.push(type_names(kind))
-            }
-            ValidationErrorKind::Required { property } if property == "kind" => tagged = true,
-            _ => {}
-        }
-    }
-    offers.dedup();
-    offers.retain(|offer| offer != "null");
-    let instance = error.instance();
-    let (place, got) = match instance.get("kind") {
-        Some(found) if tagged => (kind, quoted(found)),
-        None if tagged && instance.is_object() => (kind, "nothing".to_owned()),
-        _ => (pointer.to_owned(), quoted(instance)),
-    };
-    let kinds = kinds(error);
-    let (expected, hint) = if kinds.is_empty() {
-        (
-            offers.join(" or "),
-            "Write the value in one of these forms.".to_owned(),
-        )
-    } else if instance.is_object() {
-        (
-            format!("one of {}", kinds.join(", ")),
-            "Choose one of the kinds.".to_owned(),
-        )
-    } else {
-        let example = format!("Write it as {{\"kind\": {}, …}}.", kinds[0]);
-        (
-            format!("an object with a `kind`, one of {}", kinds.join(", ")),
-            example,
-        )
-    };
-    let reason = Reason::UnknownAlternative;
-    found.add(Violation::new(place, reason, got, expected, hint));
-}
-
-/// The `kind`s that the schema offers where `error` stands.
-fn kinds(error: &ValidationError<'_>) -> Vec<String> {
-    let branches = SCHEMA.pointer(error.schema_path().as_str());
-    let branches = branches.and_then(Value::as_array).into_iter().flatten();
-    branches
-        .filter_map(|b| b.pointer("/properties/kind/const").map(Value::to_string))
-        .collect()
-}
-
-/// The names that the schema has where an unknown one was found.
-fn known_names(error: &ValidationError<'_>) -> Vec<String> {
-    let path = error.schema_path().as_str();
-    let object = path
-        .strip_suffix("/additionalProperties")
-        .and_then(|parent| SCHEMA.pointer(parent));
-    let properties = object
-        .and_then(|o| o.get("properties"))
-        .and_then(Value::as_object);
-    properties
-        .into_iter()
-        .flat_map(|p| p.keys().map(|name| format!("`{name}`")))
-        .collect()
-}
-
-fn type_names(kind: &TypeKind) -> String {
-    match kind {
-        TypeKind::Single(one) => one.to_string(),
-        TypeKind::Multiple(many) => {
-            let names: Vec<String> = many
-                .iter()
-                .map(|t| t.to_string())
-                .filter(|name| name != "null")
-                .collect();
-            names.join(" or ")
-        }
-    }
-}
-
-/// A value as text, cut where it would fill the page.
-fn quoted(value: &Value) -> String {
-    shortened(&value.to_string(), 80)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::schema::accepts;
 
     const GOOD: &str = r#"{
         "analysis": {"kind": "plane_strain"},
@@ -551,11 +270,6 @@ mod tests {
             "nodal" => serde_json::json!([[0.0, 1.0]]),
             _ => serde_json::json!([0.0, 1.0]),
         };
-        let validator = |definition: &str| {
-            let mut schema = SCHEMA.clone();
-            let root = serde_json::json!({"$ref": format!("#/$defs/{definition}"), "$defs": schema["$defs"].take()});
-            jsonschema::validator_for(&root).unwrap()
-        };
         let subsets = |names: &[&str], value: &dyn Fn(&str) -> Value| -> Vec<Value> {
             let object = |bits: usize| {
                 let chosen = names.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1);
@@ -568,10 +282,9 @@ mod tests {
                 .map(Value::Object)
                 .collect()
         };
-        let loads = validator("Load");
         for load in subsets(&names, &value) {
             let read = serde_json::from_value::<solver::problem::Load>(load.clone());
-            assert_eq!(loads.is_valid(&load), read.is_ok(), "{load}");
+            assert_eq!(accepts("Load", &load), read.is_ok(), "{load}");
             // and what was read is written as it was
             if let Ok(read) = read {
                 assert_eq!(serde_json::to_value(read).unwrap(), load);
@@ -583,7 +296,6 @@ mod tests {
             "group" | "name" => serde_json::json!("wood"),
             _ => serde_json::json!(0.25),
         };
-        let materials = validator("Material");
         for material in subsets(
             &[
                 "youngs_modulus",
@@ -595,7 +307,7 @@ mod tests {
             &constant,
         ) {
             let read = serde_json::from_value::<solver::problem::Material>(material.clone());
-            assert_eq!(materials.is_valid(&material), read.is_ok(), "{material}");
+            assert_eq!(accepts("Material", &material), read.is_ok(), "{material}");
             if let Ok(read) = read {
                 assert_eq!(serde_json::to_value(read).unwrap(), material);
             }
@@ -607,7 +319,6 @@ mod tests {
             "boundaries" => serde_json::json!({"a": {"side": "top"}}),
             _ => serde_json::json!("text"),
         };
-        let meshes = validator("MeshInput");
         for mesh in subsets(
             &[
                 "grid",
@@ -621,7 +332,7 @@ mod tests {
             &source,
         ) {
             let read = serde_json::from_value::<solver::problem::MeshInput>(mesh.clone());
-            assert_eq!(meshes.is_valid(&mesh), read.is_ok(), "{mesh}");
+            assert_eq!(accepts("MeshInput", &mesh), read.is_ok(), "{mesh}");
             if let Ok(read) = read {
                 let mut written = mesh.clone();
                 written

@@ -8,6 +8,7 @@ pub mod json;
 
 mod external;
 mod file;
+mod schema;
 mod source;
 
 // Out: tables (CSV and JSON Lines are in `table`), fields, figures.
@@ -23,5 +24,16 @@ mod number; // what these share
 
 pub use external::external_mesh;
 pub use file::{MeshFormat, read_mesh};
-pub use json::{parse, schema};
+pub use json::parse;
+pub use schema::schema;
 pub use source::ReadError;
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    #[should_panic(expected = "attempt to add with overflow")]
+    fn an_overflow_is_a_panic_in_the_profile_that_ships() {
+        let most = std::hint::black_box(u32::MAX);
+        std::hint::black_box(most + 1);
+    }
+}

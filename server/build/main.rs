@@ -16,8 +16,7 @@ use prost::Message;
 use protox::prost_reflect::DescriptorPool;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // Tables and examples are compiled in too.
-    for input in ["build", "../proto", "../migrations", "../examples"] {
+    for input in ["build", "../proto"] {
         println!("cargo:rerun-if-changed={input}");
     }
     let descriptors = protox::compile(["signorini/v1/signorini.proto"], ["../proto"])?;

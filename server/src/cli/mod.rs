@@ -13,7 +13,7 @@ use std::{io::IsTerminal, process::ExitCode};
 
 use clap::{Parser, Subcommand};
 use tracing::level_filters::LevelFilter;
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::{filter::Targets, prelude::*};
 
 use self::exit::Exit;
 use crate::{config::Config, rest};
@@ -93,14 +93,47 @@ fn with_runtime(command: impl Future<Output = anyhow::Result<Exit>>) -> anyhow::
 
 /// One line per event on standard error, filtered by SIGNORINI_LOG, e.g. `info,service=debug`.
 fn log(default: LevelFilter) {
-    let filter = EnvFilter::builder()
-        .with_default_directive(default.into())
-        .with_env_var("SIGNORINI_LOG");
-    tracing_subscriber::fmt()
-        .with_env_filter(filter.from_env_lossy())
+    let asked = std::env::var("SIGNORINI_LOG").unwrap_or_default();
+    let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         // a log that cannot be written must not end the process
         .log_internal_errors(false)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_ansi(std::io::stderr().is_terminal());
+    tracing_subscriber::registry()
+        .with(lines)
+        .with(filter(&asked, default))
         .init();
+}
+
+/// What is logged. A filter that cannot be read is said to be so, and ignored.
+fn filter(asked: &str, default: LevelFilter) -> Targets {
+    let default = Targets::new().with_default(default);
+    if asked.trim().is_empty() {
+        return default;
+    }
+    asked.parse().unwrap_or_else(|error| {
+        eprintln!("signorini: SIGNORINI_LOG={asked} is ignored: {error}");
+        default
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracing::Level;
+
+    #[test]
+    fn a_log_filter_is_a_level_and_targets_or_the_default() {
+        let debug = |asked| {
+            let filter = filter(asked, LevelFilter::WARN);
+            ["service::queue", "hyper"].map(|target| filter.would_enable(target, &Level::DEBUG))
+        };
+        assert_eq!(debug("info,service=debug"), [true, false]);
+        assert_eq!(debug("debug"), [true, true]);
+        for asked in ["", " ", "service=loud"] {
+            assert_eq!(debug(asked), [false, false], "{asked}");
+            let warnings = filter(asked, LevelFilter::WARN).would_enable("hyper", &Level::WARN);
+            assert!(warnings, "{asked}");
+        }
+    }
 }

@@ -15,6 +15,7 @@ use tokio::sync::mpsc;
 
 use super::{
     error::{Result, StoreError},
+    migrations,
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
@@ -64,7 +65,7 @@ impl Store {
             })
             .connect_with(writing)
             .await?;
-        sqlx::migrate!("../migrations").run(&writer).await?;
+        migrations::migrator().run(&writer).await?;
         let reading = options.read_only(true);
         let reader = pool(4).connect_with(reading.clone()).await?;
         let lists = pool(2)

@@ -21,6 +21,7 @@ mod submission;
 // The database; one transaction of its single writer; the jobs that wait, mirrored in memory.
 mod change;
 mod database;
+mod migrations;
 mod waiting;
 
 // A job: its row, its labels, its events, its result.

@@ -1,0 +1,70 @@
+//! The tables and how they came to be: `migrations/`, compiled in.
+
+use std::borrow::Cow;
+
+use sqlx::{
+    SqlSafeStr,
+    migrate::{Migration, MigrationType, Migrator},
+};
+
+/// Every step, with the name of its file. Listed here rather than found by `sqlx::migrate!`, for whose sake sqlx
+/// and SQLite would be compiled a second time, for the compiler to run; a test compares the list with the folder.
+const STEPS: [(i64, &str, &str); 3] = [
+    (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
+    (
+        2,
+        "meshes",
+        include_str!("../../../migrations/0002_meshes.sql"),
+    ),
+    (
+        3,
+        "job api",
+        include_str!("../../../migrations/0003_job_api.sql"),
+    ),
+];
+
+/// What brings the tables of an older version up to date.
+pub(super) fn migrator() -> Migrator {
+    let migration = |(version, description, sql): (i64, &'static str, &'static str)| {
+        let description = Cow::Borrowed(description);
+        let one_transaction_each = false;
+        Migration::new(
+            version,
+            description,
+            MigrationType::Simple,
+            sql.into_sql_str(),
+            one_transaction_each,
+        )
+    };
+    Migrator::with_migrations(STEPS.map(migration).to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::path::Path;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn every_file_of_the_folder_is_a_step_under_its_name() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../migrations");
+        let files = Migrator::new(folder).await.unwrap();
+        let said = |migrator: &Migrator| -> Vec<_> {
+            let steps = migrator.iter().cloned();
+            steps
+                .map(|m| {
+                    (
+                        m.version,
+                        m.description,
+                        m.migration_type,
+                        m.checksum,
+                        m.no_tx,
+                    )
+                })
+                .collect()
+        };
+        assert_eq!(said(&migrator()), said(&files));
+    }
+}
