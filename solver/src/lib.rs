@@ -123,3 +123,13 @@ fn tell(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveE
 }
 
 pub use model::estimate::{Estimate, MeshSize, estimate};
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    #[should_panic(expected = "attempt to add with overflow")]
+    fn an_overflow_is_a_panic_in_the_profile_that_ships() {
+        let most = std::hint::black_box(u32::MAX);
+        std::hint::black_box(most + 1);
+    }
+}

@@ -71,7 +71,7 @@ pub(super) async fn start_attempt(change: &mut Change<'_>, job: &Job) -> Result<
 
 /// Ends a job, with its one `done` event. Jobs coalesced into it are not touched.
 pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
-    debug_assert!(ending.status.is_terminal());
+    assert!(ending.status.is_terminal());
     // Lists rely on it that no job ends before it was accepted, even if the clock was set back.
     let now = Time::now().max(job.created_at);
     let failure = ending
