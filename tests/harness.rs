@@ -137,8 +137,8 @@ impl Server {
         response.json().await.unwrap()
     }
 
-    /// Hands in a body; gives the job.
-    pub async fn hand_in(&self, body: &Value) -> Value {
+    /// Posts a job; gives the job as answered.
+    pub async fn create_job(&self, body: &Value) -> Value {
         answer(self.post("/v1/jobs").json(body)).await.1
     }
 
@@ -148,7 +148,7 @@ impl Server {
         answer(request.json(body)).await.1
     }
 
-    /// Hands in a job that is solved on its own; gives its id.
+    /// Posts a job that is solved on its own; gives its id.
     pub async fn submit(&self, problem: &Value) -> String {
         let response = self
             .post("/v1/jobs")

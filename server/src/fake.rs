@@ -1,14 +1,14 @@
 //! A problem and a solver for the unit tests of this crate: plausible, quick, and obedient.
 
-use std::ops::ControlFlow;
+use std::{ops::ControlFlow, sync::LazyLock};
 
 use solver::{
     error::SolveError,
     mesh::External,
     problem::Problem,
     solution::{
-        ContactCount, ContactProfile, ErrorEstimate, Fields, ForcePair, FrictionCount, Iteration,
-        NodeState, Observer, Outcome, Phase, Progress, Residuals, Solution, Stage, Summary,
+        ContactCount, ForcePair, FrictionCount, Iteration, Observer, Outcome, Phase, Progress,
+        Solution, Stage,
     },
 };
 
@@ -32,60 +32,16 @@ pub(crate) fn problem() -> Problem {
     .unwrap_or_else(|error| unreachable!("the fake problem is well formed: {error}"))
 }
 
-/// A small solution.
+/// The solution of [`problem`], with a history of three rows.
 pub(crate) fn solution() -> Solution {
-    Solution {
-        summary: Summary {
-            outcome: Outcome::Converged,
-            converged: true,
-            normal_force: 50.0,
-            tangential_force: 14.1,
-            friction_force: 14.2,
-            contacts: Default::default(),
-            iterations: 3,
-            stage: Stage::Outer,
-            contraction: Some(0.1),
-            residuals: Residuals::default(),
-            energy: -1.5,
-            friction_work: 0.1,
-            error_estimate: ErrorEstimate::default(),
-            increments: 1,
-            cut_backs: 0,
-            uniqueness: None,
-            doubled_increments: None,
-            refinements: vec![],
-            warnings: vec![],
-            dofs: 26,
-            contact_dofs: 10,
-        },
-        history: (1..=3).map(iteration).collect(),
-        profiles: [(
-            "top".to_string(),
-            ContactProfile {
-                s: vec![0.0, 1.0],
-                x: vec![0.0, 1.0],
-                y: vec![0.0, 0.0],
-                gap: vec![-0.1, 0.1],
-                normal_displacement: vec![-0.1, 0.0],
-                tangential_displacement: vec![0.0, 0.01],
-                normal_stress: vec![-20.0, 0.0],
-                tangential_stress: vec![0.1, 0.0],
-                nonlocal_pressure: vec![19.0, 0.0],
-                friction_bound: vec![5.7, 0.0],
-                friction_ratio: vec![0.02, 1.0],
-                state: vec![NodeState::Stick, NodeState::Open],
-            },
-        )]
-        .into(),
-        friction_profiles: Default::default(),
-        steps: vec![],
-        fields: Fields {
-            x: vec![0.0, 1.0],
-            y: vec![0.0, 0.0],
-            ux: vec![0.1, 0.2],
-            ..Fields::default()
-        },
-    }
+    static SOLVED: LazyLock<Solution> = LazyLock::new(|| {
+        solver::solve(&problem(), &mut |_| ControlFlow::Continue(()))
+            .unwrap_or_else(|error| unreachable!("the fake problem is solved: {error}"))
+    });
+    let mut solution = SOLVED.clone();
+    solution.history = (1..=3).map(iteration).collect();
+    solution.summary.iterations = 3;
+    solution
 }
 
 /// Row `k` of a history.
@@ -132,6 +88,11 @@ pub(crate) fn solve(
     _: Option<External>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
+    iterate(observe)
+}
+
+/// The same, for any problem.
+pub(crate) fn iterate(observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
     let mut solution = solution();
     for phase in [Phase::Mesh, Phase::Factor, Phase::Iterate] {
         if observe(Progress::Phase(phase)).is_break() {

@@ -71,16 +71,16 @@ async fn the_same_input_is_answered_from_the_first_result() {
         wait: Some(60.0),
         ..Default::default()
     };
-    let twin = grpc
+    let over_grpc = grpc
         .create_job(create(pb::Cache::Unspecified))
         .await
         .unwrap()
         .into_inner();
-    assert_eq!(twin.cached_from.as_deref(), Some(id));
+    assert_eq!(over_grpc.cached_from.as_deref(), Some(id));
     for cache in [pb::Cache::Refresh, pb::Cache::Off] {
-        let twin = grpc.create_job(create(cache)).await.unwrap().into_inner();
+        let over_grpc = grpc.create_job(create(cache)).await.unwrap().into_inner();
         assert_eq!(
-            (twin.status(), twin.cached_from),
+            (over_grpc.status(), over_grpc.cached_from),
             (pb::Status::Succeeded, None)
         );
     }
@@ -91,11 +91,13 @@ async fn the_same_input_is_answered_from_the_first_result() {
 async fn two_of_the_same_input_are_solved_once_and_canceled_apart() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "2"]).await;
     let post = async || {
-        let job = server.hand_in(&json!({ "problem": block(120, 110) })).await;
+        let job = server
+            .create_job(&json!({ "problem": block(120, 110) }))
+            .await;
         job["id"].as_str().unwrap().to_owned()
     };
-    let (source, twin, canceled) = (post().await, post().await, post().await);
-    let waiting = server.job(&twin).await;
+    let (source, coalesced, canceled) = (post().await, post().await, post().await);
+    let waiting = server.job(&coalesced).await;
     assert_eq!(waiting["queue"]["reason"], "coalesced");
     assert_eq!(
         server.json("/v1/queue").await["running"],
@@ -104,7 +106,7 @@ async fn two_of_the_same_input_are_solved_once_and_canceled_apart() {
     );
     assert_eq!(server.cancel(&canceled).await["outcome"], "canceled");
     assert_eq!(server.until_done(&source).await["status"], "succeeded");
-    let done = server.until_done(&twin).await;
+    let done = server.until_done(&coalesced).await;
     assert_eq!(
         (&done["status"], &done["cached_from"]),
         (&json!("succeeded"), &json!(source))
@@ -112,12 +114,12 @@ async fn two_of_the_same_input_are_solved_once_and_canceled_apart() {
     let digest = async |id: &str| {
         server.json(&format!("/v1/jobs/{id}/result")).await["summary"]["digest"].take()
     };
-    assert_eq!(digest(&source).await, digest(&twin).await);
+    assert_eq!(digest(&source).await, digest(&coalesced).await);
     // a problem that does not converge fails both of them, with what there is
     let mut problem = block(60, 60);
     problem["solver"] = json!({ "max_iterations": 2 });
     let post = async || {
-        let job = server.hand_in(&json!({ "problem": problem })).await;
+        let job = server.create_job(&json!({ "problem": problem })).await;
         job["id"].as_str().unwrap().to_owned()
     };
     for id in [post().await, post().await] {

@@ -275,7 +275,7 @@ async fn many_jobs_are_canceled_and_deleted_by_a_filter_and_not_without_one() {
     let mut labeled = vec![];
     for n in 0..6 {
         let body = json!({ "problem": example_json("sheet"), "cache": "off", "labels": { "odd": (n % 2).to_string() } });
-        let job = server.hand_in(&body).await;
+        let job = server.create_job(&body).await;
         labeled.push(job["id"].as_str().unwrap().to_owned());
     }
     let act = async |method: Method, path: &str| answer(server.request(method, path)).await;
@@ -353,18 +353,18 @@ async fn a_paused_queue_accepts_and_does_not_start() {
         (&json!(true), &json!(1))
     );
     let mut grpc = connect(&server).await;
-    let twin = grpc
+    let over_grpc = grpc
         .get_queue(pb::GetQueueRequest {})
         .await
         .unwrap()
         .into_inner();
-    assert!(twin.paused && twin.queued == 1 && twin.workers == 2);
-    let twin = grpc
+    assert!(over_grpc.paused && over_grpc.queued == 1 && over_grpc.workers == 2);
+    let over_grpc = grpc
         .resume_queue(pb::ResumeQueueRequest {})
         .await
         .unwrap()
         .into_inner();
-    assert!(!twin.paused);
+    assert!(!over_grpc.paused);
     assert_eq!(server.until_done(&id).await["status"], "succeeded");
     assert!(
         grpc.pause_queue(pb::PauseQueueRequest {})
@@ -382,7 +382,7 @@ async fn time_limits_end_a_job_with_reasons_of_their_own() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
     let post = async |problem: Value, limits: Value| {
         let body = json!({ "problem": problem, "limits": limits, "cache": "off" });
-        let job = server.hand_in(&body).await;
+        let job = server.create_job(&body).await;
         job["id"].as_str().unwrap().to_owned()
     };
     let long = post(large(), json!({ "timeout_s": 1.0 })).await;

@@ -104,7 +104,7 @@ async fn lists_go_by_the_time_that_is_asked_for_in_both_directions() {
     let mut ids = vec![];
     for priority in [0, 5, -5, 9] {
         let body = json!({ "problem": example_json("sheet"), "priority": priority, "cache": "off", "labels": { "l": "x" } });
-        let job = server.hand_in(&body).await;
+        let job = server.create_job(&body).await;
         ids.push(job["id"].as_str().unwrap().to_owned());
     }
     server.post("/v1/queue/resume").send().await.unwrap();

@@ -62,9 +62,12 @@ async fn a_key_answers_with_the_same_job_as_it_is_now() {
         request_id: Some("k".into()),
         ..grpc_body(name)
     };
-    let twin = grpc.create_job(request("a")).await.unwrap();
-    assert_eq!(twin.metadata().get("idempotency-replayed").unwrap(), "true");
-    assert_eq!(first["id"], twin.into_inner().id);
+    let over_grpc = grpc.create_job(request("a")).await.unwrap();
+    assert_eq!(
+        over_grpc.metadata().get("idempotency-replayed").unwrap(),
+        "true"
+    );
+    assert_eq!(first["id"], over_grpc.into_inner().id);
     let refused = grpc.create_job(request("b")).await.unwrap_err();
     assert_eq!(refused.code(), Code::AlreadyExists);
 
@@ -136,8 +139,8 @@ async fn a_job_may_have_a_name_of_the_clients_own() {
         job_id: Some(id.into()),
         ..grpc_body(name)
     };
-    let twin = grpc.create_job(request("a")).await.unwrap().into_inner();
-    assert_eq!(twin.status(), pb::Status::Succeeded);
+    let over_grpc = grpc.create_job(request("a")).await.unwrap().into_inner();
+    assert_eq!(over_grpc.status(), pb::Status::Succeeded);
     let refused = grpc.create_job(request("b")).await.unwrap_err();
     assert_eq!(refused.code(), Code::AlreadyExists);
     let deleted = server
@@ -216,7 +219,11 @@ async fn a_batch_is_accepted_whole_or_not_at_all() {
         jobs: vec![grpc_body("a"), grpc_body("b"), grpc_body("c")],
         request_id: Some("b".into()),
     };
-    let twin = grpc.batch_create_jobs(request).await.unwrap().into_inner();
-    let twins: Vec<Value> = twin.jobs.into_iter().map(|job| json!(job.id)).collect();
-    assert_eq!(twins, ids(&batch));
+    let over_grpc = grpc.batch_create_jobs(request).await.unwrap().into_inner();
+    let ids_over_grpc: Vec<Value> = over_grpc
+        .jobs
+        .into_iter()
+        .map(|job| json!(job.id))
+        .collect();
+    assert_eq!(ids_over_grpc, ids(&batch));
 }

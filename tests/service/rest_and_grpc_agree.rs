@@ -98,10 +98,10 @@ async fn both_protocols_say_the_same_of_a_job_that_failed() {
     problem["solver"] = json!({ "max_iterations": 3 });
     let id = server.submit(&problem).await;
     let job = server.until_done(&id).await;
-    let twin = grpc.get_job(pb::GetJobRequest { id }).await.unwrap();
+    let over_grpc = grpc.get_job(pb::GetJobRequest { id }).await.unwrap();
     assert!(job["progress"]["rate"].is_number(), "{job:#}");
     assert!(job["failure"]["code"].is_string(), "{job:#}");
-    agree(&job, "Job", &twin.into_inner());
+    agree(&job, "Job", &over_grpc.into_inner());
 }
 
 /// All that REST says, but for its addresses, is in the message, and nothing else.
@@ -130,17 +130,17 @@ async fn both_protocols_tell_the_same_story_of_one_job() {
         .unwrap()
         .into_inner();
     for event in &by_rest {
-        let twin = stream.message().await.unwrap().unwrap();
+        let over_grpc = stream.message().await.unwrap().unwrap();
         assert_eq!(
             (event["seq"].as_i64(), event["attempt"].as_i64()),
-            (Some(twin.seq), Some(twin.attempt as i64))
+            (Some(over_grpc.seq), Some(over_grpc.attempt as i64))
         );
-        agree(event, "Event", &twin);
+        agree(event, "Event", &over_grpc);
     }
     assert!(stream.message().await.unwrap().is_none());
 
     let profile = server.json(&format!("/v1/jobs/{id}/profiles/top")).await;
-    let twin = grpc
+    let over_grpc = grpc
         .get_profile(pb::GetProfileRequest {
             id,
             boundary: "top".into(),
@@ -150,7 +150,7 @@ async fn both_protocols_tell_the_same_story_of_one_job() {
         .await
         .unwrap()
         .into_inner();
-    agree(&profile, "ContactProfile", &twin);
+    agree(&profile, "ContactProfile", &over_grpc);
 }
 
 /// Load steps: indented, then dragged, by the incremental law; the second solution asked for.
@@ -170,16 +170,16 @@ async fn both_protocols_serve_every_load_step() {
     let id = server.submit(&problem).await;
     assert_eq!(server.until_done(&id).await["status"], "succeeded");
     let result = server.json(&format!("/v1/jobs/{id}/result")).await;
-    let twin = grpc
+    let over_grpc = grpc
         .get_result(pb::GetResultRequest { id: id.clone() })
         .await
         .unwrap()
         .into_inner();
     assert_eq!(result["result_available"], "final");
-    assert_eq!(twin.result_available(), pb::ResultAvailable::Final);
-    agree(&result, "Result", &twin);
+    assert_eq!(over_grpc.result_available(), pb::ResultAvailable::Final);
+    agree(&result, "Result", &over_grpc);
     let steps = result["steps"].as_array().unwrap();
-    assert_eq!((steps.len(), twin.steps.len()), (2, 2));
+    assert_eq!((steps.len(), over_grpc.steps.len()), (2, 2));
     assert!(steps[1]["summary"]["uniqueness"]["agrees"].is_boolean());
     assert_eq!(result["summary"]["increments"], 3);
     assert_eq!(

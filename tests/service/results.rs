@@ -380,8 +380,11 @@ async fn a_profile_is_given_at_nodes_at_friction_points_or_at_any_number_of_plac
             points: Some(points.into()),
             ..Default::default()
         };
-        let twin = grpc.get_profile(request).await.unwrap().into_inner();
-        assert_eq!(same["tangential_stress"], json!(twin.tangential_stress));
+        let over_grpc = grpc.get_profile(request).await.unwrap().into_inner();
+        assert_eq!(
+            same["tangential_stress"],
+            json!(over_grpc.tangential_stress)
+        );
     }
     for bad in ["1", "100001", "corners", "-3"] {
         let response = server.get(&at(bad)).send().await.unwrap();

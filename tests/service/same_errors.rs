@@ -272,22 +272,22 @@ async fn what_both_protocols_answer_about_the_service_is_the_same() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     let info = server.json("/v1/info").await;
-    let twin = grpc
+    let over_grpc = grpc
         .get_server_info(pb::GetServerInfoRequest {})
         .await
         .unwrap()
         .into_inner();
-    let limits = twin.limits.unwrap();
+    let limits = over_grpc.limits.unwrap();
     assert_eq!(
         (&info["version"], &info["api_version"]),
-        (&json!(twin.version), &json!(twin.api_version))
+        (&json!(over_grpc.version), &json!(over_grpc.api_version))
     );
     assert_eq!(
         info["limits"]["memory_budget_bytes"],
         limits.memory_budget_bytes
     );
     assert_eq!(info["limits"]["max_wait_s"], limits.max_wait_s);
-    assert_eq!(info["field_formats"], json!(twin.field_formats));
+    assert_eq!(info["field_formats"], json!(over_grpc.field_formats));
     let caller = grpc
         .get_caller(pb::GetCallerRequest {})
         .await
@@ -308,13 +308,13 @@ async fn what_both_protocols_answer_about_the_service_is_the_same() {
         }
     })
     .await;
-    let twin = grpc
+    let over_grpc = grpc
         .get_queue(pb::GetQueueRequest {})
         .await
         .unwrap()
         .into_inner();
-    let same = json!({ "paused": twin.paused, "queued": twin.queued, "running": twin.running,
-        "workers": twin.workers, "idle": twin.idle, "max_queued": twin.max_queued });
+    let same = json!({ "paused": over_grpc.paused, "queued": over_grpc.queued, "running": over_grpc.running,
+        "workers": over_grpc.workers, "idle": over_grpc.idle, "max_queued": over_grpc.max_queued });
     assert_eq!(queue, same);
 
     for (n, name) in ["sheet", "cylinder", "sheet"].into_iter().enumerate() {
@@ -337,8 +337,11 @@ async fn what_both_protocols_answer_about_the_service_is_the_same() {
         filter: Some(filter.clone()),
         group_by: "status".into(),
     };
-    let twin = grpc.count_jobs(request).await.unwrap().into_inner();
-    assert_eq!(count, json!({ "total": twin.total, "groups": twin.groups }));
+    let over_grpc = grpc.count_jobs(request).await.unwrap().into_inner();
+    assert_eq!(
+        count,
+        json!({ "total": over_grpc.total, "groups": over_grpc.groups })
+    );
     assert_eq!(count["groups"], json!({ "succeeded": 3 }));
     let page = server
         .json("/v1/jobs?status=succeeded&order_by=finished_at%20asc&name=sheet")
@@ -352,25 +355,25 @@ async fn what_both_protocols_answer_about_the_service_is_the_same() {
         order_by: "finished_at asc".into(),
         ..Default::default()
     };
-    let twin = grpc.list_jobs(request).await.unwrap().into_inner();
+    let over_grpc = grpc.list_jobs(request).await.unwrap().into_inner();
     let ids: Vec<&Value> = page["jobs"]
         .as_array()
         .unwrap()
         .iter()
         .map(|job| &job["id"])
         .collect();
-    let twins: Vec<Value> = twin.jobs.iter().map(|job| json!(job.id)).collect();
+    let ids_over_grpc: Vec<Value> = over_grpc.jobs.iter().map(|job| json!(job.id)).collect();
     assert_eq!(ids.len(), 2);
-    assert!(ids.into_iter().eq(twins.iter()));
+    assert!(ids.into_iter().eq(ids_over_grpc.iter()));
 
-    let id = twin.jobs[0].id.clone();
+    let id = over_grpc.jobs[0].id.clone();
     let problem = server.json(&format!("/v1/jobs/{id}/problem")).await;
-    let twin = grpc
+    let over_grpc = grpc
         .get_job_problem(pb::GetJobProblemRequest { id: id.clone() })
         .await
         .unwrap()
         .into_inner();
-    assert_eq!(twin, message(&problem.to_string()));
+    assert_eq!(over_grpc, message(&problem.to_string()));
     let rows = server
         .json(&format!("/v1/jobs/{id}/history?max_points=3"))
         .await;
@@ -379,7 +382,7 @@ async fn what_both_protocols_answer_about_the_service_is_the_same() {
         max_points: Some(3),
         ..Default::default()
     };
-    let twin = grpc
+    let over_grpc = grpc
         .list_iterations(request)
         .await
         .unwrap()
@@ -392,7 +395,7 @@ async fn what_both_protocols_answer_about_the_service_is_the_same() {
         .map(|row| &row["residual"])
         .collect();
     assert!(
-        residuals.into_iter().eq(&twin
+        residuals.into_iter().eq(&over_grpc
             .iter()
             .map(|row| json!(row.residual))
             .collect::<Vec<_>>())

@@ -14,7 +14,6 @@ mod profile;
 mod theme;
 
 use std::collections::BTreeMap;
-use std::str::FromStr;
 
 pub use convergence::convergence_svg;
 pub use deformed::{Stress, deformed_svg};
@@ -26,9 +25,11 @@ pub use theme::Theme;
 use solver::mesh::Mesh;
 use solver::problem::Problem;
 use solver::solution::{ContactProfile, Fields, Iteration};
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// What can be drawn of a problem and its solution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
+#[strum(serialize_all = "snake_case")]
 pub enum Plot {
     /// Elements and named boundaries.
     Mesh,
@@ -41,26 +42,9 @@ pub enum Plot {
 }
 
 impl Plot {
-    /// All of them.
-    pub const ALL: [Plot; 4] = [Plot::Mesh, Plot::Deformed, Plot::Profile, Plot::Convergence];
-
     /// Its name in paths and file names.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Plot::Mesh => "mesh",
-            Plot::Deformed => "deformed",
-            Plot::Profile => "profile",
-            Plot::Convergence => "convergence",
-        }
-    }
-}
-
-impl FromStr for Plot {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let named = Plot::ALL.into_iter().find(|plot| plot.as_str() == text);
-        named.ok_or_else(|| "expected mesh, deformed, profile or convergence".to_owned())
+        self.into()
     }
 }
 
@@ -152,7 +136,7 @@ mod tests {
             fields: &solution.fields,
             stored: None,
         };
-        for plot in Plot::ALL {
+        for &plot in Plot::VARIANTS {
             assert_eq!(plot.as_str().parse(), Ok(plot));
             let drawn = |theme| draw(plot, theme, &problem, &parts).unwrap();
             let (light, dark) = (drawn(Theme::Light), drawn(Theme::Dark));

@@ -9,6 +9,7 @@ use std::{
 use anyhow::Context;
 use files::plot::{self, Parts, Plot, Theme};
 use solver::{problem::Problem, solution::Iteration};
+use strum::VariantArray;
 
 use crate::{
     formats::{self, Format},
@@ -59,9 +60,11 @@ impl Output {
             .and_then(|name| name.rsplit_once('.'))
             .unwrap_or_default();
         let ending = ending.to_ascii_lowercase();
-        let format = Format::ALL.iter().find(|format| format.name() == ending);
+        let format = Format::VARIANTS
+            .iter()
+            .find(|format| format.name() == ending);
         let format = *format.ok_or_else(|| {
-            let endings: Vec<String> = Format::ALL
+            let endings: Vec<String> = Format::VARIANTS
                 .iter()
                 .map(|format| format!(".{}", format.name()))
                 .collect();

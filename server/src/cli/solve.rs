@@ -10,7 +10,10 @@ use std::{
 use anyhow::Context;
 use clap::Args;
 use files::plot::Theme;
-use solver::error::{SolveError, Violation};
+use solver::{
+    error::{SolveError, Violation},
+    solution::Observer,
+};
 
 use super::{
     exit::Exit,
@@ -82,7 +85,10 @@ pub(super) fn run(
         eprintln!("{}: {too_large}", file.display());
         return Ok(Exit::Invalid);
     }
-    let solved = run::run(&problem, None, parse_s, solver::solve_on, &mut |update| {
+    let solve = |observe: &mut Observer<'_>| {
+        solver::solve_on(&problem, files::external_mesh(&problem, None), observe)
+    };
+    let solved = run::run(&problem, parse_s, solve, &mut |update| {
         match update {
             Update::Phase(phase) => eprintln!("{} …", phase.as_str()),
             Update::Iteration(timed) => eprintln!("{}", report::iteration(&timed.row)),

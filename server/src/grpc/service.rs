@@ -323,8 +323,11 @@ impl JobService for Grpc {
 
     async fn update_job(&self, request: Request<pb::UpdateJobRequest>) -> Reply<pb::Job> {
         let (caller, request) = asked(request)?;
-        let (id, version) = (ID.read(&request.id)?, request.version);
-        let job = jobs::update(&self.service, &caller, id, edit(request)?, version).await?;
+        let (id, versions) = (
+            ID.read(&request.id)?,
+            request.version.map(|only| vec![only]),
+        );
+        let job = jobs::update(&self.service, &caller, id, edit(request)?, versions).await?;
         Ok(Response::new(job.into()))
     }
 

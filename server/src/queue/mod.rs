@@ -29,6 +29,6 @@ mod dispatch;
 mod tests;
 
 pub use self::{
-    state::{Queue, State},
+    state::{Queue, Solve, State},
     watchers::Subscription,
 };

@@ -6,15 +6,17 @@ use solver::{
     error::SolveError,
     mesh::Mesh,
     problem::{Problem, Refine, Step},
+    solution::Observer,
 };
 
 use super::{
     ending::{Solved, Unsolved, ending_of_solution},
     recorder::Report,
+    state::Solve,
 };
 use crate::{
     event::Payload,
-    run::{self, PartialSolution, Solve, Update},
+    run::{self, PartialSolution, Update},
     store::{Parts, Store},
     time::Time,
 };
@@ -49,7 +51,9 @@ pub(super) fn solve_and_report(
     }
     let event = |payload| Some(Report::Event(Time::now(), payload));
     let mut partials = Partials::default();
-    let document = run::run(&problem, mesh, parse_s, solve, &mut |update| {
+    let solve =
+        |observe: &mut Observer<'_>| solve(&problem, files::external_mesh(&problem, mesh), observe);
+    let document = run::run(&problem, parse_s, solve, &mut |update| {
         report(match update {
             Update::Phase(stage) => event(Payload::Stage { stage }),
             Update::Iteration(row) => event(Payload::Iteration(row)),

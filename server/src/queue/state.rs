@@ -5,6 +5,12 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
+use solver::{
+    error::SolveError,
+    mesh::External,
+    problem::Problem,
+    solution::{Observer, Solution},
+};
 use tokio::sync::{Notify, RwLock, Semaphore};
 use tokio_util::sync::CancellationToken;
 
@@ -14,9 +20,11 @@ use super::{
 };
 use crate::{
     job::Job,
-    run::Solve,
-    store::{Ending, FinalBatch, Result, Store},
+    store::{self, Ending, FinalBatch, Store},
 };
+
+/// The solver, or what stands in for it in a test.
+pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Solution, SolveError>;
 
 /// Runs, cancels and announces jobs.
 #[derive(Debug)]
@@ -96,13 +104,13 @@ impl Queue {
     }
 
     /// Starts no more jobs until the queue is resumed, also across restarts; those that run go on.
-    pub async fn pause(&self) -> Result<()> {
+    pub async fn pause(&self) -> store::Result<()> {
         let _guard = self.claiming.write().await; // no claim is under way
         self.store.set_paused(true).await
     }
 
     /// Starts jobs again.
-    pub async fn resume(&self) -> Result<()> {
+    pub async fn resume(&self) -> store::Result<()> {
         let _guard = self.claiming.write().await; // no pause is under way
         self.store.set_paused(false).await?;
         self.wake.notify_one();
@@ -115,7 +123,7 @@ impl Queue {
         key: i64,
         attempt: i32,
         ending: &Ending,
-    ) -> Result<bool> {
+    ) -> store::Result<bool> {
         let last = FinalBatch::default();
         let changed = self.store.finish(key, attempt, ending, last, None).await?;
         if let Some(changed) = &changed {

@@ -116,14 +116,11 @@ impl Tags {
         self.0.iter().any(same)
     }
 
-    /// The same as `If-Match` compares: strongly.
-    pub(super) fn contain_strongly(&self, tag: &str) -> bool {
-        self.0.iter().any(|own| own == tag)
-    }
-
-    /// Whether anything matches.
-    pub(super) fn any(&self) -> bool {
-        self.0.iter().any(|own| own == "*")
+    /// The versions that match as `If-Match` compares: strongly. `None`: all of them.
+    pub(super) fn versions(&self) -> Option<Vec<i64>> {
+        let strong = |tag: &String| tag.strip_prefix('"')?.strip_suffix('"')?.parse().ok();
+        let any = self.0.iter().any(|tag| tag == "*");
+        (!any).then(|| self.0.iter().filter_map(strong).collect())
     }
 
     /// The first number among them.

@@ -102,17 +102,8 @@ pub(super) async fn update(
     let Call {
         service, caller, ..
     } = &call;
-    let version = match meant_for {
-        None => None,
-        Some(tags) if tags.any() => None,
-        Some(tags) => {
-            let job = verbs::get(service, caller, id).await?;
-            // no job is of version −1
-            let same = tags.contain_strongly(&tag(&job));
-            Some(if same { job.version } else { -1 })
-        }
-    };
-    let job = verbs::update(service, caller, id, edit, version).await?;
+    let versions = meant_for.as_ref().and_then(Tags::versions);
+    let job = verbs::update(service, caller, id, edit, versions).await?;
     Ok(one(&job))
 }
 

@@ -9,7 +9,6 @@ use std::ops::ControlFlow;
 use solver::{
     error::SolveError,
     finite::is_finite,
-    mesh::{External, Mesh},
     problem::Problem,
     solution::{Fields, Observer, Outcome, Phase, Progress, Solution, Warning},
 };
@@ -18,9 +17,6 @@ use crate::event::TimedIteration;
 pub use document::{Document, Step, Summary};
 pub use stopwatch::Timings;
 use stopwatch::{Stopwatch, Times};
-
-/// The solver, or what stands in for it in a test.
-pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Solution, SolveError>;
 
 /// What a run reports while it goes on.
 #[derive(Debug)]
@@ -52,21 +48,22 @@ impl PartialSolution<'_> {
     }
 }
 
-/// Solves `problem`, notes when each iteration was done and measures the phases. `stored`: the mesh that it
-/// names by its hash. `parse_s`: seconds that reading the problem took, the caller's own phase.
+/// Solves `problem` by `solve`, notes when each iteration was done and measures the phases. `parse_s`: seconds that
+/// reading the problem took, the caller's own phase.
+///
+/// `solve` is [`solver::solve_on`] for one problem on its own; problems that share a condensed body are each solved
+/// by [`solver::steps::run`] on it.
 pub fn run(
     problem: &Problem,
-    stored: Option<Mesh>,
     parse_s: f64,
-    solve: Solve,
+    solve: impl FnOnce(&mut Observer<'_>) -> Result<Solution, SolveError>,
     report: &mut dyn FnMut(Update<'_>) -> ControlFlow<()>,
 ) -> Result<Document, SolveError> {
     let mut watch = Stopwatch::new(parse_s);
     let mut non_finite = false;
-    // reading the mesh is a part of meshing, which the solver begins with
+    // reading an external mesh is a part of meshing, which the solver begins with
     watch.enter(Phase::Mesh);
-    let external = files::external_mesh(problem, stored);
-    let solved = solve(problem, external, &mut |progress| {
+    let solved = solve(&mut |progress| {
         let update = match progress {
             Progress::Phase(phase) => {
                 watch.enter(phase);
@@ -122,7 +119,7 @@ mod tests {
     #[test]
     fn every_iteration_is_stamped_and_every_phase_has_a_time() {
         let mut stamps = vec![];
-        let document = run(&fake::problem(), None, 0.5, fake::solve, &mut |update| {
+        let document = run(&fake::problem(), 0.5, fake::iterate, &mut |update| {
             if let Update::Iteration(row) = update {
                 stamps.push(row.wall_s);
             }
@@ -149,14 +146,19 @@ mod tests {
             .into();
         let (start, mut recovers_s) = (Instant::now(), 0.0);
         let mut told = vec![];
-        let document = run(&problem, None, 0.0, solver::solve_on, &mut |update| {
-            match update {
-                Update::Phase(Phase::Recover) => recovers_s = start.elapsed().as_secs_f64(),
-                Update::Iteration(row) => told.push(row),
-                _ => {}
-            }
-            ControlFlow::Continue(())
-        })
+        let document = run(
+            &problem,
+            0.0,
+            |observe| solver::solve(&problem, observe),
+            &mut |update| {
+                match update {
+                    Update::Phase(Phase::Recover) => recovers_s = start.elapsed().as_secs_f64(),
+                    Update::Iteration(row) => told.push(row),
+                    _ => {}
+                }
+                ControlFlow::Continue(())
+            },
+        )
         .unwrap();
         let history = &document.history;
         assert!(document.summary.solution.refinements.len() > 1 && history.len() > 2);
@@ -174,12 +176,17 @@ mod tests {
         let mut problem = fake::problem();
         problem.steps = vec![Step::whole(); 2];
         let mut first = None;
-        let document = run(&problem, None, 0.0, solver::solve_on, &mut |update| {
-            if let Update::Step(partial) = update {
-                first = Some(partial.document().unwrap());
-            }
-            ControlFlow::Continue(())
-        })
+        let document = run(
+            &problem,
+            0.0,
+            |observe| solver::solve(&problem, observe),
+            &mut |update| {
+                if let Update::Step(partial) = update {
+                    first = Some(partial.document().unwrap());
+                }
+                ControlFlow::Continue(())
+            },
+        )
         .unwrap();
         let first = first.unwrap().history;
         assert!(!first.is_empty() && document.history.starts_with(&first));
@@ -217,7 +224,13 @@ mod tests {
     fn the_same_problem_has_the_same_digest_and_another_one_another() {
         let solved = |problem: &Problem| {
             let go_on = &mut |_: Update<'_>| ControlFlow::Continue(());
-            let document = run(problem, None, 0.0, solver::solve_on, go_on).unwrap();
+            let document = run(
+                problem,
+                0.0,
+                |observe| solver::solve(problem, observe),
+                go_on,
+            )
+            .unwrap();
             assert!(document.summary.solution.converged);
             document.summary
         };
@@ -233,8 +246,27 @@ mod tests {
     }
 
     #[test]
+    fn problems_that_share_a_body_are_solved_on_it_as_they_are_on_their_own() {
+        let go_on = &mut |_: Update<'_>| ControlFlow::Continue(());
+        let problem = fake::problem();
+        let body = solver::prepare(&problem, None, &mut |_| ControlFlow::Continue(()));
+        let body = body.unwrap().body;
+        for coefficient in [0.1, 0.6] {
+            let mut problem = problem.clone();
+            let friction = problem.contacts[0].friction.as_mut().unwrap();
+            friction.coefficient = Some(coefficient);
+            let model = solver::model::Model::new(&problem, None).unwrap();
+            let solve = |observe: &mut Observer<'_>| solver::steps::run(&model, &body, observe);
+            let shared = run(&problem, 0.0, solve, go_on).unwrap();
+            let alone = |observe: &mut Observer<'_>| solver::solve(&problem, observe);
+            let alone = run(&problem, 0.0, alone, go_on).unwrap();
+            assert_eq!(shared.summary.digest, alone.summary.digest);
+        }
+    }
+
+    #[test]
     fn a_summary_is_read_back_as_it_was_written() {
-        let summary = run(&fake::problem(), None, 0.0, fake::solve, &mut |_| {
+        let summary = run(&fake::problem(), 0.0, fake::iterate, &mut |_| {
             ControlFlow::Continue(())
         })
         .unwrap()

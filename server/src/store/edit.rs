@@ -29,20 +29,20 @@ pub struct Edit {
 }
 
 impl Store {
-    /// Edits a job, if it still has that version. `Err` holds the version that it has instead; `None`: there is no
-    /// such job.
+    /// Edits a job, if it has one of these versions or none are given. `Err` holds the version that it has
+    /// instead; `None`: there is no such job.
     pub async fn edit(
         &self,
         owners: Owners<'_>,
         id: JobId,
         edit: &Edit,
-        version: Option<i64>,
+        versions: Option<&[i64]>,
     ) -> Result<Option<std::result::Result<Job, i64>>> {
         let mut change = self.change().await?;
         let Some(job) = with_id(change.sql(), owners, id).await? else {
             return Ok(None);
         };
-        if version.is_some_and(|version| version != job.version) {
+        if versions.is_some_and(|versions| !versions.contains(&job.version)) {
             return Ok(Some(Err(job.version)));
         }
         let key = job.key;

@@ -9,7 +9,7 @@ use sqlx::{
 
 /// Every step, with the name of its file. Listed here rather than found by `sqlx::migrate!`, for whose sake sqlx
 /// and SQLite would be compiled a second time, for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 3] = [
+const STEPS: [(i64, &str, &str); 5] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -20,6 +20,16 @@ const STEPS: [(i64, &str, &str); 3] = [
         3,
         "job api",
         include_str!("../../../migrations/0003_job_api.sql"),
+    ),
+    (
+        4,
+        "owners",
+        include_str!("../../../migrations/0004_owners.sql"),
+    ),
+    (
+        5,
+        "coalesced jobs",
+        include_str!("../../../migrations/0005_coalesced_jobs.sql"),
     ),
 ];
 

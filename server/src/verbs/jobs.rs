@@ -83,13 +83,13 @@ pub async fn problem(service: &Service, caller: &Caller, id: JobId) -> Result<Pr
     Ok(Problem { title, ..problem })
 }
 
-/// Changes what may be changed of a job, if it is still of that version.
+/// Changes what may be changed of a job, if it has one of these versions; `None`: whatever its version.
 pub async fn update(
     service: &Arc<Service>,
     caller: &Caller,
     id: JobId,
     edit: Edit,
-    version: Option<i64>,
+    versions: Option<Vec<i64>>,
 ) -> Result<Job, ApiError> {
     let mut violations = Findings::default();
     let name = edit.name.iter().flatten().next();
@@ -101,8 +101,8 @@ pub async fn update(
         .map_err(ApiError::InvalidProblem)?;
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
-        let edited = service.store.edit(caller.sees(), id, &edit, version);
-        match edited.await? {
+        let (owners, versions) = (caller.sees(), versions.as_deref());
+        match service.store.edit(owners, id, &edit, versions).await? {
             Some(Ok(job)) => {
                 service.queue.announce(&[job.key]);
                 Ok(job)

@@ -125,7 +125,7 @@ pub fn isotropic(analysis: &Analysis, youngs_modulus: f64, poissons_ratio: f64) 
 }
 
 /// From the constants of an orthotropic material; `None` where they make no stable one. Constants
-/// across the plane are needed but in plane stress.
+/// across the plane are required unless the analysis is plane stress.
 #[rustfmt::skip]
 pub fn orthotropic(analysis: &Analysis, material: &Orthotropic) -> Option<Moduli> {
     let Orthotropic { e1, e2, nu12, g12, angle, e3, nu13, nu23 } = *material;

@@ -87,7 +87,7 @@ macro_rules! obstacles {
 }
 
 obstacles! {
-    /// Profile 0.
+    /// Profile 0: a flat face.
     Flat {}
     /// Profile R − √(R² − (c − center)²); there is no obstacle beyond R.
     Circle {
@@ -162,7 +162,7 @@ obstacles! {
         /// Its points `[x, y]`.
         points: Vec<[f64; 2]>,
     }
-    /// A straight line in space, without end; the profile is the distance along the body's normal.
+    /// A straight line in space, infinitely long; the profile is the distance along the body's normal.
     Line {
         /// A point `[x, y]` of it.
         point: [f64; 2],
@@ -188,11 +188,11 @@ pub enum Along {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Friction {
-    /// μ ≥ 0 (the thesis's ν). Needed, but with a `bound`.
+    /// Friction coefficient μ ≥ 0 (the thesis's ν). Required unless `bound` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coefficient: Option<f64>,
-    /// ρ ≥ 0 (length): the pressure is averaged over this distance. 0: Coulomb's local law. Needed,
-    /// but with a `bound`.
+    /// ρ ≥ 0 (length): the pressure is averaged over this distance. 0: Coulomb's local law. Required
+    /// unless `bound` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nonlocal_radius: Option<f64>,
     /// ε > 0 (length): tangential displacement at which the friction bound is reached.
@@ -206,7 +206,7 @@ pub struct Friction {
     /// φ_ε, from stick to slip.
     #[serde(default)]
     pub transition: Transition,
-    /// What friction remembers.
+    /// Whether friction depends on the path.
     #[serde(default)]
     pub history: History,
     /// Where friction is evaluated.
@@ -218,7 +218,7 @@ pub struct Friction {
     /// Added to μ S wherever S > 0, ≥ 0 (stress).
     #[serde(default)]
     pub cohesion: f64,
-    /// Largest τ, > 0 (stress); absent: none.
+    /// Upper limit of τ, > 0 (stress); absent: no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shear_cap: Option<f64>,
     /// A prescribed τ ≥ 0 (Tresca's law) instead of coefficient, radius, cohesion and cap. It acts on all
@@ -233,7 +233,7 @@ pub struct Friction {
 pub enum PrescribedBound {
     /// The same everywhere.
     Constant(f64),
-    /// Linear between points of arc length; nothing outside of them.
+    /// Linear between points of arc length; zero outside of them.
     Table(BoundTable),
 }
 
@@ -303,7 +303,7 @@ pub enum Transition {
     Tanh,
 }
 
-/// What friction remembers.
+/// Whether friction depends on the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum History {

@@ -46,7 +46,7 @@ impl Load {
     }
 }
 
-/// The forms as JSON Schema, each by what it requires and by what it excludes: all that makes up the others.
+/// The forms as JSON Schema: each requires its own fields and excludes those of the others.
 fn forms() -> [Schema; 6] {
     const FORMS: [(Option<&str>, &[&str]); 6] = [
         (Some("boundary"), &["pressure"]),
@@ -82,7 +82,7 @@ fn forms() -> [Schema; 6] {
     })
 }
 
-/// A load as it is written: what of it may stand together is for [`Load`] to say.
+/// A load as it is written; [`Load`] checks which fields may stand together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LoadFields {

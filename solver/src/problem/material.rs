@@ -36,7 +36,7 @@ pub enum Elasticity {
     Orthotropic(Orthotropic),
 }
 
-/// A material as it is written: what of it may stand together is for [`Material`] to say.
+/// A material as it is written; [`Material`] checks which fields may stand together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialFields {
@@ -152,13 +152,13 @@ pub struct Orthotropic {
     /// Angle from x to axis 1, counter-clockwise (degrees).
     #[serde(default)]
     pub angle: f64,
-    /// Modulus along axis 3, > 0 (stress); needed but in plane stress.
+    /// Modulus along axis 3, > 0 (stress); required unless the analysis is plane stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub e3: Option<f64>,
-    /// −ε_3/ε_1 under σ_1 alone; needed but in plane stress.
+    /// −ε_3/ε_1 under σ_1 alone; required unless the analysis is plane stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nu13: Option<f64>,
-    /// −ε_3/ε_2 under σ_2 alone; needed but in plane stress.
+    /// −ε_3/ε_2 under σ_2 alone; required unless the analysis is plane stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nu23: Option<f64>,
 }

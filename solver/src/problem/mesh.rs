@@ -82,7 +82,7 @@ impl MeshInput {
     }
 }
 
-/// A mesh as it is written: one source must be there, for [`MeshInput`] to say.
+/// A mesh as it is written; [`MeshInput`] checks that it has exactly one source.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct MeshFields {

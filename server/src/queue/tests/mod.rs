@@ -25,7 +25,6 @@ use crate::{
     event::{Event, Payload},
     fake,
     job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status, Waiting},
-    run::Solve,
     store::{
         Accepted, CancelOutcome, Edit, Ending, Filter, FinalBatch, GroupBy, NewJob, Order,
         RequestKey, Store, StoreError, Submission,
