@@ -11,7 +11,7 @@ mod file;
 mod schema;
 mod source;
 
-// Out: tables (CSV and JSON Lines are in `table`), fields, figures.
+// Out: tables (those that are text in `table`), fields, figures.
 pub mod arrow;
 pub mod fields;
 pub mod npz;

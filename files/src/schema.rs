@@ -94,7 +94,8 @@ impl Walk<'_> {
             }
         }
         if let Some(branches) = branches(schema) {
-            match forms(branches) {
+            let exactly_one = schema.get("oneOf").is_some();
+            match forms(branches).filter(|_| exactly_one) {
                 Some(forms) => self.check_forms(branches, &forms, value),
                 None => self.check_alternatives(branches, value),
             }

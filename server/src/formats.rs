@@ -48,7 +48,7 @@ impl Format {
         self.into()
     }
 
-    /// As in `Accept` and `Content-Type`; registered where there is a registered one.
+    /// The name of the media type, as in `Accept`; a registered one where there is one.
     pub fn media_type(self) -> &'static str {
         match self {
             Format::Json => "application/json",
@@ -59,6 +59,20 @@ impl Format {
             Format::Vtu => "application/vnd.vtk.unstructuredgrid+xml",
             Format::Svg => "image/svg+xml",
         }
+    }
+
+    /// As in `Content-Type`.
+    pub fn content_type(self) -> String {
+        match self {
+            Format::Csv => format!("{}; charset=utf-8", self.media_type()),
+            _ => self.media_type().to_owned(),
+        }
+    }
+
+    /// The endings of files in these formats: `.csv, .jsonl`.
+    pub fn endings(formats: &[Format]) -> String {
+        let endings: Vec<String> = formats.iter().map(|f| format!(".{}", f.name())).collect();
+        endings.join(", ")
     }
 }
 

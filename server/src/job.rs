@@ -12,6 +12,11 @@ use crate::{
     time::Time,
 };
 
+/// The lowest priority.
+pub const MIN_PRIORITY: i32 = -10;
+/// The highest priority.
+pub const MAX_PRIORITY: i32 = 10;
+
 /// A problem submitted to the service, as clients see it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Job {
@@ -222,7 +227,7 @@ pub enum Reason {
     NotConverged,
     /// The contact set repeats itself.
     ContactCycling,
-    /// The method's own tests were met, but the forces on the body do not balance.
+    /// The method's own test was met, but the true residual is above the tolerance or the forces do not balance.
     FalseConvergence,
     /// The stiffness matrix has no factor.
     SingularSystem,

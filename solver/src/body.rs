@@ -125,6 +125,23 @@ impl ElasticBody {
         })
     }
 
+    /// Whether the body of one model is the body of another: all that [`ElasticBody::new`] reads is equal.
+    pub fn same(a: &Model, b: &Model) -> bool {
+        let on_boundary = |model: &Model| -> Vec<(Vec<u32>, Vec<[f64; 2]>)> {
+            let boundaries = model.contacts.iter().map(|contact| &contact.boundary);
+            boundaries
+                .map(|boundary| (boundary.nodes.clone(), boundary.normals.clone()))
+                .collect()
+        };
+        a.mesh == b.mesh
+            && a.section == b.section
+            && a.quadrature == b.quadrature
+            && a.fixed == b.fixed
+            && a.loads == b.loads
+            && a.held_by_contact == b.held_by_contact
+            && on_boundary(a) == on_boundary(b)
+    }
+
     /// f̂ at a load level.
     pub fn load(&self, level: &Level) -> Vec<f64> {
         let parts = self.load_of_loads.iter().zip(&self.load_of_supports);

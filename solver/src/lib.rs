@@ -76,8 +76,9 @@ pub fn solve_on(
 
 /// A problem up to its iterations: checked, and its body factored and condensed onto its contacts.
 ///
-/// What comes before the iterations is most of the work, and problems that differ in obstacles, friction, load
-/// steps or tolerances only have the same body: [`steps::run`] solves any of their models on it.
+/// What comes before the iterations is most of the work, and problems that differ in friction, indentation, drag,
+/// load steps or tolerances only have the same body. (An obstacle of another shape may face other nodes, or turn their
+/// normals.)
 pub struct Prepared {
     /// What is to be solved.
     pub model: Model,
@@ -104,6 +105,15 @@ impl Prepared {
     /// Contact and friction, load step by load step.
     pub fn solve(&self, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
         steps::run(&self.model, &self.body, observe)
+    }
+
+    /// Solves another problem on this body; `None`: its body is not the same.
+    pub fn solve_other(
+        &self,
+        model: &Model,
+        observe: &mut Observer<'_>,
+    ) -> Option<Result<Solution, SolveError>> {
+        ElasticBody::same(&self.model, model).then(|| steps::run(model, &self.body, observe))
     }
 }
 

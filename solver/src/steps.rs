@@ -10,6 +10,7 @@ use crate::model::{Level, Model};
 use crate::problem::{Algorithm, Spacing, Step};
 use crate::solution::{
     Comparison, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution, StepSolution,
+    Summary,
 };
 
 /// An increment that does not converge is halved this often before the step ends there.
@@ -79,9 +80,9 @@ pub fn run(
         return Err(SolveError::NonFinite { phase: "steps" });
     };
     if model.controls.check_increments && solution.summary.converged {
-        let second = doubled(model, body, steps, observe);
         let summary = &mut solution.summary;
-        algorithm::note_doubled_increments(summary, second, model.controls.tolerance);
+        let second = doubled(model, body, steps, summary, observe);
+        algorithm::note_doubled_increments(summary, second);
     }
     if model.steps.is_empty() {
         solution.steps.clear();
@@ -95,6 +96,7 @@ fn doubled(
     model: &Model,
     body: &ElasticBody,
     steps: &[Step],
+    solution: &Summary,
     observe: &mut Observer<'_>,
 ) -> Comparison {
     let quiet: &mut Observer<'_> = &mut |progress| match progress {
@@ -103,15 +105,17 @@ fn doubled(
         _ => ControlFlow::Continue(()),
     };
     let mut march = March::new(model, body);
-    let mut converged = true;
+    let mut last = None;
     for (number, step) in steps.iter().enumerate() {
         let (finished, _) = march.step(number as u32, step, 2, quiet);
-        converged = finished.outcome == Outcome::Converged;
+        let converged = finished.outcome == Outcome::Converged;
+        last = Some(finished);
         if !converged {
             break;
         }
     }
-    algorithm::compared(&march.system, march.last.as_ref(), converged)
+    let tolerance = model.controls.tolerance;
+    algorithm::compared(&march.system, solution, last.as_ref(), tolerance)
 }
 
 /// Whether a next increment can begin there: the thesis's own iteration settles in false states, and

@@ -76,7 +76,7 @@ fn main() {
         };
         let title = problem.title.as_deref().unwrap_or(name);
         write!(text, "\n## {title}\n\n{seen}\n").unwrap();
-        for &plot in Plot::VARIANTS {
+        for &plot in Plot::ALL {
             let svg = draw(plot, Theme::Light, &problem, &parts).unwrap();
             let file = format!("{name}_{}.svg", plot.as_str());
             std::fs::write(figures.join(&file), svg).unwrap();

@@ -387,3 +387,30 @@ fn averaging_lowers_the_peak_at_an_edge_and_vanishes_with_its_radius() {
         0.01,
     );
 }
+
+/// What holds a bonded contact is among the forces that are compared: the total law does not depend on the
+/// increments, whatever holds the body.
+#[test]
+fn forces_that_hold_a_bonded_contact_are_compared_too() {
+    let problem: solver::problem::Problem = serde_json::from_value(serde_json::json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [0, 1, 2, 3, 4], "y": [-2, -1, 0]}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "contacts": [
+            {"boundary": "bottom", "obstacle": {"kind": "flat"}, "condition": "bonded"},
+            {"boundary": "top", "obstacle": {"kind": "circle", "radius": 8, "center": 2.5}, "indentation": 0.1,
+             "tangential_displacement": 0.02,
+             "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}}
+        ],
+        "solver": {"check_increments": true, "check_uniqueness": true}
+    }))
+    .unwrap();
+    let summary = solve(&problem).summary;
+    let held = &summary.contacts["bottom"];
+    assert!(held.friction_force > 0.1 * summary.contacts["top"].friction_force);
+    let doubled = summary.doubled_increments.unwrap();
+    assert!(doubled.agrees, "{doubled:?}");
+    close(doubled.friction_force, summary.friction_force, 1e-8);
+    let other = summary.uniqueness.unwrap();
+    close(other.tangential_force, summary.tangential_force, 1e-8);
+}

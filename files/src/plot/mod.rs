@@ -42,6 +42,9 @@ pub enum Plot {
 }
 
 impl Plot {
+    /// All of them.
+    pub const ALL: &[Plot] = Plot::VARIANTS;
+
     /// Its name in paths and file names.
     pub fn as_str(self) -> &'static str {
         self.into()
@@ -136,7 +139,7 @@ mod tests {
             fields: &solution.fields,
             stored: None,
         };
-        for &plot in Plot::VARIANTS {
+        for &plot in Plot::ALL {
             assert_eq!(plot.as_str().parse(), Ok(plot));
             let drawn = |theme| draw(plot, theme, &problem, &parts).unwrap();
             let (light, dark) = (drawn(Theme::Light), drawn(Theme::Dark));

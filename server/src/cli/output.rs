@@ -17,12 +17,19 @@ use crate::{
 };
 
 /// The help of `-o`.
-pub(super) const HELP: &str = "\
-Write the result to this file, in the format of its extension: .json everything; .csv, .jsonl, .arrow the \
-profile of the contact; .npz fields, profiles and history; .vtu the fields; .svg the profile as a figure. \
-Put a part before the extension to choose it: punch.history.csv, punch.fields.npz, punch.mesh.svg, \
-punch.deformed.svg, punch.convergence.svg; with several contacts name the boundary: \
-punch.profile.top.csv. Can be repeated; - writes JSON to standard output. Without it a summary is printed";
+pub(super) fn help() -> String {
+    let whole = [Format::Json, Format::Npz];
+    let mut tables = Format::OF_TABLES.to_vec();
+    tables.retain(|format| !whole.contains(format));
+    format!(
+        "Write the result to this file, in the format of its extension: .json everything; {} the profile of the \
+         contact; .npz fields, profiles and history; .vtu the fields; .svg the profile as a figure. Put a part before \
+         the extension to choose it: punch.history.csv, punch.fields.npz, punch.mesh.svg, punch.deformed.svg, \
+         punch.convergence.svg; with several contacts name the boundary: punch.profile.top.csv. Can be repeated; - \
+         writes JSON to standard output. Without it a summary is printed",
+        Format::endings(&tables)
+    )
+}
 
 /// One file to write.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,11 +71,7 @@ impl Output {
             .iter()
             .find(|format| format.name() == ending);
         let format = *format.ok_or_else(|| {
-            let endings: Vec<String> = Format::VARIANTS
-                .iter()
-                .map(|format| format!(".{}", format.name()))
-                .collect();
-            let endings = endings.join(", ");
+            let endings = Format::endings(Format::VARIANTS);
             said(format!(
                 "the file must have one of the extensions {endings}, or be - for JSON on standard output"
             ))
@@ -169,11 +172,13 @@ fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
     let ending = format.name();
     match (asked, format) {
         (Some(("fields", _)), f) if !Format::OF_FIELDS.contains(&f) => Err(format!(
-            "fields are written as .vtu, .npz or .json, not as .{ending}"
+            "fields are not written as .{ending}, but as one of {}",
+            Format::endings(Format::OF_FIELDS)
         )),
         (None | Some(("fields", _)), Format::Vtu) => Ok(Part::Fields),
         (Some((word, _)), Format::Vtu) => Err(format!(
-            "a .vtu file holds fields; the {word} is written as .csv, .jsonl, .arrow, .npz or .json"
+            "a .vtu file holds fields; the {word} is written as one of {}",
+            Format::endings(Format::OF_TABLES)
         )),
         (None, Format::Json | Format::Npz) => Ok(Part::Everything),
         (Some(("fields", _)), _) => Ok(Part::Fields),
@@ -274,7 +279,7 @@ mod tests {
             (
                 "punch.history.vtu",
                 vec!["top"],
-                "history is written as .csv",
+                "history is written as one of .json, .csv",
             ),
             ("punch.csv", vec![], "no contact"),
             ("punch.csv", vec!["left", "top"], "NAME.profile.left.csv"),

@@ -31,7 +31,7 @@ pub(super) struct Arguments {
     /// The problem: a JSON file, or an Abaqus or CalculiX deck (.inp)
     file: PathBuf,
 
-    #[arg(short, long, value_name = "OUT", help = output::HELP)]
+    #[arg(short, long, value_name = "OUT", help = output::help())]
     output: Vec<PathBuf>,
 
     /// Colours of a figure: light or dark

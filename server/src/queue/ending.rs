@@ -47,10 +47,11 @@ pub(super) fn ending_of_solution(document: &Document) -> Ending {
             residuals.kkt, residuals.friction
         )
     };
-    let unbalanced = || {
+    let no_solution = || {
         format!(
-            "the forces on the body are out of balance by {:.3e} of their size",
-            residuals.equilibrium
+            "the residual of the whole problem is {:.3e}, and the forces on the body are out of balance by {:.3e} of \
+             their size",
+            residuals.monolithic, residuals.equilibrium
         )
     };
     match summary.outcome {
@@ -62,7 +63,7 @@ pub(super) fn ending_of_solution(document: &Document) -> Ending {
         },
         Outcome::NotConverged => failed(Reason::NotConverged, unsettled()),
         Outcome::ContactCycling => failed(Reason::ContactCycling, unsettled()),
-        Outcome::FalseConvergence => failed(Reason::FalseConvergence, unbalanced()),
+        Outcome::FalseConvergence => failed(Reason::FalseConvergence, no_solution()),
         Outcome::Canceled => Ending {
             result: partial,
             ..Ending::canceled()

@@ -14,14 +14,11 @@ use solver::{
 use super::object::{Object, Read};
 use crate::{
     error::ApiError,
-    job::{Cache, Limits},
+    job::{Cache, Limits, MAX_PRIORITY, MIN_PRIORITY},
     parameters::Values,
     store::Edit,
     verbs::{
-        envelope::{
-            Envelope, JobRequest, MAX_LABEL, MAX_LABELS, MAX_NAME, MAX_PRIORITY, MIN_PRIORITY,
-            PRIORITIES,
-        },
+        envelope::{Envelope, JobRequest, MAX_LABEL, MAX_LABELS, MAX_NAME, PRIORITIES},
         retry::Changes,
         submit::MAX_BATCH,
     },

@@ -141,17 +141,13 @@ pub(super) fn answer(
         }
     };
     let name: String = file.name.chars().map(plain).collect();
-    let kind = match file.format {
-        Format::Csv => "text/csv; charset=utf-8",
-        other => other.media_type(),
-    };
     let disposition = format!("attachment; filename=\"{name}.{}\"", file.format.name());
     let response = with((status, body(range)).into_response(), known);
     Ok(with(
         response,
         [
             content,
-            (header::CONTENT_TYPE, kind.to_owned()),
+            (header::CONTENT_TYPE, file.format.content_type()),
             (header::CONTENT_DISPOSITION, disposition),
             (header::CONTENT_LENGTH, length.to_string()),
         ],

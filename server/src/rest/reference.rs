@@ -135,3 +135,16 @@ fn capital(name: &str) -> String {
     let (first, rest) = name.split_at(1);
     first.to_uppercase() + rest
 }
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_published_page_is_the_one_that_is_written_here() {
+        let published = include_str!("../../../docs/api.md");
+        let same = published == super::reference();
+        assert!(
+            same,
+            "write it anew: signorini openapi --reference > docs/api.md"
+        );
+    }
+}

@@ -52,7 +52,7 @@ impl PartialSolution<'_> {
 /// reading the problem took, the caller's own phase.
 ///
 /// `solve` is [`solver::solve_on`] for one problem on its own; problems that share a condensed body are each solved
-/// by [`solver::steps::run`] on it.
+/// by [`solver::Prepared::solve_other`].
 pub fn run(
     problem: &Problem,
     parse_s: f64,
@@ -249,19 +249,34 @@ mod tests {
     fn problems_that_share_a_body_are_solved_on_it_as_they_are_on_their_own() {
         let go_on = &mut |_: Update<'_>| ControlFlow::Continue(());
         let problem = fake::problem();
-        let body = solver::prepare(&problem, None, &mut |_| ControlFlow::Continue(()));
-        let body = body.unwrap().body;
+        let prepared = solver::prepare(&problem, None, &mut |_| ControlFlow::Continue(()));
+        let prepared = prepared.unwrap();
         for coefficient in [0.1, 0.6] {
             let mut problem = problem.clone();
             let friction = problem.contacts[0].friction.as_mut().unwrap();
             friction.coefficient = Some(coefficient);
             let model = solver::model::Model::new(&problem, None).unwrap();
-            let solve = |observe: &mut Observer<'_>| solver::steps::run(&model, &body, observe);
+            let solve = |observe: &mut Observer<'_>| prepared.solve_other(&model, observe).unwrap();
             let shared = run(&problem, 0.0, solve, go_on).unwrap();
             let alone = |observe: &mut Observer<'_>| solver::solve(&problem, observe);
             let alone = run(&problem, 0.0, alone, go_on).unwrap();
             assert_eq!(shared.summary.digest, alone.summary.digest);
         }
+        let mut other = problem;
+        other.materials[0].elasticity = solver::problem::Elasticity::Isotropic {
+            youngs_modulus: 2000.0,
+            poissons_ratio: 0.3,
+        };
+        let model = solver::model::Model::new(&other, None).unwrap();
+        let go_on = &mut |_: solver::solution::Progress<'_>| ControlFlow::Continue(());
+        assert!(prepared.solve_other(&model, go_on).is_none());
+    }
+
+    #[test]
+    fn a_summary_that_an_earlier_version_stored_is_still_read() {
+        let stored = include_str!("stored_summary.json");
+        let read: Summary = serde_json::from_str(stored).unwrap();
+        assert_eq!(read.solution.iterations, 8);
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! The jobs that wait, in memory and in the order in which they will be started: a mirror of the index
 //! `job_queue`, so that neither a job's position nor the length of the queue costs a scan, however many wait.
 
-/// Priorities are −10 … 10.
-const PRIORITIES: usize = 21;
+use crate::job::{MAX_PRIORITY, MIN_PRIORITY};
+
+/// How many priorities there are.
+const PRIORITIES: usize = (MAX_PRIORITY - MIN_PRIORITY + 1) as usize;
 
 /// Waiting jobs by their keys, for each priority in order of arrival, the highest priority first.
 #[derive(Debug, Default)]
@@ -60,7 +62,7 @@ impl WaitingJobs {
 }
 
 fn rank(priority: i32) -> usize {
-    (10 - priority.clamp(-10, 10)) as usize
+    (MAX_PRIORITY - priority.clamp(MIN_PRIORITY, MAX_PRIORITY)) as usize
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use solver::{
 };
 
 use crate::{
-    job::{Cache, Limits},
+    job::{Cache, Limits, MAX_PRIORITY, MIN_PRIORITY},
     parameters::{Values, Whole},
 };
 
@@ -19,10 +19,6 @@ pub const MAX_NAME: usize = 256;
 pub const MAX_LABELS: usize = 64;
 /// Characters of the longest key or value of a label.
 pub const MAX_LABEL: usize = 256;
-/// The lowest priority.
-pub const MIN_PRIORITY: i32 = -10;
-/// The highest priority.
-pub const MAX_PRIORITY: i32 = 10;
 /// All priorities.
 pub const PRIORITIES: Whole = Whole(MIN_PRIORITY as i64..=MAX_PRIORITY as i64);
 /// Longest time that a job may run, in seconds: a week.

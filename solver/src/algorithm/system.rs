@@ -402,6 +402,19 @@ impl<'a> System<'a> {
         self.nodes.iter().map(reaction).collect()
     }
 
+    /// ∫σ_t and ∫|σ_t| of friction points with their tractions, and of the nodal forces that hold nodes along t; in
+    /// axisymmetry without 2π.
+    pub fn tangential_forces<'b>(
+        &self,
+        tractions: impl Iterator<Item = (&'b Point, &'b f64)>,
+        held: &[f64],
+    ) -> [f64; 2] {
+        let friction = tractions.map(|(point, traction)| point.weight * traction);
+        friction
+            .chain(held.iter().copied())
+            .fold([0.0; 2], |[sum, size], f| [sum + f, size + f.abs()])
+    }
+
     /// Nodal pressures p = R / ∫h; on the axis the parabola through the next two nodes.
     pub fn pressures(&self, reactions: &[f64]) -> Vec<f64> {
         let direct = |i: usize| reactions[i] / self.nodes[i].weight;

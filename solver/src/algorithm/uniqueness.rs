@@ -41,19 +41,7 @@ pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
 }
 
 /// The same for a solution with twice the increments.
-pub fn note_doubled_increments(summary: &mut Summary, mut second: Comparison, tolerance: f64) {
-    let first = [
-        summary.normal_force,
-        summary.tangential_force,
-        summary.friction_force,
-    ];
-    let other = [
-        second.normal_force,
-        second.tangential_force,
-        second.friction_force,
-    ];
-    second.change = force_change(first, other);
-    second.agrees = second.converged && second.change <= tolerance;
+pub fn note_doubled_increments(summary: &mut Summary, second: Comparison) {
     if !second.agrees {
         summary.warnings.push(Warning {
             code: "increments_matter".to_owned(),
@@ -72,19 +60,31 @@ pub fn note_doubled_increments(summary: &mut Summary, mut second: Comparison, to
     summary.doubled_increments = Some(second);
 }
 
-/// The forces of a state, to be compared with others.
-pub fn compared(system: &System<'_>, finished: Option<&Finished>, converged: bool) -> Comparison {
-    let forces = finished.map_or([0.0; 3], |finished| {
-        let (state, bound) = (finished.state.clone(), finished.bound.clone());
+/// Compares the forces of a second state with those of a solution, which are to agree to `tolerance`.
+pub fn compared(
+    system: &System<'_>,
+    solution: &Summary,
+    second: Option<&Finished>,
+    tolerance: f64,
+) -> Comparison {
+    let converged = second.is_some_and(|second| second.outcome == Outcome::Converged);
+    let first = [
+        solution.normal_force,
+        solution.tangential_force,
+        solution.friction_force,
+    ];
+    let second = second.map_or([0.0; 3], |second| {
+        let (state, bound) = (second.state.clone(), second.bound.clone());
         forces(system, &Measured::new(system, state, bound))
     });
+    let change = force_change(first, second);
     Comparison {
-        agrees: false,
+        agrees: converged && change <= tolerance,
         converged,
-        normal_force: forces[0],
-        tangential_force: forces[1],
-        friction_force: forces[2],
-        change: 0.0,
+        normal_force: second[0],
+        tangential_force: second[1],
+        friction_force: second[2],
+        change,
     }
 }
 
@@ -151,14 +151,12 @@ pub fn other_solution(
     }
 }
 
-/// ∫p, ∫σ_t and ∫|σ_t|.
+/// ∫p, ∫σ_t and ∫|σ_t| over all contacts.
 fn forces(system: &System<'_>, measured: &Measured) -> [f64; 3] {
     let tractions = system.tractions(&measured.state.v, &measured.bound);
-    let (mut tangential, mut friction) = (0.0, 0.0);
-    for (point, traction) in system.points.iter().zip(&tractions) {
-        tangential += point.weight * traction;
-        friction += point.weight * traction.abs();
-    }
+    let held = system.tangential_reactions(&measured.state);
+    let points = system.points.iter().zip(&tractions);
+    let [tangential, friction] = system.tangential_forces(points, &held);
     let normal: f64 = measured.reactions.iter().sum();
     [normal, tangential, friction].map(|f| system.circumference * f)
 }

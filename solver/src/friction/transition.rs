@@ -36,14 +36,14 @@ pub fn psi(transition: Transition, r: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use strum::VariantArray;
 
-    const BOTH: [Transition; 2] = [Transition::Linear, Transition::Tanh];
+    use super::*;
 
     /// The four properties of thesis (1.6).
     #[test]
     fn phi_is_odd_monotone_bounded_and_tends_to_one() {
-        for transition in BOTH {
+        for transition in Transition::VARIANTS.iter().copied() {
             let mut last = -1.0;
             for k in -4000..=4000 {
                 let r = f64::from(k) / 100.0;
@@ -60,7 +60,7 @@ mod tests {
     #[test]
     fn phi_is_the_slope_of_psi_and_phi_slope_that_of_phi() {
         let step = 1e-6;
-        for transition in BOTH {
+        for transition in Transition::VARIANTS.iter().copied() {
             for r in [-40.0, -1.7, -0.6, 0.2, 0.9, 3.0, 500.0] {
                 let slope = |f: fn(Transition, f64) -> f64| {
                     (f(transition, r + step) - f(transition, r - step)) / (2.0 * step)

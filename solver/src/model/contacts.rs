@@ -395,7 +395,12 @@ fn power(obstacle: &Obstacle) -> Option<f64> {
         Obstacle::Circle { .. } | Obstacle::Parabola { .. } => Some(2.0),
         Obstacle::Wedge { .. } | Obstacle::Cone { .. } => Some(1.0),
         Obstacle::Power { exponent, .. } => Some(*exponent),
-        _ => None,
+        Obstacle::Flat { .. }
+        | Obstacle::Tilted { .. }
+        | Obstacle::RoundedFlat { .. }
+        | Obstacle::Table { .. }
+        | Obstacle::Polyline { .. }
+        | Obstacle::Line { .. } => None,
     }
 }
 

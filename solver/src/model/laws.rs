@@ -295,7 +295,7 @@ impl Checks {
             all.refuse(self.say(
                 at("transition"),
                 Reason::NotUsed,
-                "`tanh` with the incremental history",
+                "another transition with the incremental history",
                 "`linear`",
                 "The incremental law is defined for the linear transition only.",
             ));

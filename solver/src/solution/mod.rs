@@ -80,6 +80,9 @@ pub enum Outcome {
 }
 
 /// The scalars of a solution.
+///
+/// Stored with each result: a field that is added is an `Option` or has a `#[serde(default)]`, so that older results
+/// can still be read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(rename = "SolutionSummary")]
 pub struct Summary {

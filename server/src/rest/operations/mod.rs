@@ -90,7 +90,7 @@ mod tests {
             .collect();
         let named: BTreeSet<String> = named.into_iter().map(str::to_owned).collect();
         assert_eq!(named, rpcs());
-        // API.md: plots, docs, openapi, proto, schema, error pages, probes
+        // plots, pages and documents, and probes of HTTP have no rpc
         let rest_only = [
             "/v1/jobs/{id}/plots/{plot}",
             "/docs",

@@ -20,16 +20,11 @@ impl PatchView<'_> {
     pub(in crate::algorithm) fn summary(&self) -> ContactSummary {
         let circumference = self.system.circumference;
         let range = self.system.range(self.patch);
-        let (mut tangential, mut friction) = (0.0, 0.0);
         let points = self.system.points.iter().zip(&self.finished.tractions);
-        for (point, traction) in points.filter(|(point, _)| point.patch == self.p) {
-            tangential += point.weight * traction;
-            friction += point.weight * traction.abs();
-        }
-        for held in &self.forces.tangential_reactions[range.clone()] {
-            tangential += held;
-            friction += held.abs();
-        }
+        let [tangential, friction] = self.system.tangential_forces(
+            points.filter(|(point, _)| point.patch == self.p),
+            &self.forces.tangential_reactions[range.clone()],
+        );
         let Extents {
             contact,
             stick,
