@@ -25,13 +25,14 @@ pub(crate) fn pair(pointer: &str, reason: &str) -> (String, String) {
 /// A hundred violations are as many as are listed; what comes after them is refused all the same.
 #[test]
 fn what_fails_after_a_full_list_still_fails() {
-    // this used to be meshed: the table is looked at as if it had points
+    // this used to panic: the table, alone on its boundary, was evaluated as if it had points
     let mut p = example("rectangular_punch");
     let bad = Contact {
         obstacle: serde_json::from_str(r#"{"kind": "circle", "radius": -1}"#).unwrap(),
         ..p.contacts[0].clone()
     };
     p.contacts.splice(0..0, vec![bad; 100]);
+    p.contacts[100].boundary = "left".to_owned();
     p.contacts[100].obstacle =
         serde_json::from_str(r#"{"kind": "table", "x": [], "gap": []}"#).unwrap();
     let list = solver::check(&p, None).unwrap_err();

@@ -23,7 +23,10 @@ pub fn job_request(request: pb::CreateJobRequest) -> JobRequest {
         priority,
         limits,
         cache,
-        ..
+        // for the handlers: under which key and id, and how long to wait
+        request_id: _,
+        job_id: _,
+        wait: _,
     } = request;
     let mut read = Reader::default();
     // what cannot be read is noted, and then of no further importance
@@ -93,7 +96,8 @@ pub fn edit(request: pb::UpdateJobRequest) -> Result<Edit, ApiError> {
         labels,
         priority,
         pinned,
-        ..
+        id: _,      // which job, read by the handler
+        version: _, // whether it is still the one that was meant, likewise
     } = request;
     let Some(mask) = update_mask else {
         return Ok(Edit {
