@@ -64,18 +64,18 @@ impl Walk<'_> {
             let expected = "no such field: it cannot be combined with the others";
             let hint = "Leave it out, or choose another form.";
             let got = || quoted(value);
-            return self.say(|at| Violation::new(at, Reason::NotUsed, got(), expected, hint));
+            return self.report(|at| Violation::new(at, Reason::NotUsed, got(), expected, hint));
         }
         if !has_type(schema, value) {
             let expected = type_names(schema).join(" or ");
             let hint = "Write the value in that form.";
             let got = || quoted(value);
-            return self.say(|at| Violation::new(at, Reason::WrongType, got(), expected, hint));
+            return self.report(|at| Violation::new(at, Reason::WrongType, got(), expected, hint));
         }
         if let Some(only) = schema.get("const").filter(|only| *only != value) {
             let (reason, hint) = (Reason::UnknownAlternative, "Correct the value.");
             let got = || quoted(value);
-            self.say(|at| Violation::new(at, reason, got(), only.to_string(), hint));
+            self.report(|at| Violation::new(at, reason, got(), only.to_string(), hint));
         }
         match value {
             Value::Object(members) => self.check_members(schema, members),
@@ -108,7 +108,7 @@ impl Walk<'_> {
             let own = known.and_then(|known| known.get(name));
             match own.or(schema.get("additionalProperties")) {
                 Some(Value::Bool(false)) if own.is_none() => self.inside(escape(name), |walk| {
-                    walk.say(|at| unknown_name(at, name, known.into_iter().flat_map(Map::keys)));
+                    walk.report(|at| unknown_name(at, name, known.into_iter().flat_map(Map::keys)));
                 }),
                 Some(schema) => self.inside(escape(name), |walk| walk.check(schema, value)),
                 None => {}
@@ -118,7 +118,7 @@ impl Walk<'_> {
             let expected = format!("a value for `{name}`");
             let (reason, hint) = (Reason::Missing, "It has no default.");
             self.inside(escape(name), |walk| {
-                walk.say(|at| Violation::new(at, reason, "nothing", expected, hint));
+                walk.report(|at| Violation::new(at, reason, "nothing", expected, hint));
             });
         }
     }
@@ -130,7 +130,7 @@ impl Walk<'_> {
         if let Some(limit) = least.or(limit("maxItems").filter(|most| count > *most)) {
             let (got, expected) = (format!("{count} item(s)"), format!("{limit} items"));
             let (reason, hint) = (Reason::WrongLength, "Correct the list.");
-            self.say(|at| Violation::new(at, reason, got, expected, hint));
+            self.report(|at| Violation::new(at, reason, got, expected, hint));
         }
         if let Some(schema) = schema.get("items") {
             for (index, item) in items.iter().enumerate() {
@@ -146,7 +146,7 @@ impl Walk<'_> {
         {
             let expected = format!("a number of at least {least}");
             let (reason, hint) = (Reason::OutOfRange, "Correct the number.");
-            self.say(|at| Violation::new(at, reason, number, expected, hint));
+            self.report(|at| Violation::new(at, reason, number, expected, hint));
         }
     }
 
@@ -169,20 +169,20 @@ impl Walk<'_> {
                 let got = members.get("kind").map_or("nothing".to_owned(), quoted);
                 let (expected, hint) = (format!("one of {names}"), "Choose one of the kinds.");
                 self.inside("kind", |walk| {
-                    walk.say(|at| Violation::new(at, reason, got, expected, hint));
+                    walk.report(|at| Violation::new(at, reason, got, expected, hint));
                 });
             }
             (_, Some(first)) => {
                 let expected = format!("an object with a `kind`, one of {names}");
                 let hint = format!("Write it as {{\"kind\": {first}, …}}.");
-                self.say(|at| Violation::new(at, reason, quoted(value), expected, hint));
+                self.report(|at| Violation::new(at, reason, quoted(value), expected, hint));
             }
             (_, None) => {
                 let mut offers: Vec<_> = branches.iter().flat_map(offers).collect();
                 offers.dedup();
                 let hint = "Write the value in one of these forms.";
                 let expected = offers.join(" or ");
-                self.say(|at| Violation::new(at, reason, quoted(value), expected, hint));
+                self.report(|at| Violation::new(at, reason, quoted(value), expected, hint));
             }
         }
     }
@@ -200,7 +200,7 @@ impl Walk<'_> {
         let offers = forms.iter().map(|form| listed(form, " and "));
         let expected = format!("exactly one of {}", offers.collect::<Vec<_>>().join(", "));
         let (reason, hint) = (Reason::WrongCount, "Choose one of the forms.");
-        self.say(|at| Violation::new(at, reason, either(&got), expected, hint));
+        self.report(|at| Violation::new(at, reason, either(&got), expected, hint));
     }
 
     /// Goes on at a member or an item.
@@ -213,7 +213,7 @@ impl Walk<'_> {
     }
 
     /// One more violation, of the value where we are.
-    fn say(&mut self, violation: impl FnOnce(&str) -> Violation) {
+    fn report(&mut self, violation: impl FnOnce(&str) -> Violation) {
         self.faults += 1;
         match &mut self.found {
             Some(found) if found.is_full() => found.count(1),

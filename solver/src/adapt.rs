@@ -12,7 +12,7 @@ use crate::error::SolveError;
 use crate::model::ContactModel;
 use crate::model::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
 use crate::problem::{AdaptiveRefine, Grid, MeshInput, Problem, Refine};
-use crate::solution::{Observer, Progress, Refinement, Solution, Warning};
+use crate::solution::{Observer, Progress, Refinement, Solution, Warning, WarningCode};
 
 /// Part of the squared error that the columns and rows to be split hold.
 const BULK: f64 = 0.7;
@@ -65,9 +65,9 @@ pub fn run(
             stopped |= answer.is_break();
             answer
         })?;
-        let reached = Reached::new(contacts, &solution);
-        let change = sequence.last().map(|before| reached.change(before));
-        sequence.push(reached.row(change));
+        let results = WatchedResults::new(contacts, &solution);
+        let change = sequence.last().map(|before| results.change(before));
+        sequence.push(results.row(change));
         let grid = problem.mesh.grid();
         let split = grid.map(|grid| finer(grid, contacts, &solution));
         let elements = split.as_ref().map_or(0, |grid| grid.x.len() * grid.y.len());
@@ -114,7 +114,7 @@ fn unfinished(sequence: &[Refinement], tolerance: f64) -> Warning {
         .and_then(|row| row.change)
         .unwrap_or(f64::NAN);
     Warning {
-        code: "refinement_unfinished".to_owned(),
+        code: WarningCode::RefinementUnfinished,
         pointer: "/mesh/refine/tolerance".to_owned(),
         message: format!(
             "After {} meshes the results still change by {change:.1e}, more than the tolerance {tolerance} allows. See summary.refinements; raise the tolerance, or give the grid more lines where the body needs them.",
@@ -124,7 +124,7 @@ fn unfinished(sequence: &[Refinement], tolerance: f64) -> Warning {
 }
 
 /// What is watched from mesh to mesh.
-struct Reached<'a> {
+struct WatchedResults<'a> {
     solution: &'a Solution,
     /// σ_n has a peak with a mesh limit: no contact ends at a sharp edge.
     normal_peak: bool,
@@ -132,17 +132,17 @@ struct Reached<'a> {
     tangential_peak: bool,
 }
 
-impl<'a> Reached<'a> {
+impl<'a> WatchedResults<'a> {
     fn new(contacts: &[ContactModel], solution: &'a Solution) -> Self {
         let warnings = &solution.summary.warnings;
         let normal_peak = !warnings
             .iter()
-            .any(|w| w.code == "contact_reaches_obstacle_end");
+            .any(|w| w.code == WarningCode::ContactReachesObstacleEnd);
         let laws = contacts.iter().filter_map(|c| c.friction.as_ref());
         let averages = laws
             .into_iter()
             .all(|law| law.bound.radius().is_some_and(|r| r > 0.0));
-        Reached {
+        WatchedResults {
             solution,
             normal_peak,
             tangential_peak: normal_peak || averages,

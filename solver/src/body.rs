@@ -62,7 +62,9 @@ impl ElasticBody {
         let right_hand_sides = [of_loads, of_supports];
         let finite = |forces: &Vec<f64>| forces.iter().all(|f| f.is_finite());
         if !matrix.is_finite() || !right_hand_sides.iter().all(finite) {
-            return Err(SolveError::NonFinite { phase: "assembly" });
+            return Err(SolveError::NonFinite {
+                phase: Phase::Assemble,
+            });
         }
         let spring = if model.held_by_contact {
             matrix.mean_diagonal(interior)
@@ -101,7 +103,7 @@ impl ElasticBody {
         }
         if !(0..stiffness.size()).all(|j| stiffness.column(j).iter().all(|v| v.is_finite())) {
             return Err(SolveError::NonFinite {
-                phase: "condensation",
+                phase: Phase::Condense,
             });
         }
         let to_contact = |dof| match dof {

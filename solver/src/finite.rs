@@ -48,7 +48,7 @@ impl Walk {
         }
     }
 
-    fn look(&mut self, number: f64) -> fmt::Result {
+    fn check_number(&mut self, number: f64) -> fmt::Result {
         if number.is_finite() {
             return Ok(());
         }
@@ -133,11 +133,11 @@ impl<'a> Serializer for &'a mut Walk {
     );
 
     fn serialize_f32(self, value: f32) -> fmt::Result {
-        self.look(f64::from(value))
+        self.check_number(f64::from(value))
     }
 
     fn serialize_f64(self, value: f64) -> fmt::Result {
-        self.look(value)
+        self.check_number(value)
     }
 
     fn serialize_str(self, value: &str) -> fmt::Result {

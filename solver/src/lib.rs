@@ -9,6 +9,7 @@
 // What is asked and answered, as plain data; violations and errors; numbers that are none.
 pub mod error;
 pub mod finite;
+pub mod phase;
 pub mod problem;
 pub mod solution;
 
@@ -92,10 +93,10 @@ pub fn prepare(
     external: Option<External>,
     observe: &mut Observer<'_>,
 ) -> Result<Prepared, SolveError> {
-    tell(observe, Progress::Phase(Phase::Mesh))?;
+    notify(observe, Progress::Phase(Phase::Mesh))?;
     let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
     for warning in &model.warnings {
-        tell(observe, Progress::Warning(warning))?;
+        notify(observe, Progress::Warning(warning))?;
     }
     let body = ElasticBody::new(&model, observe)?;
     Ok(Prepared { model, body })
@@ -125,7 +126,7 @@ pub fn check(
     Model::new(problem, external).map(|model| model.warnings)
 }
 
-fn tell(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
+fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
     match observe(progress).is_break() {
         true => Err(SolveError::Stopped),
         false => Ok(()),

@@ -1,8 +1,6 @@
 //! Load steps and their increments: the incremental law (formulation 1.5), and results along a history
 //! of loading for either law.
 
-use std::ops::ControlFlow;
-
 use crate::algorithm::{self, Finished, Place, System, report};
 use crate::body::ElasticBody;
 use crate::error::SolveError;
@@ -28,7 +26,7 @@ pub fn run(
     } else {
         &model.steps
     };
-    let mut march = March::new(model, body);
+    let mut load_history = LoadHistory::new(model, body);
     let mut so_far: Option<Solution> = None;
     let mut fields = Fields::default();
     for (number, step) in steps.iter().enumerate() {
@@ -36,18 +34,18 @@ pub fn run(
             let _ = observe(Progress::Step(solution));
         }
         let _ = observe(Progress::Phase(Phase::Iterate));
-        let (finished, rows) = march.step(number as u32, step, 1, observe);
+        let (finished, rows) = load_history.step(number as u32, step, 1, observe);
         // the last state is kept also when the observer broke off: its answer no longer matters
         let _ = observe(Progress::Phase(Phase::Recover));
-        let reported = report(model, body, &march.system, &finished)?;
+        let reported = report(model, body, &load_history.system, &finished)?;
         let mut summary = reported.summary;
         if model.controls.check_uniqueness && summary.converged {
-            let (system, controls) = (&march.system, &model.controls);
+            let (system, controls) = (&load_history.system, &model.controls);
             let second = algorithm::other_solution(system, controls, &finished, observe);
             algorithm::note_uniqueness(&mut summary, second);
         }
-        summary.increments = march.increments;
-        summary.cut_backs = march.cut_backs;
+        summary.increments = load_history.increments;
+        summary.cut_backs = load_history.cut_backs;
         summary.iterations = rows.len() as u32;
         let outcome = summary.outcome;
         let (mut history, mut ends) = match so_far.take() {
@@ -72,12 +70,12 @@ pub fn run(
             steps: ends,
             fields: Fields::default(),
         });
-        if !goes_on(outcome) {
+        if !can_continue(outcome) {
             break;
         }
     }
     let Some(mut solution) = so_far else {
-        return Err(SolveError::NonFinite { phase: "steps" });
+        unreachable!("there is a step: without any the whole problem is one")
     };
     if model.controls.check_increments && solution.summary.converged {
         let summary = &mut solution.summary;
@@ -99,15 +97,11 @@ fn doubled(
     solution: &Summary,
     observe: &mut Observer<'_>,
 ) -> Comparison {
-    let quiet: &mut Observer<'_> = &mut |progress| match progress {
-        Progress::Iteration(_) => observe(Progress::Pulse),
-        Progress::Pulse => observe(progress),
-        _ => ControlFlow::Continue(()),
-    };
-    let mut march = March::new(model, body);
+    let quiet: &mut Observer<'_> = &mut algorithm::quiet(observe);
+    let mut load_history = LoadHistory::new(model, body);
     let mut last = None;
     for (number, step) in steps.iter().enumerate() {
-        let (finished, _) = march.step(number as u32, step, 2, quiet);
+        let (finished, _) = load_history.step(number as u32, step, 2, quiet);
         let converged = finished.outcome == Outcome::Converged;
         last = Some(finished);
         if !converged {
@@ -115,38 +109,38 @@ fn doubled(
         }
     }
     let tolerance = model.controls.tolerance;
-    algorithm::compared(&march.system, solution, last.as_ref(), tolerance)
+    algorithm::compared(&load_history.system, solution, last.as_ref(), tolerance)
 }
 
 /// Whether a next increment can begin there: the thesis's own iteration settles in false states, and
 /// goes on from them.
-fn goes_on(outcome: Outcome) -> bool {
+fn can_continue(outcome: Outcome) -> bool {
     matches!(outcome, Outcome::Converged | Outcome::FalseConvergence)
 }
 
 /// The way through the steps.
-struct March<'a> {
+struct LoadHistory<'a> {
     model: &'a Model,
     system: System<'a>,
     /// The end of the last increment, and its level.
     last: Option<Finished>,
     level: Level,
     /// Whether the anchors have moved since.
-    remembered: bool,
+    anchors_moved: bool,
     rows: Vec<Iteration>,
     row_count: u32,
     increments: u32,
     cut_backs: u32,
 }
 
-impl<'a> March<'a> {
+impl<'a> LoadHistory<'a> {
     fn new(model: &'a Model, body: &'a ElasticBody) -> Self {
-        March {
+        LoadHistory {
             model,
             system: System::new(model, body),
             last: None,
-            level: Level::NOTHING,
-            remembered: true,
+            level: Level::ZERO,
+            anchors_moved: true,
             rows: Vec::new(),
             row_count: 0,
             increments: 0,
@@ -162,7 +156,7 @@ impl<'a> March<'a> {
         multiple: u32,
         observe: &mut Observer<'_>,
     ) -> (Finished, Vec<Iteration>) {
-        let path = Path {
+        let path = StepPath {
             from: self.level,
             step,
             power: self.model.contacts.iter().find_map(|c| c.power),
@@ -176,7 +170,7 @@ impl<'a> March<'a> {
             );
             let place = (number, &mut increment);
             let finished = self.advance(&path, place, from, to, 0, observe);
-            if !goes_on(finished.outcome) || k == count {
+            if !can_continue(finished.outcome) || k == count {
                 return (finished, std::mem::take(&mut self.rows));
             }
         }
@@ -186,7 +180,7 @@ impl<'a> March<'a> {
     /// From one part of a step to another, in halves where that is too far.
     fn advance(
         &mut self,
-        path: &Path<'_>,
+        path: &StepPath<'_>,
         (step, increment): (u32, &mut u32),
         from: f64,
         to: f64,
@@ -203,7 +197,7 @@ impl<'a> March<'a> {
                 let middle = 0.5 * (from + to);
                 let half =
                     self.advance(path, (step, increment), from, middle, halvings + 1, observe);
-                if !goes_on(half.outcome) {
+                if !can_continue(half.outcome) {
                     return half;
                 }
                 self.advance(path, (step, increment), middle, to, halvings + 1, observe)
@@ -218,14 +212,14 @@ impl<'a> March<'a> {
     /// Solves at one level; a converged end is where the next increment begins.
     fn increment(
         &mut self,
-        path: &Path<'_>,
+        path: &StepPath<'_>,
         (step, increment): (u32, u32),
         to: f64,
         observe: &mut Observer<'_>,
     ) -> Finished {
-        if let (Some(last), false) = (&self.last, self.remembered) {
-            self.system.remember(&last.state.v, &last.bound);
-            self.remembered = true;
+        if let (Some(last), false) = (&self.last, self.anchors_moved) {
+            self.system.move_anchors(&last.state.v, &last.bound);
+            self.anchors_moved = true;
         }
         let level = path.level(to);
         self.system.set_level(level);
@@ -238,25 +232,25 @@ impl<'a> March<'a> {
         let finished = algorithm::run(&self.system, controls, place, self.last.as_ref(), observe);
         self.row_count += finished.history.len() as u32;
         self.rows.extend(finished.history.iter().cloned());
-        if goes_on(finished.outcome) {
+        if can_continue(finished.outcome) {
             self.increments += 1;
             self.level = level;
             self.last = Some(finished.clone());
-            self.remembered = false;
+            self.anchors_moved = false;
         }
         finished
     }
 }
 
 /// From the level before a step to its end.
-struct Path<'a> {
+struct StepPath<'a> {
     from: Level,
     step: &'a Step,
     /// Power of the first obstacle's profile, where it has one.
     power: Option<f64>,
 }
 
-impl Path<'_> {
+impl StepPath<'_> {
     /// The level at a part of the step, 0 … 1.
     fn level(&self, part: f64) -> Level {
         let between = |from: f64, to: f64| match part {
@@ -303,8 +297,8 @@ mod tests {
             ..Step::whole()
         };
         let at = |step: &Step, power, part| {
-            let path = Path {
-                from: Level::NOTHING,
+            let path = StepPath {
+                from: Level::ZERO,
                 step,
                 power,
             };

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::Path;
 
-use files::plot::{Curve, Look, Panel, Theme, figure};
+use files::plot::{Curve, LineStyle, Panel, Theme, figure};
 use solver::problem::{AdaptiveRefine, BoundaryValue, Obstacle, Problem, Refine};
 use solver::solution::{ContactProfile, Solution, Summary};
 
@@ -90,7 +90,7 @@ fn line(name: &str, radius: f64, mesh: &str, summary: &Summary) -> String {
         all => format!("{:.0} %", 100.0 * width(&contact.slip) / all),
     };
     let peak = contact.peak_tangential_stress.map_or(0.0, |p| p.value);
-    let mut codes: Vec<&str> = summary.warnings.iter().map(|w| &w.code[..]).collect();
+    let mut codes: Vec<&str> = summary.warnings.iter().map(|w| w.code.as_str()).collect();
     codes.dedup();
     format!(
         "| {} | {radius} | {mesh}, {} unknowns | {} | {} | {} | {} | {slips} | {:.1} % | {} |\n",
@@ -105,11 +105,11 @@ fn line(name: &str, radius: f64, mesh: &str, summary: &Summary) -> String {
     )
 }
 
-fn curve(label: impl Into<String>, look: Look, points: Vec<(f64, f64)>) -> Curve {
+fn curve(label: impl Into<String>, style: LineStyle, points: Vec<(f64, f64)>) -> Curve {
     let label = label.into();
     Curve {
         label,
-        look,
+        style,
         points,
     }
 }
@@ -159,13 +159,13 @@ fn stresses(name: &str, mesh: &str, radii: &[f64]) -> String {
             })
             .collect()
     };
-    let mut normal = vec![curve("frictionless", Look::Points(2), scaled(&plain))];
+    let mut normal = vec![curve("frictionless", LineStyle::Points(2), scaled(&plain))];
     if let Some(points) = closed_form(&frictionless, &plain.summary) {
         normal.insert(
             0,
             curve(
                 "closed form, frictionless half-space",
-                Look::Reference,
+                LineStyle::Reference,
                 points,
             ),
         );
@@ -176,7 +176,7 @@ fn stresses(name: &str, mesh: &str, radii: &[f64]) -> String {
         if k == 1 {
             normal.push(curve(
                 format!("ρ = {radius}, μ = .3"),
-                Look::Line(0),
+                LineStyle::Line(0),
                 scaled(&solution),
             ));
         }
@@ -184,7 +184,7 @@ fn stresses(name: &str, mesh: &str, radii: &[f64]) -> String {
         let points = shown(profile).map(|i| (place(profile, i), profile.tangential_stress[i]));
         tangential.push(curve(
             format!("ρ = {radius}"),
-            Look::Line([0, 1, 3][k]),
+            LineStyle::Line([0, 1, 3][k]),
             points.collect(),
         ));
     }
@@ -278,7 +278,7 @@ fn gauss_row() -> String {
                 points.push((x, stress));
             }
         }
-        curve(format!("pull {pull}"), Look::Line(k), points)
+        curve(format!("pull {pull}"), LineStyle::Line(k), points)
     });
     let panel = Panel {
         x: "x".to_owned(),

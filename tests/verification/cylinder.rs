@@ -2,7 +2,7 @@
 //! ν = .3: contact half-width a = 1 needs P = 107.884 (full load) and gives p₀ = 68.681.
 
 use serde_json::json;
-use solver::solution::Solution;
+use solver::solution::{Solution, WarningCode};
 
 use crate::record::held;
 use crate::support::{close, graded, problem, solve, union};
@@ -92,7 +92,7 @@ fn the_peak_of_a_coarse_contact_is_off_by_no_more_than_the_warning_says() {
             let exact = (load * 1000.0 / 0.91 / (std::f64::consts::PI * 8.0)).sqrt();
             let off = (-contact.peak_normal_stress.unwrap().value / exact - 1.0).abs();
             let told = solution.summary.warnings.iter();
-            let mut told = told.filter(|w| w.code == "mesh_too_coarse_for_contact");
+            let mut told = told.filter(|w| w.code == WarningCode::MeshTooCoarseForContact);
             let message = &told.next().expect("no warning").message;
             let percent = message
                 .split("up to ")

@@ -2,7 +2,7 @@
 //! to 1e-6, and mesh-converged values on graded ones.
 
 use solver::problem::{Problem, Refine};
-use solver::solution::Solution;
+use solver::solution::{Solution, WarningCode};
 
 use crate::support::{close, example, graded, solve, union};
 
@@ -67,7 +67,7 @@ fn the_sheet_touches_with_one_node_and_then_with_three() {
             .summary
             .warnings
             .iter()
-            .map(|w| &w.code[..])
+            .map(|w| w.code.as_str())
             .collect();
         assert!(codes.contains(&"mesh_too_coarse_for_contact"), "{codes:?}");
         let without = frictionless(&sheet).summary.normal_force;
@@ -212,7 +212,7 @@ fn oscillating_stick_tractions_have_their_published_size_and_a_warning() {
         let told = summary
             .warnings
             .iter()
-            .any(|w| w.code == "oscillating_stick");
+            .any(|w| w.code == WarningCode::OscillatingStick);
         assert_eq!(told, warned, "ε = {elastic_slip}: {:?}", summary.warnings);
     }
 }

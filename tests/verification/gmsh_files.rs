@@ -20,10 +20,13 @@ fn bytes(name: &str) -> Vec<u8> {
     std::fs::read(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-fn read(name: &str) -> (Mesh, Vec<String>) {
+fn read(name: &str) -> (Mesh, Vec<&'static str>) {
     let (mesh, notes) =
         gmsh::read(&bytes(name)[..]).unwrap_or_else(|error| panic!("{name}: {error:#?}"));
-    (mesh, notes.into_iter().map(|note| note.code).collect())
+    (
+        mesh,
+        notes.into_iter().map(|note| note.code.as_str()).collect(),
+    )
 }
 
 fn area(mesh: &Mesh) -> f64 {

@@ -2,6 +2,7 @@
 
 use solver::error::{SolveError, Violation};
 use solver::problem::{Contact, Elasticity, MeshSource, Problem};
+use solver::solution::WarningCode;
 
 use crate::support::{example, problem, solve};
 
@@ -231,10 +232,7 @@ fn an_obstacle_that_covers_no_node_is_refused_and_one_that_cuts_an_edge_is_warne
         .into_iter()
         .map(|w| w.code)
         .collect();
-    assert!(
-        codes.contains(&"obstacle_cuts_edge".to_owned()),
-        "{codes:?}"
-    );
+    assert!(codes.contains(&WarningCode::ObstacleCutsEdge), "{codes:?}");
     p.contacts[0].obstacle = obstacle(r#"{"kind": "circle", "radius": -8}"#);
     assert!(violations(&p).contains(&pair("/contacts/0/obstacle/radius", "out_of_range")));
 }
@@ -250,14 +248,14 @@ fn a_contact_that_turns_a_corner_is_warned_of() {
     let warnings = solver::check(&p, None).unwrap();
     let turn = warnings
         .iter()
-        .find(|w| w.code == "contact_turns")
+        .find(|w| w.code == WarningCode::ContactTurns)
         .expect("no warning");
     assert!(turn.message.contains("28° at (2, 0.4)"), "{}", turn.message);
     assert!(
         solver::check(&example("sheet"), None)
             .unwrap()
             .iter()
-            .all(|w| w.code != "contact_turns")
+            .all(|w| w.code != WarningCode::ContactTurns)
     );
 }
 
@@ -330,7 +328,7 @@ fn a_contact_that_never_engages_is_said_with_its_smallest_gap() {
         .summary
         .warnings
         .iter()
-        .find(|w| w.code == "no_contact")
+        .find(|w| w.code == WarningCode::NoContact)
         .expect("no warning");
     let (gap, needed) = ("gap is 1.250000e-1", "above 0.000000e0");
     assert!(

@@ -1,6 +1,7 @@
 //! Bodies that were pressed and are let go: what is left must be nothing.
 
 use serde_json::json;
+use solver::solution::WarningCode;
 
 use crate::support::{example, solve};
 
@@ -31,6 +32,10 @@ fn a_cylinder_that_is_lifted_off_leaves_nothing() {
         let moved = |u: &[f64]| u.iter().fold(0.0f64, |most, u| most.max(u.abs()));
         let most = moved(&solution.fields.ux).max(moved(&solution.fields.uy));
         assert!(most < 1e-10, "refine {refine}: {most:.1e} is left");
-        assert!(free.warnings.iter().any(|w| w.code == "no_contact"));
+        assert!(
+            free.warnings
+                .iter()
+                .any(|w| w.code == WarningCode::NoContact)
+        );
     }
 }

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 use solver::model::{ContactModel, Model};
+use solver::solution::WarningCode;
 
 use crate::support::{problem, solve};
 
@@ -301,7 +302,7 @@ fn the_indentation_that_engages_a_sloping_obstacle_is_its_own() {
         .summary
         .warnings
         .iter()
-        .find(|w| w.code == "no_contact")
+        .find(|w| w.code == WarningCode::NoContact)
         .unwrap()
         .message;
     assert!(
@@ -318,7 +319,7 @@ fn a_given_bound_beyond_the_contact_is_said() {
     let bound = |bound: Value| {
         let solution = cylinder("body", json!({"elastic_slip": 1e-4, "bound": bound}));
         let mut codes = solution.summary.warnings.into_iter().map(|w| w.code);
-        codes.any(|code| code == "bound_beyond_contact")
+        codes.any(|code| code == WarningCode::BoundBeyondContact)
     };
     assert!(bound(json!(5)));
     assert!(!bound(json!({"s": [0, 0.5], "bound": [5, 5]})));

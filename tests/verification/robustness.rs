@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 use solver::problem::{Algorithm, BoundaryValue, FrictionPoints, Problem, Refine};
-use solver::solution::{Solution, Summary};
+use solver::solution::{Solution, Summary, WarningCode};
 
 use crate::record::{held, keep_table};
 use crate::support::{example, problem, solve};
@@ -96,7 +96,7 @@ fn warned(summary: &Summary) -> bool {
     summary
         .warnings
         .iter()
-        .any(|w| w.code == "oscillating_stick")
+        .any(|w| w.code == WarningCode::OscillatingStick)
 }
 
 /// The sheet of formulation 4.8, with two solutions.
@@ -151,7 +151,12 @@ fn the_jammed_sheet_is_found_beside_the_free_one() {
             jammed,
             1e-6,
         );
-        assert!(summary.warnings.iter().any(|w| w.code == "not_unique"));
+        assert!(
+            summary
+                .warnings
+                .iter()
+                .any(|w| w.code == WarningCode::NotUnique)
+        );
     }
     for mu in [0.3, 0.6] {
         let mut sheet = dragged_sheet(0.1, 1.0, mu);

@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 use solver::problem::Problem;
-use solver::solution::{Solution, Summary};
+use solver::solution::{Solution, Summary, WarningCode};
 
 use crate::record::{Line, held};
 use crate::support::{close, example, graded, problem, solve, union};
@@ -242,7 +242,7 @@ fn more_increments_change_less() {
         summary
             .warnings
             .iter()
-            .any(|w| w.code == "increments_matter")
+            .any(|w| w.code == WarningCode::IncrementsMatter)
     );
 }
 

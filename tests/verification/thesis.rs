@@ -2,7 +2,7 @@
 //! limits of its integration cost.
 
 use solver::problem::{Algorithm, Problem, ThesisOptions, ThesisPressure};
-use solver::solution::{Outcome, Solution};
+use solver::solution::{Outcome, Solution, WarningCode};
 
 use crate::record::held;
 use crate::support::{close, example, solve};
@@ -60,7 +60,7 @@ fn without_the_sign_it_settles_in_full_slip_and_says_so() {
             summary
                 .warnings
                 .iter()
-                .any(|w| w.code == "false_convergence")
+                .any(|w| w.code == WarningCode::FalseConvergence)
         );
         // friction pushes along the motion where it moves at all
         let profile = &solution.profiles["top"];
@@ -82,7 +82,7 @@ fn with_the_sign_it_falls_into_a_cycle_of_two() {
     let told = summary
         .warnings
         .iter()
-        .find(|w| w.code == "contact_cycling");
+        .find(|w| w.code == WarningCode::ContactCycling);
     let message = &told.unwrap().message;
     assert!(
         message.contains("every 2 iterations") && message.contains("contact nodes [0, 1"),

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::page::{self, Area, Fallible, HEAD, WIDTH, px, say, tick};
+use super::page::{self, Area, Fallible, HEAD, WIDTH, draw_text, px, tick};
 use super::theme::{Theme, hex};
 use solver::element::Element;
 use solver::mesh::runs;
@@ -166,7 +166,7 @@ pub(super) fn axes(
         .axis_desc_style(page::text(theme, 16))
         .draw()?;
     let corner = (left / page::FINE, top / page::FINE - CAPTION / 2);
-    say(area, theme, caption, corner)
+    draw_text(area, theme, caption, corner)
 }
 
 /// What is inside of the axes, clipped, in a border; goes on top of the page.

@@ -1,6 +1,6 @@
 //! How the iterations went: residuals, and the contact set.
 
-use super::figure::{Curve, Look, Panel, Scale, figure};
+use super::figure::{Curve, LineStyle, Panel, Scale, figure};
 use super::theme::Theme;
 use solver::problem::Problem;
 use solver::solution::Iteration;
@@ -15,9 +15,9 @@ pub fn convergence_svg(
     if history.is_empty() || problem.contacts.is_empty() {
         return Err("without contact there are no iterations to draw".to_owned());
     }
-    let curve = |label: &str, look: Look, value: &dyn Fn(&Iteration) -> Option<f64>| Curve {
+    let curve = |label: &str, style: LineStyle, value: &dyn Fn(&Iteration) -> Option<f64>| Curve {
         label: label.to_owned(),
-        look,
+        style,
         points: history
             .iter()
             .filter_map(|row| Some((f64::from(row.k), value(row)?)))
@@ -33,27 +33,27 @@ pub fn convergence_svg(
     // frictionless contact has no friction points, and often no node leaves
     let nonzero = |curve: &Curve| curve.points.iter().any(|p| p.1 != 0.0);
     let residuals = vec![
-        curve("residual", Look::Marked(0), &|row| Some(row.residual)),
-        curve("friction_residual", Look::Marked(1), &|row| {
+        curve("residual", LineStyle::Marked(0), &|row| Some(row.residual)),
+        curve("friction_residual", LineStyle::Marked(1), &|row| {
             Some(row.friction_residual)
         }),
-        curve("r_f (thesis 3.5)", Look::Points(3), &|row| row.r_f),
-        curve("tolerance", Look::Dashed, &|row| Some(row.tolerance)),
+        curve("r_f (thesis 3.5)", LineStyle::Points(3), &|row| row.r_f),
+        curve("tolerance", LineStyle::Dashed, &|row| Some(row.tolerance)),
     ];
     let counts = vec![
-        curve("nodes in contact", Look::Marked(0), &|row| {
+        curve("nodes in contact", LineStyle::Marked(0), &|row| {
             Some(f64::from(row.contact.active))
         }),
-        curve("entered", Look::Line(3), &|row| {
+        curve("entered", LineStyle::Line(3), &|row| {
             Some(f64::from(row.contact.entered))
         }),
-        curve("left", Look::Line(2), &|row| {
+        curve("left", LineStyle::Line(2), &|row| {
             Some(f64::from(row.contact.left))
         }),
-        curve("points in slip", Look::Marked(1), &|row| {
+        curve("points in slip", LineStyle::Marked(1), &|row| {
             Some(f64::from(row.friction.slip))
         }),
-        curve("points in stick", Look::Marked(4), &|row| {
+        curve("points in stick", LineStyle::Marked(4), &|row| {
             Some(f64::from(row.friction.stick))
         }),
     ];

@@ -5,7 +5,7 @@ use std::ops::Range;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::page::{self, Area, Fallible, LETTERS, WIDTH, number, px, say, tick};
+use super::page::{self, Area, Fallible, LETTERS, WIDTH, draw_text, number, px, tick};
 use super::theme::{Palette, Theme};
 
 /// Of a panel without its legend (pixels).
@@ -20,7 +20,7 @@ const DECADES: f64 = 18.0;
 
 /// How a curve looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
+pub enum LineStyle {
     /// A line in one of six colours, counted from 0.
     Line(usize),
     /// A line with a mark at every value.
@@ -39,7 +39,7 @@ pub struct Curve {
     /// In the legend; empty: not there.
     pub label: String,
     /// How it looks.
-    pub look: Look,
+    pub style: LineStyle,
     /// In order of x.
     pub points: Vec<(f64, f64)>,
 }
@@ -174,21 +174,21 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
         }
     }
     for (curve, points) in panel.curves.iter().zip(&curves) {
-        let style = style(&palette, curve.look);
+        let style = style(&palette, curve.style);
         let points = points.iter().copied();
         let dots = |k: f64| {
             let radius = (k * f64::from(px(1))) as i32;
             move |p| Circle::new(p, radius, style.filled())
         };
-        match curve.look {
-            Look::Points(_) => {
+        match curve.style {
+            LineStyle::Points(_) => {
                 chart.draw_series(points.map(|p| Circle::new(p, px(3), style)))?;
             }
-            Look::Marked(_) => {
+            LineStyle::Marked(_) => {
                 chart.draw_series(LineSeries::new(points.clone(), style))?;
                 chart.draw_series(points.map(dots(2.6)))?;
             }
-            Look::Dashed => {
+            LineStyle::Dashed => {
                 // from edge to edge: also one iteration has a limit
                 let ends = points.clone().next().zip(points.clone().next_back());
                 let points: Vec<_> = ends.map_or(vec![], |(first, last)| {
@@ -202,7 +202,7 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
                 });
                 chart.draw_series(DashedLineSeries::new(points, px(7), px(5), style))?;
             }
-            Look::Line(_) | Look::Reference => {
+            LineStyle::Line(_) | LineStyle::Reference => {
                 chart.draw_series(LineSeries::new(points, style))?;
             }
         }
@@ -210,13 +210,13 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
     legend(&head, theme, panel, limit)
 }
 
-fn style(palette: &Palette, look: Look) -> ShapeStyle {
+fn style(palette: &Palette, style: LineStyle) -> ShapeStyle {
     let colour = |k: usize| palette.curves[k % palette.curves.len()];
-    match look {
-        Look::Line(k) | Look::Marked(k) => colour(k).stroke_width(px(2) as u32),
-        Look::Points(k) => colour(k).stroke_width(px(1) as u32),
-        Look::Reference => palette.reference.stroke_width(px(1) as u32),
-        Look::Dashed => palette.text.stroke_width(px(1) as u32),
+    match style {
+        LineStyle::Line(k) | LineStyle::Marked(k) => colour(k).stroke_width(px(2) as u32),
+        LineStyle::Points(k) => colour(k).stroke_width(px(1) as u32),
+        LineStyle::Reference => palette.reference.stroke_width(px(1) as u32),
+        LineStyle::Dashed => palette.text.stroke_width(px(1) as u32),
     }
 }
 
@@ -263,24 +263,24 @@ fn legend(area: &Area<'_>, theme: Theme, panel: &Panel, limit: f64) -> Fallible<
     let named = panel.curves.iter().filter(|curve| !curve.label.is_empty());
     for (curve, (row, x)) in named.zip(places(panel, limit)) {
         let middle = LEGEND * row + LEGEND / 2;
-        let style = style(&palette, curve.look);
+        let style = style(&palette, curve.style);
         let line = |from: i32, to: i32| {
             PathElement::new([(px(from), px(middle)), (px(to), px(middle))], style)
         };
         let dot = (px(x + 11), px(middle));
-        match curve.look {
-            Look::Points(_) => area.draw(&Circle::new(dot, px(3), style))?,
-            Look::Marked(_) => {
+        match curve.style {
+            LineStyle::Points(_) => area.draw(&Circle::new(dot, px(3), style))?,
+            LineStyle::Marked(_) => {
                 area.draw(&line(x, x + 22))?;
                 area.draw(&Circle::new(dot, px(3), style.filled()))?;
             }
-            Look::Dashed => {
+            LineStyle::Dashed => {
                 area.draw(&line(x, x + 8))?;
                 area.draw(&line(x + 14, x + 22))?;
             }
-            Look::Line(_) | Look::Reference => area.draw(&line(x, x + 22))?,
+            LineStyle::Line(_) | LineStyle::Reference => area.draw(&line(x, x + 22))?,
         }
-        say(area, theme, &entry(curve, limit).0, (x + 28, middle))?;
+        draw_text(area, theme, &entry(curve, limit).0, (x + 28, middle))?;
     }
     Ok(())
 }
@@ -380,7 +380,7 @@ mod tests {
     fn a_long_legend_takes_more_lines_and_nothing_is_no_figure() {
         let curve = |label: &str| Curve {
             label: label.to_owned(),
-            look: Look::Line(0),
+            style: LineStyle::Line(0),
             points: vec![(0.0, 1.0), (1.0, 2.0)],
         };
         let mut panel = Panel {

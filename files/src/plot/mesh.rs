@@ -10,7 +10,7 @@ use solver::problem::Problem;
 use solver::solution::Fields;
 
 use super::body::{self, Path, Sides, Window};
-use super::page::{self, WIDTH, px, say, with_unit};
+use super::page::{self, WIDTH, draw_text, px, with_unit};
 use super::theme::{Theme, hex};
 use crate::external::external_mesh;
 
@@ -149,7 +149,7 @@ pub fn mesh_svg(
                     }
                 }
             }
-            say(area, theme, label, (x + 28, middle))?;
+            draw_text(area, theme, label, (x + 28, middle))?;
         }
         Ok(body::inside(theme, frame, &content))
     })

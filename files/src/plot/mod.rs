@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 pub use convergence::convergence_svg;
 pub use deformed::{Stress, deformed_svg};
-pub use figure::{Curve, Look, Panel, Scale, figure};
+pub use figure::{Curve, LineStyle, Panel, Scale, figure};
 pub use mesh::mesh_svg;
 pub use profile::profile_svg;
 pub use theme::Theme;

@@ -76,7 +76,12 @@ pub(super) fn text(theme: Theme, pixels: i32) -> TextStyle<'static> {
 }
 
 /// A line of text with its left end and its middle at a place (pixels).
-pub(super) fn say(area: &Area<'_>, theme: Theme, words: &str, (x, y): (i32, i32)) -> Fallible<()> {
+pub(super) fn draw_text(
+    area: &Area<'_>,
+    theme: Theme,
+    words: &str,
+    (x, y): (i32, i32),
+) -> Fallible<()> {
     let style = text(theme, LETTERS).pos(Pos::new(HPos::Left, VPos::Center));
     area.draw(&Text::new(words.to_owned(), (px(x), px(y)), style))?;
     Ok(())

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::figure::{Curve, Look, Panel, figure};
+use super::figure::{Curve, LineStyle, Panel, figure};
 use super::page::{self, with_unit};
 use super::theme::Theme;
 use solver::problem::{Contact, Problem};
@@ -29,9 +29,9 @@ pub fn profile_svg(
 
 fn panels(problem: &Problem, name: &str, profile: &ContactProfile) -> Vec<Panel> {
     let shown = stressed(profile);
-    let curve = |label: &str, look: Look, values: &[f64]| Curve {
+    let curve = |label: &str, style: LineStyle, values: &[f64]| Curve {
         label: label.to_owned(),
-        look,
+        style,
         points: shown.clone().map(|i| (profile.s[i], values[i])).collect(),
     };
     let opposite: Vec<f64> = profile.friction_bound.iter().map(|tau| -tau).collect();
@@ -44,15 +44,15 @@ fn panels(problem: &Problem, name: &str, profile: &ContactProfile) -> Vec<Panel>
         curves,
         ..Panel::default()
     };
-    let normal = vec![curve("σ_n", Look::Line(0), &profile.normal_stress)];
+    let normal = vec![curve("σ_n", LineStyle::Line(0), &profile.normal_stress)];
     let tangential = vec![
         curve(
             "±τ, friction bound",
-            Look::Reference,
+            LineStyle::Reference,
             &profile.friction_bound,
         ),
-        curve("", Look::Reference, &opposite),
-        curve("σ_t", Look::Line(1), &profile.tangential_stress),
+        curve("", LineStyle::Reference, &opposite),
+        curve("σ_t", LineStyle::Line(1), &profile.tangential_stress),
     ];
     let rough = |contact: &Contact| contact.boundary == name && contact.friction.is_some();
     match problem.contacts.iter().any(rough) {

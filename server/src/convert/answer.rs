@@ -2,7 +2,7 @@
 //! what the service adds to a summary.
 
 use prost_types::Timestamp;
-use solver::solution::{Phase, Stage};
+use solver::solution::{Phase, Stage, WarningCode};
 
 use super::IntoMessage;
 use crate::{
@@ -56,7 +56,14 @@ macro_rules! words {
     };
 }
 
-words!(solver::error::Reason, Phase, Reason, Stage, Waiting);
+words!(
+    solver::error::Reason,
+    Phase,
+    Reason,
+    Stage,
+    Waiting,
+    WarningCode
+);
 
 impl From<Caller> for pb::Caller {
     fn from(caller: Caller) -> Self {

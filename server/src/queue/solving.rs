@@ -62,7 +62,9 @@ pub(super) fn solve_and_report(
             Update::Pulse => None,
         })
     })?;
-    let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite { phase: "recover" })?;
+    let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite {
+        phase: solver::solution::Phase::Recover,
+    })?;
     Ok(Solved {
         ending: ending_of_solution(&document),
         iterations: document.history.len(),

@@ -70,7 +70,9 @@ impl Document {
         solution: Solution,
         times: &Times,
     ) -> Result<Document, SolveError> {
-        let non_finite = SolveError::NonFinite { phase: "recover" };
+        let non_finite = SolveError::NonFinite {
+            phase: solver::solution::Phase::Recover,
+        };
         if !solution.is_finite() {
             return Err(non_finite);
         }

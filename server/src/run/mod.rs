@@ -95,7 +95,9 @@ pub fn run(
         }
     });
     if non_finite {
-        return Err(SolveError::NonFinite { phase: "iterate" });
+        return Err(SolveError::NonFinite {
+            phase: Phase::Iterate,
+        });
     }
     let mut solution = solved?;
     if solution.summary.outcome == Outcome::Canceled {

@@ -42,6 +42,18 @@ pub(super) struct End {
 }
 
 impl End {
+    /// Without a cycle or a contraction, and with iterations left.
+    pub(super) fn new(measured: Measured, stage: Stage, outcome: Outcome) -> Self {
+        End {
+            measured,
+            stage,
+            outcome,
+            cycle: None,
+            contraction: None,
+            exhausted: false,
+        }
+    }
+
     /// What does not converge is told with the cycle that another way ran into, if it has none itself.
     pub(super) fn with_cycle_of(mut self, other: &End) -> Self {
         if self.outcome == Outcome::NotConverged && other.cycle.is_some() {

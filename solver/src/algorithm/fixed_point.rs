@@ -48,7 +48,7 @@ pub(super) fn sweep(
         tractions: track.system.tractions(&measured.state.v, &measured.bound),
         own_r_f: None,
     };
-    let answer = track.tell(&measured, row, observe);
+    let answer = track.record(&measured, row, observe);
     (measured, answer)
 }
 
@@ -70,14 +70,7 @@ pub(super) fn run(
         Stage::Outer
     };
     let tolerance = track.controls.tolerance;
-    let mut swept = End {
-        measured: start,
-        stage,
-        outcome: Outcome::NotConverged,
-        cycle: None,
-        contraction: None,
-        exhausted: false,
-    };
+    let mut swept = End::new(start, stage, Outcome::NotConverged);
     let mut best: Option<Measured> = None;
     let mut since_best = 0;
     let mut memory = Memory::default();

@@ -24,7 +24,7 @@ pub use uniqueness::{compared, note_doubled_increments, note_uniqueness, other_s
 use std::ops::ControlFlow;
 
 use crate::problem::{Algorithm, SolverControls};
-use crate::solution::{Observer, Outcome, Stage};
+use crate::solution::{Observer, Outcome, Progress, Stage};
 use finished::{End, finish};
 use fixed_point::{stuck, sweep};
 use track::{Measured, Track};
@@ -59,15 +59,7 @@ pub fn run(
             ControlFlow::Break(()) => Outcome::Canceled,
             ControlFlow::Continue(()) => Outcome::NotConverged,
         };
-        let end = End {
-            measured: start,
-            stage: Stage::Frictionless,
-            outcome,
-            cycle: None,
-            contraction: None,
-            exhausted: false,
-        };
-        return finish(track, end);
+        return finish(track, End::new(start, Stage::Frictionless, outcome));
     }
     let end = match controls.algorithm {
         Algorithm::FixedPoint => fixed_point::run(&mut track, start, false, observe),
@@ -119,23 +111,27 @@ fn bonded_state(
 ) -> (Measured, ControlFlow<()>) {
     let bonded = system.bonded();
     let mut track = Track::new(&bonded, controls, Place::default());
-    let quiet: &mut Observer<'_> = &mut |progress| match progress {
-        crate::solution::Progress::Pulse => observe(progress),
-        _ => ControlFlow::Continue(()),
-    };
     let (found, answer) = sweep(
         &mut track,
         Stage::Bonded,
         Vec::new(),
         &bonded.rest(),
-        quiet,
+        &mut quiet(observe),
         |_| None,
     );
     let none = vec![0.0; system.points.len()];
     (Measured::new(system, found.state, none), answer)
 }
 
-/// Sweeps; where they do not get on, Newton's method from the best sweep; where that fails too, both
+/// Passes iterations on as pulses and nothing else: the observer may stop a solution that it is not shown.
+pub fn quiet(observe: &mut Observer<'_>) -> impl FnMut(Progress<'_>) -> ControlFlow<()> {
+    |progress| match progress {
+        Progress::Iteration(_) | Progress::Pulse => observe(Progress::Pulse),
+        _ => ControlFlow::Continue(()),
+    }
+}
+
+/// Sweeps; where they do not converge, Newton's method from the best sweep; where that fails too, both
 /// again from the bonded state: beyond a fold the free branch ends, and only a jammed state is left.
 fn auto(mut track: Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> Finished {
     let first = both(&mut track, start, observe);

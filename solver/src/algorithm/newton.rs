@@ -34,14 +34,7 @@ pub(super) fn run(
 ) -> End {
     let system = track.system;
     let tolerance = track.controls.tolerance;
-    let mut end = End {
-        measured: start.clone(),
-        stage: Stage::Newton,
-        outcome: Outcome::NotConverged,
-        cycle: None,
-        contraction: None,
-        exhausted: false,
-    };
+    let mut end = End::new(start.clone(), Stage::Newton, Outcome::NotConverged);
     let mut state = start.state.clone();
     follow(system, &mut state.active);
     let (mut best, mut residual_before) = (f64::INFINITY, f64::INFINITY);
@@ -62,7 +55,7 @@ pub(super) fn run(
             tractions: system.tractions(&measured.state.v, &measured.bound),
             own_r_f: None,
         };
-        let answer = track.tell(&measured, row, observe);
+        let answer = track.record(&measured, row, observe);
         let converged = !changed && measured.within(tolerance);
         since_best += 1;
         if residual < 0.9 * best || converged {

@@ -11,8 +11,8 @@ use crate::elasticity::{Dof, Recovered, StressError, recover, stress_error};
 use crate::error::SolveError;
 use crate::model::Model;
 use crate::solution::{
-    ContactProfile, ContactSummary, ErrorEstimate, Fields, GaussFields, NodeState, Outcome,
-    Residuals, Summary, Warning,
+    ContactProfile, ContactSummary, ErrorEstimate, Fields, GaussFields, NodeState, Outcome, Phase,
+    Residuals, Summary, Warning, WarningCode,
 };
 
 /// Forces that balance no better than this have lost half of their digits: no result to trust.
@@ -115,7 +115,7 @@ pub fn report(
     };
     if equilibrium > OUT_OF_BALANCE {
         warnings.push(Warning {
-            code: "out_of_balance".to_owned(),
+            code: WarningCode::OutOfBalance,
             pointer: String::new(),
             message: format!("The forces on the body do not balance: {equilibrium:.1e} of their sum is left over. The stiffness is all but singular: check supports, hinges and badly shaped elements."),
         });
@@ -159,7 +159,9 @@ pub fn report(
         && displacements.iter().flatten().all(|u| u.is_finite())
         && recovered.stress.iter().flatten().all(|s| s.is_finite());
     if !finite {
-        return Err(SolveError::NonFinite { phase: "recovery" });
+        return Err(SolveError::NonFinite {
+            phase: Phase::Recover,
+        });
     }
     Ok(Reported {
         summary,
@@ -346,7 +348,7 @@ fn warn_of_displacement(model: &Model, displacements: &[[f64; 2]], warnings: &mu
         .fold(0.0, f64::max);
     if largest > LARGE_DISPLACEMENT * size {
         warnings.push(Warning {
-            code: "large_displacement".to_owned(),
+            code: WarningCode::LargeDisplacement,
             pointer: String::new(),
             message: format!(
                 "The largest displacement, {largest:.4}, is {:.0} % of the body's size: linear elasticity no longer describes it.",
@@ -357,16 +359,16 @@ fn warn_of_displacement(model: &Model, displacements: &[[f64; 2]], warnings: &mu
 }
 
 fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
-    let mut warn = |code: &str, message: String| {
+    let mut warn = |code: WarningCode, message: String| {
         warnings.push(Warning {
-            code: code.to_owned(),
+            code,
             pointer: "/solver".to_owned(),
             message,
         });
     };
     if let Some(q) = finished.contraction.filter(|q| *q > SLOW_CONTRACTION) {
         warn(
-            "slow_contraction",
+            WarningCode::SlowContraction,
             format!(
                 "The friction bound contracts by only q = {q:.3} per sweep: friction and pressure feed each other, and the state may not be the only one."
             ),
@@ -375,7 +377,7 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
     if finished.outcome == Outcome::NotConverged {
         let r = finished.residuals;
         warn(
-            "not_converged",
+            WarningCode::NotConverged,
             format!(
                 "After {} iterations the residuals are kkt {:.1e}, friction {:.1e}, monolithic {:.1e}. Raise max_iterations if they still fall in the history; else raise elastic_slip or tolerance, or refine the mesh.",
                 finished.history.len(),
@@ -387,7 +389,7 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
     }
     if finished.own_tractions && finished.outcome == Outcome::FalseConvergence {
         warn(
-            "false_convergence",
+            WarningCode::FalseConvergence,
             format!(
                 "The thesis's iteration meets its own test, R_F, but does not solve the problem: the true residual is {:.1e}. Choose \"algorithm\": \"auto\".",
                 finished.residuals.monolithic
@@ -396,7 +398,7 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
     }
     if let Some(cycle) = &finished.cycle {
         warn(
-            "contact_cycling",
+            WarningCode::ContactCycling,
             format!(
                 "Contact and slip repeat every {} iterations; contact nodes {:?} keep changing state. Refine the mesh there, or raise elastic_slip.",
                 cycle.period, cycle.nodes

@@ -272,7 +272,7 @@ impl<'a> System<'a> {
     }
 
     /// The end of an increment: anchors move to where friction has forgotten what came before.
-    pub fn remember(&mut self, v: &[f64], bound: &[f64]) {
+    pub fn move_anchors(&mut self, v: &[f64], bound: &[f64]) {
         self.past_work = self.work(v, bound).incremental;
         let largest = bound.iter().fold(0.0f64, |a, b| a.max(*b));
         for (g, tau) in bound.iter().enumerate() {

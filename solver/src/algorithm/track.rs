@@ -131,7 +131,7 @@ impl<'s, 'a> Track<'s, 'a> {
     }
 
     /// Adds a row and tells the observer.
-    pub(super) fn tell(
+    pub(super) fn record(
         &mut self,
         measured: &Measured,
         row: Row,

@@ -1,24 +1,22 @@
 //! Whether the solution found is the only one that is easily found: once more from the bonded state.
 
-use std::ops::ControlFlow;
-
 use crate::algorithm::system::System;
 use crate::algorithm::track::{Measured, Track};
-use crate::algorithm::{End, Finished, Place, bonded_state, both, fixed_point};
+use crate::algorithm::{End, Finished, Place, bonded_state, both, fixed_point, quiet};
 use crate::problem::SolverControls;
-use crate::solution::{Comparison, Observer, Outcome, Progress, Summary, Warning};
+use crate::solution::{Comparison, Observer, Outcome, Summary, Warning, WarningCode};
 
 /// A comparison with a second solution goes into the summary, and a warning with it where the two
 /// differ.
 pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
     let warning = if !second.converged {
         Some((
-            "uniqueness_unknown",
+            WarningCode::UniquenessUnknown,
             "Started from the bonded state the method does not converge: whether there is a second solution remains open.".to_owned(),
         ))
     } else if !second.agrees {
         Some((
-            "not_unique",
+            WarningCode::NotUnique,
             format!(
                 "There is a second solution: started from the bonded state (u_t = d) the forces are Y = {:.6}, T = {:.6} instead of Y = {:.6}, T = {:.6}. Which one occurs depends on the history of loading; the incremental law with load steps can follow it.",
                 second.normal_force,
@@ -32,7 +30,7 @@ pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
     };
     if let Some((code, message)) = warning {
         summary.warnings.push(Warning {
-            code: code.to_owned(),
+            code,
             pointer: "/solver/check_uniqueness".to_owned(),
             message,
         });
@@ -44,7 +42,7 @@ pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
 pub fn note_doubled_increments(summary: &mut Summary, second: Comparison) {
     if !second.agrees {
         summary.warnings.push(Warning {
-            code: "increments_matter".to_owned(),
+            code: WarningCode::IncrementsMatter,
             pointer: "/steps".to_owned(),
             message: format!(
                 "Twice the increments change the forces by {:.2e}{}.",
@@ -111,10 +109,7 @@ pub fn other_solution(
     first: &Finished,
     observe: &mut Observer<'_>,
 ) -> Comparison {
-    let quiet: &mut Observer<'_> = &mut |progress| match progress {
-        Progress::Pulse => observe(progress),
-        _ => ControlFlow::Continue(()),
-    };
+    let quiet: &mut Observer<'_> = &mut quiet(observe);
     let (start, _) = bonded_state(system, controls, quiet);
     let mut track = Track::new(system, controls, Place::default());
     let mut end = both(&mut track, start, quiet);

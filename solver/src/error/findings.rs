@@ -59,7 +59,7 @@ impl Findings {
     }
 
     /// One more, which a check fails for. `place`: the rest of its pointer.
-    pub fn say(
+    pub fn report(
         &mut self,
         place: impl AsRef<str>,
         reason: Reason,
@@ -103,7 +103,7 @@ impl Findings {
     }
 
     /// What was checked elsewhere, with all that was wrong there.
-    pub fn took<T>(&mut self, checked: Result<T, Vec<Violation>>) -> Checked<T> {
+    pub fn merge<T>(&mut self, checked: Result<T, Vec<Violation>>) -> Checked<T> {
         checked.map_err(|violations| {
             self.extend(violations);
             Refused(())
@@ -163,27 +163,27 @@ impl Extend<Violation> for Findings {
 /// What several checks answer together: all of them are made, and one that fails fails them all.
 #[derive(Debug)]
 #[must_use]
-pub struct All(Checked);
+pub struct AllChecks(Checked);
 
-impl Default for All {
+impl Default for AllChecks {
     fn default() -> Self {
-        All(Ok(()))
+        AllChecks(Ok(()))
     }
 }
 
-impl All {
+impl AllChecks {
     /// One more check: what it found good.
-    pub fn take<T>(&mut self, checked: Checked<T>) -> Option<T> {
+    pub fn check<T>(&mut self, checked: Checked<T>) -> Option<T> {
         checked.map_err(|refused| self.0 = Err(refused)).ok()
     }
 
     /// One more failure.
-    pub fn refuse(&mut self, refused: Refused) {
+    pub fn fail(&mut self, refused: Refused) {
         self.0 = Err(refused);
     }
 
     /// `value`, where every check held.
-    pub fn then<T>(self, value: T) -> Checked<T> {
+    pub fn finish<T>(self, value: T) -> Checked<T> {
         self.0.map(|()| value)
     }
 }
@@ -203,7 +203,7 @@ mod tests {
     fn found(mut findings: Findings, count: usize) -> Vec<Violation> {
         for i in 0..count {
             let (place, hint) = (format!("/{i}"), "Leave it out.");
-            let _ = findings.say(place, Reason::UnknownName, "it", "nothing", hint);
+            let _ = findings.report(place, Reason::UnknownName, "it", "nothing", hint);
         }
         findings.into_violations()
     }
@@ -220,7 +220,7 @@ mod tests {
     fn of_a_mesh_twenty_of_a_kind_are_listed_and_the_others_leave_room() {
         let mut findings = Findings::of_mesh("/mesh/inline");
         for place in ["/nodes/7", "/nodes/8"] {
-            let _ = findings.say(place, Reason::UnusedNode, "it", "another", "Move it.");
+            let _ = findings.report(place, Reason::UnusedNode, "it", "another", "Move it.");
         }
         let list = found(findings, 1000);
         assert_eq!(
@@ -235,7 +235,7 @@ mod tests {
     fn a_hostile_text_is_cut_between_characters() {
         let mut findings = Findings::default();
         let long = "ä".repeat(1 << 20);
-        let _ = findings.say(&long, Reason::UnknownName, &long, &long, &long);
+        let _ = findings.report(&long, Reason::UnknownName, &long, &long, &long);
         let size = |v: &Violation| v.pointer.len() + v.got.len() + v.expected.len() + v.hint.len();
         assert!(size(&findings.into_violations()[0]) < 1 << 15);
         assert_eq!(shortened("top", 3), "top");
@@ -248,13 +248,13 @@ mod tests {
     #[test]
     fn one_failure_fails_all() {
         let mut findings = Findings::default();
-        let mut all = All::default();
-        assert_eq!(all.take(Ok(3)), Some(3));
-        assert_eq!(All::default().then(1), Ok(1));
-        let refused = findings.say("", Reason::Missing, "nothing", "it", "Give it.");
-        assert_eq!(all.take::<u8>(Err(refused)), None);
-        assert_eq!(all.take(Ok(3)), Some(3));
-        assert_eq!(all.then(1), Err(refused));
+        let mut all = AllChecks::default();
+        assert_eq!(all.check(Ok(3)), Some(3));
+        assert_eq!(AllChecks::default().finish(1), Ok(1));
+        let refused = findings.report("", Reason::Missing, "nothing", "it", "Give it.");
+        assert_eq!(all.check::<u8>(Err(refused)), None);
+        assert_eq!(all.check(Ok(3)), Some(3));
+        assert_eq!(all.finish(1), Err(refused));
         assert!(findings.into_result(1).is_err());
     }
 }

@@ -5,13 +5,15 @@
 mod findings;
 mod reason;
 
-pub use findings::{All, Checked, Findings, MOST_LISTED, Refused, shortened};
+pub use findings::{AllChecks, Checked, Findings, MOST_LISTED, Refused, shortened};
 pub use reason::Reason;
 
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::phase::Phase;
 
 /// One thing that is wrong with a problem, said so that its author can mend it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -97,10 +99,10 @@ pub enum SolveError {
     },
     /// The factor of the stiffness matrix has more entries than can be addressed or held.
     ResourceExhausted,
-    /// A number that is not finite came up in the named phase.
+    /// A phase computed NaN or infinity.
     NonFinite {
-        /// What was being computed.
-        phase: &'static str,
+        /// The phase.
+        phase: Phase,
     },
     /// The observer asked to stop before there was a state worth keeping.
     Stopped,
@@ -133,7 +135,8 @@ impl fmt::Display for SolveError {
             }
             SolveError::NonFinite { phase } => write!(
                 f,
-                "a number that is not finite came up in {phase}: check the magnitudes of moduli, lengths and loads"
+                "the phase `{}` computed a number that is not finite: check the magnitudes of moduli, lengths and loads",
+                phase.as_str()
             ),
             SolveError::Stopped => write!(f, "stopped on request"),
         }

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::{Edge, Mesh, key};
 use crate::element::Element;
-use crate::error::{All, Checked, Findings, Reason, Refused, Violation};
-use crate::solution::Warning;
+use crate::error::{AllChecks, Checked, Findings, Reason, Refused, Violation};
+use crate::solution::{Warning, WarningCode};
 
 /// Stands for the midsides of an element that has none yet.
 pub const NO_NODE: u32 = u32::MAX;
@@ -43,7 +43,7 @@ pub fn build(raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
 
 fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warning>)> {
     if raw.elements.is_empty() {
-        return Err(found.say(
+        return Err(found.report(
             "",
             Reason::TooFew,
             "no element of two dimensions",
@@ -52,16 +52,16 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         ));
     }
     let mut notes = Vec::new();
-    let mut note = |code: &str, message: String| {
+    let mut note = |code: WarningCode, message: String| {
         notes.push(Warning {
-            code: code.to_owned(),
+            code,
             pointer: String::new(),
             message,
         })
     };
     if raw.without_centre > 0 {
         note(
-            "centre_nodes_dropped",
+            WarningCode::CentreNodesDropped,
             format!(
                 "{} 9-node quadrilaterals lost their centre node and became 8-node elements.",
                 raw.without_centre
@@ -72,14 +72,14 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
     let reversed = counter_clockwise(&mut raw);
     if reversed > 0 {
         note(
-            "elements_reversed",
+            WarningCode::ElementsReversed,
             format!("{reversed} elements were numbered clockwise and have been turned over."),
         );
     }
     let raised = second_order(&mut raw);
     if raised > 0 {
         note(
-            "raised_to_second_order",
+            WarningCode::RaisedToSecondOrder,
             format!(
                 "{raised} elements had corners only: midside nodes were put half-way between them. A curved side stays the polygon it was."
             ),
@@ -103,7 +103,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         edges.dedup();
         if inside > 0 {
             note(
-                "lines_inside",
+                WarningCode::LinesInside,
                 format!(
                     "{inside} lines of `{name}` are not sides of the body's surface and are left out."
                 ),
@@ -133,9 +133,9 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         groups: raw.groups,
         node_sets: raw.node_sets,
     };
-    let mut all = All::default();
+    let mut all = AllChecks::default();
     for (e, place, det) in mesh.inverted_elements(true) {
-        all.refuse(found.say(
+        all.fail(found.report(
             "",
             Reason::InvertedElement,
             format!(
@@ -146,16 +146,16 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
             "Move its nodes; a midside far off the middle of its side folds the element.",
         ));
     }
-    all.then((mesh, notes))
+    all.finish((mesh, notes))
 }
 
 fn distinct(raw: &RawMesh, found: &mut Findings) -> Checked {
-    let mut all = All::default();
+    let mut all = AllChecks::default();
     for (element, label) in raw.elements.iter().zip(&raw.element_labels) {
         let repeated = (1..element.len())
             .find(|&i| element[i] != NO_NODE && element[..i].contains(&element[i]));
         if let Some(i) = repeated {
-            all.refuse(found.say(
+            all.fail(found.report(
                 "",
                 Reason::RepeatedNode,
                 format!(
@@ -167,7 +167,7 @@ fn distinct(raw: &RawMesh, found: &mut Findings) -> Checked {
             ));
         }
     }
-    all.then(())
+    all.finish(())
 }
 
 /// Turns over what runs clockwise; says how many.
@@ -284,7 +284,7 @@ struct Owners {
 
 impl Owners {
     fn new(raw: &RawMesh, found: &mut Findings) -> Checked<Self> {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let mut owners = Owners {
             count: vec![0; raw.nodes.len()],
             first: vec![0; raw.nodes.len()],
@@ -299,13 +299,13 @@ impl Owners {
                     // the neighbour runs along the same side the other way
                     let shared = raw.elements[first].sides().any(|s| s == [b, a, mid as u32]);
                     if owners.count[mid] >= 2 || !shared {
-                        all.refuse(nonconforming(raw, first, e, found));
+                        all.fail(nonconforming(raw, first, e, found));
                     }
                 }
                 owners.count[mid] = owners.count[mid].saturating_add(1);
             }
         }
-        all.then(owners)
+        all.finish(owners)
     }
 }
 
@@ -334,11 +334,11 @@ fn by_corners(
         .map(|(i, [a, b, _])| (key(*a, *b), i as u32))
         .collect();
     sorted.sort_unstable();
-    let mut all = All::default();
+    let mut all = AllChecks::default();
     for pair in sorted.windows(2) {
         if pair[0].0 == pair[1].0 {
             let owner = |i: u32| owners.first[surface[i as usize][2] as usize] as usize;
-            all.refuse(nonconforming(
+            all.fail(nonconforming(
                 raw,
                 owner(pair[0].1),
                 owner(pair[1].1),
@@ -346,12 +346,12 @@ fn by_corners(
             ));
         }
     }
-    all.then(sorted)
+    all.finish(sorted)
 }
 
 fn nonconforming(raw: &RawMesh, first: usize, second: usize, found: &mut Findings) -> Refused {
     let [a, b] = [first, second].map(|e| raw.element_labels[e]);
-    found.say(
+    found.report(
         "",
         Reason::Nonconforming,
         format!("elements {a} and {b}, which do not share a whole side"),
@@ -411,13 +411,13 @@ mod tests {
             assert!(y0 == 1.0 && y1 == 1.0 && x1 > x0 && xm == 0.5 * (x0 + x1));
         }
         assert_eq!(mesh.node_sets["corner"], [0]);
-        let codes: Vec<&str> = notes.iter().map(|w| &w.code[..]).collect();
+        let codes: Vec<WarningCode> = notes.iter().map(|w| w.code).collect();
         assert_eq!(
             codes,
             [
-                "elements_reversed",
-                "raised_to_second_order",
-                "lines_inside"
+                WarningCode::ElementsReversed,
+                WarningCode::RaisedToSecondOrder,
+                WarningCode::LinesInside
             ]
         );
         assert_eq!(mesh.surface().len(), 6);

@@ -1,7 +1,7 @@
 //! Grids of lines, and strips between two polylines.
 
 use crate::element::Element;
-use crate::error::{All, Checked, Findings, Reason, Violation};
+use crate::error::{AllChecks, Checked, Findings, Reason, Violation};
 use crate::mesh::Mesh;
 use crate::problem::Grid;
 
@@ -131,30 +131,30 @@ pub fn largest_cut(grid: &Grid) -> Option<(f64, f64)> {
 /// Whether a grid can be meshed, or all that is wrong with it; `pointer` is the grid's own.
 pub fn check_grid(grid: &Grid, pointer: &str) -> Result<(), Vec<Violation>> {
     let mut found = Findings::of_mesh(pointer);
-    let mut all = All::default();
+    let mut all = AllChecks::default();
     for (field, lines) in [("/x", &grid.x), ("/y", &grid.y)] {
-        all.take(check_lines(field, lines, &mut found));
+        all.check(check_lines(field, lines, &mut found));
     }
     let edges = [("/top", &grid.top), ("/bottom", &grid.bottom)].map(|(field, edge)| {
         let checked = match edge {
             None => Ok(()),
             Some(points) => check_edge(field, points, &grid.x, &mut found),
         };
-        all.take(checked)
+        all.check(checked)
     });
     let strip = grid.top.is_some() || grid.bottom.is_some();
     let sound = edges == [Some(()); 2] && !grid.x.is_empty() && !grid.y.is_empty();
     if strip && sound {
-        all.take(check_strip(grid, &mut found));
+        all.check(check_strip(grid, &mut found));
     }
-    found.conclude(all.then(()))
+    found.conclude(all.finish(()))
 }
 
 /// The lines in one direction.
 fn check_lines(field: &str, lines: &[f64], found: &mut Findings) -> Checked {
-    let mut all = All::default();
+    let mut all = AllChecks::default();
     if lines.len() < 2 {
-        all.refuse(found.say(
+        all.fail(found.report(
             field,
             Reason::TooFew,
             format!("{} line(s)", lines.len()),
@@ -163,7 +163,7 @@ fn check_lines(field: &str, lines: &[f64], found: &mut Findings) -> Checked {
         ));
     }
     if let Some(i) = (1..lines.len()).find(|&i| lines[i] <= lines[i - 1]) {
-        all.refuse(found.say(
+        all.fail(found.report(
             format!("{field}/{i}"),
             Reason::NotIncreasing,
             format!("{} after {}", lines[i], lines[i - 1]),
@@ -171,13 +171,13 @@ fn check_lines(field: &str, lines: &[f64], found: &mut Findings) -> Checked {
             "Sort the lines and remove repeated ones.",
         ));
     }
-    all.then(())
+    all.finish(())
 }
 
 /// The upper or lower edge of a strip.
 fn check_edge(field: &str, points: &[[f64; 2]], x: &[f64], found: &mut Findings) -> Checked {
     if points.len() < 2 {
-        return Err(found.say(
+        return Err(found.report(
             field,
             Reason::TooFew,
             format!("{} point(s)", points.len()),
@@ -186,7 +186,7 @@ fn check_edge(field: &str, points: &[[f64; 2]], x: &[f64], found: &mut Findings)
         ));
     }
     if let Some(i) = (1..points.len()).find(|&i| points[i][0] <= points[i - 1][0]) {
-        return Err(found.say(
+        return Err(found.report(
             format!("{field}/{i}"),
             Reason::NotIncreasing,
             format!("x = {} after {}", points[i][0], points[i - 1][0]),
@@ -196,7 +196,7 @@ fn check_edge(field: &str, points: &[[f64; 2]], x: &[f64], found: &mut Findings)
     }
     let ([low, _], [high, _]) = (points[0], points[points.len() - 1]);
     match (x.first(), x.last()) {
-        (Some(first), Some(last)) if low > *first || high < *last => Err(found.say(
+        (Some(first), Some(last)) if low > *first || high < *last => Err(found.report(
             field,
             Reason::DoesNotSpan,
             format!("x from {low} to {high}"),
@@ -209,9 +209,9 @@ fn check_edge(field: &str, points: &[[f64; 2]], x: &[f64], found: &mut Findings)
 
 /// Fractions of the height, and a height everywhere.
 fn check_strip(grid: &Grid, found: &mut Findings) -> Checked {
-    let mut all = All::default();
+    let mut all = AllChecks::default();
     if grid.y[0] != 0.0 || grid.y[grid.y.len() - 1] != 1.0 {
-        all.refuse(found.say(
+        all.fail(found.report(
             "/y",
             Reason::OutOfRange,
             format!("{} … {}", grid.y[0], grid.y[grid.y.len() - 1]),
@@ -226,7 +226,7 @@ fn check_strip(grid: &Grid, found: &mut Findings) -> Checked {
             Some(_) => "/top",
             None => "/bottom",
         };
-        all.refuse(found.say(
+        all.fail(found.report(
             field,
             Reason::OutOfRange,
             format!("height {} at x = {x}", at(*x)),
@@ -234,7 +234,7 @@ fn check_strip(grid: &Grid, found: &mut Findings) -> Checked {
             "Without `bottom` (or `top`) that edge is y = 0.",
         ));
     }
-    all.then(())
+    all.finish(())
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::{Mesh, key};
-use crate::error::{All, Checked, Findings, Reason, Violation, escape};
+use crate::error::{AllChecks, Checked, Findings, Reason, Violation, escape};
 use crate::problem::InlineMesh;
 
 /// The mesh, or everything that is wrong with its numbering; `pointer` is the inline mesh's own.
@@ -16,9 +16,9 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
 fn check(input: &InlineMesh, found: &mut Findings) -> Checked<Mesh> {
     // the rest needs sound numbers
     let used = numbers(input, found)?;
-    let mut all = All::default();
+    let mut all = AllChecks::default();
     for node in (0..input.nodes.len()).filter(|&n| !used[n]) {
-        all.refuse(found.say(
+        all.fail(found.report(
             format!("/nodes/{node}"),
             Reason::UnusedNode,
             "a node of no element",
@@ -28,11 +28,11 @@ fn check(input: &InlineMesh, found: &mut Findings) -> Checked<Mesh> {
     }
     let sides = surface(input, found, &mut all);
     let boundaries = input.boundaries.iter().filter_map(|(name, edges)| {
-        let directed = all.take(directed(name, edges, &sides, found))?;
+        let directed = all.check(directed(name, edges, &sides, found))?;
         Some((name.clone(), directed))
     });
     let boundaries = boundaries.collect();
-    all.then(Mesh {
+    all.finish(Mesh {
         nodes: input.nodes.clone(),
         elements: input.elements.clone(),
         boundaries,
@@ -43,10 +43,10 @@ fn check(input: &InlineMesh, found: &mut Findings) -> Checked<Mesh> {
 
 /// Nodes and elements by their numbers: which nodes are in use.
 fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
-    let mut all = All::default();
+    let mut all = AllChecks::default();
     let count = input.nodes.len() as u32;
     if input.elements.is_empty() {
-        all.refuse(found.say(
+        all.fail(found.report(
             "/elements",
             Reason::TooFew,
             "no element",
@@ -59,7 +59,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
         for (i, &node) in element.iter().enumerate() {
             let place = || format!("/elements/{e}/{i}");
             if node >= count {
-                all.refuse(found.say(
+                all.fail(found.report(
                     place(),
                     Reason::UnknownNode,
                     node,
@@ -67,7 +67,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
                     "Nodes are numbered from 0.",
                 ));
             } else if element[..i].contains(&node) {
-                all.refuse(found.say(
+                all.fail(found.report(
                     place(),
                     Reason::RepeatedNode,
                     node,
@@ -84,7 +84,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
         for (i, e) in group.iter().enumerate() {
             let place = format!("/groups/{}/{i}", escape(name));
             if *e as usize >= input.elements.len() {
-                all.refuse(found.say(
+                all.fail(found.report(
                     place,
                     Reason::UnknownElement,
                     e,
@@ -92,7 +92,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
                     "Elements are numbered from 0.",
                 ));
             } else if !members.insert(*e) {
-                all.refuse(found.say(
+                all.fail(found.report(
                     place,
                     Reason::RepeatedElement,
                     e,
@@ -104,7 +104,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
     }
     for (name, set) in &input.node_sets {
         for (i, node) in set.iter().enumerate().filter(|(_, n)| **n >= count) {
-            all.refuse(found.say(
+            all.fail(found.report(
                 format!("/node_sets/{}/{i}", escape(name)),
                 Reason::UnknownNode,
                 node,
@@ -115,7 +115,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
     }
     for (name, edges) in &input.boundaries {
         if edges.is_empty() {
-            all.refuse(found.say(
+            all.fail(found.report(
                 format!("/boundaries/{}", escape(name)),
                 Reason::TooFew,
                 "no edge",
@@ -124,7 +124,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
             ));
         }
     }
-    all.then(used)
+    all.finish(used)
 }
 
 /// The edges of a boundary, each with the body on its right.
@@ -134,7 +134,7 @@ fn directed(
     sides: &HashMap<(u32, u32), Side>,
     found: &mut Findings,
 ) -> Checked<Vec<[u32; 3]>> {
-    let mut all = All::default();
+    let mut all = AllChecks::default();
     let mut directed = Vec::with_capacity(edges.len());
     let mut named = HashSet::with_capacity(edges.len());
     for (i, &[a, b, mid]) in edges.iter().enumerate() {
@@ -169,9 +169,9 @@ fn directed(
             ),
         };
         let place = format!("/boundaries/{}/{i}", escape(name));
-        all.refuse(found.say(place, reason, got, expected, hint));
+        all.fail(found.report(place, reason, got, expected, hint));
     }
-    all.then(directed)
+    all.finish(directed)
 }
 
 struct Side {
@@ -182,7 +182,11 @@ struct Side {
 }
 
 /// All sides by their corners; says where neighbours do not share a midside.
-fn surface(input: &InlineMesh, found: &mut Findings, all: &mut All) -> HashMap<(u32, u32), Side> {
+fn surface(
+    input: &InlineMesh,
+    found: &mut Findings,
+    all: &mut AllChecks,
+) -> HashMap<(u32, u32), Side> {
     let mut sides: HashMap<(u32, u32), Side> = HashMap::with_capacity(2 * input.elements.len());
     for (e, element) in input.elements.iter().enumerate() {
         for (k, [a, b, mid]) in element.sides().enumerate() {
@@ -193,7 +197,7 @@ fn surface(input: &InlineMesh, found: &mut Findings, all: &mut All) -> HashMap<(
             });
             side.elements += 1;
             if side.mid != mid {
-                all.refuse(found.say(
+                all.fail(found.report(
                     format!("/elements/{e}/{}", element.family().corners() + k),
                     Reason::Nonconforming,
                     format!("midside {mid}"),
@@ -201,7 +205,7 @@ fn surface(input: &InlineMesh, found: &mut Findings, all: &mut All) -> HashMap<(
                     "Neighbours share all three nodes of a side.",
                 ));
             } else if side.elements > 2 {
-                all.refuse(found.say(
+                all.fail(found.report(
                     format!("/elements/{e}"),
                     Reason::Nonconforming,
                     format!("a third element on the side {a}–{b}"),

@@ -1,7 +1,7 @@
 //! Elements that are folded or numbered the wrong way round, as violations.
 
 use super::Mesh;
-use crate::error::{All, Findings, Reason, Violation};
+use crate::error::{AllChecks, Findings, Reason, Violation};
 
 /// Whether no element of a mesh that is otherwise sound is inverted. `pointer`: to an element by its
 /// number; `of`: which mesh, after that number. For [`Mesh::inverted_elements`] `at_nodes`.
@@ -12,9 +12,9 @@ pub fn check_inverted(
     of: &str,
 ) -> Result<(), Vec<Violation>> {
     let mut found = Findings::of_mesh("");
-    let mut all = All::default();
+    let mut all = AllChecks::default();
     for (e, place, det) in mesh.inverted_elements(at_nodes) {
-        all.refuse(found.say(
+        all.fail(found.report(
             pointer(e),
             Reason::InvertedElement,
             format!("element {e}{of} with det J = {det:.3e} at {place}"),
@@ -22,5 +22,5 @@ pub fn check_inverted(
             "List corners counter-clockwise, and keep midsides near the middle of their sides.",
         ));
     }
-    found.conclude(all.then(()))
+    found.conclude(all.finish(()))
 }

@@ -2,11 +2,12 @@
 
 use super::checks::{ALIGNED, Checks};
 use super::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
-use crate::error::{All, Checked, Reason, Refused, escape};
+use crate::error::{AllChecks, Checked, Reason, Refused, escape};
 use crate::mesh::{self, Edge, External, Mesh};
 use crate::problem::{
     AdaptiveRefine, Analysis, BoundaryPart, BoundaryValue, MeshInput, MeshSource, Refine,
 };
+use crate::solution::WarningCode;
 
 /// Sides face one way when their normals differ by no more (degrees).
 const SAME_DIRECTION: f64 = 1.0;
@@ -25,7 +26,7 @@ impl Checks {
     ) -> Checked<Mesh> {
         let mesh = self.source(&input.source, external);
         let refine = match input.refine {
-            Refine::Times(times) if times > MOST_REFINEMENTS => Err(self.say(
+            Refine::Times(times) if times > MOST_REFINEMENTS => Err(self.report(
                 "/mesh/refine",
                 Reason::OutOfRange,
                 times,
@@ -43,7 +44,7 @@ impl Checks {
         let refine = upright.and(radii).and(refine)?;
         if let Some((x, distance)) = input.grid().and_then(mesh::largest_cut) {
             self.warn(
-                "strip_cuts_polyline",
+                WarningCode::StripCutsPolyline,
                 "/mesh/grid",
                 format!("The strip leaves its polyline by {distance:.3e} at x = {x}, between two grid lines. Put a grid line there."),
             );
@@ -54,17 +55,17 @@ impl Checks {
         if input.grid().is_none() && refine > 0 {
             let whole = |_| "/mesh".to_owned();
             let upright = mesh::check_inverted(&mesh, false, whole, " of the refined mesh");
-            self.found.took(upright)?;
+            self.found.merge(upright)?;
         }
         Ok(mesh)
     }
 
     /// Further names for parts of boundaries and groups of elements.
     pub(super) fn names(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
-        let mut all = All::default();
-        all.take(self.parts(mesh, input));
-        all.take(self.groups(mesh, input));
-        all.then(())
+        let mut all = AllChecks::default();
+        all.check(self.parts(mesh, input));
+        all.check(self.groups(mesh, input));
+        all.finish(())
     }
 
     /// In an axisymmetric body x is the radius.
@@ -75,7 +76,7 @@ impl Checks {
             _ => None,
         };
         let Some(node) = node else { return Ok(()) };
-        Err(self.say(
+        Err(self.report(
             match &input.source {
                 MeshSource::Inline(_) => format!("/mesh/inline/nodes/{node}"),
                 MeshSource::Grid(_) => "/mesh/grid/x".to_owned(),
@@ -90,8 +91,8 @@ impl Checks {
 
     /// What adaptive refinement needs: a tolerance, a grid to put lines into, a contact to watch.
     fn adaptive(&mut self, input: &MeshInput, goal: &AdaptiveRefine, contacts: usize) -> Checked {
-        let mut all = All::default();
-        all.take(self.require(
+        let mut all = AllChecks::default();
+        all.check(self.require(
             goal.tolerance > 0.0 && goal.tolerance < 1.0,
             "/mesh/refine/tolerance",
             goal.tolerance,
@@ -99,7 +100,7 @@ impl Checks {
             "The relative change that is left; 0.01 is one percent.",
         ));
         if input.grid().is_none() {
-            all.refuse(self.say(
+            all.fail(self.report(
                 "/mesh/refine",
                 Reason::NotUsed,
                 "adaptive refinement of a mesh that is no grid",
@@ -113,7 +114,7 @@ impl Checks {
         if lines[0] * lines[1] > MOST_ADAPTIVE_ELEMENTS
             || lines[0].max(lines[1]) > MOST_ADAPTIVE_LINES
         {
-            all.refuse(self.say(
+            all.fail(self.report(
                 "/mesh/refine",
                 Reason::TooLarge,
                 format!("a first grid of {} × {} lines", lines[0], lines[1]),
@@ -122,7 +123,7 @@ impl Checks {
             ));
         }
         if contacts == 0 {
-            all.refuse(self.say(
+            all.fail(self.report(
                 "/mesh/refine",
                 Reason::NotUsed,
                 "adaptive refinement without a contact",
@@ -130,12 +131,12 @@ impl Checks {
                 "It watches the forces and peak stresses of contacts.",
             ));
         }
-        all.then(())
+        all.finish(())
     }
 
     /// Names for groups of elements.
     fn groups(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let size = [0, 1]
             .map(|axis| mesh.extent(axis))
             .into_iter()
@@ -143,7 +144,7 @@ impl Checks {
         for (name, range) in &input.groups {
             let pointer = format!("/mesh/groups/{}", escape(name));
             if mesh.groups.contains_key(name) {
-                all.refuse(self.say(
+                all.fail(self.report(
                     &pointer,
                     Reason::NameTaken,
                     name,
@@ -160,7 +161,7 @@ impl Checks {
             };
             let elements: Vec<u32> = (0..mesh.elements.len() as u32).filter(holds).collect();
             if elements.is_empty() {
-                all.refuse(self.say(
+                all.fail(self.report(
                     &pointer,
                     Reason::EmptyGroup,
                     "no element",
@@ -170,22 +171,22 @@ impl Checks {
             }
             mesh.groups.insert(name.clone(), elements);
         }
-        all.then(())
+        all.finish(())
     }
 
     /// The mesh as it is given, before it is refined.
     fn source(&mut self, source: &MeshSource, external: Option<External>) -> Checked<Mesh> {
         match source {
             MeshSource::Grid(grid) => {
-                self.found.took(mesh::check_grid(grid, "/mesh/grid"))?;
+                self.found.merge(mesh::check_grid(grid, "/mesh/grid"))?;
                 Ok(mesh::grid_mesh(grid))
             }
             MeshSource::Inline(inline) => {
-                self.found.took(mesh::inline_mesh(inline, "/mesh/inline"))
+                self.found.merge(mesh::inline_mesh(inline, "/mesh/inline"))
             }
             MeshSource::Gmsh(_) | MeshSource::Abaqus(_) | MeshSource::Stored(_) => match external {
                 Some(found) => {
-                    let found = self.found.took(found)?;
+                    let found = self.found.merge(found)?;
                     self.warnings.extend(found.warnings);
                     Ok(found.mesh)
                 }
@@ -196,7 +197,7 @@ impl Checks {
 
     /// No element is folded or numbered clockwise.
     fn upright(&mut self, mesh: &Mesh, source: &MeshSource) -> Checked {
-        self.found.took(match source {
+        self.found.merge(match source {
             // straight-sided grids need no look at their corners, and stay what they are when refined
             MeshSource::Grid(_) => mesh::check_inverted(mesh, false, |_| "/mesh".to_owned(), ""),
             MeshSource::Inline(_) => {
@@ -211,14 +212,14 @@ impl Checks {
     /// The caller has no mesh for what the problem names or quotes.
     fn absent(&mut self, source: &MeshSource) -> Refused {
         match source {
-            MeshSource::Stored(hash) => self.say(
+            MeshSource::Stored(hash) => self.report(
                 "/mesh/stored",
                 Reason::UnknownMesh,
                 hash,
                 "a mesh that this service has stored",
                 "Upload it first (POST /v1/meshes); `signorini solve` has no store: give the mesh itself.",
             ),
-            _ => self.say(
+            _ => self.report(
                 "/mesh",
                 Reason::UnknownMesh,
                 "a text that nobody has read",
@@ -230,7 +231,7 @@ impl Checks {
 
     /// Names for parts of boundaries.
     fn parts(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let original = mesh.boundaries.clone();
         let size = [0, 1]
             .map(|axis| mesh.extent(axis))
@@ -240,7 +241,7 @@ impl Checks {
         for (name, part) in &input.boundaries {
             let pointer = format!("/mesh/boundaries/{}", escape(name));
             if original.contains_key(name) {
-                all.refuse(self.say(
+                all.fail(self.report(
                     &pointer,
                     Reason::NameTaken,
                     name,
@@ -253,7 +254,7 @@ impl Checks {
                 None => surface.get_or_insert_with(|| mesh.surface()),
                 Some(side) => {
                     let Some(edges) = original.get(side) else {
-                        all.refuse(self.say(
+                        all.fail(self.report(
                             format!("{pointer}/side"),
                             Reason::UnknownBoundary,
                             side,
@@ -265,7 +266,7 @@ impl Checks {
                     edges
                 }
             };
-            if all.take(self.direction(part, &pointer)).is_none() {
+            if all.check(self.direction(part, &pointer)).is_none() {
                 continue;
             }
             let ranges = part.corners.map(|[[x0, y0], [x1, y1]]| {
@@ -283,7 +284,7 @@ impl Checks {
             };
             let part: Vec<Edge> = edges.iter().filter(holds).copied().collect();
             if part.is_empty() {
-                all.refuse(self.say(
+                all.fail(self.report(
                     &pointer,
                     Reason::EmptyBoundary,
                     "no edge",
@@ -293,13 +294,13 @@ impl Checks {
             }
             mesh.boundaries.insert(name.clone(), part);
         }
-        all.then(())
+        all.finish(())
     }
 
     /// The conditions of a part that can be wrong by themselves.
     fn direction(&mut self, part: &BoundaryPart, pointer: &str) -> Checked {
         if part.normal == Some([0.0, 0.0]) {
-            return Err(self.say(
+            return Err(self.report(
                 format!("{pointer}/normal"),
                 Reason::OutOfRange,
                 "[0, 0]",
@@ -308,7 +309,7 @@ impl Checks {
             ));
         }
         if part.normal.is_none() && part.angle.is_some() {
-            return Err(self.say(
+            return Err(self.report(
                 format!("{pointer}/angle"),
                 Reason::NotUsed,
                 "an angle without a `normal`",
@@ -318,7 +319,7 @@ impl Checks {
         }
         let angle = part.angle.unwrap_or(SAME_DIRECTION);
         if !(0.0..=180.0).contains(&angle) {
-            return Err(self.say(
+            return Err(self.report(
                 format!("{pointer}/angle"),
                 Reason::OutOfRange,
                 angle,
@@ -343,7 +344,7 @@ impl Checks {
             true => "a set of nodes; this mesh has none".to_owned(),
             false => format!("one of {}", known(mesh.node_sets.keys())),
         };
-        Err(self.say(
+        Err(self.report(
             pointer,
             Reason::UnknownNodeSet,
             name,
@@ -362,7 +363,7 @@ impl Checks {
         if let Some(edges) = mesh.boundaries.get(name) {
             return Ok(edges);
         }
-        Err(self.say(
+        Err(self.report(
             pointer,
             Reason::UnknownBoundary,
             name,
@@ -387,7 +388,7 @@ impl Checks {
         };
         let runs = mesh::runs(edges);
         let [run] = &runs[..] else {
-            return Err(self.say(
+            return Err(self.report(
                 pointer,
                 Reason::NotAChain,
                 format!("a boundary of {} pieces", runs.len()),

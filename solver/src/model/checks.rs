@@ -1,7 +1,7 @@
 //! The checks of one problem: what they have found so far.
 
 use crate::error::{Checked, Findings, Reason, Refused};
-use crate::solution::Warning;
+use crate::solution::{Warning, WarningCode};
 
 /// Directions count as equal to an axis, and prescribed values as equal, to this.
 pub(super) const ALIGNED: f64 = 1e-9;
@@ -15,7 +15,7 @@ pub(super) struct Checks {
 
 impl Checks {
     /// Something is wrong.
-    pub(super) fn say(
+    pub(super) fn report(
         &mut self,
         pointer: impl AsRef<str>,
         reason: Reason,
@@ -23,7 +23,7 @@ impl Checks {
         expected: impl Into<String>,
         hint: impl Into<String>,
     ) -> Refused {
-        self.found.say(pointer, reason, got, expected, hint)
+        self.found.report(pointer, reason, got, expected, hint)
     }
 
     /// A number is in its range, or something is wrong.
@@ -37,14 +37,14 @@ impl Checks {
     ) -> Checked {
         match holds {
             true => Ok(()),
-            false => Err(self.say(pointer, Reason::OutOfRange, got, expected, hint)),
+            false => Err(self.report(pointer, Reason::OutOfRange, got, expected, hint)),
         }
     }
 
     /// Something is accepted, and yet worth knowing.
-    pub(super) fn warn(&mut self, code: &str, pointer: &str, message: String) {
+    pub(super) fn warn(&mut self, code: WarningCode, pointer: &str, message: String) {
         self.warnings.push(Warning {
-            code: code.to_owned(),
+            code,
             pointer: pointer.to_owned(),
             message,
         });

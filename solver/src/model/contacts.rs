@@ -10,10 +10,11 @@ use super::supports::Held;
 use crate::contact::ContactBoundary;
 use crate::contact::obstacle::{self, FacingRun, Profile};
 use crate::elasticity::Section;
-use crate::error::{All, Checked, Reason};
+use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, FrictionLaw};
 use crate::mesh::{self, Edge, Mesh};
 use crate::problem::{Condition, Contact, NormalOf, Obstacle, Problem, Step};
+use crate::solution::WarningCode;
 
 /// Cosine of the sharpest turn between two contact edges that goes without a warning: 20°.
 const SHARPEST_TURN: f64 = 0.94;
@@ -37,18 +38,18 @@ impl Checks {
         numbers: Vec<(Checked, Option<FrictionLaw<Average>>)>,
         fixed: &BTreeMap<u32, Held>,
     ) -> (Vec<ContactModel>, Checked) {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let mut models: Vec<ContactModel> = Vec::new();
         for (i, numbers) in numbers.into_iter().enumerate() {
             let contact = self.contact(mesh, section, axis, &problem.contacts, i, numbers);
-            let Some(model) = all.take(contact) else {
+            let Some(model) = all.check(contact) else {
                 continue;
             };
-            all.take(self.shared_nodes(&model, &models));
-            all.take(self.supported_contact_nodes(&model, &problem.steps, fixed));
+            all.check(self.shared_nodes(&model, &models));
+            all.check(self.supported_contact_nodes(&model, &problem.steps, fixed));
             models.push(model);
         }
-        (models, all.then(()))
+        (models, all.finish(()))
     }
 
     /// Contact number i by itself.
@@ -64,7 +65,7 @@ impl Checks {
         let (contact, pointer) = (&contacts[i], format!("/contacts/{i}"));
         let same = |other: &Contact| other.boundary == contact.boundary;
         if contacts[..i].iter().any(same) {
-            return Err(self.say(
+            return Err(self.report(
                 format!("{pointer}/boundary"),
                 Reason::NameTaken,
                 &contact.boundary,
@@ -104,7 +105,7 @@ impl Checks {
         });
         match shared {
             None => Ok(()),
-            Some((other, node)) => Err(self.say(
+            Some((other, node)) => Err(self.report(
                 format!("{}/boundary", model.pointer),
                 Reason::SharedNode,
                 format!("node {node}, also in contact `{other}`"),
@@ -124,12 +125,12 @@ impl Checks {
         run: &FacingRun,
         pointer: &str,
     ) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let last = boundary.nodes.len() - 1;
         let at = |i: usize| boundary.positions[i];
         let end_on_axis = |i: usize| (i == 0 || i == last) && axis.holds(at(i));
         if let Some(i) = (0..=last).find(|&i| !(boundary.weights[i] > 0.0 || end_on_axis(i))) {
-            all.refuse(self.say(
+            all.fail(self.report(
                 format!("{pointer}/boundary"),
                 Reason::NoArea,
                 format!(
@@ -146,7 +147,7 @@ impl Checks {
             .step_by(2)
             .find(|&corner| turn(boundary, corner) < SHARPEST_CORNER)
         {
-            all.refuse(self.say(
+            all.fail(self.report(
                 format!("{pointer}/boundary"),
                 Reason::TurnsCorner,
                 format!(
@@ -167,7 +168,7 @@ impl Checks {
         let falls = |pair: &[f64]| pair[1] < pair[0];
         if curved && !run.coordinate.windows(2).all(grows) && !run.coordinate.windows(2).all(falls)
         {
-            all.refuse(self.say(
+            all.fail(self.report(
                 format!("{pointer}/obstacle/along"),
                 Reason::NotMonotonic,
                 "a coordinate x that does not grow or fall along the boundary",
@@ -177,7 +178,7 @@ impl Checks {
         }
         if let Some(radius) = radius {
             let most = LARGEST_RADIUS * boundary.s[last];
-            all.take(self.require(
+            all.check(self.require(
                 radius <= most,
                 format!("{pointer}/friction/nonlocal_radius"),
                 radius,
@@ -185,7 +186,7 @@ impl Checks {
                 "The radius is a material length, far below the size of the contact.",
             ));
         }
-        all.then(())
+        all.finish(())
     }
 
     /// The part of the boundary that faces the obstacle: one chain.
@@ -198,7 +199,7 @@ impl Checks {
     ) -> Checked<FacingRun> {
         let runs = mesh::runs(edges);
         let [run] = &runs[..] else {
-            return Err(self.say(
+            return Err(self.report(
                 format!("{pointer}/boundary"),
                 Reason::NotAChain,
                 format!("{} pieces", runs.len()),
@@ -207,7 +208,7 @@ impl Checks {
             ));
         };
         if run[0][0] == run[run.len() - 1][1] {
-            return Err(self.say(
+            return Err(self.report(
                 format!("{pointer}/boundary"),
                 Reason::NotAChain,
                 "a closed loop",
@@ -218,7 +219,7 @@ impl Checks {
         let mut facing = obstacle::facing(mesh, run, &contact.obstacle);
         for [low, high] in &facing.cut {
             self.warn(
-                "obstacle_cuts_edge",
+                WarningCode::ObstacleCutsEdge,
                 &format!("{pointer}/obstacle"),
                 format!("The obstacle ends inside the edge from {low} to {high}, which is left out of the contact. Put a grid line on the obstacle's end."),
             );
@@ -249,7 +250,7 @@ impl Checks {
                 "one piece",
             ),
         };
-        Err(self.say(place, reason, got, expected, extent))
+        Err(self.report(place, reason, got, expected, extent))
     }
 
     /// A supported contact node keeps its two unknowns apart only where a support acts along the
@@ -260,7 +261,7 @@ impl Checks {
         steps: &[Step],
         fixed: &BTreeMap<u32, Held>,
     ) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let (boundary, pointer) = (&contact.boundary, &contact.pointer);
         let ends: Vec<Level> = match steps {
             [] => vec![Level::FULL],
@@ -278,7 +279,7 @@ impl Checks {
             );
             let (along_n, along_t) = (held.along(n), held.along(t));
             if along_n.is_none() && along_t.is_none() {
-                all.refuse(self.say(
+                all.fail(self.report(
                     format!("{pointer}/boundary"),
                     Reason::ObliqueSupport,
                     format!("node {node} at ({x}, {y}), normal ({:.4}, {:.4}), supported along one axis", n[0], n[1]),
@@ -293,7 +294,7 @@ impl Checks {
                         continue;
                     };
                     if (u - wanted).abs() > ALIGNED * u.abs().max(wanted.abs()) {
-                        return Err(self.say(
+                        return Err(self.report(
                             format!("{pointer}/condition"),
                             Reason::Conflict,
                             format!("node {node} at ({x}, {y}) held at {u} by a support"),
@@ -308,7 +309,7 @@ impl Checks {
                 let (u_n, gap) = (level.supports * u_n, contact.gap(i, level.indentation));
                 let free = contact.condition == Condition::None;
                 if !free && u_n > gap + ALIGNED * gap.abs() {
-                    return Err(self.say(
+                    return Err(self.report(
                         format!("{pointer}/indentation"),
                         Reason::Impossible,
                         format!("node {node} at ({x}, {y}) held at u_n = {u_n} by a support, {} inside the obstacle", u_n - gap),
@@ -318,11 +319,11 @@ impl Checks {
                 }
             }
         }
-        all.then(())
+        all.finish(())
     }
 
     /// What is accepted, and yet makes the numbers doubtful.
-    pub(super) fn doubts(&mut self, contacts: &[ContactModel]) {
+    pub(super) fn warn_about_contacts(&mut self, contacts: &[ContactModel]) {
         for contact in contacts {
             self.corners(contact);
             self.coarseness(contact);
@@ -337,7 +338,7 @@ impl Checks {
             if cosine < SHARPEST_TURN {
                 let ([x, y], angle) = (boundary.positions[corner], cosine.acos().to_degrees());
                 self.warn(
-                    "contact_turns",
+                    WarningCode::ContactTurns,
                     &format!("{}/boundary", contact.pointer),
                     format!("The contact boundary turns by {angle:.0}° at ({x}, {y}), where the mean of the two normals is used. Give each side a contact of its own, or mesh the rounding."),
                 );
@@ -358,7 +359,7 @@ impl Checks {
             .fold(f64::INFINITY, f64::min);
         if shortest > radius {
             self.warn(
-                "mesh_too_coarse_for_radius",
+                WarningCode::MeshTooCoarseForRadius,
                 &format!("{}/friction/nonlocal_radius", contact.pointer),
                 format!("The shortest contact edge ({shortest:.3e}) is longer than the nonlocal radius ({radius}): the averaging is not resolved. Refine the mesh towards the ends of the contact."),
             );

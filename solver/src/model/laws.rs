@@ -2,7 +2,7 @@
 //! each other.
 
 use super::checks::Checks;
-use crate::error::{All, Checked, Reason};
+use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, BoundLaw, FrictionLaw};
 use crate::problem::{
     Analysis, Condition, Contact, Friction, History, Measure, Obstacle, PrescribedBound, Transition,
@@ -11,7 +11,7 @@ use crate::problem::{
 impl Checks {
     /// The numbers of an obstacle.
     pub(super) fn obstacle(&mut self, obstacle: &Obstacle, pointer: &str) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let at = |field: &str| format!("{pointer}/{field}");
         let lengths = "a length > 0";
         match obstacle {
@@ -19,10 +19,10 @@ impl Checks {
             | Obstacle::Parabola { radius, .. }
             | Obstacle::RoundedFlat { radius, .. } => {
                 let hint = "The obstacle is convex towards the body.";
-                all.take(self.require(*radius > 0.0, at("radius"), *radius, lengths, hint));
+                all.check(self.require(*radius > 0.0, at("radius"), *radius, lengths, hint));
             }
             Obstacle::Wedge { angle, .. } | Obstacle::Cone { angle, .. } => {
-                all.take(self.require(
+                all.check(self.require(
                     *angle > 0.0 && *angle < 90.0,
                     at("angle"),
                     *angle,
@@ -36,21 +36,21 @@ impl Checks {
                 ..
             } => {
                 let hint = "The obstacle is convex towards the body.";
-                all.take(self.require(
+                all.check(self.require(
                     *coefficient > 0.0,
                     at("coefficient"),
                     *coefficient,
                     "> 0",
                     hint,
                 ));
-                all.take(self.require(*exponent >= 1.0, at("exponent"), *exponent, "≥ 1", hint));
+                all.check(self.require(*exponent >= 1.0, at("exponent"), *exponent, "≥ 1", hint));
             }
             Obstacle::Table { x, gap, .. } => {
-                all.take(self.table(&at("x"), x, &at("gap"), gap, "profile"));
+                all.check(self.table(&at("x"), x, &at("gap"), gap, "profile"));
             }
             Obstacle::Polyline { points, .. } => {
                 if points.len() < 2 {
-                    all.refuse(self.say(
+                    all.fail(self.report(
                         at("points"),
                         Reason::TooFew,
                         format!("{} point(s)", points.len()),
@@ -59,7 +59,7 @@ impl Checks {
                     ));
                 }
                 if let Some(i) = (1..points.len()).find(|&i| points[i] == points[i - 1]) {
-                    all.refuse(self.say(
+                    all.fail(self.report(
                         format!("{pointer}/points/{i}"),
                         Reason::RepeatedPoint,
                         format!("{:?} twice", points[i]),
@@ -71,7 +71,7 @@ impl Checks {
             Obstacle::Flat { .. } | Obstacle::Tilted { .. } | Obstacle::Line { .. } => {}
         }
         if let Obstacle::RoundedFlat { half_width, .. } = obstacle {
-            all.take(self.require(
+            all.check(self.require(
                 *half_width >= 0.0,
                 at("half_width"),
                 *half_width,
@@ -82,7 +82,7 @@ impl Checks {
         if let (Some(from), Some(to), _) = obstacle.span()
             && from >= to
         {
-            all.refuse(self.say(
+            all.fail(self.report(
                 at("to"),
                 Reason::OutOfRange,
                 to,
@@ -90,14 +90,14 @@ impl Checks {
                 "`from` and `to` are the ends of the obstacle.",
             ));
         }
-        all.then(())
+        all.finish(())
     }
 
     /// Places that grow, and as many values.
     fn table(&mut self, x_at: &str, x: &[f64], y_at: &str, y: &[f64], what: &str) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         if x.len() < 2 {
-            all.refuse(self.say(
+            all.fail(self.report(
                 x_at,
                 Reason::TooFew,
                 format!("{} point(s)", x.len()),
@@ -106,7 +106,7 @@ impl Checks {
             ));
         }
         if let Some(i) = (1..x.len()).find(|&i| x[i] <= x[i - 1]) {
-            all.refuse(self.say(
+            all.fail(self.report(
                 format!("{x_at}/{i}"),
                 Reason::NotIncreasing,
                 format!("{} after {}", x[i], x[i - 1]),
@@ -115,7 +115,7 @@ impl Checks {
             ));
         }
         if x.len() != y.len() {
-            all.refuse(self.say(
+            all.fail(self.report(
                 y_at,
                 Reason::WrongLength,
                 format!("{} values", y.len()),
@@ -123,7 +123,7 @@ impl Checks {
                 "Give one value for each place.",
             ));
         }
-        all.then(())
+        all.finish(())
     }
 
     /// The friction law of a contact, where all its parts are there; and whether its numbers are in their
@@ -134,9 +134,9 @@ impl Checks {
         contact: &Contact,
         pointer: &str,
     ) -> (Option<FrictionLaw<Average>>, Checked) {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         match (&contact.friction, contact.condition) {
-            (Some(_), Condition::Bonded) => all.refuse(self.say(
+            (Some(_), Condition::Bonded) => all.fail(self.report(
                 pointer,
                 Reason::NotUsed,
                 "friction on a bonded contact",
@@ -144,7 +144,7 @@ impl Checks {
                 "Leave `friction` out, or choose another `condition`.",
             )),
             (friction, Condition::None) if friction.as_ref().is_none_or(|f| f.bound.is_none()) => {
-                all.refuse(self.say(
+                all.fail(self.report(
                     format!("{pointer}/bound"),
                     Reason::Missing,
                     "nothing",
@@ -155,14 +155,14 @@ impl Checks {
             _ => {}
         }
         let Some(friction) = &contact.friction else {
-            return (None, all.then(()));
+            return (None, all.finish(()));
         };
         let (bound, sound) = match &friction.bound {
             Some(bound) => self.prescribed_bound(friction, bound, pointer),
             None => self.pressure_bound(friction, pointer),
         };
-        all.take(sound);
-        all.take(self.slip(analysis, friction, pointer));
+        all.check(sound);
+        all.check(self.slip(analysis, friction, pointer));
         let law = bound.map(|bound| FrictionLaw {
             bound,
             elastic_slip: friction.elastic_slip,
@@ -170,7 +170,7 @@ impl Checks {
             history: friction.history,
             points: friction.points,
         });
-        (law, all.then(()))
+        (law, all.finish(()))
     }
 
     /// A bound that follows from the pressure.
@@ -179,7 +179,7 @@ impl Checks {
         friction: &Friction,
         pointer: &str,
     ) -> (Option<BoundLaw<Average>>, Checked) {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let at = |field: &str| format!("{pointer}/{field}");
         let numbers = [
             (
@@ -196,9 +196,9 @@ impl Checks {
             ),
         ];
         for (name, value, expected, hint) in numbers {
-            all.take(match value {
+            all.check(match value {
                 Some(value) => self.require(value >= 0.0, at(name), value, expected, hint),
-                None => Err(self.say(
+                None => Err(self.report(
                     at(name),
                     Reason::Missing,
                     "nothing",
@@ -207,7 +207,7 @@ impl Checks {
                 )),
             });
         }
-        all.take(self.require(
+        all.check(self.require(
             friction.cohesion >= 0.0,
             at("cohesion"),
             friction.cohesion,
@@ -216,7 +216,7 @@ impl Checks {
         ));
         if let Some(cap) = friction.shear_cap {
             let hint = "The largest tangential stress that the surface bears.";
-            all.take(self.require(cap > 0.0, at("shear_cap"), cap, "a stress > 0", hint));
+            all.check(self.require(cap > 0.0, at("shear_cap"), cap, "a stress > 0", hint));
         }
         let law = match (friction.coefficient, friction.nonlocal_radius) {
             (Some(coefficient), Some(radius)) => Some(BoundLaw::Pressure {
@@ -232,7 +232,7 @@ impl Checks {
             }),
             _ => None,
         };
-        (law, all.then(()))
+        (law, all.finish(()))
     }
 
     /// A bound that is given, alone.
@@ -242,7 +242,7 @@ impl Checks {
         bound: &PrescribedBound,
         pointer: &str,
     ) -> (Option<BoundLaw<Average>>, Checked) {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let at = |field: &str| format!("{pointer}/{field}");
         for (name, given) in [
             ("coefficient", friction.coefficient.is_some()),
@@ -251,7 +251,7 @@ impl Checks {
             ("shear_cap", friction.shear_cap.is_some()),
         ] {
             if given {
-                all.refuse(self.say(
+                all.fail(self.report(
                     at(name),
                     Reason::NotUsed,
                     "a value beside `bound`",
@@ -266,25 +266,25 @@ impl Checks {
         );
         match bound {
             PrescribedBound::Constant(bound) => {
-                all.take(self.require(*bound >= 0.0, at("bound"), *bound, stress, hint));
+                all.check(self.require(*bound >= 0.0, at("bound"), *bound, stress, hint));
             }
             PrescribedBound::Table(table) => {
                 let (s, bound) = (at("bound/s"), at("bound/bound"));
-                all.take(self.table(&s, &table.s, &bound, &table.bound, "friction bound"));
+                all.check(self.table(&s, &table.s, &bound, &table.bound, "friction bound"));
                 if let Some(i) = table.bound.iter().position(|b| *b < 0.0) {
                     let place = format!("{bound}/{i}");
-                    all.take(self.require(false, place, table.bound[i], stress, hint));
+                    all.check(self.require(false, place, table.bound[i], stress, hint));
                 }
             }
         }
-        (Some(BoundLaw::Prescribed(bound.clone())), all.then(()))
+        (Some(BoundLaw::Prescribed(bound.clone())), all.finish(()))
     }
 
     /// How a law goes from stick to slip.
     fn slip(&mut self, analysis: &Analysis, friction: &Friction, pointer: &str) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let at = |field: &str| format!("{pointer}/{field}");
-        all.take(self.require(
+        all.check(self.require(
             friction.elastic_slip > 0.0,
             at("elastic_slip"),
             friction.elastic_slip,
@@ -292,7 +292,7 @@ impl Checks {
             "About 1e-4 of the contact's width; below 1e-5 nothing physical changes.",
         ));
         if friction.history == History::Incremental && friction.transition != Transition::Linear {
-            all.refuse(self.say(
+            all.fail(self.report(
                 at("transition"),
                 Reason::NotUsed,
                 "another transition with the incremental history",
@@ -302,7 +302,7 @@ impl Checks {
         }
         let round = matches!(analysis, Analysis::Axisymmetric {});
         if friction.measure == Measure::Surface && !round {
-            all.refuse(self.say(
+            all.fail(self.report(
                 at("measure"),
                 Reason::NotUsed,
                 "`surface`",
@@ -310,6 +310,6 @@ impl Checks {
                 "In the plane there is no surface to integrate over.",
             ));
         }
-        all.then(())
+        all.finish(())
     }
 }

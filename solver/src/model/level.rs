@@ -17,7 +17,7 @@ pub struct Level {
 
 impl Level {
     /// Nothing.
-    pub const NOTHING: Level = Level {
+    pub const ZERO: Level = Level {
         indentation: 0.0,
         tangential_displacement: 0.0,
         loads: 0.0,

@@ -2,7 +2,7 @@
 
 use super::checks::Checks;
 use crate::elasticity::{EdgeLoad, LoadAxes, Loads, Section};
-use crate::error::{All, Checked, Reason};
+use crate::error::{AllChecks, Checked, Reason};
 use crate::mesh::{self, Edge, Mesh};
 use crate::problem::{BoundaryValue, Load};
 
@@ -23,12 +23,12 @@ impl Checks {
         section: &Section,
         loads: &[Load],
     ) -> Checked<Loads> {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let mut found = Loads::default();
         for (i, load) in loads.iter().enumerate() {
-            all.take(self.load(mesh, section, load, &format!("/loads/{i}"), &mut found));
+            all.check(self.load(mesh, section, load, &format!("/loads/{i}"), &mut found));
         }
-        all.then(found)
+        all.finish(found)
     }
 
     /// Adds one load to those `found`.
@@ -128,7 +128,7 @@ impl Checks {
     fn nodes_in_order(&mut self, edges: &[Edge], count: usize, pointer: &str) -> Checked<Vec<u32>> {
         let runs = mesh::runs(edges);
         let [run] = &runs[..] else {
-            return Err(self.say(
+            return Err(self.report(
                 pointer,
                 Reason::NotAChain,
                 format!("a boundary of {} pieces", runs.len()),
@@ -140,7 +140,7 @@ impl Checks {
         run.iter()
             .for_each(|[_, end, mid]| nodes.extend([*mid, *end]));
         if nodes.len() != count {
-            return Err(self.say(
+            return Err(self.report(
                 pointer,
                 Reason::WrongLength,
                 format!("{count} forces"),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::checks::Checks;
 use crate::elasticity::{self, Moduli, Section};
-use crate::error::{All, Checked, Reason};
+use crate::error::{AllChecks, Checked, Reason};
 use crate::mesh::Mesh;
 use crate::problem::{Analysis, Elasticity, Material, Orthotropic};
 
@@ -16,9 +16,9 @@ impl Checks {
         materials: &[Material],
         mesh: &Mesh,
     ) -> Checked<Section> {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         if materials.is_empty() {
-            all.refuse(self.say(
+            all.fail(self.report(
                 "/materials",
                 Reason::TooFew,
                 "no material",
@@ -28,10 +28,10 @@ impl Checks {
         }
         let mut moduli = Vec::new();
         for (i, material) in materials.iter().enumerate() {
-            moduli.extend(all.take(self.moduli(&analysis, material, &format!("/materials/{i}"))));
+            moduli.extend(all.check(self.moduli(&analysis, material, &format!("/materials/{i}"))));
         }
         let material_of = self.elements_of(materials, mesh);
-        all.then(())?;
+        all.finish(())?;
         let material_of = material_of?;
         Ok(match moduli[..] {
             [only] => Section::uniform(analysis, only),
@@ -61,22 +61,22 @@ impl Checks {
         nu: f64,
         pointer: &str,
     ) -> Checked<Moduli> {
-        let mut all = All::default();
-        all.take(self.require(
+        let mut all = AllChecks::default();
+        all.check(self.require(
             e > 0.0,
             format!("{pointer}/youngs_modulus"),
             e,
             "a stress > 0",
             "Young's modulus E.",
         ));
-        all.take(self.require(
+        all.check(self.require(
             nu > -1.0 && nu < 0.5,
             format!("{pointer}/poissons_ratio"),
             nu,
             "−1 < Poisson's ratio < 0.5",
             "For a nearly incompressible body use a value such as 0.49.",
         ));
-        all.then(elasticity::isotropic(analysis, e, nu))
+        all.finish(elasticity::isotropic(analysis, e, nu))
     }
 
     fn orthotropic(
@@ -85,7 +85,7 @@ impl Checks {
         constants: &Orthotropic,
         pointer: &str,
     ) -> Checked<Moduli> {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let at = |field: &str| format!("{pointer}/orthotropic/{field}");
         let sheet = matches!(analysis, Analysis::PlaneStress { .. });
         for (name, value) in [
@@ -94,7 +94,7 @@ impl Checks {
             ("nu23", constants.nu23),
         ] {
             if value.is_none() && !sheet {
-                all.refuse(self.say(
+                all.fail(self.report(
                     at(name),
                     Reason::Missing,
                     "nothing",
@@ -111,13 +111,13 @@ impl Checks {
         ];
         for (name, value) in moduli {
             if let Some(value) = value {
-                all.take(self.require(value > 0.0, at(name), value, "a stress > 0", "A modulus."));
+                all.check(self.require(value > 0.0, at(name), value, "a stress > 0", "A modulus."));
             }
         }
-        all.then(())?;
+        all.finish(())?;
         elasticity::orthotropic(analysis, constants).ok_or_else(|| {
             let (nu13, nu23) = (named("nu13", constants.nu13), named("nu23", constants.nu23));
-            self.say(
+            self.report(
                 format!("{pointer}/orthotropic"),
                 Reason::OutOfRange,
                 format!("nu12 = {}{nu13}{nu23}", constants.nu12),
@@ -130,7 +130,7 @@ impl Checks {
     /// The material of every element: that of its group, else the one without a group.
     fn elements_of(&mut self, materials: &[Material], mesh: &Mesh) -> Checked<Vec<u16>> {
         const NONE: u16 = u16::MAX;
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let mut material_of = vec![NONE; mesh.elements.len()];
         for (i, material) in materials.iter().enumerate() {
             let Some(name) = &material.group else {
@@ -138,7 +138,7 @@ impl Checks {
             };
             let pointer = format!("/materials/{i}/group");
             let Some(elements) = mesh.groups.get(name) else {
-                all.refuse(self.say(
+                all.fail(self.report(
                     pointer,
                     Reason::UnknownGroup,
                     name,
@@ -149,7 +149,7 @@ impl Checks {
             };
             let taken = elements.iter().find(|&&e| material_of[e as usize] != NONE);
             if let Some(e) = taken {
-                all.refuse(self.say(
+                all.fail(self.report(
                     pointer,
                     Reason::Overlap,
                     format!(
@@ -167,7 +167,7 @@ impl Checks {
         let mut rest = (0..materials.len()).filter(|&i| materials[i].group.is_none());
         let (first, second) = (rest.next(), rest.next());
         if let Some(second) = second {
-            all.refuse(self.say(
+            all.fail(self.report(
                 format!("/materials/{second}/group"),
                 Reason::WrongCount,
                 "a second material without a group",
@@ -181,7 +181,7 @@ impl Checks {
                 .iter_mut()
                 .filter(|m| **m == NONE)
                 .for_each(|m| *m = i as u16),
-            (None, Some(e)) if !materials.is_empty() => all.refuse(self.say(
+            (None, Some(e)) if !materials.is_empty() => all.fail(self.report(
                 "/materials",
                 Reason::Missing,
                 format!("no material for element {e}"),
@@ -190,7 +190,7 @@ impl Checks {
             )),
             _ => {}
         }
-        all.then(material_of)
+        all.finish(material_of)
     }
 }
 

@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 use checks::Checks;
 
 use crate::elasticity::{Loads, Section};
-use crate::error::{All, Checked, Violation};
+use crate::error::{AllChecks, Checked, Violation};
 use crate::mesh::{External, Mesh};
 use crate::problem::{Problem, SolverControls, Step};
 use crate::solution::Warning;
@@ -62,7 +62,7 @@ impl Model {
     /// Checks and numbers a problem; `external`: the mesh that it only names or quotes, where it does.
     pub fn new(problem: &Problem, external: Option<External>) -> Result<Model, Vec<Violation>> {
         let mut checks = Checks::default();
-        let model = checks.all(problem, external);
+        let model = checks.model(problem, external);
         checks.found.conclude(model)
     }
 
@@ -74,41 +74,41 @@ impl Model {
 }
 
 impl Checks {
-    fn all(&mut self, problem: &Problem, external: Option<External>) -> Checked<Model> {
+    fn model(&mut self, problem: &Problem, external: Option<External>) -> Checked<Model> {
         // numbers that are not finite would make nonsense of every later check
         self.finite(problem)?;
         self.counts(problem)?;
         let analysis = problem.analysis;
-        let mut all = All::default();
-        all.take(self.analysis(&analysis));
-        all.take(self.units(problem.units.as_ref()));
-        all.take(self.controls(problem));
-        all.take(self.thesis(problem));
-        all.take(self.steps(&problem.steps));
+        let mut all = AllChecks::default();
+        all.check(self.analysis(&analysis));
+        all.check(self.units(problem.units.as_ref()));
+        all.check(self.controls(problem));
+        all.check(self.thesis(problem));
+        all.check(self.steps(&problem.steps));
         let mut numbers = Vec::new();
         for (i, contact) in problem.contacts.iter().enumerate() {
             let at = |field: &str| format!("/contacts/{i}/{field}");
             let obstacle = self.obstacle(&contact.obstacle, &at("obstacle"));
             let (friction, sound) = self.friction(&analysis, contact, &at("friction"));
-            all.take(sound);
+            all.check(sound);
             numbers.push((obstacle, friction));
         }
         let mut mesh = self.mesh(&problem.mesh, external, &analysis, problem.contacts.len())?;
-        all.take(self.names(&mut mesh, &problem.mesh));
-        all.take(self.thesis_elements(problem, &mesh));
+        all.check(self.names(&mut mesh, &problem.mesh));
+        all.check(self.thesis_elements(problem, &mesh));
         // wrong materials have been named; the checks that follow need only the theory
         let section = all
-            .take(self.section(analysis, &problem.materials, &mesh))
+            .check(self.section(analysis, &problem.materials, &mesh))
             .unwrap_or_else(|| Section::uniform(analysis, Default::default()));
         let axis = Axis::new(&section, &mesh);
         let (fixed, supported) = self.supports(&mesh, &axis, &problem.supports);
-        all.take(supported);
+        all.check(supported);
         let loads = self.loads(&mesh, &section, &problem.loads);
         let (contacts, sound) = self.contacts(&mesh, &section, &axis, problem, numbers, &fixed);
-        all.take(sound);
+        all.check(sound);
         let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);
-        all.then(())?;
-        self.doubts(&contacts);
+        all.finish(())?;
+        self.warn_about_contacts(&contacts);
         Ok(Model {
             mesh,
             section,

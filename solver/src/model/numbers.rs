@@ -2,7 +2,7 @@
 
 use super::checks::Checks;
 use crate::element::{Element, Family};
-use crate::error::{All, Checked, MOST_LISTED, Reason, escape};
+use crate::error::{AllChecks, Checked, MOST_LISTED, Reason, escape};
 use crate::finite::not_finite;
 use crate::mesh::Mesh;
 use crate::problem::{
@@ -13,9 +13,9 @@ use crate::problem::{
 impl Checks {
     /// JSON has no other numbers, but protobuf has.
     pub(super) fn finite(&mut self, problem: &Problem) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         for pointer in not_finite(problem, MOST_LISTED) {
-            all.refuse(self.say(
+            all.fail(self.report(
                 pointer,
                 Reason::NotFinite,
                 "NaN or infinity",
@@ -23,12 +23,12 @@ impl Checks {
                 "Check the computation that produced it.",
             ));
         }
-        all.then(())
+        all.finish(())
     }
 
     /// Long lists of the same thing are a mistake, and each of them is gone through edge by edge.
     pub(super) fn counts(&mut self, problem: &Problem) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         const MOST: usize = 1000;
         for (pointer, count) in [
             ("/supports", problem.supports.len()),
@@ -40,7 +40,7 @@ impl Checks {
             ("/mesh/groups", problem.mesh.groups.len()),
         ] {
             if count > MOST {
-                all.refuse(self.say(
+                all.fail(self.report(
                     pointer,
                     Reason::TooMany,
                     format!("{count} of them"),
@@ -49,7 +49,7 @@ impl Checks {
                 ));
             }
         }
-        all.then(())
+        all.finish(())
     }
 
     /// Labels that fit on an axis.
@@ -63,11 +63,11 @@ impl Checks {
         else {
             return Ok(());
         };
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         for (name, label) in [("length", length), ("force", force), ("stress", stress)] {
             let characters = label.as_ref().map_or(0, |label| label.chars().count());
             if characters > MOST {
-                all.refuse(self.say(
+                all.fail(self.report(
                     format!("/units/{name}"),
                     Reason::TooLong,
                     format!("{characters} characters"),
@@ -76,7 +76,7 @@ impl Checks {
                 ));
             }
         }
-        all.then(())
+        all.finish(())
     }
 
     pub(super) fn analysis(&mut self, analysis: &Analysis) -> Checked {
@@ -93,10 +93,10 @@ impl Checks {
     }
 
     pub(super) fn controls(&mut self, problem: &Problem) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let controls = &problem.solver;
         if problem.quadrature != 2 && problem.quadrature != 3 {
-            all.refuse(self.say(
+            all.fail(self.report(
                 "/quadrature",
                 Reason::OutOfRange,
                 problem.quadrature,
@@ -105,7 +105,7 @@ impl Checks {
             ));
         }
         if controls.check_increments && problem.steps.is_empty() {
-            all.refuse(self.say(
+            all.fail(self.report(
                 "/solver/check_increments",
                 Reason::NotUsed,
                 "true without steps",
@@ -113,32 +113,32 @@ impl Checks {
                 "Without steps there are no increments to double.",
             ));
         }
-        all.take(self.require(
+        all.check(self.require(
             controls.tolerance >= 1e-14 && controls.tolerance < 1.0,
             "/solver/tolerance",
             controls.tolerance,
             "a number from 1e-14 to below 1",
             "It bounds dimensionless residuals; 1e-10 is the default.",
         ));
-        all.take(self.require(
+        all.check(self.require(
             (1..=100_000).contains(&controls.max_iterations),
             "/solver/max_iterations",
             f64::from(controls.max_iterations),
             "1 … 100000 sweeps",
             "6 to 25 are usual.",
         ));
-        all.then(())
+        all.finish(())
     }
 
     pub(super) fn steps(&mut self, steps: &[Step]) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         /// Far beyond any use, and still a bounded time.
         const MOST_INCREMENTS: u32 = 10_000;
         /// Of all steps: each leaves rows of history.
         const MOST_IN_ALL: u64 = 20_000;
         let total: u64 = steps.iter().map(|step| u64::from(step.increments)).sum();
         if total > MOST_IN_ALL {
-            all.refuse(self.say(
+            all.fail(self.report(
                 "/steps",
                 Reason::TooMany,
                 format!("{total} increments in all"),
@@ -147,7 +147,7 @@ impl Checks {
             ));
         }
         for (i, step) in steps.iter().enumerate() {
-            all.take(self.require(
+            all.check(self.require(
                 (1..=MOST_INCREMENTS).contains(&step.increments),
                 format!("/steps/{i}/increments"),
                 f64::from(step.increments),
@@ -155,7 +155,7 @@ impl Checks {
                 "1 is enough for the total law; the incremental law wants a few dozen for curved obstacles.",
             ));
         }
-        all.then(())
+        all.finish(())
     }
 
     /// The thesis carries stresses to the boundary along rows of Gauss points, which triangles lack.
@@ -164,7 +164,7 @@ impl Checks {
         if problem.solver.algorithm == Algorithm::Thesis
             && let Some(e) = mesh.elements.iter().position(triangle)
         {
-            return Err(self.say(
+            return Err(self.report(
                 "/solver/algorithm",
                 Reason::NotUsed,
                 format!("`thesis` with triangles (element {e} is one)"),
@@ -177,11 +177,11 @@ impl Checks {
 
     /// Choices of the thesis's own iteration, and what it can be used for.
     pub(super) fn thesis(&mut self, problem: &Problem) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let controls = &problem.solver;
         if controls.algorithm != Algorithm::Thesis {
             if controls.thesis.is_some() {
-                return Err(self.say(
+                return Err(self.report(
                     "/solver/thesis",
                     Reason::NotUsed,
                     "choices for the thesis's iteration",
@@ -193,7 +193,7 @@ impl Checks {
         }
         for (i, contact) in problem.contacts.iter().enumerate() {
             if contact.condition != Condition::Unilateral {
-                all.refuse(self.say(
+                all.fail(self.report(
                     format!("/contacts/{i}/condition"),
                     Reason::NotUsed,
                     "another condition than `unilateral`",
@@ -203,7 +203,7 @@ impl Checks {
             }
             let surface = |f: &Friction| f.measure == Measure::Surface;
             if contact.friction.as_ref().is_some_and(surface) {
-                all.refuse(self.say(
+                all.fail(self.report(
                     format!("/contacts/{i}/friction/measure"),
                     Reason::NotUsed,
                     "`surface`",
@@ -213,7 +213,7 @@ impl Checks {
             }
             let incremental = |f: &Friction| f.history == History::Incremental;
             if contact.friction.as_ref().is_some_and(incremental) {
-                all.refuse(self.say(
+                all.fail(self.report(
                     format!("/contacts/{i}/friction/history"),
                     Reason::NotUsed,
                     "`incremental`",
@@ -224,7 +224,7 @@ impl Checks {
         }
         for (i, contact) in problem.contacts.iter().enumerate() {
             if contact.normal == NormalOf::Obstacle {
-                all.refuse(self.say(
+                all.fail(self.report(
                     format!("/contacts/{i}/normal"),
                     Reason::NotUsed,
                     "`obstacle`",
@@ -233,7 +233,7 @@ impl Checks {
                 ));
             }
             if contact.friction.as_ref().is_some_and(|f| f.bound.is_some()) {
-                all.refuse(self.say(
+                all.fail(self.report(
                     format!("/contacts/{i}/friction/bound"),
                     Reason::NotUsed,
                     "a prescribed bound",
@@ -243,7 +243,7 @@ impl Checks {
             }
             let nodal = |f: &Friction| f.points == FrictionPoints::Nodal;
             if contact.friction.as_ref().is_some_and(nodal) {
-                all.refuse(self.say(
+                all.fail(self.report(
                     format!("/contacts/{i}/friction/points"),
                     Reason::NotUsed,
                     "`nodal`",
@@ -253,23 +253,23 @@ impl Checks {
             }
         }
         let Some(options) = &controls.thesis else {
-            return all.then(());
+            return all.finish(());
         };
-        all.take(self.require(
+        all.check(self.require(
             options.relaxation > 0.0 && options.relaxation <= 1.0,
             "/solver/thesis/relaxation",
             options.relaxation,
             "0 < relaxation ≤ 1",
             "1 takes the new friction force as it is.",
         ));
-        all.take(self.require(
+        all.check(self.require(
             [1, 2].contains(&options.friction_force),
             "/solver/thesis/friction_force",
             f64::from(options.friction_force),
             "1 or 2",
             "The two ways of thesis 3.2.",
         ));
-        all.take(self.require(
+        all.check(self.require(
             options.local_points <= 100,
             "/solver/thesis/local_points",
             f64::from(options.local_points),
@@ -277,7 +277,7 @@ impl Checks {
             "0 averages nodal values without regard to the mesh.",
         ));
         if options.local_points > 0 && options.pressure == ThesisPressure::Lumped {
-            all.refuse(self.say(
+            all.fail(self.report(
                 "/solver/thesis/local_points",
                 Reason::NotUsed,
                 options.local_points,
@@ -288,7 +288,7 @@ impl Checks {
         for (name, [s0, s1]) in &options.contact_guess {
             let pointer = format!("/solver/thesis/contact_guess/{}", escape(name));
             if !problem.contacts.iter().any(|c| c.boundary == *name) {
-                all.refuse(self.say(
+                all.fail(self.report(
                     &pointer,
                     Reason::UnknownBoundary,
                     name,
@@ -297,7 +297,7 @@ impl Checks {
                 ));
             }
             if s0 >= s1 {
-                all.refuse(self.say(
+                all.fail(self.report(
                     &pointer,
                     Reason::OutOfRange,
                     format!("[{s0}, {s1}]"),
@@ -306,6 +306,6 @@ impl Checks {
                 ));
             }
         }
-        all.then(())
+        all.finish(())
     }
 }

@@ -6,7 +6,7 @@ use super::axis::Axis;
 use super::checks::{ALIGNED, Checks};
 use super::contact_model::ContactModel;
 use crate::elasticity::Section;
-use crate::error::{All, Checked, Reason};
+use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, FrictionLaw};
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{BoundaryValue, Condition, Support};
@@ -93,12 +93,12 @@ impl Checks {
             .flatten()
             .map(largest)
             .fold(0.0, f64::max);
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         for (i, support) in supports.iter().enumerate() {
             let pointer = format!("/supports/{i}");
-            all.take(self.support(mesh, support, &pointer, ALIGNED * size, &mut fixed));
+            all.check(self.support(mesh, support, &pointer, ALIGNED * size, &mut fixed));
         }
-        (fixed, all.then(()))
+        (fixed, all.finish(()))
     }
 
     /// Adds what one support prescribes to what is `fixed` already; two values agree to `rounding`.
@@ -110,7 +110,7 @@ impl Checks {
         rounding: f64,
         fixed: &mut BTreeMap<u32, Held>,
     ) -> Checked {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let fields = [
             ("ux", support.ux),
             ("uy", support.uy),
@@ -119,7 +119,7 @@ impl Checks {
         ];
         let named = fields.map(|(_, value)| value.is_some());
         if named == [false; 4] {
-            all.refuse(self.say(
+            all.fail(self.report(
                 pointer,
                 Reason::TooFew,
                 "neither `ux` nor `uy` nor `un` nor `ut`",
@@ -128,7 +128,7 @@ impl Checks {
             ));
         }
         if (named[0] || named[1]) && (named[2] || named[3]) {
-            return Err(self.say(
+            return Err(self.report(
                 pointer,
                 Reason::WrongCount,
                 "displacements along x, y and along normal, tangent",
@@ -140,10 +140,10 @@ impl Checks {
         let normals = match place {
             Place::Edges(edges) if named[2] || named[3] => {
                 let normals = self.normals(mesh, edges, &format!("{pointer}/boundary"));
-                all.take(normals).unwrap_or_default()
+                all.check(normals).unwrap_or_default()
             }
             Place::Nodes(_) if named[2] || named[3] => {
-                return Err(self.say(
+                return Err(self.report(
                     format!("{pointer}/nodes"),
                     Reason::NotUsed,
                     "`un` or `ut` on a set of nodes",
@@ -157,7 +157,7 @@ impl Checks {
             let Some(value) = value else { continue };
             let at = format!("{pointer}/{field}");
             let mut conflict = None;
-            let Some(values) = all.take(self.at_nodes(mesh, &place, value, &at)) else {
+            let Some(values) = all.check(self.at_nodes(mesh, &place, value, &at)) else {
                 continue;
             };
             for (node, value) in values {
@@ -179,7 +179,7 @@ impl Checks {
             }
             if let Some((node, known, value)) = conflict {
                 let [x, y] = mesh.nodes[node as usize];
-                all.refuse(self.say(
+                all.fail(self.report(
                     at,
                     Reason::Conflict,
                     value,
@@ -190,7 +190,7 @@ impl Checks {
                 ));
             }
         }
-        all.then(())
+        all.finish(())
     }
 
     /// The boundary or the set of nodes that a support names.
@@ -212,7 +212,7 @@ impl Checks {
                     Some(_) => "both `boundary` and `nodes`",
                     None => "neither `boundary` nor `nodes`",
                 };
-                Err(self.say(
+                Err(self.report(
                     pointer,
                     Reason::WrongCount,
                     got,
@@ -240,7 +240,7 @@ impl Checks {
             (Place::Nodes(nodes), BoundaryValue::Constant(value)) => {
                 Ok(nodes.iter().map(|node| (*node, value)).collect())
             }
-            (Place::Nodes(_), BoundaryValue::Linear(_)) => Err(self.say(
+            (Place::Nodes(_), BoundaryValue::Linear(_)) => Err(self.report(
                 pointer,
                 Reason::NotUsed,
                 "a value from start to end on a set of nodes",
@@ -281,7 +281,7 @@ impl Checks {
         }
         if let Some(node) = corner {
             let [x, y] = mesh.nodes[node as usize];
-            return Err(self.say(
+            return Err(self.report(
                 pointer,
                 Reason::TurnsCorner,
                 format!("a boundary that turns by more than 45° at ({x}, {y})"),
@@ -301,7 +301,7 @@ impl Checks {
         fixed: &BTreeMap<u32, Held>,
         contacts: &[ContactModel],
     ) -> Checked<bool> {
-        let mut all = All::default();
+        let mut all = AllChecks::default();
         let held = directions(fixed);
         let touched: Vec<(u32, [f64; 2])> = contacts.iter().flat_map(hindered).collect();
         let mut by_contact = false;
@@ -314,7 +314,7 @@ impl Checks {
                 None => by_contact = true,
                 Some((direction, node)) => {
                     let [x, y] = mesh.nodes[node as usize];
-                    all.refuse(self.say(
+                    all.fail(self.report(
                         "/supports",
                         Reason::FreeBody,
                         format!("a body free to move: {direction}, e.g. node {node} at ({x}, {y})"),
@@ -324,7 +324,7 @@ impl Checks {
                 }
             }
         }
-        all.then(by_contact)
+        all.finish(by_contact)
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod sample;
 
+pub use crate::phase::Phase;
 pub use sample::sample;
 
 use std::collections::BTreeMap;
@@ -234,12 +235,87 @@ pub struct Residuals {
 /// Something the user should know.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {
-    /// A short name, stable for programs.
-    pub code: String,
+    /// The kind of warning, stable for programs.
+    pub code: WarningCode,
     /// JSON Pointer to what it is about.
     pub pointer: String,
     /// The finding with its figures, and what to do.
     pub message: String,
+}
+
+/// A kind of warning.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+    VariantArray,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum WarningCode {
+    /// Lines of a mesh file that are not sides of the surface.
+    LinesInside,
+    /// 9-node quadrilaterals that became 8-node elements.
+    CentreNodesDropped,
+    /// Elements that were numbered clockwise.
+    ElementsReversed,
+    /// Elements without midside nodes, which were given some.
+    RaisedToSecondOrder,
+    /// A strip that leaves its polyline between two grid lines.
+    StripCutsPolyline,
+    /// An obstacle that ends inside an edge.
+    ObstacleCutsEdge,
+    /// A contact boundary with a corner between two edges.
+    ContactTurns,
+    /// Edges longer than the nonlocal radius.
+    MeshTooCoarseForRadius,
+    /// Few elements in the contact.
+    MeshTooCoarseForContact,
+    /// A body that never touches the obstacle.
+    NoContact,
+    /// Contact up to the end of the obstacle.
+    ContactReachesObstacleEnd,
+    /// A nonlocal radius larger than the contact.
+    RadiusExceedsContact,
+    /// A prescribed friction bound that acts where the body does not touch.
+    BoundBeyondContact,
+    /// A friction bound that jumps at the end of the pressure.
+    CohesionJumps,
+    /// A tangential stress that oscillates inside stick.
+    OscillatingStick,
+    /// Sweeps that barely contract.
+    SlowContraction,
+    /// Residuals above the tolerance after all iterations.
+    NotConverged,
+    /// An iteration of the thesis that settles in a state that is not a solution.
+    FalseConvergence,
+    /// Contact and slip that repeat themselves.
+    ContactCycling,
+    /// Forces on the body that do not balance.
+    OutOfBalance,
+    /// Displacements that are not small beside the body.
+    LargeDisplacement,
+    /// A second solution that did not converge.
+    UniquenessUnknown,
+    /// A second solution that differs from the first.
+    NotUnique,
+    /// Twice the increments change the result.
+    IncrementsMatter,
+    /// Adaptive refinement that ended before the results settled.
+    RefinementUnfinished,
+}
+
+impl WarningCode {
+    /// The name that the API has for it.
+    pub fn as_str(self) -> &'static str {
+        self.into()
+    }
 }
 
 /// Where in the method an iteration belongs.
@@ -470,49 +546,6 @@ pub struct GaussFields {
     pub stress_xy: Vec<f64>,
     /// σ_zz (σ_θθ in axisymmetry).
     pub stress_zz: Vec<f64>,
-}
-
-/// Phases of a solution, in their order; the caller times them.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    JsonSchema,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "snake_case")]
-#[strum(serialize_all = "snake_case")]
-pub enum Phase {
-    /// Reading the JSON (the caller's own).
-    Parse,
-    /// Meshing and checking.
-    Mesh,
-    /// Element stiffnesses and loads.
-    Assemble,
-    /// Fill-reducing ordering and symbolic factorisation.
-    Order,
-    /// Numerical factorisation.
-    Factor,
-    /// Stiffness and load seen from the contact boundary.
-    Condense,
-    /// Contact and friction.
-    Iterate,
-    /// Back-substitution, stresses, profiles.
-    Recover,
-}
-
-impl Phase {
-    /// The name that the API has for it.
-    pub fn as_str(self) -> &'static str {
-        self.into()
-    }
 }
 
 /// What the solver tells its observer.

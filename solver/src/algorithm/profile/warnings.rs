@@ -5,7 +5,7 @@ use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
 use crate::friction::{Average, BoundLaw, FrictionLaw};
 use crate::problem::Condition;
-use crate::solution::{Outcome, Warning};
+use crate::solution::{Outcome, Warning, WarningCode};
 
 /// Error of a smooth peak times the square of the number of elements across.
 const SMOOTH_PEAK: f64 = 0.28;
@@ -27,9 +27,9 @@ impl PatchView<'_> {
 
     fn warn_of_contact(&self, warnings: &mut Vec<Warning>) {
         let contact = self.patch.contact;
-        let mut warn = |code: &str, message: String| {
+        let mut warn = |code: WarningCode, message: String| {
             warnings.push(Warning {
-                code: code.to_owned(),
+                code,
                 pointer: contact.pointer.clone(),
                 message,
             });
@@ -46,7 +46,7 @@ impl PatchView<'_> {
         );
         if !settled && contact.friction.as_ref().is_some_and(jumps) {
             warn(
-                "cohesion_jumps",
+                WarningCode::CohesionJumps,
                 "The friction bound jumps by the cohesion where the pressure ends; without a nonlocal radius the nodes there may come and go for ever. Give a radius of an element or more.".to_owned(),
             );
         }
@@ -72,7 +72,7 @@ impl PatchView<'_> {
             };
             let needed = (0..self.count()).map(engages).fold(f64::INFINITY, f64::min);
             warn(
-                "no_contact",
+                WarningCode::NoContact,
                 format!(
                     "The body never touches the obstacle: the smallest gap is {smallest:.6e}. An indentation above {needed:.6e} engages it."
                 ),
@@ -81,7 +81,7 @@ impl PatchView<'_> {
         }
         if let Some(tau) = self.bound_beyond_contact() {
             warn(
-                "bound_beyond_contact",
+                WarningCode::BoundBeyondContact,
                 format!(
                     "The prescribed friction bound acts on all of the boundary, as Tresca's law has it: up to {tau:.3e} also where the body does not touch. Give it as a table over s that ends with the contact."
                 ),
@@ -89,7 +89,7 @@ impl PatchView<'_> {
         }
         if let Some((length, radius)) = self.unresolved_radius() {
             warn(
-                "mesh_too_coarse_for_radius",
+                WarningCode::MeshTooCoarseForRadius,
                 format!(
                     "The edge under the peak of σ_t ({length:.3e}) is longer than the nonlocal radius ({radius}): the averaging is not resolved there. Refine the mesh."
                 ),
@@ -100,7 +100,7 @@ impl PatchView<'_> {
             .count();
         if edges < FEWEST_EDGES {
             warn(
-                "mesh_too_coarse_for_contact",
+                WarningCode::MeshTooCoarseForContact,
                 format!(
                     "Only {edges} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a pressure to rely on. {} Refine the mesh there.",
                     self.peak_uncertainty(edges)
@@ -111,7 +111,7 @@ impl PatchView<'_> {
         let ends = [0, self.count() - 1].map(|i| (s[i], self.active(i) && !self.symmetric(i)));
         for (s, _) in ends.into_iter().filter(|(_, pressed)| *pressed) {
             warn(
-                "contact_reaches_obstacle_end",
+                WarningCode::ContactReachesObstacleEnd,
                 format!(
                     "The body presses against the very end of the obstacle, s = {s:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the obstacle goes on there, extend it."
                 ),
@@ -128,7 +128,7 @@ impl PatchView<'_> {
             let width = (s[last] - s[first]) * (1 + mirrored) as f64;
             if let Some(radius) = radius.filter(|radius| *radius > width && width > 0.0) {
                 warn(
-                    "radius_exceeds_contact",
+                    WarningCode::RadiusExceedsContact,
                     format!(
                         "The nonlocal radius {radius} is larger than the whole contact, {width:.4}: the averaged pressure, and friction with it, is smeared out beyond the contact."
                     ),
@@ -192,7 +192,7 @@ impl PatchView<'_> {
         }
         if canceling > OSCILLATING * total {
             warnings.push(Warning {
-                code: "oscillating_stick".to_owned(),
+                code: WarningCode::OscillatingStick,
                 pointer: self.patch.contact.pointer.clone(),
                 message: format!(
                     "The tangential stress oscillates between the friction points of single edges: the mesh does not resolve elastic_slip, and friction_force is too large by about {:.1} %. Refine the contact, raise elastic_slip, or choose \"points\": \"nodal\".",

@@ -12,7 +12,7 @@ pub(super) struct Friction {
 }
 
 /// σ_t / τ from φ with the sign of the motion.
-pub(super) fn sense(phi: f64, options: &ThesisOptions) -> f64 {
+pub(super) fn signed_ratio(phi: f64, options: &ThesisOptions) -> f64 {
     if options.signed { -phi } else { phi.abs() }
 }
 

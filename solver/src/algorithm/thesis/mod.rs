@@ -24,7 +24,7 @@ use crate::elasticity::Dof;
 use crate::linear::solve_positive_definite;
 use crate::problem::{ThesisOptions, ThesisPressure};
 use crate::solution::{Observer, Outcome, Stage};
-use friction::{Friction, relax, sense};
+use friction::{Friction, relax, signed_ratio};
 use rows::Rows;
 
 /// Iterates; the tractions that the final state was solved with come back beside it.
@@ -47,18 +47,18 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
         };
         state.v = v;
         // step 3
-        let seen = rows.see(system, &state, &friction.traction, &options);
+        let row_values = rows.evaluate(system, &state, &friction.traction, &options);
         // step 4
-        let next = next_contact(system, &state, &seen.node_stress);
+        let next = next_contact(system, &state, &row_values.node_stress);
         let unchanged = next == state.active;
         // step 5
-        let new = new_friction(system, &state, &next, &seen, &options);
+        let new = new_friction(system, &state, &next, &row_values, &options);
         // step 6
         let r_f = normal_stress
             .as_ref()
-            .map(|before| relative_change(&seen.node_stress, before) / options.relaxation);
+            .map(|before| relative_change(&row_values.node_stress, before) / options.relaxation);
         let settled = unchanged && r_f.is_some_and(|r_f| r_f <= track.controls.tolerance);
-        normal_stress = Some(seen.node_stress);
+        normal_stress = Some(row_values.node_stress);
 
         let measured = Measured::new(system, state.clone(), friction.bound.clone());
         let row = Row {
@@ -69,7 +69,7 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
             tractions: friction.traction.clone(),
             own_r_f: r_f,
         };
-        let answer = track.tell(&measured, row, observe);
+        let answer = track.record(&measured, row, observe);
         // a slow approach passes the same states again and again; only a full step cycles
         let cycle = if options.relaxation == 1.0 {
             track.note(&state, r_f.unwrap_or(1.0))
@@ -87,12 +87,9 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
         };
         let stop = outcome != Outcome::NotConverged;
         let reached = End {
-            measured,
-            stage: Stage::Thesis,
-            outcome,
             cycle,
-            contraction: None,
             exhausted: true,
+            ..End::new(measured, Stage::Thesis, outcome)
         };
         end = Some((reached, friction.traction.clone()));
         if stop {
@@ -104,12 +101,8 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
     end.unwrap_or_else(|| {
         let measured = Measured::new(system, state, friction.bound);
         let reached = End {
-            measured,
-            stage: Stage::Thesis,
-            outcome: Outcome::NotConverged,
-            cycle: None,
-            contraction: None,
             exhausted: true,
+            ..End::new(measured, Stage::Thesis, Outcome::NotConverged)
         };
         (reached, friction.traction)
     })
@@ -165,12 +158,14 @@ fn new_friction(
     system: &System<'_>,
     state: &State,
     next: &[bool],
-    seen: &rows::Seen,
+    row_values: &rows::RowValues,
     options: &ThesisOptions,
 ) -> Friction {
     let mut friction = match options.pressure {
-        ThesisPressure::Extrapolated if options.local_points > 0 => seen.friction(system, options),
-        _ => averaged(system, state, seen, options),
+        ThesisPressure::Extrapolated if options.local_points > 0 => {
+            row_values.friction(system, options)
+        }
+        _ => averaged(system, state, row_values, options),
     };
     for (g, point) in system.points.iter().enumerate() {
         let [start, end, middle] = point.nodes;
@@ -188,18 +183,22 @@ fn new_friction(
 fn averaged(
     system: &System<'_>,
     state: &State,
-    seen: &rows::Seen,
+    row_values: &rows::RowValues,
     options: &ThesisOptions,
 ) -> Friction {
-    let pressures: Vec<f64> = seen.node_stress.iter().map(|stress| -stress).collect();
+    let pressures: Vec<f64> = row_values
+        .node_stress
+        .iter()
+        .map(|stress| -stress)
+        .collect();
     let bound = system.friction_bound(&pressures);
     let traction = system.points.iter().zip(&bound).enumerate();
     let traction = traction.map(|(g, (point, tau))| {
         let phi = match options.friction_force {
             1 => system.law(point).phi(system.slip(&state.v, point)),
-            _ => seen.phi[g],
+            _ => row_values.phi[g],
         };
-        tau * sense(phi, options)
+        tau * signed_ratio(phi, options)
     });
     Friction {
         traction: traction.collect(),

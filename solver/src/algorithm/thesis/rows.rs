@@ -15,7 +15,7 @@
 //! share has the mean of both.
 
 use super::average::{self, linear};
-use super::friction::{Friction, sense};
+use super::friction::{Friction, signed_ratio};
 use crate::algorithm::system::{State, System};
 use crate::contact::edge_nodes;
 use crate::elasticity::{self, Dof};
@@ -48,7 +48,7 @@ impl EdgeRows {
 }
 
 /// What is known of a state.
-pub(super) struct Seen {
+pub(super) struct RowValues {
     /// σ_n at every contact node (≤ 0 in compression).
     pub(super) node_stress: Vec<f64>,
     /// φ with its sign, carried to every friction point.
@@ -95,15 +95,15 @@ impl Rows {
     }
 
     /// Looks at a state; only what the options need.
-    pub(super) fn see(
+    pub(super) fn evaluate(
         &self,
         system: &System<'_>,
         state: &State,
         traction: &[f64],
         options: &ThesisOptions,
-    ) -> Seen {
+    ) -> RowValues {
         let extrapolated = options.pressure == ThesisPressure::Extrapolated;
-        let mut seen = Seen {
+        let mut row_values = RowValues {
             node_stress: Vec::new(),
             phi: vec![0.0; system.points.len()],
             stress: Vec::new(),
@@ -114,19 +114,19 @@ impl Rows {
         if extrapolated || options.friction_force == 2 {
             let displacements = self.displacements(system, state, traction);
             for rows in &self.edges {
-                let (stress, phi) = self.look(system, rows, &displacements);
-                seen.stress.push(stress);
-                seen.row_phi.push(phi);
+                let (stress, phi) = self.evaluate_edge(system, rows, &displacements);
+                row_values.stress.push(stress);
+                row_values.row_phi.push(phi);
             }
-            seen.phi = seen.to_points(system, &seen.row_phi);
+            row_values.phi = row_values.to_points(system, &row_values.row_phi);
         }
-        seen.node_stress = if extrapolated {
-            seen.to_nodes(system)
+        row_values.node_stress = if extrapolated {
+            row_values.to_nodes(system)
         } else {
             let pressures = system.pressures(&system.reactions(state));
             pressures.iter().map(|p| -p).collect()
         };
-        seen
+        row_values
     }
 
     /// The whole field.
@@ -143,7 +143,7 @@ impl Rows {
     }
 
     /// σ_n and φ at the Gauss points of both rows below an edge.
-    fn look(
+    fn evaluate_edge(
         &self,
         system: &System<'_>,
         rows: &EdgeRows,
@@ -199,7 +199,7 @@ fn to_boundary(rule: &[(f64, f64)], [near, far]: &[Vec<f64>; 2]) -> Vec<f64> {
         .collect()
 }
 
-impl Seen {
+impl RowValues {
     /// σ_n at the boundary's Gauss points of every edge.
     fn boundary_stress(&self) -> Vec<Vec<f64>> {
         self.stress
@@ -325,7 +325,9 @@ impl Seen {
             .zip(phi)
             .map(|(bound, phi)| {
                 let pairs = bound.iter().zip(phi);
-                pairs.map(|(tau, phi)| tau * sense(*phi, options)).collect()
+                pairs
+                    .map(|(tau, phi)| tau * signed_ratio(*phi, options))
+                    .collect()
             })
             .collect();
         Friction {

@@ -1,0 +1,48 @@
+//! The phases of a solution: a room below `error` and `solution`, which both name them.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use strum::{IntoStaticStr, VariantArray};
+
+/// Phases of a solution, in their order; the caller times them.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+    VariantArray,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum Phase {
+    /// Reading the JSON (the caller's own).
+    Parse,
+    /// Meshing and checking.
+    Mesh,
+    /// Element stiffnesses and loads.
+    Assemble,
+    /// Fill-reducing ordering and symbolic factorisation.
+    Order,
+    /// Numerical factorisation.
+    Factor,
+    /// Stiffness and load seen from the contact boundary.
+    Condense,
+    /// Contact and friction.
+    Iterate,
+    /// Back-substitution, stresses, profiles.
+    Recover,
+}
+
+impl Phase {
+    /// The name that the API has for it.
+    pub fn as_str(self) -> &'static str {
+        self.into()
+    }
+}
