@@ -50,15 +50,15 @@ pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
     }
 }
 
-/// Physical tags of an entity, by dimension and number.
-type Entities = BTreeMap<(u8, i64), Vec<i64>>;
+/// Physical tags of an entity, by dimension and number. A tag may have a sign, which is its direction.
+type Entities = BTreeMap<(u8, i64), Vec<u64>>;
 
 struct File<R> {
     source: Source<R>,
     version: Version,
     binary: bool,
     /// Names of physical groups by dimension and tag.
-    names: BTreeMap<(u8, i64), String>,
+    names: BTreeMap<(u8, u64), String>,
     entities: Entities,
     labels: Labels,
     plane: Plane,
@@ -280,7 +280,8 @@ impl<R: BufRead> File<R> {
                     "Correct that line.",
                 ));
             };
-            self.names.insert((dimension, tag), name.to_owned());
+            self.names
+                .insert((dimension, tag.unsigned_abs()), name.to_owned());
         }
         self.end("$EndPhysicalNames")
     }
@@ -328,7 +329,7 @@ impl<R: BufRead> File<R> {
                 }
                 let mut physical = Vec::new();
                 for _ in 0..self.size("the number of physical tags")? {
-                    physical.push(self.int("a physical tag")?.abs());
+                    physical.push(self.int("a physical tag")?.unsigned_abs());
                 }
                 if dimension > 0 {
                     for _ in 0..self.size("the number of bounding entities")? {
@@ -442,7 +443,7 @@ impl<R: BufRead> File<R> {
                 for tag in 0..tags {
                     let value = self.int("a tag")?;
                     if tag == 0 {
-                        physical = value.abs();
+                        physical = value.unsigned_abs();
                     }
                 }
                 // 0: in no physical group
@@ -509,7 +510,7 @@ impl<R: BufRead> File<R> {
         label: u64,
         kind: Kind,
         size: usize,
-        physical: &[i64],
+        physical: &[u64],
     ) -> Result<(), ReadError> {
         let mut nodes = [NO_NODE; 9];
         for slot in &mut nodes[..size] {
@@ -570,6 +571,36 @@ impl<R: BufRead> File<R> {
         match self.version {
             Version::Two => Ok(self.int("a node number")? as u64),
             Version::Four => self.size("a node number"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One triangle with a physical tag; in MSH 2.2 at the element, in MSH 4.1 at its surface.
+    fn triangle(version: Version, tag: i64) -> String {
+        match version {
+            Version::Two => format!(
+                "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n\
+                 $Elements\n1\n1 2 2 {tag} 1 1 2 3\n$EndElements\n"
+            ),
+            Version::Four => format!(
+                "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 1 0\n1 0 0 0 1 1 0 1 {tag} 0\n$EndEntities\n\
+                 $Nodes\n1 3 1 3\n2 1 0 3\n1\n2\n3\n0 0 0\n1 0 0\n0 1 0\n$EndNodes\n\
+                 $Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n"
+            ),
+        }
+    }
+
+    #[test]
+    fn the_sign_of_a_physical_tag_is_ignored_also_of_the_least_integer() {
+        for version in [Version::Two, Version::Four] {
+            for (tag, name) in [(-7, "7"), (i64::MIN, "9223372036854775808")] {
+                let (mesh, _) = read(triangle(version, tag).as_bytes()).unwrap();
+                assert_eq!(mesh.groups[name], [0]);
+            }
         }
     }
 }

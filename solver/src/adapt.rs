@@ -1,9 +1,9 @@
 //! `refine: {"tolerance": …}`: a grid is refined where its error lies until the results settle.
 //!
-//! Solve, split the columns and rows of the grid that hold most of the estimated error (and those
-//! under a peak of σ_t that are wider than a part of ρ), and again; a corner of a body or the edge of
-//! a punch so gets the graded mesh that it needs. The results have settled when what further meshes
-//! could still change, extrapolated from the last two changes, lies below the tolerance.
+//! Solves, splits the columns and rows of the grid with most of the estimated error (and those under a
+//! peak of σ_t that are wider than a part of ρ), and repeats, so that a corner of a body or the edge of a
+//! punch gets a graded mesh. The results have settled when the change by further meshes, extrapolated from
+//! the last two changes, lies below the tolerance.
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -14,26 +14,26 @@ use crate::model::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
 use crate::problem::{AdaptiveRefine, Grid, MeshInput, Problem, Refine};
 use crate::solution::{Observer, Progress, Refinement, Solution, Warning, WarningCode};
 
-/// Part of the squared error that the columns and rows to be split hold.
+/// The columns and rows to be split hold this part of the squared error.
 const BULK: f64 = 0.7;
 
 /// Edges under a peak of σ_t are split until they are this part of ρ.
 const PART_OF_RADIUS: f64 = 0.25;
 
-/// More meshes than this are not tried: each about halves the smallest element.
+/// Most meshes: each about halves the smallest element.
 const MOST_MESHES: usize = 30;
 
-/// A force below this part of the largest is not worth refining for.
+/// A force below this part of the largest one is not compared.
 const SMALL_FORCE: f64 = 1e-3;
 
-/// Changes of this part of the tolerance need no trend to be believed.
+/// Changes below this part of the tolerance count as settled without a trend.
 const SETTLED: f64 = 0.1;
 
-/// Solves on finer and finer grids; the finest solution comes back with the sequence of them.
+/// Solves on finer and finer grids; returns the finest solution with the sequence of meshes.
 ///
-/// `contacts` are the problem's own, on whatever mesh; `solve` solves one problem without adaptive
+/// `contacts` are those of the problem, on any mesh; `solve` solves one problem without adaptive
 /// refinement. The observer sees the phases of every mesh, its iterations (but no load steps) as tentative
-/// ones, and those of the last one again when it is known to be the last.
+/// ones, and those of the last mesh again once it is known to be the last.
 pub fn run(
     problem: &Problem,
     goal: &AdaptiveRefine,
@@ -96,8 +96,8 @@ pub fn run(
     }
 }
 
-/// Whether what is still to come, judged by the last two changes, lies below the tolerance. Changes
-/// that shrink by a ratio r from mesh to mesh leave r/(1 − r) of the last one.
+/// Whether all further change, estimated from the last two changes, lies below the tolerance. Changes that
+/// shrink by a ratio r from mesh to mesh add up to r/(1 − r) of the last one.
 fn settled(sequence: &[Refinement], tolerance: f64) -> bool {
     let changes: Vec<f64> = sequence.iter().filter_map(|row| row.change).collect();
     let [.., before, last] = changes[..] else {
@@ -117,18 +117,18 @@ fn unfinished(sequence: &[Refinement], tolerance: f64) -> Warning {
         code: WarningCode::RefinementUnfinished,
         pointer: "/mesh/refine/tolerance".to_owned(),
         message: format!(
-            "After {} meshes the results still change by {change:.1e}, more than the tolerance {tolerance} allows. See summary.refinements; raise the tolerance, or give the grid more lines where the body needs them.",
+            "After {} meshes the results still change by {change:.1e}, more than the tolerance {tolerance} allows. See summary.refinements; raise the tolerance, or give the grid more lines where the error is large.",
             sequence.len()
         ),
     }
 }
 
-/// What is watched from mesh to mesh.
+/// Results compared from mesh to mesh.
 struct WatchedResults<'a> {
     solution: &'a Solution,
-    /// σ_n has a peak with a mesh limit: no contact ends at a sharp edge.
+    /// The peak of σ_n converges: no contact ends at a sharp edge.
     normal_peak: bool,
-    /// σ_t has one: at a sharp edge only where friction averages.
+    /// The peak of σ_t converges: at a sharp edge only if friction averages.
     tangential_peak: bool,
 }
 
@@ -176,7 +176,7 @@ impl<'a> WatchedResults<'a> {
         }
     }
 
-    /// Largest relative change of the forces, and of the peaks that have a limit.
+    /// Largest relative change of the forces, and of the peaks that converge.
     fn change(&self, before: &Refinement) -> f64 {
         let now = self.row(None);
         let relative = |a: f64, b: f64| {
@@ -208,7 +208,7 @@ impl<'a> WatchedResults<'a> {
     }
 }
 
-/// The grid with more lines where the error lies.
+/// The grid with more lines where the error is large.
 fn finer(grid: &Grid, contacts: &[ContactModel], solution: &Solution) -> Grid {
     let (columns, rows) = (grid.x.len() - 1, grid.y.len() - 1);
     let (mut by_column, mut by_row) = (vec![0.0; columns], vec![0.0; rows]);
@@ -312,7 +312,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_worst_few_are_split_in_the_middle() {
+    fn the_intervals_with_most_of_the_error_are_halved() {
         let split = bulk(&[0.1, 5.0, 0.0, 4.0]);
         assert_eq!(split, BTreeSet::from([1, 3]));
         let lines = halved(&[0.0, 1.0, 2.0, 4.0, 5.0], &split);
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn one_small_change_is_not_yet_settled_and_slow_ones_neither() {
+    fn one_small_change_or_slowly_shrinking_ones_are_not_settled() {
         assert!(!settled(&after(&[0.005]), 0.01));
         assert!(settled(&after(&[0.01, 0.005]), 0.01));
         // 0.9 of each change is still to come: together nine times the last

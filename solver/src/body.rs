@@ -1,8 +1,8 @@
-//! The body as felt from Γ_C: one factorisation, then a small dense system.
+//! The body reduced to Γ_C: one factorisation, then a small dense system.
 //!
 //! Ŝ v = f̂ + (forces on Γ_C), with v the displacements of the contact nodes along n and t. Every
-//! contact and friction iteration runs on it; [`ElasticBody::displacements`] leads back to the
-//! whole field by one back-substitution. How the factor is kept is nobody else's business.
+//! contact and friction iteration runs on it; [`ElasticBody::displacements`] computes
+//! the whole field by one back-substitution. The factor is private to this module.
 
 use std::ops::ControlFlow;
 
@@ -12,7 +12,7 @@ use crate::linear::{Dense, Factor, FactorError, Graph, Ordering, SparseSymmetric
 use crate::model::{Held, Level, Model};
 use crate::solution::{Observer, Phase, Progress};
 
-/// Assembled, supported, condensed onto the contact boundaries.
+/// A body, assembled, supported and condensed onto its contact boundaries.
 pub struct ElasticBody {
     /// Ŝ, on the contact unknowns in the order of `contact_dofs`.
     pub stiffness: Dense,
@@ -30,14 +30,14 @@ pub struct ElasticBody {
     matrix: SparseSymmetric,
     /// Forces of the loads, and of the prescribed displacements, on all unknowns.
     right_hand_sides: [Vec<f64>; 2],
-    /// Added to the diagonal of the contact unknowns in `matrix`, and taken off Ŝ again: what contact
-    /// alone holds has no factor without (force/length).
+    /// Added to the diagonal of the contact unknowns in `matrix`, and subtracted from Ŝ: without it a body that
+    /// only contact holds has no factor (force/length).
     spring: f64,
     factor: Factor,
 }
 
 impl ElasticBody {
-    /// Assembles, factors and condenses, telling the observer each phase.
+    /// Assembles, factors and condenses, and reports each phase to the observer.
     pub fn new(model: &Model, observe: &mut Observer<'_>) -> Result<Self, SolveError> {
         let mut phase = |phase| match observe(Progress::Phase(phase)) {
             ControlFlow::Continue(()) => Ok(()),
@@ -85,7 +85,7 @@ impl ElasticBody {
 
         phase(Phase::Condense)?;
         let mut stiffness = factor.trailing_schur_complement();
-        // f̂ = Ŝ u_c with u_c from the whole system under its loads alone; springs and all
+        // f̂ = Ŝ u_c with u_c of the whole system, springs included, under the loads alone
         let condensed = |forces: &Vec<f64>| {
             if forces.iter().all(|f| *f == 0.0) {
                 return vec![0.0; contact_unknowns];
@@ -153,7 +153,7 @@ impl ElasticBody {
     }
 
     /// Displacements along x and y of every node at a load level, under the given forces on the
-    /// contact unknowns; their displacements are known already from the condensed system.
+    /// contact unknowns; their displacements are known from the condensed system.
     pub fn displacements(
         &self,
         contact_force: &[f64],
@@ -167,7 +167,7 @@ impl ElasticBody {
             .collect();
         let interior = rhs.len() - contact_force.len();
         for (i, force) in contact_force.iter().enumerate() {
-            // the springs in the matrix pull back what they are stretched by
+            // the force of the springs in the matrix
             rhs[interior + i] += force + self.spring * contact_displacement[i];
         }
         let mut u = rhs.clone();
@@ -198,7 +198,7 @@ fn contact_nodes(model: &Model) -> impl Iterator<Item = u32> {
 fn number(model: &Model) -> (DofMap, usize) {
     let count = model.mesh.nodes.len();
     let mut axes = vec![None; count];
-    // a node that is held along an oblique direction has its axes there
+    // the axes of a node that is held along an oblique direction lie along it
     for (&node, held) in &model.fixed {
         if let Held::Along {
             direction: [x, y], ..
@@ -225,7 +225,7 @@ fn number(model: &Model) -> (DofMap, usize) {
         let axes = map.axes[node as usize].unwrap_or([[1.0, 0.0], [0.0, 1.0]]);
         let held = model.fixed.get(&node);
         for a in 0..2 {
-            // Model::new has seen to it that a single direction is one of the node's axes
+            // Model::new checks that a single direction is one of the node's axes
             map.dofs[node as usize][a] = match held.and_then(|held| held.along(axes[a])) {
                 Some(value) => Dof::Fixed(value),
                 None => {

@@ -1,5 +1,5 @@
-//! Whether every number of a value is one, asked of its serde form: JSON has no word for NaN and
-//! infinity, and its writers put null in their place without a word of their own.
+//! Finds NaN and infinity in a value by serializing it: JSON cannot write them, and serde_json silently
+//! writes null.
 
 use std::fmt;
 
@@ -16,18 +16,18 @@ pub fn is_finite<T: Serialize + ?Sized>(value: &T) -> bool {
 /// JSON Pointers to the numbers of a value that are not finite; the first `most` of them.
 pub fn not_finite<T: Serialize + ?Sized>(value: &T, most: usize) -> Vec<String> {
     let mut walk = Walk::new(most);
-    // an error means that there are enough of them
+    // an error only means that `most` are found
     let _ = value.serialize(&mut walk);
     walk.found
 }
 
-/// A serializer that writes nothing and looks at every number.
+/// A serializer that writes nothing and checks every number.
 struct Walk {
-    /// Where it is.
+    /// The way from the whole value to the current one.
     path: Vec<Step>,
     found: Vec<String>,
     most: usize,
-    /// The string that comes is the key of an entry.
+    /// The next string is the key of an entry.
     in_key: bool,
 }
 
@@ -77,7 +77,7 @@ impl Walk {
 /// The parts of a list, one after the other.
 struct List<'a> {
     walk: &'a mut Walk,
-    /// A variant of an enum with data has a name around them.
+    /// The list is the data of an enum variant, below its name.
     named: bool,
 }
 
@@ -106,7 +106,7 @@ impl<'a> List<'a> {
     }
 }
 
-/// What is no number has nothing to look at.
+/// Values that are not numbers need no check.
 macro_rules! passed {
     ($($method:ident: $type:ty),*) => { $(
         fn $method(self, _: $type) -> fmt::Result {
@@ -259,7 +259,7 @@ impl ser::SerializeMap for &mut Walk {
         key.serialize(&mut **self)?;
         self.in_key = false;
         if self.path.len() == depth {
-            self.path.push(Step::Field("")); // a key that is no text
+            self.path.push(Step::Field("")); // the key is not a string
         }
         Ok(())
     }
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn every_number_that_is_none_is_found_with_its_pointer() {
+    fn nan_and_infinity_are_found_with_their_pointers() {
         let all = [
             "/bad",
             "/lists/1/1",

@@ -3,32 +3,38 @@
 //! numbers, and docs/formulation.md as "formulation 4.3".
 //!
 //! A library of pure functions: no clock, thread, file or network; the same problem gives the same
-//! bits. Reading and writing of any format is the business of the crate `files`. From the ground up; each
-//! room uses only rooms in the groups above it.
+//! bits. Reading and writing of any format is left to the crate `files`. The
+//! modules are listed from the ground up; each uses only those above it.
 
-// What is asked and answered, as plain data; violations and errors; numbers that are none.
-pub mod error;
-pub mod finite;
+// The phases of a solution.
 pub mod phase;
+
+// Violations, and errors that end a solution.
+pub mod error;
+
+// Pure maths on numbers: master elements and rules; matrices (the one room that names faer); NaN and infinity.
+pub mod element;
+pub mod finite;
+pub mod linear;
+
+// Plain data: the question and the answer.
 pub mod problem;
 pub mod solution;
 
-// Pure maths on numbers: master elements and rules; matrices (the one room that names faer).
-pub mod element;
-pub mod linear;
-
-// The friction law, along arc length only; nodes, elements and named boundaries.
-pub mod friction;
+// Nodes, elements and named boundaries.
 pub mod mesh;
+
+// The friction law, along arc length only.
+pub mod friction;
 
 // A standard elastic program; the geometry of the contact boundary.
 pub mod contact;
 pub mod elasticity;
 
-// Every check: the only door to a problem that can be solved.
+// All checks: the only way to obtain a problem that can be solved.
 pub mod model;
 
-// The body as felt from the contact boundary: one factorisation, then a small dense system.
+// The body reduced to its contact boundary: one factorisation, then a small dense system.
 pub mod body;
 
 // Contact and friction on that system.
@@ -37,7 +43,7 @@ pub mod algorithm;
 // Load steps, one after the other.
 pub mod steps;
 
-// Finer and finer grids until the results settle.
+// Finer grids until the results settle.
 pub mod adapt;
 
 use body::ElasticBody;
@@ -49,13 +55,13 @@ use solution::{Observer, Phase, Progress, Solution, Warning};
 
 /// Solves a problem: the whole flow on one screen.
 ///
-/// `observe` is told every phase and iteration and may break off: then the last state comes back
-/// as `Outcome::Canceled`, or `SolveError::Stopped` when there is none yet.
+/// `observe` is called with every phase and iteration and may stop the solution: the result is then the
+/// last state as `Outcome::Canceled`, or `SolveError::Stopped` if there is none yet.
 pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
     solve_on(problem, None, observe)
 }
 
-/// Solves a problem that may only name or quote its mesh: `external` is what was read.
+/// Solves a problem that may only name or quote its mesh: `external` is that mesh.
 pub fn solve_on(
     problem: &Problem,
     external: Option<External>,
@@ -66,7 +72,7 @@ pub fn solve_on(
         Refine::Adaptive(goal) => {
             let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
             let contacts = model.contacts;
-            // only grids are refined so, and a grid stands in the problem itself
+            // only grids are refined adaptively, and a grid is part of the problem
             let solve = |problem: &Problem, observe: &mut Observer<'_>| {
                 prepare(problem, None, observe)?.solve(observe)
             };
@@ -77,17 +83,16 @@ pub fn solve_on(
 
 /// A problem up to its iterations: checked, and its body factored and condensed onto its contacts.
 ///
-/// What comes before the iterations is most of the work, and problems that differ in friction, indentation, drag,
-/// load steps or tolerances only have the same body. (An obstacle of another shape may face other nodes, or turn their
-/// normals.)
+/// This is most of the work, and problems that differ only in friction, indentation, drag, load steps or tolerances
+/// share it. (An obstacle of another shape may face other nodes, or turn their normals.)
 pub struct Prepared {
-    /// What is to be solved.
+    /// The checked problem.
     pub model: Model,
-    /// The body as felt from its contacts.
+    /// The body reduced to its contacts.
     pub body: ElasticBody,
 }
 
-/// Prepares a problem on the one mesh that it gives; adaptive refinement goes through several.
+/// Prepares a problem on its own mesh; adaptive refinement prepares it on each of several.
 pub fn prepare(
     problem: &Problem,
     external: Option<External>,
@@ -118,7 +123,7 @@ impl Prepared {
     }
 }
 
-/// Checks a problem without solving it: its warnings, or everything that is wrong with it.
+/// Checks a problem without solving it: its warnings, or all its violations.
 pub fn check(
     problem: &Problem,
     external: Option<External>,

@@ -1,5 +1,5 @@
-//! Load steps and their increments: the incremental law (formulation 1.5), and results along a history
-//! of loading for either law.
+//! Load steps and their increments: the incremental law (formulation 1.5), and results along a load
+//! history for both laws.
 
 use crate::algorithm::{self, Finished, Place, System, report};
 use crate::body::ElasticBody;
@@ -14,7 +14,7 @@ use crate::solution::{
 /// An increment that does not converge is halved this often before the step ends there.
 const MOST_HALVINGS: u32 = 6;
 
-/// Runs all steps; the end of the last one is the solution. A step that does not converge is the last.
+/// Solves all steps; the end of the last one is the solution. After a step that does not converge no other follows.
 pub fn run(
     model: &Model,
     body: &ElasticBody,
@@ -35,7 +35,7 @@ pub fn run(
         }
         let _ = observe(Progress::Phase(Phase::Iterate));
         let (finished, rows) = load_history.step(number as u32, step, 1, observe);
-        // the last state is kept also when the observer broke off: its answer no longer matters
+        // a stopped solution is reported too: the answer of the observer no longer matters
         let _ = observe(Progress::Phase(Phase::Recover));
         let reported = report(model, body, &load_history.system, &finished)?;
         let mut summary = reported.summary;
@@ -75,7 +75,7 @@ pub fn run(
         }
     }
     let Some(mut solution) = so_far else {
-        unreachable!("there is a step: without any the whole problem is one")
+        unreachable!("there is at least one step: a problem without steps is one step")
     };
     if model.controls.check_increments && solution.summary.converged {
         let summary = &mut solution.summary;
@@ -89,7 +89,7 @@ pub fn run(
     Ok(solution)
 }
 
-/// The forces that twice the increments lead to, without a word to the observer.
+/// The forces after twice the increments, without reporting to the observer.
 fn doubled(
     model: &Model,
     body: &ElasticBody,
@@ -112,20 +112,21 @@ fn doubled(
     algorithm::compared(&load_history.system, solution, last.as_ref(), tolerance)
 }
 
-/// Whether a next increment can begin there: the thesis's own iteration settles in false states, and
-/// goes on from them.
+/// Whether a next increment can start from this end: the thesis's own iteration settles in false states and
+/// continues from them.
 fn can_continue(outcome: Outcome) -> bool {
     matches!(outcome, Outcome::Converged | Outcome::FalseConvergence)
 }
 
-/// The way through the steps.
+/// State while the load steps are solved.
 struct LoadHistory<'a> {
     model: &'a Model,
     system: System<'a>,
-    /// The end of the last increment, and its level.
+    /// The end of the last increment.
     last: Option<Finished>,
+    /// Its level.
     level: Level,
-    /// Whether the anchors have moved since.
+    /// Whether the anchors have moved since then.
     anchors_moved: bool,
     rows: Vec<Iteration>,
     row_count: u32,
@@ -148,7 +149,7 @@ impl<'a> LoadHistory<'a> {
         }
     }
 
-    /// One step in `multiple` times its increments: its end, and its rows.
+    /// Solves one step in `multiple` times its increments: its end, and its rows.
     fn step(
         &mut self,
         number: u32,
@@ -174,10 +175,10 @@ impl<'a> LoadHistory<'a> {
                 return (finished, std::mem::take(&mut self.rows));
             }
         }
-        unreachable!("a step has an increment at least: Model::new has seen to it")
+        unreachable!("a step has at least one increment: Model::new checks it")
     }
 
-    /// From one part of a step to another, in halves where that is too far.
+    /// Solves from one part of a step to another, in halves if that does not converge.
     fn advance(
         &mut self,
         path: &StepPath<'_>,
@@ -209,7 +210,7 @@ impl<'a> LoadHistory<'a> {
         }
     }
 
-    /// Solves at one level; a converged end is where the next increment begins.
+    /// Solves at one level; the next increment starts from a converged end.
     fn increment(
         &mut self,
         path: &StepPath<'_>,

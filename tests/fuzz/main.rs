@@ -12,7 +12,7 @@ use proptest::sample::Index;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
 /// What a number becomes.
-const EXTREMES: [&str; 12] = [
+const EXTREMES: [&str; 13] = [
     "0",
     "-1",
     "1",
@@ -21,6 +21,7 @@ const EXTREMES: [&str; 12] = [
     "4294967295",
     "4294967296",
     "18446744073709551615",
+    "-9223372036854775808",
     "1e308",
     "-1e-320",
     "nan",

@@ -306,7 +306,7 @@ fn the_indentation_that_engages_a_sloping_obstacle_is_its_own() {
         .unwrap()
         .message;
     assert!(
-        message.contains("An indentation above 1.000000e0 engages it"),
+        message.contains("contact if the indentation is above 1.000000e0"),
         "{message}"
     );
     assert_eq!(solution(0.99).summary.normal_force, 0.0);

@@ -59,12 +59,21 @@ impl Deck {
                     );
                     continue;
                 };
-                for element in elements {
-                    let element = &self.raw.elements[element as usize];
+                for place in elements {
+                    let element = &self.raw.elements[place as usize];
                     let corners = element.family().corners();
-                    if side <= corners {
-                        lines.push([element[side - 1], element[side % corners]]);
+                    if side > corners {
+                        let label = self.raw.element_labels[place as usize];
+                        faults.add(Violation::new(
+                            "",
+                            Reason::UnknownEdge,
+                            format!("side {side} of the triangle {label} in `{name:.60}`"),
+                            "sides 1 … 3 of a triangle",
+                            "Name the sides of triangles and of quadrilaterals in sets of their own.",
+                        ));
+                        break;
                     }
+                    lines.push([element[side - 1], element[side % corners]]);
                 }
             }
             self.raw.lines.entry(name).or_default().extend(lines);
@@ -175,4 +184,32 @@ fn unknown<'a>(
         false => format!("There are {}.", names.join(", ")),
     };
     faults.add(Violation::new("", Reason::UnknownName, got, expected, hint));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::read;
+    use super::*;
+    use crate::source::ReadError;
+
+    /// A square and a triangle in one set.
+    const MIXED: &str = "*NODE\n1, 0, 0\n2, 1, 0\n3, 1, 1\n4, 0, 1\n5, 2, 0\n\
+        *ELEMENT, TYPE=CPE4, ELSET=ALL\n10, 1, 2, 3, 4\n*ELEMENT, TYPE=CPE3, ELSET=ALL\n20, 2, 5, 3\n";
+
+    #[test]
+    fn a_fourth_side_of_a_triangle_is_a_violation_and_not_left_out() {
+        let read = |text: &str| read(format!("{MIXED}{text}").as_bytes());
+        let (mesh, _) = read("*DLOAD\nALL, P1, 5.\n").unwrap();
+        assert_eq!(mesh.boundaries["ALL P1"].len(), 2);
+        for (text, name) in [
+            ("*DLOAD\nALL, P4, 5.\n", "ALL P4"),
+            ("*SURFACE, NAME=LEFT\nALL, S4\n", "LEFT"),
+        ] {
+            let Err(ReadError::Invalid(list)) = read(text) else {
+                panic!("{text} was read");
+            };
+            let got = format!("side 4 of the triangle 20 in `{name}`");
+            assert_eq!((list[0].reason, &list[0].got), (Reason::UnknownEdge, &got));
+        }
+    }
 }

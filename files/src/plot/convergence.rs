@@ -2,6 +2,7 @@
 
 use super::figure::{Curve, LineStyle, Panel, Scale, figure};
 use super::theme::Theme;
+use solver::error::shortened;
 use solver::problem::Problem;
 use solver::solution::Iteration;
 
@@ -91,7 +92,7 @@ fn steps(problem: &Problem, history: &[Iteration], named: bool) -> Vec<(f64, Str
             let name = step.and_then(|step| step.name.clone());
             let name = name.unwrap_or_else(|| format!("step {}", row.step));
             let word = if named {
-                super::page::shortened(&name, 20)
+                shortened(&name, 20)
             } else {
                 String::new()
             };

@@ -7,6 +7,7 @@ use super::bands::{BAR, Bands};
 use super::body::{self, Frame, Path, Sides, Window};
 use super::page::{self, number, with_unit};
 use super::theme::{Theme, hex};
+use crate::stress::von_mises;
 use solver::problem::{Analysis, Problem};
 use solver::solution::{ContactProfile, Fields, NodeState};
 
@@ -53,10 +54,7 @@ impl Stress {
         let (xx, yy) = (of(&fields.stress_xx), of(&fields.stress_yy));
         let (zz, xy) = (of(&fields.stress_zz), of(&fields.stress_xy));
         match self {
-            Stress::VonMises => {
-                let squares = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
-                (0.5 * squares + 3.0 * xy * xy).sqrt()
-            }
+            Stress::VonMises => von_mises([xx, yy, xy, zz]),
             Stress::Xx => xx,
             Stress::Yy => yy,
             Stress::Zz => zz,
@@ -176,7 +174,7 @@ impl Body<'_> {
             && f.elements.iter().all(|e| e.iter().all(known))
         {
             true => Ok(()),
-            false => Err("the fields do not hold all nodes".to_owned()),
+            false => Err("some nodes have no field values".to_owned()),
         }
     }
 

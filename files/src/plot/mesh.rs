@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use plotters::prelude::*;
 use solver::error::Violation;
+use solver::error::shortened;
 use solver::mesh::Mesh;
 use solver::model::Model;
 use solver::problem::Problem;
@@ -175,7 +176,7 @@ fn label(problem: &Problem, name: &str) -> String {
         .filter(|(is, _)| *is)
         .map(|(_, role)| role)
         .collect();
-    let name = page::shortened(name, 30);
+    let name = shortened(name, 30);
     match roles.is_empty() {
         true => name,
         false => format!("{name} ({})", roles.join(", ")),

@@ -5,6 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::theme::Theme;
+use solver::error::shortened;
 use solver::problem::Units;
 
 /// Width of every figure (pixels).
@@ -90,15 +91,6 @@ pub(super) fn draw_text(
 /// How wide a text of that height is at most, without asking a font (pixels).
 pub(super) fn width(words: &str) -> i32 {
     8 * words.chars().count() as i32
-}
-
-/// The first `most` characters.
-pub(super) fn shortened(words: &str, most: usize) -> String {
-    if words.chars().count() <= most {
-        return words.to_owned();
-    }
-    let start: String = words.chars().take(most - 1).collect();
-    format!("{}…", start.trim_end())
 }
 
 /// A quantity with its unit, where there is one.

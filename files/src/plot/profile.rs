@@ -6,6 +6,7 @@ use std::ops::Range;
 use super::figure::{Curve, LineStyle, Panel, figure};
 use super::page::{self, with_unit};
 use super::theme::Theme;
+use solver::error::shortened;
 use solver::problem::{Contact, Problem};
 use solver::solution::ContactProfile;
 
@@ -37,7 +38,7 @@ fn panels(problem: &Problem, name: &str, profile: &ContactProfile) -> Vec<Panel>
     let opposite: Vec<f64> = profile.friction_bound.iter().map(|tau| -tau).collect();
     let panel = |curves: Vec<Curve>| Panel {
         x: with_unit(
-            &format!("arc length s along `{}`", page::shortened(name, 40)),
+            &format!("arc length s along `{}`", shortened(name, 40)),
             page::length(&problem.units),
         ),
         y: with_unit("stress", page::stress(&problem.units)),

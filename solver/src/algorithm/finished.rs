@@ -1,4 +1,4 @@
-//! The end of an iteration: what every method hands back, and what is kept of it.
+//! The end of an iteration: what every method returns, and what is kept of it.
 
 use crate::algorithm::system::State;
 use crate::algorithm::track::{Cycle, Measured, Track};
@@ -9,17 +9,17 @@ use crate::solution::{Iteration, Outcome, Residuals, Stage};
 pub struct Finished {
     /// The final state.
     pub state: State,
-    /// The friction bound that it was solved with, at every friction point.
+    /// The friction bound used for it, at every friction point.
     pub bound: Vec<f64>,
     /// σ_t at every friction point.
     pub tractions: Vec<f64>,
-    /// The tractions are those of the thesis's own iteration, not what the law says of the state.
+    /// The tractions are those of the thesis's own iteration, not those of the law at this state.
     pub own_tractions: bool,
     /// How it ended.
     pub outcome: Outcome,
-    /// What produced the final state.
+    /// The stage that produced the final state.
     pub stage: Stage,
-    /// kkt, friction and monolithic; equilibrium is the body's to say.
+    /// kkt, friction and monolithic; equilibrium is computed from the body.
     pub residuals: Residuals,
     /// Last q = |Δτ_k|/|Δτ_{k−1}| of plain sweeps.
     pub contraction: Option<f64>,
@@ -37,7 +37,7 @@ pub(super) struct End {
     pub(super) cycle: Option<Cycle>,
     /// Last q of sweeps that were not accelerated.
     pub(super) contraction: Option<f64>,
-    /// All iterations that were allowed are done.
+    /// The limit of iterations is reached.
     pub(super) exhausted: bool,
 }
 
@@ -54,7 +54,7 @@ impl End {
         }
     }
 
-    /// What does not converge is told with the cycle that another way ran into, if it has none itself.
+    /// A method that does not converge, and has no cycle, is reported with the cycle found by the other method.
     pub(super) fn with_cycle_of(mut self, other: &End) -> Self {
         if self.outcome == Outcome::NotConverged && other.cycle.is_some() {
             self.cycle.clone_from(&other.cycle);
@@ -63,7 +63,7 @@ impl End {
         self
     }
 
-    /// Nothing else is to be tried: it converged, or the observer or the limit put an end to it.
+    /// No other method is to be tried: it converged, or the observer or the limit ended it.
     pub(super) fn ended(&self) -> bool {
         matches!(self.outcome, Outcome::Converged | Outcome::Canceled) || self.exhausted
     }

@@ -1,5 +1,5 @@
 //! The outer sweeps, thesis (1.18)–(1.22) and 3.1: freeze the friction bound, solve the convex
-//! problem, take the bound that its pressure implies, and again. Where the sweeps contract badly,
+//! problem, take the bound that its pressure implies, and repeat. Where the sweeps contract slowly,
 //! the next bound is extrapolated from the last few (Anderson acceleration).
 
 use std::ops::ControlFlow;
@@ -16,13 +16,13 @@ use crate::solution::{Observer, Outcome, Progress, Stage};
 /// q above which sweeps are accelerated.
 const SLOW: f64 = 0.7;
 
-/// Sweeps that an acceleration looks back on.
+/// Sweeps that an acceleration uses.
 const DEPTH: usize = 5;
 
-/// Sweeps without progress after which another method is worth trying.
+/// Sweeps without progress after which another method is tried.
 const PATIENCE: usize = 15;
 
-/// One convex problem, measured and told.
+/// Solves one convex problem; its solution is measured and reported.
 pub(super) fn sweep(
     track: &mut Track<'_, '_>,
     stage: Stage,
@@ -108,7 +108,7 @@ pub(super) fn run(
             since_best += 1;
         }
         if let Some(cycle) = track.note(&swept.measured.state, friction) {
-            // an acceleration may yet lead out of it; if not, this is what is told in the end
+            // an acceleration may still lead out of the cycle; if not, it is what is reported at the end
             swept.cycle = Some(cycle);
             if give_up_early && !accelerated {
                 break;
@@ -144,7 +144,7 @@ pub(super) fn run(
     swept
 }
 
-/// The last sweeps: the bounds tried, and by how much each missed the bound it implied.
+/// The last sweeps: the bounds tried, and the difference of each from the bound that it implied.
 #[derive(Default)]
 struct Memory {
     bounds: Vec<Vec<f64>>,
@@ -162,7 +162,7 @@ impl Memory {
             .push(implied.iter().zip(bound).map(|(a, b)| a - b).collect());
     }
 
-    /// Anderson's step: the combination of the last sweeps whose defect is least, plus that defect.
+    /// Anderson's step: the combination of the last sweeps with the least defect, plus that defect.
     /// A friction bound is never negative.
     fn extrapolate(&self) -> Vec<f64> {
         let last = self.bounds.len() - 1;
@@ -190,7 +190,7 @@ impl Memory {
 }
 
 /// The state with u_t at rest on the obstacle at every contact node with friction: every point
-/// sticks, and pulls with full stiffness.
+/// sticks and acts with full stiffness.
 pub(super) fn stuck(system: &System<'_>, state: &State) -> State {
     let mut state = state.clone();
     for patch in system.patches.iter().filter(|patch| patch.law.is_some()) {

@@ -1,7 +1,7 @@
 //! Contact and friction on the condensed system, docs/formulation.md section 4.
 //!
-//! Algorithms are functions of one kind: from a [`System`] to its final state, an iteration at a
-//! time to the observer. [`run`] chooses among them.
+//! Algorithms are functions from a [`System`] to its final state, and show each iteration to the
+//! observer. [`run`] chooses among them.
 
 mod convex;
 mod finished;
@@ -32,8 +32,8 @@ use track::{Measured, Track};
 /// Newton steps before giving up.
 const NEWTON_STEPS: u32 = 60;
 
-/// Solves a system at its load level with the algorithm asked for, from the end of the increment
-/// before where there is one.
+/// Solves a system at its load level with the chosen algorithm, from the end of the previous increment
+/// if there is one.
 pub fn run(
     system: &System<'_>,
     controls: &SolverControls,
@@ -51,7 +51,7 @@ pub fn run(
         };
     }
     let (start, answer) = start(&mut track, before, observe);
-    // without friction, or where friction never acts, the first solution is the last
+    // without friction, or if friction never acts, the first solution is final
     let solved = start.within(controls.tolerance) && before.is_none();
     if system.points.is_empty() || solved || answer.is_break() {
         let outcome = match answer {
@@ -69,7 +69,7 @@ pub fn run(
     finish(track, end)
 }
 
-/// The state that friction starts from: that of the increment before; else the frictionless
+/// The state that friction starts from: that of the previous increment; else the frictionless
 /// solution with u_t = d (friction pulls with full stiffness at first).
 fn start(
     track: &mut Track<'_, '_>,
@@ -79,7 +79,7 @@ fn start(
     let system = track.system;
     if let (Some(before), false) = (before, system.points.is_empty()) {
         let (state, bound) = (before.state.clone(), before.bound.clone());
-        // its reactions mean nothing at the new level; its friction bound is near
+        // its reactions are not valid at the new level; its friction bound is a good guess
         let measured = Measured {
             implied_bound: bound.clone(),
             ..Measured::new(system, state, bound)
@@ -95,7 +95,7 @@ fn start(
         return (measured, answer);
     }
     if system.semidefinite && measured.residuals.kkt > track.controls.tolerance {
-        // nothing but friction holds this body: the frictionless one slides away
+        // only friction holds this body: without it, it slides away
         let (bonded, answer) = bonded_state(system, track.controls, observe);
         return (bonded, answer);
     }
@@ -132,7 +132,7 @@ pub fn quiet(observe: &mut Observer<'_>) -> impl FnMut(Progress<'_>) -> ControlF
 }
 
 /// Sweeps; where they do not converge, Newton's method from the best sweep; where that fails too, both
-/// again from the bonded state: beyond a fold the free branch ends, and only a jammed state is left.
+/// again from the bonded state: beyond a fold the free branch ends, and only a jammed state exists.
 fn auto(mut track: Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> Finished {
     let first = both(&mut track, start, observe);
     if first.ended() {

@@ -7,8 +7,8 @@
 //!
 //!   H = Ŝ + Σ_g w τ φ′ h hᵀ − Σ_g w φ τ′ h (W P Ŝ_n)_g
 //!
-//! Not symmetric. A step that does not lessen the residual is cut to the least energy along it, for
-//! the friction bound before it; beyond that there is no safeguard. Where it converges it takes four
+//! Not symmetric. A step that does not reduce the residual is shortened to the least energy along it, with
+//! the friction bound before it; there is no other safeguard. Where it converges it takes four
 //! to twenty steps.
 
 use crate::algorithm::convex::{
@@ -22,10 +22,10 @@ use crate::friction::Source;
 use crate::linear::solve_general;
 use crate::solution::{Observer, Outcome, Stage};
 
-/// Steps without progress after which there will be none.
+/// Steps without progress after which the method gives up.
 const PATIENCE: u32 = 20;
 
-/// Iterates from a state; the best state reached comes back.
+/// Iterates from a state; returns the best state reached.
 pub(super) fn run(
     track: &mut Track<'_, '_>,
     start: &Measured,
@@ -82,8 +82,8 @@ pub(super) fn run(
     end
 }
 
-/// The state after a step: the whole of it where that lessens the residual, else the part with the
-/// least energy; and whether the contact set changed.
+/// The state after a step: the whole step if it reduces the residual, else the part of it with the least
+/// energy; and whether the contact set changed.
 fn next(system: &System<'_>, state: &State, residual: f64) -> Option<(Measured, bool)> {
     let target = step(system, state)?;
     let reach = |part: f64| {

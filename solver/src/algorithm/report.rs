@@ -1,5 +1,4 @@
-//! From a final state to a [`Solution`]: forces, extents, profiles, fields, and what the user
-//! should know before trusting them.
+//! From a final state to a [`Solution`]: forces, extents, profiles, fields and warnings.
 
 use std::collections::BTreeMap;
 
@@ -15,19 +14,19 @@ use crate::solution::{
     Residuals, Summary, Warning, WarningCode,
 };
 
-/// Forces that balance no better than this have lost half of their digits: no result to trust.
+/// Forces with a larger imbalance than this have lost half of their digits: the result is not reliable.
 const OUT_OF_BALANCE: f64 = 1e-7;
 
-/// Forces are told from rounding when they are above this part of modulus × displacement × depth.
+/// Forces count as more than rounding when they exceed this part of modulus × displacement × depth.
 const FORCE_FLOOR: f64 = 1e-6;
 
-/// Displacement beyond this part of the body's size is not small.
+/// Displacements above this part of the body's size are not small.
 const LARGE_DISPLACEMENT: f64 = 0.1;
 
-/// q beyond which the sweeps barely contract.
+/// q above which the sweeps barely contract.
 const SLOW_CONTRACTION: f64 = 0.9;
 
-/// Everything a user gets to see of a final state.
+/// The results of a final state.
 pub struct Reported {
     /// Scalars, extents and warnings.
     pub summary: Summary,
@@ -39,7 +38,7 @@ pub struct Reported {
     pub fields: Fields,
 }
 
-/// What a final state means: forces, extents, profiles, fields, and whether to trust them.
+/// The results of a final state: forces, extents, profiles, fields and warnings.
 pub fn report(
     model: &Model,
     body: &ElasticBody,
@@ -117,7 +116,7 @@ pub fn report(
         warnings.push(Warning {
             code: WarningCode::OutOfBalance,
             pointer: String::new(),
-            message: format!("The forces on the body do not balance: {equilibrium:.1e} of their sum is left over. The stiffness is all but singular: check supports, hinges and badly shaped elements."),
+            message: format!("The forces on the body do not balance: {equilibrium:.1e} of their sum remains. The stiffness is nearly singular: check supports, hinges and badly shaped elements."),
         });
     }
     let summary = Summary {
@@ -171,7 +170,7 @@ pub fn report(
     })
 }
 
-/// Whether the contacts that touch in the end, and their friction, hold what supports do not.
+/// Checks that the contacts of the final state, with their friction, hold what the supports do not.
 fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
     let mut hindered = Vec::new();
     for patch in &system.patches {
@@ -203,8 +202,8 @@ fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), S
     }
 }
 
-/// Force on every contact unknown: the obstacle's reaction −R along n, friction and what holds a
-/// bonded node along t.
+/// Force on every contact unknown: the obstacle's reaction −R along n, friction and the reaction of bonded nodes
+/// along t.
 fn contact_force(system: &System<'_>, finished: &Finished, forces: &Forces) -> Vec<f64> {
     let mut friction = vec![0.0; finished.state.v.len()];
     system.add_traction_force(&finished.tractions, &mut friction);
@@ -251,7 +250,7 @@ fn equilibrium(
         let external: [f64; 2] = std::array::from_fn(|a| match dofs[a] {
             Dof::Free(i) if i >= interior => load[a] + contact_force[i - interior],
             Dof::Free(_) => load[a],
-            Dof::Fixed(_) => internal[a], // what the support must give, load included
+            Dof::Fixed(_) => internal[a], // the reaction of the support, load included
         });
         let [fx, fy] = match body.map.axes[node] {
             None => external,
@@ -265,7 +264,7 @@ fn equilibrium(
             size += f.abs();
         }
     }
-    // a body that only moves has no forces but rounding: that must not look like imbalance
+    // a body in rigid motion has only rounding errors as forces: they must not count as an imbalance
     let moved = displacements
         .iter()
         .flatten()
@@ -339,7 +338,7 @@ fn fields(
     }
 }
 
-/// Linear elasticity takes displacements for small beside the body.
+/// Linear elasticity assumes displacements that are small beside the body.
 fn warn_of_displacement(model: &Model, displacements: &[[f64; 2]], warnings: &mut Vec<Warning>) {
     let size = model.mesh.extent(0).hypot(model.mesh.extent(1));
     let largest = displacements
@@ -351,7 +350,7 @@ fn warn_of_displacement(model: &Model, displacements: &[[f64; 2]], warnings: &mu
             code: WarningCode::LargeDisplacement,
             pointer: String::new(),
             message: format!(
-                "The largest displacement, {largest:.4}, is {:.0} % of the body's size: linear elasticity no longer describes it.",
+                "The largest displacement, {largest:.4}, is {:.0} % of the body's size: linear elasticity is no longer accurate.",
                 100.0 * largest / size
             ),
         });
@@ -370,7 +369,7 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
         warn(
             WarningCode::SlowContraction,
             format!(
-                "The friction bound contracts by only q = {q:.3} per sweep: friction and pressure feed each other, and the state may not be the only one."
+                "The friction bound contracts by only q = {q:.3} per sweep: friction and pressure amplify each other, and the solution may not be unique."
             ),
         );
     }
@@ -379,7 +378,7 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
         warn(
             WarningCode::NotConverged,
             format!(
-                "After {} iterations the residuals are kkt {:.1e}, friction {:.1e}, monolithic {:.1e}. Raise max_iterations if they still fall in the history; else raise elastic_slip or tolerance, or refine the mesh.",
+                "After {} iterations the residuals are kkt {:.1e}, friction {:.1e}, monolithic {:.1e}. Raise max_iterations if they still decrease in the history; else raise elastic_slip or tolerance, or refine the mesh.",
                 finished.history.len(),
                 r.kkt,
                 r.friction,

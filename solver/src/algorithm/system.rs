@@ -1,5 +1,5 @@
-//! The problem as seen from Γ_C at one load level: contact nodes, friction points, and the forces
-//! between them.
+//! The problem reduced to Γ_C at one load level: contact nodes, friction points, and the forces between
+//! them.
 
 use crate::body::ElasticBody;
 use crate::elasticity::Dof;
@@ -11,7 +11,7 @@ use crate::problem::{Condition, FrictionPoints, History, Measure};
 /// A friction point whose bound is below this part of the largest is open: its anchor follows it.
 const OPEN: f64 = 1e-12;
 
-/// Everything the iterations need, all contacts in a row.
+/// The data of the iterations, all contacts in a row.
 #[derive(Clone)]
 pub struct System<'a> {
     /// Ŝ.
@@ -28,12 +28,12 @@ pub struct System<'a> {
     pub circumference: f64,
     /// The load level that all of the above is for.
     pub level: Level,
-    /// Ŝ has rigid motions that contact alone can hold.
+    /// Ŝ has rigid motions that only contact can prevent.
     pub semidefinite: bool,
     /// Work done against friction under the incremental law in the increments so far (without 2π).
     pub past_work: f64,
-    /// A nodal force of the size that this problem is about, also at a level where nothing acts: that
-    /// of the full loads, or of a contact node pushed by the indentation or the drag.
+    /// A typical nodal force of this problem, for levels where nothing acts: that of the full loads, or of a
+    /// contact node pushed by the indentation or the drag.
     pub reference_force: f64,
     pub(super) body: &'a ElasticBody,
     pub(super) model: &'a Model,
@@ -87,9 +87,9 @@ pub struct Point {
     pub weight: f64,
     /// Where its bound comes from, on all nodes.
     pub source: Source,
-    /// g, the part of its displacement that friction has forgotten; 0 in the total law.
+    /// g, the anchor: slip is measured from here; 0 in the total law.
     pub anchor: f64,
-    /// The slip at the end of the increment before, for the work done.
+    /// u_t − d at the end of the previous increment, for the work done.
     past_displacement: f64,
 }
 
@@ -183,7 +183,7 @@ impl<'a> System<'a> {
             BoundLaw::Pressure { average, .. } => average.measure == Measure::Surface,
             BoundLaw::Prescribed(_) => false,
         };
-        // over a surface the rings themselves lead round the axis
+        // over a surface the rings already include the other side of the axis
         let round = contact.friction.as_ref().is_some_and(surface);
         let symmetric = |i: usize| {
             let held = matches!(self.nodes[first + i].tangent, Dof::Fixed(value) if value == 0.0);
@@ -258,7 +258,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The same with u_t = d at all nodes of contacts with friction: everything sticks.
+    /// This system with u_t = d at all nodes of contacts with friction: everything sticks.
     pub fn bonded(&self) -> Self {
         let mut bonded = self.clone();
         for patch in bonded.patches.iter().filter(|patch| patch.law.is_some()) {
@@ -271,7 +271,7 @@ impl<'a> System<'a> {
         bonded
     }
 
-    /// The end of an increment: anchors move to where friction has forgotten what came before.
+    /// The end of an increment: the anchors of sliding and of open points move with the slip.
     pub fn move_anchors(&mut self, v: &[f64], bound: &[f64]) {
         self.past_work = self.work(v, bound).incremental;
         let largest = bound.iter().fold(0.0f64, |a, b| a.max(*b));
@@ -279,8 +279,8 @@ impl<'a> System<'a> {
             let point = &self.points[g];
             let (slip, relative) = (self.slip(v, point), self.relative_displacement(v, point));
             let open = *tau <= OPEN * largest;
-            let forgotten = self.law(point).anchor_move(slip, open);
-            self.points[g].anchor += forgotten;
+            let moved = self.law(point).anchor_move(slip, open);
+            self.points[g].anchor += moved;
             self.points[g].past_displacement = relative;
         }
     }
@@ -307,7 +307,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The state to start from: nothing moves, nothing touches but what is bonded.
+    /// The initial state: no displacement, and only bonded nodes in contact.
     pub fn rest(&self) -> State {
         State {
             v: vec![0.0; self.load.len()],

@@ -1,4 +1,4 @@
-//! What every algorithm measures of its states, keeps of them and tells of them.
+//! Measures, records and reports the states of every algorithm.
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -16,7 +16,7 @@ pub struct Place {
     pub step: u32,
     /// Increment within the step, from 0.
     pub increment: u32,
-    /// Rows told before.
+    /// Rows reported before.
     pub rows: u32,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Measured {
     pub(super) implied_bound: Vec<f64>,
     pub(super) reactions: Vec<f64>,
     pub(super) pressures: Vec<f64>,
-    /// kkt, friction and monolithic; equilibrium is the body's to say.
+    /// kkt, friction and monolithic; equilibrium is computed from the body.
     pub(super) residuals: Residuals,
     /// max|τ − implied τ| (stress).
     pub(super) bound_change: f64,
@@ -42,7 +42,7 @@ impl Measured {
         let pressures = system.pressures(&reactions);
         let implied_bound = system.friction_bound(&pressures);
         let bound_change = largest_difference(&implied_bound, &bound);
-        // the largest bound, old or new: formulation 4.4, guarded where one of them is nothing
+        // the largest bound, old or new: formulation 4.4, safe where one of them is zero
         let scale = implied_bound
             .iter()
             .chain(&bound)
@@ -75,20 +75,20 @@ impl Measured {
     }
 }
 
-/// Residuals count as the same to this part: a cycle repeats them, an approach does not.
+/// Relative difference up to which residuals count as equal: a cycle repeats them, an approach does not.
 const SAME: f64 = 0.01;
 
-/// What a row says beside its state.
+/// What a row of the history has beside its state.
 pub(super) struct Row {
     pub(super) stage: Stage,
-    /// The residual that the stage itself works on.
+    /// The residual that the stage itself reduces.
     pub(super) residual: f64,
     pub(super) contraction: Option<f64>,
     /// Newton steps inside.
     pub(super) inner: u32,
     /// σ_t at every friction point.
     pub(super) tractions: Vec<f64>,
-    /// R_F where the stage tests one of its own; else it is that of the nodal pressures.
+    /// R_F of the stage, if it has its own; else that of the nodal pressures.
     pub(super) own_r_f: Option<f64>,
 }
 
@@ -111,7 +111,7 @@ pub(super) struct Track<'s, 'a> {
     before: Option<(Vec<bool>, Vec<f64>)>,
     /// Whether the last row's contact set differs from that of the row before.
     pub(super) contact_changed: bool,
-    /// States met, with their number and the residual there.
+    /// Previous states, with their number and their residual.
     met: HashMap<Vec<u8>, (usize, f64)>,
     states: Vec<Vec<u8>>,
 }
@@ -130,7 +130,7 @@ impl<'s, 'a> Track<'s, 'a> {
         }
     }
 
-    /// Adds a row and tells the observer.
+    /// Adds a row to the history and shows it to the observer.
     pub(super) fn record(
         &mut self,
         measured: &Measured,
@@ -186,8 +186,8 @@ impl<'s, 'a> Track<'s, 'a> {
         answer
     }
 
-    /// Notes contact and slip of a state. A cycle is a state met before, after others, with the same
-    /// residual as then.
+    /// Notes contact and slip of a state. A cycle is a previous state that returns after others, with the same
+    /// residual.
     pub(super) fn note(&mut self, state: &State, residual: f64) -> Option<Cycle> {
         let code = code(self.system, state);
         let now = self.states.len();
@@ -217,7 +217,7 @@ impl<'s, 'a> Track<'s, 'a> {
         cycle
     }
 
-    /// Forgets the states met: another method begins.
+    /// Clears the previous states: another method begins.
     pub(super) fn forget(&mut self) {
         self.met.clear();
         self.states.clear();
@@ -249,7 +249,7 @@ fn slipping(system: &System<'_>, state: &State, bound: &[f64]) -> (u32, u32) {
     (slip, stick)
 }
 
-/// R_F of thesis 3.5: ‖σ_n − σ_n′‖ / ‖σ_n′‖, guarded where nothing touched before.
+/// R_F of thesis 3.5: ‖σ_n − σ_n′‖ / ‖σ_n′‖, safe where nothing touched before.
 pub(super) fn relative_change(now: &[f64], before: &[f64]) -> f64 {
     let change: f64 = now.iter().zip(before).map(|(a, b)| (a - b) * (a - b)).sum();
     let scale: f64 = before.iter().map(|b| b * b).sum();

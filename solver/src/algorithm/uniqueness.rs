@@ -1,4 +1,4 @@
-//! Whether the solution found is the only one that is easily found: once more from the bonded state.
+//! A test of uniqueness: the solution is computed once more, from the bonded state.
 
 use crate::algorithm::system::System;
 use crate::algorithm::track::{Measured, Track};
@@ -6,19 +6,18 @@ use crate::algorithm::{End, Finished, Place, bonded_state, both, fixed_point, qu
 use crate::problem::SolverControls;
 use crate::solution::{Comparison, Observer, Outcome, Summary, Warning, WarningCode};
 
-/// A comparison with a second solution goes into the summary, and a warning with it where the two
-/// differ.
+/// Adds a comparison with a second solution to the summary, and a warning if the two differ.
 pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
     let warning = if !second.converged {
         Some((
             WarningCode::UniquenessUnknown,
-            "Started from the bonded state the method does not converge: whether there is a second solution remains open.".to_owned(),
+            "Started from the bonded state the method does not converge: whether there is a second solution is unknown.".to_owned(),
         ))
     } else if !second.agrees {
         Some((
             WarningCode::NotUnique,
             format!(
-                "There is a second solution: started from the bonded state (u_t = d) the forces are Y = {:.6}, T = {:.6} instead of Y = {:.6}, T = {:.6}. Which one occurs depends on the history of loading; the incremental law with load steps can follow it.",
+                "There is a second solution: started from the bonded state (u_t = d) the forces are Y = {:.6}, T = {:.6} instead of Y = {:.6}, T = {:.6}. Which one occurs depends on the history of loading, which the incremental law with load steps can follow.",
                 second.normal_force,
                 second.tangential_force,
                 summary.normal_force,
@@ -38,7 +37,7 @@ pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
     summary.uniqueness = Some(second);
 }
 
-/// The same for a solution with twice the increments.
+/// Adds a comparison with a solution in twice the increments to the summary, and a warning if it differs.
 pub fn note_doubled_increments(summary: &mut Summary, second: Comparison) {
     if !second.agrees {
         summary.warnings.push(Warning {
@@ -98,8 +97,8 @@ fn relative(a: f64, b: f64, scale: f64) -> f64 {
     if a == b { 0.0 } else { (a - b).abs() / scale }
 }
 
-/// Solutions agree when forces and friction bounds do to this: far above what the tolerance leaves,
-/// far below what tells two states apart.
+/// Solutions agree if their forces and friction bounds do so to this part: far above the error that the tolerance
+/// leaves, far below the difference of two states.
 const AGREES: f64 = 1e-6;
 
 /// Solves a system from the bonded state (u_t = d everywhere) and compares with `first`.
@@ -114,7 +113,7 @@ pub fn other_solution(
     let mut track = Track::new(system, controls, Place::default());
     let mut end = both(&mut track, start, quiet);
     if !end.ended() {
-        // there may be no state near the bonded one: let the sweeps wander off to where one is
+        // no solution is near the bonded state: sweeps may move further away from it
         track.forget();
         end = fixed_point::run(&mut track, end.measured, false, quiet);
     }

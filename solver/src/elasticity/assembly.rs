@@ -55,8 +55,8 @@ impl DofMap {
 /// Element stiffness k_ij = ∫ B_iᵀ D B_j, along x and y; 16 × 16, symmetric. The last four rows and
 /// columns of a triangle are zero.
 ///
-/// `quadrature`: 3 leaves no more than the rigid modes without stiffness; 2 leaves a quadrilateral one
-/// mode more, which neighbours may suppress or not.
+/// `quadrature`: with 3 only the rigid modes have no stiffness; with 2 a quadrilateral has one more such
+/// mode, which its neighbours may or may not suppress.
 pub fn assemble_element(
     family: Family,
     nodes: &[[f64; 2]; 8],
@@ -179,7 +179,7 @@ pub struct Loads {
 pub struct EdgeLoad {
     /// The edge.
     pub edge: Edge,
-    /// What the two components are along.
+    /// The directions of the two components.
     pub axes: LoadAxes,
     /// Two components (stress) at start, end and midside.
     pub values: [[f64; 2]; 3],
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn uniform_stresses_load_an_edge_one_four_one() {
+    fn uniform_stresses_load_the_nodes_of_an_edge_by_one_four_one() {
         // a top edge: n = (0, 1), t = (1, 0)
         let mesh = Mesh {
             nodes: vec![[0.0, 0.0], [3.0, 0.0], [1.5, 0.0]],
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_force_weighs_the_body() {
+    fn a_body_force_adds_up_to_force_times_volume() {
         let mesh = Mesh {
             nodes: SQUARE.to_vec(),
             elements: vec![Element::Quad([0, 1, 2, 3, 4, 5, 6, 7])],

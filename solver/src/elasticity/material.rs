@@ -9,7 +9,7 @@ pub const COMPONENTS: usize = 4;
 /// σ = moduli · ε, symmetric (stress).
 pub type Moduli = [[f64; COMPONENTS]; COMPONENTS];
 
-/// The body's theory and its materials, seen in the plane of the analysis.
+/// The body's theory and its materials, in the plane of the analysis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
     analysis: Analysis,
@@ -28,7 +28,7 @@ impl Section {
         }
     }
 
-    /// Several materials, with the number of its own for every element.
+    /// Several materials, with the number of its material for every element.
     pub fn by_element(analysis: Analysis, moduli: Vec<Moduli>, material_of: Vec<u16>) -> Self {
         Section {
             analysis,
@@ -53,7 +53,7 @@ impl Section {
     }
 
     /// The factor of every integral over the section at the first coordinate x: thickness, or r.
-    /// The 2π of axisymmetry stays out here and enters totals only.
+    /// The 2π of axisymmetry is left out here and enters totals only.
     pub fn depth(&self, x: f64) -> f64 {
         match self.analysis {
             Analysis::PlaneStrain {} => 1.0,
@@ -71,7 +71,7 @@ impl Section {
         }
     }
 
-    /// True where the hoop strain u_r / r counts.
+    /// True if there is a hoop strain u_r / r.
     pub fn axisymmetric(&self) -> bool {
         matches!(self.analysis, Analysis::Axisymmetric {})
     }
@@ -124,7 +124,7 @@ pub fn isotropic(analysis: &Analysis, youngs_modulus: f64, poissons_ratio: f64) 
     }
 }
 
-/// From the constants of an orthotropic material; `None` where they make no stable one. Constants
+/// From the constants of an orthotropic material; `None` if the material is not stable. Constants
 /// across the plane are required unless the analysis is plane stress.
 #[rustfmt::skip]
 pub fn orthotropic(analysis: &Analysis, material: &Orthotropic) -> Option<Moduli> {
@@ -163,8 +163,8 @@ pub fn orthotropic(analysis: &Analysis, material: &Orthotropic) -> Option<Moduli
     Some(moduli)
 }
 
-/// The inverse of a symmetric matrix whose last row and column may be nothing (σ_zz = 0) and are
-/// then left so; `None` when the rest is not positive definite.
+/// The inverse of a symmetric matrix whose last row and column may be zero (σ_zz = 0) and then
+/// stay so; `None` when the rest is not positive definite.
 pub fn inverse(matrix: &Moduli) -> Option<Moduli> {
     let n = if matrix[COMPONENTS - 1][COMPONENTS - 1] == 0.0 {
         COMPONENTS - 1

@@ -1,4 +1,4 @@
-//! A standard elastic program, thesis 1.3 and 2.2; no word of contact.
+//! A standard elastic program, thesis 1.3 and 2.2; independent of contact.
 
 mod assembly;
 mod error_estimate;

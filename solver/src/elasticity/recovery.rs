@@ -5,7 +5,7 @@ use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::element::{Family, Mapped};
 use crate::mesh::Mesh;
 
-/// What the displacements mean for the body.
+/// Stresses, forces and energy of a displacement field.
 pub struct Recovered {
     /// Stress at every node: xx, yy, xy, zz (hoop), averaged over all elements that meet there.
     pub stress: Vec<[f64; COMPONENTS]>,

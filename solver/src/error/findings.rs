@@ -1,39 +1,39 @@
-//! What is wrong, gathered: all of it is counted, and as much is kept as helps.
+//! Collects violations: all are counted, and a limited number is kept.
 
 use std::collections::BTreeMap;
 
 use super::{Reason, Violation};
 
-/// More violations than this are counted, not listed: nobody reads them, and the answer stays small.
+/// Violations beyond this number are counted, not listed, so that the answer stays small.
 pub const MOST_LISTED: usize = 100;
 
-/// In one mesh the same thing may be wrong thousands of times; more of a kind would hide the others.
+/// The same fault may occur thousands of times in one mesh; more of one kind would hide the other kinds.
 const MOST_OF_A_KIND: usize = 20;
 
 /// Characters of each text: a name from a request may be as long as the request.
 const LONGEST: usize = 2000;
 
-/// Gathers violations.
+/// Collects violations.
 ///
-/// No check asks it whether something failed: each answers by itself, as [`Checked`].
+/// Whether a check failed is its own result, a [`Checked`]; the list is not asked.
 #[derive(Debug)]
 pub struct Findings {
-    /// Where all pointers begin.
+    /// The start of all pointers.
     at: String,
     listed: Vec<Violation>,
     /// Violations by reason, while there is room for more.
     of_a_kind: BTreeMap<Reason, usize>,
     most_of_a_kind: usize,
-    /// Violations that came when the list was full.
+    /// Violations found after the list was full.
     more: usize,
 }
 
-/// Something is wrong, and it has been said what: only [`Findings`] makes one.
+/// Proof that a violation has been reported: only [`Findings`] makes one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub struct Refused(());
 
-/// What a check answers, with what it has found good.
+/// Result of a check: the checked value, or [`Refused`].
 pub type Checked<T = ()> = Result<T, Refused>;
 
 impl Default for Findings {
@@ -49,7 +49,7 @@ impl Default for Findings {
 }
 
 impl Findings {
-    /// Of one mesh; `pointer` is its own.
+    /// For one mesh at `pointer`, with a limit for each kind of violation.
     pub fn of_mesh(pointer: &str) -> Self {
         Findings {
             at: pointer.to_owned(),
@@ -58,7 +58,7 @@ impl Findings {
         }
     }
 
-    /// One more, which a check fails for. `place`: the rest of its pointer.
+    /// Adds a violation that makes a check fail. `place`: the rest of its pointer.
     pub fn report(
         &mut self,
         place: impl AsRef<str>,
@@ -71,7 +71,7 @@ impl Findings {
         Refused(())
     }
 
-    /// One more, where the list itself is the answer.
+    /// Adds a violation where the list itself is the result.
     pub fn add(&mut self, violation: Violation) {
         if !self.has_room(violation.reason) {
             return;
@@ -92,17 +92,17 @@ impl Findings {
         });
     }
 
-    /// Whether any further violation would only be counted.
+    /// Whether further violations are only counted.
     pub fn is_full(&self) -> bool {
         self.listed.len() >= MOST_LISTED
     }
 
-    /// Counts more of them.
+    /// Counts violations without listing them.
     pub fn count(&mut self, more: usize) {
         self.more += more;
     }
 
-    /// What was checked elsewhere, with all that was wrong there.
+    /// Adds the violations of a check made elsewhere.
     pub fn merge<T>(&mut self, checked: Result<T, Vec<Violation>>) -> Checked<T> {
         checked.map_err(|violations| {
             self.extend(violations);
@@ -110,7 +110,7 @@ impl Findings {
         })
     }
 
-    /// Counts one more; whether it is listed.
+    /// Counts one more; true if it is to be listed.
     fn has_room(&mut self, reason: Reason) -> bool {
         if self.is_full() {
             self.more += 1;
@@ -121,7 +121,7 @@ impl Findings {
         *count <= self.most_of_a_kind
     }
 
-    /// The list; what is not listed is counted in the last hints.
+    /// The list; the last hints give the numbers of violations that are not listed.
     pub fn into_violations(mut self) -> Vec<Violation> {
         for (reason, count) in self.of_a_kind {
             let more = count.saturating_sub(self.most_of_a_kind);
@@ -138,12 +138,12 @@ impl Findings {
         self.listed
     }
 
-    /// What was checked, or all that is wrong with it.
+    /// The checked value, or all violations.
     pub fn conclude<T>(self, checked: Checked<T>) -> Result<T, Vec<Violation>> {
         checked.map_err(|_| self.into_violations())
     }
 
-    /// What was gathered beside `value`, or `value` where there is nothing.
+    /// `value`, or the violations if there are any.
     pub fn into_result<T>(self, value: T) -> Result<T, Vec<Violation>> {
         match self.into_violations() {
             list if list.is_empty() => Ok(value),
@@ -160,7 +160,7 @@ impl Extend<Violation> for Findings {
     }
 }
 
-/// What several checks answer together: all of them are made, and one that fails fails them all.
+/// The result of several checks: all are made, and the whole fails if one of them does.
 #[derive(Debug)]
 #[must_use]
 pub struct AllChecks(Checked);
@@ -172,23 +172,23 @@ impl Default for AllChecks {
 }
 
 impl AllChecks {
-    /// One more check: what it found good.
+    /// Adds a check; returns the checked value.
     pub fn check<T>(&mut self, checked: Checked<T>) -> Option<T> {
         checked.map_err(|refused| self.0 = Err(refused)).ok()
     }
 
-    /// One more failure.
+    /// Adds a failed check.
     pub fn fail(&mut self, refused: Refused) {
         self.0 = Err(refused);
     }
 
-    /// `value`, where every check held.
+    /// `value`, if every check holds.
     pub fn finish<T>(self, value: T) -> Checked<T> {
         self.0.map(|()| value)
     }
 }
 
-/// The first `most` characters of a text, with a sign where some are missing.
+/// The first `most` characters of a text, with … where some are left out.
 pub fn shortened(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         Some((end, _)) => format!("{}…", &text[..end]),
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_mesh_twenty_of_a_kind_are_listed_and_the_others_leave_room() {
+    fn a_mesh_lists_twenty_violations_of_a_kind() {
         let mut findings = Findings::of_mesh("/mesh/inline");
         for place in ["/nodes/7", "/nodes/8"] {
             let _ = findings.report(place, Reason::UnusedNode, "it", "another", "Move it.");
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hostile_text_is_cut_between_characters() {
+    fn a_very_long_text_is_cut_between_characters() {
         let mut findings = Findings::default();
         let long = "ä".repeat(1 << 20);
         let _ = findings.report(&long, Reason::UnknownName, &long, &long, &long);
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn one_failure_fails_all() {
+    fn all_checks_fail_if_one_fails() {
         let mut findings = Findings::default();
         let mut all = AllChecks::default();
         assert_eq!(all.check(Ok(3)), Some(3));

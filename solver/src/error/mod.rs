@@ -1,6 +1,6 @@
-//! What can be wrong with a problem, and what can stop a solution.
+//! Violations of a problem, and errors that end a solution.
 //!
-//! Not converging is neither: it is an [`Outcome`](crate::solution::Outcome) with its history.
+//! A method that does not converge is neither: it is an [`Outcome`](crate::solution::Outcome) with its history.
 
 mod findings;
 mod reason;
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::phase::Phase;
 
-/// One thing that is wrong with a problem, said so that its author can mend it.
+/// A fault of a problem, described so that its author can correct it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Violation {
@@ -23,11 +23,11 @@ pub struct Violation {
     pub pointer: String,
     /// The kind of violation, stable for programs.
     pub reason: Reason,
-    /// What was found there.
+    /// What the problem has there.
     pub got: String,
-    /// What would have been right.
+    /// What is required there.
     pub expected: String,
-    /// What to do about it.
+    /// How to correct it.
     pub hint: String,
 }
 
@@ -50,7 +50,7 @@ impl Violation {
     }
 }
 
-/// What was given of alternatives, of which exactly one was asked for.
+/// Lists which of several alternatives were given, where exactly one is required.
 pub fn either(given: &[(&str, bool)]) -> String {
     let given = given.iter().filter(|(_, given)| *given);
     let names: Vec<String> = given.map(|(name, _)| format!("`{name}`")).collect();
@@ -80,31 +80,31 @@ impl fmt::Display for Violation {
     }
 }
 
-/// Why a solution could not be had at all.
+/// Why no solution could be computed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SolveError {
-    /// The problem is not one that can be solved; every violation found.
+    /// The problem cannot be solved; all its violations.
     Invalid(Vec<Violation>),
     /// The stiffness matrix has no Cholesky factor although the supports looked sufficient.
     SingularSystem {
         /// The pivot (in factor order) at which the factorisation stopped.
         pivot: usize,
     },
-    /// Supports leave the body free to move, and in the end contact does not hold it either.
+    /// Neither the supports nor the contacts of the final state hold the body.
     Unheld {
-        /// The motion that nothing hinders.
+        /// The free motion.
         motion: String,
         /// A node that moves.
         node: u32,
     },
-    /// The factor of the stiffness matrix has more entries than can be addressed or held.
+    /// The factor of the stiffness matrix has more entries than fit into memory.
     ResourceExhausted,
     /// A phase computed NaN or infinity.
     NonFinite {
         /// The phase.
         phase: Phase,
     },
-    /// The observer asked to stop before there was a state worth keeping.
+    /// The observer stopped the solution before there was a state to return.
     Stopped,
 }
 
@@ -123,14 +123,14 @@ impl fmt::Display for SolveError {
             ),
             SolveError::Unheld { motion, node } => write!(
                 f,
-                "nothing holds the body: it is free to move {motion}, e.g. at node {node}. Supports leave \
-                 that to contact, which does not touch in the end, or not where it would hold. Add a \
-                 support, or loads that press the body against the obstacle"
+                "nothing holds the body: it is free to move {motion}, e.g. at node {node}. The supports leave \
+                 this motion to contact, which in the end does not touch, or not where it would hold the \
+                 body. Add a support, or loads that press the body against the obstacle"
             ),
             SolveError::ResourceExhausted => {
                 write!(
                     f,
-                    "the factor of the stiffness matrix does not fit: refine less"
+                    "the factor of the stiffness matrix does not fit into memory: use a coarser mesh"
                 )
             }
             SolveError::NonFinite { phase } => write!(

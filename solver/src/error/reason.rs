@@ -24,43 +24,43 @@ use strum::{IntoStaticStr, VariantArray};
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Reason {
-    // What is written, whatever it means.
-    /// A text or a value that cannot be read as what it should be.
+    // Values as they are written.
+    /// A text or a value that cannot be read.
     Malformed,
     /// A value of another type.
     WrongType,
-    /// A name that means nothing here.
+    /// A name that is not known here.
     UnknownName,
-    /// None of the forms or words that may stand here.
+    /// None of the forms or words that are allowed here.
     UnknownAlternative,
-    /// A name that stands twice in one object.
+    /// A name that occurs twice in one object.
     DuplicateName,
-    /// Something that must be given is not.
+    /// A required value that is absent.
     Missing,
-    /// None, or several, of what exactly one is to be given.
+    /// None or several were given where exactly one is required.
     WrongCount,
-    /// A list of another length than is needed.
+    /// A list of another length than required.
     WrongLength,
-    /// Fewer than are needed.
+    /// Fewer than required.
     TooFew,
-    /// More than are taken.
+    /// More than allowed.
     TooMany,
-    /// A text longer than is taken.
+    /// A text longer than allowed.
     TooLong,
-    /// Larger than can be afforded.
+    /// Needs more memory than allowed.
     TooLarge,
     /// NaN or infinity.
     NotFinite,
-    /// A number out of its range.
+    /// A number outside its range.
     OutOfRange,
-    /// Numbers that should grow from one to the next.
+    /// Numbers that do not increase.
     NotIncreasing,
-    /// Given where it has no effect, or beside what excludes it.
+    /// Given where it has no effect, or together with a field that excludes it.
     NotUsed,
     /// Two values that cannot both hold.
     Conflict,
 
-    // Names that refer to nothing, or to too much.
+    // Names that refer to nothing, or that are taken.
     /// No boundary of that name.
     UnknownBoundary,
     /// No group of elements of that name.
@@ -69,15 +69,15 @@ pub enum Reason {
     UnknownNodeSet,
     /// No such mesh.
     UnknownMesh,
-    /// A name that something else has already.
+    /// A name that is in use already.
     NameTaken,
 
     // Files of meshes.
     /// A file that ends too early.
     Truncated,
-    /// A kind of file, keyword or element that is not read.
+    /// A kind of file, keyword or element that is not supported.
     Unsupported,
-    /// What a deck says of its analysis and has no meaning here.
+    /// A part of a deck's analysis that is not supported here.
     NotUnderstood,
 
     // Meshes.
@@ -85,21 +85,21 @@ pub enum Reason {
     UnknownNode,
     /// No element of that number.
     UnknownElement,
-    /// No side of an element.
+    /// A side that no element has.
     UnknownEdge,
-    /// A node that is there already.
+    /// A node that occurs twice.
     RepeatedNode,
-    /// An element that is there already.
+    /// An element that occurs twice.
     RepeatedElement,
-    /// A side that is there already.
+    /// A side that occurs twice.
     RepeatedEdge,
-    /// A point that is there already.
+    /// A point that occurs twice.
     RepeatedPoint,
-    /// A node of no element.
+    /// A node that belongs to no element.
     UnusedNode,
-    /// Another node than the one in the middle of the side.
+    /// A midside node other than the element's.
     WrongMidside,
-    /// A side between two elements, where one of the surface is meant.
+    /// A side between two elements where a side of the surface is required.
     InnerEdge,
     /// Neighbours that do not share a whole side.
     Nonconforming,
@@ -107,19 +107,19 @@ pub enum Reason {
     InvertedElement,
     /// Nodes that do not lie in one plane.
     NotPlane,
-    /// An edge that does not reach over all of the grid.
+    /// An edge that does not span the whole grid.
     DoesNotSpan,
 
     // Parts of a body.
-    /// A rule that no side fits.
+    /// A rule that matches no side.
     EmptyBoundary,
-    /// A rule that no element fits.
+    /// A rule that matches no element.
     EmptyGroup,
-    /// Something that belongs to two where it may belong to one.
+    /// Something assigned to two where only one is allowed.
     Overlap,
     /// Edges that do not follow one another.
     NotAChain,
-    /// A boundary with a corner, where there is no normal.
+    /// A boundary with a corner, where the normal is not defined.
     TurnsCorner,
     /// A coordinate that takes the same value twice along the boundary.
     NotMonotonic,
@@ -130,7 +130,7 @@ pub enum Reason {
     /// A node of two contacts.
     SharedNode,
 
-    // What holds the body.
+    // Supports.
     /// A contact node supported along a direction that is neither normal nor tangent.
     ObliqueSupport,
     /// A support inside the obstacle.
@@ -140,7 +140,7 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// The word.
+    /// The name that the API has for it.
     pub fn as_str(self) -> &'static str {
         self.into()
     }
@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reason_is_written_as_its_one_word() {
+    fn json_and_display_write_a_reason_alike() {
         for reason in Reason::VARIANTS {
             let json = serde_json::to_string(reason).unwrap();
             assert_eq!(json, format!("\"{reason}\""));

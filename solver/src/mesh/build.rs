@@ -1,4 +1,4 @@
-//! From the nodes and elements of a file to a mesh: second order, counter-clockwise, only what is used.
+//! From the nodes and elements of a file to a mesh: second order, counter-clockwise, without unused nodes.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -7,17 +7,17 @@ use crate::element::Element;
 use crate::error::{AllChecks, Checked, Findings, Reason, Refused, Violation};
 use crate::solution::{Warning, WarningCode};
 
-/// Stands for the midsides of an element that has none yet.
+/// Placeholder for the midsides of an element that has none yet.
 pub const NO_NODE: u32 = u32::MAX;
 
-/// A mesh as a file has it. Labels are the file's own numbers, for messages.
+/// A mesh as read from a file. Labels are the numbers in the file, for messages.
 #[derive(Debug, Default)]
 pub struct RawMesh {
     /// Positions.
     pub nodes: Vec<[f64; 2]>,
     /// Label of every node.
     pub node_labels: Vec<u64>,
-    /// Nodes by their place in `nodes`; all midsides are [`NO_NODE`] where the file has corners only.
+    /// Nodes by their place in `nodes`; all midsides are [`NO_NODE`] if the file has only corners.
     pub elements: Vec<Element>,
     /// Label of every element.
     pub element_labels: Vec<u64>,
@@ -27,14 +27,14 @@ pub struct RawMesh {
     pub groups: BTreeMap<String, Vec<u32>>,
     /// Named sets of nodes.
     pub node_sets: BTreeMap<String, Vec<u32>>,
-    /// 9-node quadrilaterals that lost their centre node.
+    /// Number of 9-node quadrilaterals whose centre node was dropped.
     pub without_centre: usize,
-    /// A set of nodes that holds whole sides of the surface is a boundary too.
+    /// A set of nodes that contains whole sides of the surface is a boundary too.
     pub sets_span_boundaries: bool,
 }
 
-/// The mesh and what was changed on the way, or everything that is wrong with it. Pointers are empty:
-/// only the caller knows where the file came from.
+/// The mesh and warnings of what was changed, or all its violations. Pointers are empty: only the caller knows
+/// the origin of the file.
 pub fn build(raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
     let mut found = Findings::of_mesh("");
     let built = assemble(raw, &mut found);
@@ -63,7 +63,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         note(
             WarningCode::CentreNodesDropped,
             format!(
-                "{} 9-node quadrilaterals lost their centre node and became 8-node elements.",
+                "{} 9-node quadrilaterals became 8-node elements; their centre nodes were dropped.",
                 raw.without_centre
             ),
         );
@@ -73,7 +73,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
     if reversed > 0 {
         note(
             WarningCode::ElementsReversed,
-            format!("{reversed} elements were numbered clockwise and have been turned over."),
+            format!("{reversed} elements were numbered clockwise and have been reversed."),
         );
     }
     let raised = second_order(&mut raw);
@@ -81,7 +81,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         note(
             WarningCode::RaisedToSecondOrder,
             format!(
-                "{raised} elements had corners only: midside nodes were put half-way between them. A curved side stays the polygon it was."
+                "{raised} elements had only corners: midside nodes were added half-way between them. A curved side remains a polygon."
             ),
         );
     }
@@ -170,7 +170,7 @@ fn distinct(raw: &RawMesh, found: &mut Findings) -> Checked {
     all.finish(())
 }
 
-/// Turns over what runs clockwise; says how many.
+/// Reverses elements that are numbered clockwise; returns their number.
 fn counter_clockwise(raw: &mut RawMesh) -> usize {
     let mut reversed = 0;
     for element in &mut raw.elements {
@@ -194,7 +194,7 @@ fn counter_clockwise(raw: &mut RawMesh) -> usize {
     reversed
 }
 
-/// Puts midsides where there are none, shared with the neighbours; says how many elements had none.
+/// Adds missing midsides, shared with the neighbours; returns the number of elements that had none.
 fn second_order(raw: &mut RawMesh) -> usize {
     let lacks = |element: &Element| element[element.len() - 1] == NO_NODE;
     let lacking = raw.elements.iter().filter(|e| lacks(e)).count();
@@ -242,7 +242,7 @@ fn second_order(raw: &mut RawMesh) -> usize {
     lacking
 }
 
-/// Leaves out the nodes of no element: points of the geometry, centres of 9-node elements.
+/// Removes the nodes that belong to no element: points of the geometry, centres of 9-node elements.
 fn drop_unused(raw: &mut RawMesh) {
     let mut number = vec![NO_NODE; raw.nodes.len()];
     for &node in raw.elements.iter().flat_map(|e| e.iter()) {
@@ -401,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_get_shared_midsides_and_the_unused_node_goes() {
+    fn missing_midsides_are_added_and_unused_nodes_removed() {
         let (mesh, notes) = build(two_squares()).unwrap();
         assert_eq!(mesh.nodes.len(), 13);
         assert_eq!(mesh.connected_parts().len(), 1);
@@ -424,7 +424,7 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_of_second_order_lends_its_midside_to_a_square_without() {
+    fn a_linear_square_shares_the_midside_of_a_quadratic_triangle() {
         let mut raw = two_squares();
         raw.nodes.extend([[1.5, 0.0], [1.6, 0.5], [1.0, 0.55]]);
         raw.node_labels.extend([17, 18, 19]);
@@ -436,15 +436,15 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_a_mesh_is_named_with_the_files_numbers() {
-        let said = |raw: RawMesh| {
+    fn faults_of_a_mesh_are_reported_with_the_numbers_of_the_file() {
+        let reported = |raw: RawMesh| {
             let list = build(raw).unwrap_err();
             (list[0].reason, list[0].got.clone())
         };
         let mut raw = two_squares();
         raw.elements[0] = raw.elements[0].map_nodes(|n| if n == 4 { 1 } else { n });
         assert_eq!(
-            said(raw),
+            reported(raw),
             (
                 Reason::RepeatedNode,
                 "node 11 twice in element 100".to_owned()
@@ -453,14 +453,14 @@ mod tests {
         let mut raw = two_squares();
         raw.elements.push(raw.elements[0]);
         raw.element_labels.push(300);
-        let (reason, got) = said(raw);
+        let (reason, got) = reported(raw);
         assert!(
             reason == Reason::Nonconforming && got.contains("100") && got.contains("300"),
             "{got}"
         );
         let mut raw = two_squares();
         raw.nodes[5] = [0.4, 0.1];
-        assert_eq!(said(raw).0, Reason::InvertedElement);
-        assert_eq!(said(RawMesh::default()).0, Reason::TooFew);
+        assert_eq!(reported(raw).0, Reason::InvertedElement);
+        assert_eq!(reported(RawMesh::default()).0, Reason::TooFew);
     }
 }

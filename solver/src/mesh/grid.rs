@@ -128,7 +128,7 @@ pub fn largest_cut(grid: &Grid) -> Option<(f64, f64)> {
     worst
 }
 
-/// Whether a grid can be meshed, or all that is wrong with it; `pointer` is the grid's own.
+/// Whether a grid can be meshed, or all its violations; `pointer` is that of the grid.
 pub fn check_grid(grid: &Grid, pointer: &str) -> Result<(), Vec<Violation>> {
     let mut found = Findings::of_mesh(pointer);
     let mut all = AllChecks::default();
@@ -207,7 +207,7 @@ fn check_edge(field: &str, points: &[[f64; 2]], x: &[f64], found: &mut Findings)
     }
 }
 
-/// Fractions of the height, and a height everywhere.
+/// Fractions of the height, and a positive height everywhere.
 fn check_strip(grid: &Grid, found: &mut Findings) -> Checked {
     let mut all = AllChecks::default();
     if grid.y[0] != 0.0 || grid.y[grid.y.len() - 1] != 1.0 {
@@ -288,14 +288,14 @@ mod tests {
     }
 
     #[test]
-    fn a_kink_between_grid_lines_is_noticed() {
+    fn a_kink_between_grid_lines_is_found() {
         let mut grid = lines(&[0.0, 2.0, 4.0], &[0.0, 1.0]);
         grid.top = Some(vec![[0.0, 1.0], [1.0, 4.0], [2.0, 1.0], [4.0, 1.0]]);
         assert_eq!(largest_cut(&grid), Some((1.0, 3.0)));
     }
 
     #[test]
-    fn every_fault_of_a_grid_is_named() {
+    fn every_fault_of_a_grid_is_reported() {
         let mut grid = lines(&[0.0, 2.0, 1.0], &[0.0]);
         grid.top = Some(vec![[0.0, 1.0]]);
         let pointers: Vec<_> = check_grid(&grid, "/mesh/grid")

@@ -6,7 +6,7 @@ use super::{Mesh, key};
 use crate::error::{AllChecks, Checked, Findings, Reason, Violation, escape};
 use crate::problem::InlineMesh;
 
-/// The mesh, or everything that is wrong with its numbering; `pointer` is the inline mesh's own.
+/// The mesh, or all faults of its numbering; `pointer` is that of the inline mesh.
 pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violation>> {
     let mut found = Findings::of_mesh(pointer);
     let mesh = check(input, &mut found);
@@ -14,7 +14,7 @@ pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violat
 }
 
 fn check(input: &InlineMesh, found: &mut Findings) -> Checked<Mesh> {
-    // the rest needs sound numbers
+    // the following needs valid numbers
     let used = numbers(input, found)?;
     let mut all = AllChecks::default();
     for node in (0..input.nodes.len()).filter(|&n| !used[n]) {
@@ -181,7 +181,7 @@ struct Side {
     directed: [u32; 3],
 }
 
-/// All sides by their corners; says where neighbours do not share a midside.
+/// All sides by their corners; reports neighbours that do not share a midside.
 fn surface(
     input: &InlineMesh,
     found: &mut Findings,
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_boundary_edge_is_directed_with_the_body_on_its_right_whichever_way_it_was_written() {
+    fn a_boundary_edge_is_directed_with_the_body_on_its_right() {
         for edge in [[3, 2, 6], [2, 3, 6]] {
             let mut input = square();
             input.boundaries.insert("top".to_owned(), vec![edge]);
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_and_repeated_nodes_and_foreign_edges_are_named() {
+    fn unknown_and_repeated_nodes_and_unknown_edges_are_reported() {
         let mut input = square();
         input.elements[0] = Element::Quad([0, 1, 99, 1, 4, 5, 6, 7]);
         let pointers: Vec<_> = inline_mesh(&input, "/mesh/inline")

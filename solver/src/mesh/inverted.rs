@@ -1,9 +1,9 @@
-//! Elements that are folded or numbered the wrong way round, as violations.
+//! Elements that are folded or numbered clockwise, as violations.
 
 use super::Mesh;
 use crate::error::{AllChecks, Findings, Reason, Violation};
 
-/// Whether no element of a mesh that is otherwise sound is inverted. `pointer`: to an element by its
+/// Whether no element of an otherwise valid mesh is inverted. `pointer`: to an element by its
 /// number; `of`: which mesh, after that number. For [`Mesh::inverted_elements`] `at_nodes`.
 pub fn check_inverted(
     mesh: &Mesh,

@@ -25,7 +25,7 @@ use crate::solution::Warning;
 /// counter-clockwise; in other words t, the normal turned clockwise, is the direction.
 pub type Edge = [u32; 3];
 
-/// Nodes, elements and named boundaries, without a word of what they are for.
+/// Nodes, elements and named boundaries, independent of their use.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
     /// Positions.
@@ -40,7 +40,7 @@ pub struct Mesh {
     pub node_sets: BTreeMap<String, Vec<u32>>,
 }
 
-/// A mesh that a problem only names or quotes, and that its caller has read or fetched.
+/// A mesh that a problem only names or quotes, read or fetched by its caller.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ExternalMesh {
     /// The mesh, before it is refined.
@@ -49,8 +49,7 @@ pub struct ExternalMesh {
     pub warnings: Vec<Warning>,
 }
 
-/// What came of reading such a mesh: the mesh, or everything that is wrong with it. Pointers are those of
-/// the problem.
+/// The result of reading such a mesh: the mesh, or all its violations. Pointers are those of the problem.
 pub type External = Result<ExternalMesh, Vec<Violation>>;
 
 impl From<Mesh> for ExternalMesh {
@@ -83,9 +82,8 @@ impl Mesh {
         edge.map(|n| self.nodes[n as usize])
     }
 
-    /// Elements that are inverted somewhere: number, place, det J. Looked at are the Gauss points of
-    /// the larger rule and, with `at_nodes`, the nodes: a midside far off its middle folds the corner
-    /// first.
+    /// Elements that are inverted somewhere: number, place, det J. Checked at the Gauss points of
+    /// the larger rule and, with `at_nodes`, at the nodes: a midside far off its middle folds the corner first.
     pub fn inverted_elements(&self, at_nodes: bool) -> Vec<(usize, String, f64)> {
         let inverted = |(e, element): (usize, &Element)| {
             let (family, nodes) = (element.family(), self.element_nodes(element));
@@ -130,8 +128,8 @@ impl Mesh {
         )
     }
 
-    /// The parts that hang together by sides of elements, each as a list of its nodes. Parts that
-    /// touch in a corner only are parts of their own, and share that node.
+    /// The parts that are connected by sides of elements, each as a list of its nodes. Parts that touch only in
+    /// a corner are separate, and share that node.
     pub fn connected_parts(&self) -> Vec<Vec<u32>> {
         // union–find over the elements; a side is known by its midside node
         let mut parent: Vec<u32> = (0..self.elements.len() as u32).collect();
@@ -168,7 +166,7 @@ impl Mesh {
     }
 }
 
-/// The two corners of a side, whichever way it runs.
+/// The two corners of a side, in ascending order.
 fn key(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }

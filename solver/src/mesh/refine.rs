@@ -9,11 +9,11 @@ use crate::mesh::{Edge, Mesh};
 /// New nodes lie half-way between the old ones, in master coordinates.
 const STEP: f64 = 0.5;
 
-/// And a quarter from the sides of a triangle.
+/// Places a quarter from the sides of a triangle.
 const QUARTER: f64 = 0.25;
 
 /// Every element becomes four, every edge two; new nodes lie on the parent's own map, so that
-/// curved sides stay the curves they are.
+/// curved sides keep their shape.
 pub fn refine(mesh: &Mesh) -> Mesh {
     let mut finer = Finer {
         nodes: mesh.nodes.clone(),

@@ -1,16 +1,16 @@
-//! What counts as the axis of a body of revolution: decided once, for supports, contacts and friction alike.
+//! The axis of a body of revolution: one criterion for supports, contacts and friction.
 
 use crate::elasticity::Section;
 use crate::mesh::Mesh;
 
-/// A radius below this part of the body's largest is the axis: a mesh generator may miss 0 by rounding, and
-/// the contact area of such a node is nothing but rounding.
+/// A radius below this part of the body's largest counts as 0: a mesh generator may miss the axis by rounding,
+/// and the contact area of such a node is pure rounding error.
 const ROUNDING: f64 = 1e-12;
 
 /// The axis of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
-    /// The largest radius on it; none in the plane.
+    /// The largest radius that counts as 0; `None` in the plane.
     reach: Option<f64>,
 }
 
@@ -21,7 +21,7 @@ impl Axis {
         Axis { reach }
     }
 
-    /// Whether a place (r, z) lies on the axis; in the plane nothing does.
+    /// Whether a place (r, z) lies on the axis; never in the plane.
     pub fn holds(&self, [r, _]: [f64; 2]) -> bool {
         self.reach.is_some_and(|reach| r <= reach)
     }

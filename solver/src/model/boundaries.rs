@@ -1,6 +1,6 @@
 //! The mesh with all its names, and values along named boundaries.
 
-use super::checks::{ALIGNED, Checks};
+use super::checks::{ALIGNED, Checks, known, one_of};
 use super::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
 use crate::error::{AllChecks, Checked, Reason, Refused, escape};
 use crate::mesh::{self, Edge, External, Mesh};
@@ -9,10 +9,10 @@ use crate::problem::{
 };
 use crate::solution::WarningCode;
 
-/// Sides face one way when their normals differ by no more (degrees).
+/// Sides face the same way if their normals differ by no more than this (degrees).
 const SAME_DIRECTION: f64 = 1.0;
 
-/// More refinements than this overflow any machine; the size itself is bounded by the caller.
+/// More refinements than this exceed any memory; the caller limits the size itself.
 const MOST_REFINEMENTS: u32 = 20;
 
 impl Checks {
@@ -89,7 +89,7 @@ impl Checks {
         ))
     }
 
-    /// What adaptive refinement needs: a tolerance, a grid to put lines into, a contact to watch.
+    /// Adaptive refinement needs a tolerance, a grid, and a contact whose results it compares.
     fn adaptive(&mut self, input: &MeshInput, goal: &AdaptiveRefine, contacts: usize) -> Checked {
         let mut all = AllChecks::default();
         all.check(self.require(
@@ -97,15 +97,15 @@ impl Checks {
             "/mesh/refine/tolerance",
             goal.tolerance,
             "0 < tolerance < 1",
-            "The relative change that is left; 0.01 is one percent.",
+            "The remaining relative change; 0.01 is one percent.",
         ));
         if input.grid().is_none() {
             all.fail(self.report(
                 "/mesh/refine",
                 Reason::NotUsed,
-                "adaptive refinement of a mesh that is no grid",
+                "adaptive refinement of a mesh that is not a grid",
                 "a `grid`, or a number of refinements",
-                "Lines can be put into a grid only; refine an inline mesh by a number.",
+                "Only grids can be refined adaptively; give a number of refinements.",
             ));
         }
         let lines = input
@@ -119,7 +119,7 @@ impl Checks {
                 Reason::TooLarge,
                 format!("a first grid of {} × {} lines", lines[0], lines[1]),
                 format!("at most {MOST_ADAPTIVE_ELEMENTS} elements and {MOST_ADAPTIVE_LINES} lines in a direction"),
-                "Adaptive refinement starts coarse and makes no larger grid; give a coarse one, or a number of refinements.",
+                "Adaptive refinement starts from a coarse grid; give a coarser one, or a number of refinements.",
             ));
         }
         if contacts == 0 {
@@ -128,7 +128,7 @@ impl Checks {
                 Reason::NotUsed,
                 "adaptive refinement without a contact",
                 "a contact, or a number of refinements",
-                "It watches the forces and peak stresses of contacts.",
+                "Adaptive refinement compares the forces and peak stresses of contacts.",
             ));
         }
         all.finish(())
@@ -149,7 +149,7 @@ impl Checks {
                     Reason::NameTaken,
                     name,
                     "a name that the mesh does not have yet",
-                    "Groups of an inline mesh have names already.",
+                    "An inline mesh names its own groups.",
                 ));
                 continue;
             }
@@ -174,7 +174,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// The mesh as it is given, before it is refined.
+    /// The given mesh, before it is refined.
     fn source(&mut self, source: &MeshSource, external: Option<External>) -> Checked<Mesh> {
         match source {
             MeshSource::Grid(grid) => {
@@ -195,36 +195,36 @@ impl Checks {
         }
     }
 
-    /// No element is folded or numbered clockwise.
+    /// Whether no element is folded or numbered clockwise.
     fn upright(&mut self, mesh: &Mesh, source: &MeshSource) -> Checked {
         self.found.merge(match source {
-            // straight-sided grids need no look at their corners, and stay what they are when refined
+            // a grid has straight sides: its corners need no check, and refinement does not fold it
             MeshSource::Grid(_) => mesh::check_inverted(mesh, false, |_| "/mesh".to_owned(), ""),
             MeshSource::Inline(_) => {
                 let element = |e| format!("/mesh/inline/elements/{e}");
                 mesh::check_inverted(mesh, true, element, "")
             }
-            // what was read from a file was looked at there
+            // the elements of a file are checked when it is read
             MeshSource::Gmsh(_) | MeshSource::Abaqus(_) | MeshSource::Stored(_) => Ok(()),
         })
     }
 
-    /// The caller has no mesh for what the problem names or quotes.
+    /// The caller gave no mesh for the one that the problem names or quotes.
     fn absent(&mut self, source: &MeshSource) -> Refused {
         match source {
             MeshSource::Stored(hash) => self.report(
                 "/mesh/stored",
                 Reason::UnknownMesh,
                 hash,
-                "a mesh that this service has stored",
-                "Upload it first (POST /v1/meshes); `signorini solve` has no store: give the mesh itself.",
+                "the hash of a stored mesh that can be read here",
+                "Store the mesh first; where no meshes are stored, give the mesh itself.",
             ),
             _ => self.report(
                 "/mesh",
                 Reason::UnknownMesh,
-                "a text that nobody has read",
-                "a mesh that was read from it",
-                "Read it before the problem is checked.",
+                "a quoted mesh that was not parsed",
+                "the parsed mesh",
+                "Pass the mesh that `files::external_mesh` reads.",
             ),
         }
     }
@@ -258,7 +258,7 @@ impl Checks {
                             format!("{pointer}/side"),
                             Reason::UnknownBoundary,
                             side,
-                            format!("one of {}", known(original.keys())),
+                            one_of("a boundary", original.keys()),
                             "Check the spelling.",
                         ));
                         continue;
@@ -288,7 +288,7 @@ impl Checks {
                     &pointer,
                     Reason::EmptyBoundary,
                     "no edge",
-                    "at least one edge of the surface that fits all conditions at its three nodes",
+                    "at least one edge of the surface that meets all conditions at its three nodes",
                     "Put grid lines on the ends of the part; check the direction of the normal.",
                 ));
             }
@@ -297,7 +297,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// The conditions of a part that can be wrong by themselves.
+    /// Checks the normal and the angle of a part.
     fn direction(&mut self, part: &BoundaryPart, pointer: &str) -> Checked {
         if part.normal == Some([0.0, 0.0]) {
             return Err(self.report(
@@ -305,7 +305,7 @@ impl Checks {
                 Reason::OutOfRange,
                 "[0, 0]",
                 "a direction",
-                "E.g. [0, 1] for sides that face up.",
+                "For example [0, 1] for sides that face up.",
             ));
         }
         if part.normal.is_none() && part.angle.is_some() {
@@ -314,7 +314,7 @@ impl Checks {
                 Reason::NotUsed,
                 "an angle without a `normal`",
                 "both or neither",
-                "It says how far a side may turn away from `normal`.",
+                "It is the largest angle between a side's normal and `normal`.",
             ));
         }
         let angle = part.angle.unwrap_or(SAME_DIRECTION);
@@ -340,16 +340,13 @@ impl Checks {
         if let Some(nodes) = mesh.node_sets.get(name) {
             return Ok(nodes);
         }
-        let expected = match mesh.node_sets.is_empty() {
-            true => "a set of nodes; this mesh has none".to_owned(),
-            false => format!("one of {}", known(mesh.node_sets.keys())),
-        };
+        let expected = one_of("a set of nodes", mesh.node_sets.keys());
         Err(self.report(
             pointer,
             Reason::UnknownNodeSet,
             name,
             expected,
-            "Inline meshes have `node_sets`, Gmsh files physical points, decks *NSET.",
+            "Node sets are `node_sets` of inline meshes, physical points of Gmsh files, *NSET of decks.",
         ))
     }
 
@@ -367,7 +364,7 @@ impl Checks {
             pointer,
             Reason::UnknownBoundary,
             name,
-            format!("one of {}", known(mesh.boundaries.keys())),
+            one_of("a boundary", mesh.boundaries.keys()),
             "Check the spelling, or name a part under /mesh/boundaries.",
         ))
     }
@@ -393,7 +390,7 @@ impl Checks {
                 Reason::NotAChain,
                 format!("a boundary of {} pieces", runs.len()),
                 "one chain of edges",
-                "A value from start to end needs a boundary that hangs together.",
+                "A value from start to end needs a connected boundary.",
             ));
         };
         let s = crate::contact::arc_lengths(mesh, run);
@@ -414,7 +411,7 @@ fn within(ranges: &[Option<[f64; 2]>; 2], place: &[f64; 2], size: f64) -> bool {
     })
 }
 
-/// Whether a side faces the way that its part asks for.
+/// Whether the normal of a side is the one that its part requires.
 fn faces(part: &BoundaryPart, nodes: &[[f64; 2]; 3]) -> bool {
     let Some([x, y]) = part.normal else {
         return true;
@@ -423,18 +420,4 @@ fn faces(part: &BoundaryPart, nodes: &[[f64; 2]; 3]) -> bool {
     crate::contact::edge_normals(nodes)
         .iter()
         .all(|[nx, ny]| (nx * x + ny * y) / x.hypot(y) >= least - ALIGNED)
-}
-
-/// The names that exist, or the first of them.
-fn known<'a>(names: impl ExactSizeIterator<Item = &'a String>) -> String {
-    const SHOWN: usize = 20;
-    let count = names.len();
-    let shown: Vec<String> = names
-        .take(SHOWN)
-        .map(|name| format!("`{name:.80}`"))
-        .collect();
-    match count.saturating_sub(SHOWN) {
-        0 => shown.join(", "),
-        more => format!("{} and {more} more", shown.join(", ")),
-    }
 }

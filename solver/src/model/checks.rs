@@ -1,12 +1,12 @@
-//! The checks of one problem: what they have found so far.
+//! The state of the checks of one problem: violations and warnings so far.
 
 use crate::error::{Checked, Findings, Reason, Refused};
 use crate::solution::{Warning, WarningCode};
 
-/// Directions count as equal to an axis, and prescribed values as equal, to this.
+/// Relative tolerance for directions along an axis and for equal prescribed values.
 pub(super) const ALIGNED: f64 = 1e-9;
 
-/// Every check is a method; each answers whether it held.
+/// Every check is a method and returns whether it holds.
 #[derive(Default)]
 pub(super) struct Checks {
     pub(super) found: Findings,
@@ -14,7 +14,7 @@ pub(super) struct Checks {
 }
 
 impl Checks {
-    /// Something is wrong.
+    /// Adds a violation.
     pub(super) fn report(
         &mut self,
         pointer: impl AsRef<str>,
@@ -26,7 +26,7 @@ impl Checks {
         self.found.report(pointer, reason, got, expected, hint)
     }
 
-    /// A number is in its range, or something is wrong.
+    /// Adds a violation unless a number is in its range.
     pub(super) fn require(
         &mut self,
         holds: bool,
@@ -41,12 +41,34 @@ impl Checks {
         }
     }
 
-    /// Something is accepted, and yet worth knowing.
+    /// Adds a warning.
     pub(super) fn warn(&mut self, code: WarningCode, pointer: &str, message: String) {
         self.warnings.push(Warning {
             code,
             pointer: pointer.to_owned(),
             message,
         });
+    }
+}
+
+/// What is expected where a name is unknown: one of those that the mesh has, or that it has none of the `kind`.
+pub(super) fn one_of<'a>(kind: &str, names: impl ExactSizeIterator<Item = &'a String>) -> String {
+    match names.len() {
+        0 => format!("{kind}; this mesh has none"),
+        _ => format!("one of {}", known(names)),
+    }
+}
+
+/// The names that exist, or the first of them.
+pub(super) fn known<'a>(names: impl ExactSizeIterator<Item = &'a String>) -> String {
+    const SHOWN: usize = 20;
+    let count = names.len();
+    let shown: Vec<String> = names
+        .take(SHOWN)
+        .map(|name| format!("`{name:.80}`"))
+        .collect();
+    match count.saturating_sub(SHOWN) {
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
     }
 }

@@ -1,4 +1,4 @@
-//! A contact as it can be solved.
+//! A checked contact, ready to be solved.
 
 use super::level::Level;
 use crate::contact::ContactBoundary;
@@ -25,7 +25,7 @@ pub struct ContactModel {
     pub tangential_displacement: f64,
     /// Whose normal it is.
     pub normal: NormalOf,
-    /// What the obstacle does.
+    /// The contact condition.
     pub condition: Condition,
     /// m where the profile is a power |c|^m: a contact's width then grows like δ^(1/m).
     pub power: Option<f64>,

@@ -16,19 +16,19 @@ use crate::mesh::{self, Edge, Mesh};
 use crate::problem::{Condition, Contact, NormalOf, Obstacle, Problem, Step};
 use crate::solution::WarningCode;
 
-/// Cosine of the sharpest turn between two contact edges that goes without a warning: 20°.
+/// Cosine of the sharpest turn between two contact edges without a warning: 20°.
 const SHARPEST_TURN: f64 = 0.94;
 
-/// And of the sharpest that is accepted at all: 45°.
+/// Cosine of the sharpest turn that is accepted: 45°.
 const SHARPEST_CORNER: f64 = 0.7;
 
-/// Largest nonlocal radius, in lengths of the contact boundary. Beyond it the average knows nothing
-/// of the contact, and between two lines of symmetry its cost grows with the radius.
+/// Largest nonlocal radius, in lengths of the contact boundary. Beyond it the average hardly depends
+/// on the contact, and between two lines of symmetry its cost grows with the radius.
 const LARGEST_RADIUS: f64 = 10.0;
 
 impl Checks {
-    /// Those contacts that are sound, and whether all are. `numbers`: whether those of its obstacle are, and
-    /// its friction law, for each of them.
+    /// The valid contacts, and whether all are valid. `numbers`: for each contact the check of its obstacle's
+    /// numbers, and its friction law.
     pub(super) fn contacts(
         &mut self,
         mesh: &Mesh,
@@ -52,7 +52,7 @@ impl Checks {
         (models, all.finish(()))
     }
 
-    /// Contact number i by itself.
+    /// Contact number i, without regard to the others.
     fn contact(
         &mut self,
         mesh: &Mesh,
@@ -115,7 +115,7 @@ impl Checks {
         }
     }
 
-    /// Whether the chain can carry a pressure, and its obstacle and friction make sense on it.
+    /// Whether the chain can carry a pressure, and its obstacle and friction are valid on it.
     fn sound(
         &mut self,
         boundary: &ContactBoundary,
@@ -139,7 +139,7 @@ impl Checks {
                     at(i),
                     boundary.weights[i]
                 ),
-                "a boundary with area at every node (in axisymmetry off the axis, but for an end)",
+                "a boundary with area at every node (in axisymmetry only an end may lie on the axis)",
                 "Choose another boundary; keep midsides near the middle of their sides.",
             ));
         }
@@ -155,11 +155,11 @@ impl Checks {
                     turn(boundary, corner).acos().to_degrees(),
                     at(corner)
                 ),
-                "a boundary without corners: at one there is no normal",
+                "a boundary without corners, where the normal is not defined",
                 "Give each side a contact of its own, with names under /mesh/boundaries.",
             ));
         }
-        // a flat is the same everywhere, and a curve in space knows no coordinate
+        // a flat does not depend on the coordinate, and a curve in space has none
         let curved = !matches!(
             contact.obstacle,
             Obstacle::Flat { .. } | Obstacle::Line { .. } | Obstacle::Polyline { .. }
@@ -171,8 +171,8 @@ impl Checks {
             all.fail(self.report(
                 format!("{pointer}/obstacle/along"),
                 Reason::NotMonotonic,
-                "a coordinate x that does not grow or fall along the boundary",
-                "a coordinate that tells the places of the boundary apart",
+                "a coordinate x that both increases and decreases along the boundary",
+                "a coordinate that only increases or only decreases along the boundary",
                 "Write \"along\": \"arc_length\".",
             ));
         }
@@ -242,7 +242,7 @@ impl Checks {
             0 => (
                 Reason::CoversNothing,
                 "an obstacle that covers no edge of the boundary".to_owned(),
-                "one that covers all three nodes of an edge at least",
+                "an obstacle that covers all three nodes of at least one edge",
             ),
             _ => (
                 Reason::NotAChain,
@@ -253,7 +253,7 @@ impl Checks {
         Err(self.report(place, reason, got, expected, extent))
     }
 
-    /// A supported contact node keeps its two unknowns apart only where a support acts along the
+    /// The two unknowns of a supported contact node are independent only where the support acts along the
     /// normal or along the tangent; and it must not be held inside the obstacle, at the end of any step.
     fn supported_contact_nodes(
         &mut self,
@@ -322,7 +322,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// What is accepted, and yet makes the numbers doubtful.
+    /// Warns of contacts whose results may be inaccurate.
     pub(super) fn warn_about_contacts(&mut self, contacts: &[ContactModel]) {
         for contact in contacts {
             self.corners(contact);
@@ -330,7 +330,7 @@ impl Checks {
         }
     }
 
-    /// At a corner between two edges there is no one normal.
+    /// At a corner between two edges the normal is not unique.
     fn corners(&mut self, contact: &ContactModel) {
         let boundary = &contact.boundary;
         for corner in (2..boundary.nodes.len() - 1).step_by(2) {
@@ -367,8 +367,8 @@ impl Checks {
     }
 }
 
-/// Turns the normals to those of the obstacle where they are asked for; says what of a push against the
-/// body then acts along normal and tangent. At the angle whose tangent is the slope p′ of the profile,
+/// Turns the normals to those of the obstacle if the contact uses them; returns the parts of a push against
+/// the body along normal and tangent. At the angle whose tangent is the slope p′ of the profile,
 /// m = (n − p′ t)/√(1 + p′²); the push is along −n.
 fn turn_normals(
     boundary: &mut ContactBoundary,

@@ -1,4 +1,4 @@
-//! What a problem will cost, before anything is built.
+//! Memory and time that a problem needs, estimated before anything is built.
 
 use std::collections::BTreeMap;
 
@@ -12,19 +12,19 @@ use crate::problem::{MeshInput, MeshSource, Problem, Refine};
 pub struct Estimate {
     /// Displacements, supported ones included.
     pub dofs: u64,
-    /// Peak memory (bytes), rather too high than too low.
+    /// Peak memory (bytes), overestimated rather than underestimated.
     pub memory_bytes: u64,
     /// Time (seconds).
     pub run_s: f64,
 }
 
-/// Adaptive refinement makes no larger mesh.
+/// Most elements of a mesh of adaptive refinement.
 pub const MOST_ADAPTIVE_ELEMENTS: usize = 60_000;
 
-/// Nor one with more lines in a direction: the contact's dense system grows with their square.
+/// Most lines of such a mesh in one direction: the dense system of the contact grows with their square.
 pub const MOST_ADAPTIVE_LINES: usize = 600;
 
-/// What the estimate needs of a stored mesh.
+/// Size of a stored mesh, for the estimate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshSize {
     /// Elements.
@@ -33,15 +33,15 @@ pub struct MeshSize {
     pub boundaries: BTreeMap<String, u64>,
 }
 
-/// Bytes of a mesh file for one element, rather too few than too many: in the larger files that
+/// Bytes of a mesh file for one element, underestimated rather than overestimated: in the larger files that
 /// Gmsh writes an element of second order has about 150 with its nodes, one of first order 100.
 const BYTES_PER_ELEMENT: f64 = 80.0;
 
-/// Bytes of history that an increment leaves: some twenty rows, kept for the step and for the whole.
+/// Bytes of history of an increment: about twenty rows, kept for the step and for the whole.
 const INCREMENT: f64 = 1e4;
 
 /// Estimates from the numbers of elements alone; the constants are measured in `docs/performance.md`.
-/// `stored`: the mesh that the problem names by its hash, where it does.
+/// `stored`: the mesh that the problem names by its hash, if it does.
 pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Estimate {
     let mesh = &problem.mesh;
     let split = 4f64.powi(halvings(mesh));
@@ -56,7 +56,7 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Estimate {
     };
     // A large mesh has three nodes an element, a small one up to eight.
     let n = match adaptive {
-        // as large as it may become
+        // the largest mesh of the refinement
         true => elements.max(MOST_ADAPTIVE_ELEMENTS as f64),
         false => split * elements,
     };
@@ -75,7 +75,7 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Estimate {
         + 2 * u32::from(problem.solver.check_increments);
     let iterations = increments.max(1.0) * f64::from(once_more);
     let time = 6e-6 * dofs + 4e-9 * dofs.powf(1.5) + 1e-9 * contact.powi(3) * iterations;
-    // floats saturate when cast: a hopeless problem gets the largest number there is
+    // floats saturate when cast: an impossibly large problem gets the largest number
     Estimate {
         dofs: dofs as u64,
         memory_bytes: memory as u64,

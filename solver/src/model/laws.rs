@@ -1,4 +1,4 @@
-//! Obstacles and friction laws by themselves: every number in its range, no two choices that exclude
+//! Checks of single obstacles and friction laws: every number in its range, no two options that exclude
 //! each other.
 
 use super::checks::Checks;
@@ -93,7 +93,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// Places that grow, and as many values.
+    /// Increasing places, and one value for each.
     fn table(&mut self, x_at: &str, x: &[f64], y_at: &str, y: &[f64], what: &str) -> Checked {
         let mut all = AllChecks::default();
         if x.len() < 2 {
@@ -126,8 +126,8 @@ impl Checks {
         all.finish(())
     }
 
-    /// The friction law of a contact, where all its parts are there; and whether its numbers are in their
-    /// range and go with the contact.
+    /// The friction law of a contact, if all its parts are given; and whether its numbers are in their range and
+    /// compatible with the contact.
     pub(super) fn friction(
         &mut self,
         analysis: &Analysis,
@@ -140,8 +140,8 @@ impl Checks {
                 pointer,
                 Reason::NotUsed,
                 "friction on a bonded contact",
-                "none: what is bonded does not slide",
-                "Leave `friction` out, or choose another `condition`.",
+                "no friction: a bonded contact does not slide",
+                "Remove `friction`, or choose another `condition`.",
             )),
             (friction, Condition::None) if friction.as_ref().is_none_or(|f| f.bound.is_none()) => {
                 all.fail(self.report(
@@ -149,7 +149,7 @@ impl Checks {
                     Reason::Missing,
                     "nothing",
                     "a prescribed friction bound",
-                    "Without an obstacle there is no pressure that a bound could follow from.",
+                    "Without an obstacle there is no pressure to compute a bound from.",
                 ));
             }
             _ => {}
@@ -186,7 +186,7 @@ impl Checks {
                 "coefficient",
                 friction.coefficient,
                 "a number ≥ 0",
-                "Leave `friction` out for frictionless contact.",
+                "Remove `friction` for frictionless contact.",
             ),
             (
                 "nonlocal_radius",
@@ -215,7 +215,7 @@ impl Checks {
             "It is added to the friction bound in contact.",
         ));
         if let Some(cap) = friction.shear_cap {
-            let hint = "The largest tangential stress that the surface bears.";
+            let hint = "The largest tangential stress that the surface can bear.";
             all.check(self.require(cap > 0.0, at("shear_cap"), cap, "a stress > 0", hint));
         }
         let law = match (friction.coefficient, friction.nonlocal_radius) {
@@ -235,7 +235,7 @@ impl Checks {
         (law, all.finish(()))
     }
 
-    /// A bound that is given, alone.
+    /// A prescribed bound, without the fields that would determine one.
     fn prescribed_bound(
         &mut self,
         friction: &Friction,
@@ -256,7 +256,7 @@ impl Checks {
                     Reason::NotUsed,
                     "a value beside `bound`",
                     "one of the two",
-                    "A prescribed bound knows nothing of pressure; remove this field or `bound`.",
+                    "A prescribed bound does not depend on pressure; remove this field or `bound`.",
                 ));
             }
         }
@@ -280,7 +280,7 @@ impl Checks {
         (Some(BoundLaw::Prescribed(bound.clone())), all.finish(()))
     }
 
-    /// How a law goes from stick to slip.
+    /// The transition from stick to slip.
     fn slip(&mut self, analysis: &Analysis, friction: &Friction, pointer: &str) -> Checked {
         let mut all = AllChecks::default();
         let at = |field: &str| format!("{pointer}/{field}");
@@ -289,7 +289,7 @@ impl Checks {
             at("elastic_slip"),
             friction.elastic_slip,
             "a length > 0",
-            "About 1e-4 of the contact's width; below 1e-5 nothing physical changes.",
+            "About 1e-4 of the contact's width; below 1e-5 the result no longer changes physically.",
         ));
         if friction.history == History::Incremental && friction.transition != Transition::Linear {
             all.fail(self.report(
@@ -306,7 +306,7 @@ impl Checks {
                 at("measure"),
                 Reason::NotUsed,
                 "`surface`",
-                "`line`, but in axisymmetry",
+                "`line` (`surface` only in axisymmetry)",
                 "In the plane there is no surface to integrate over.",
             ));
         }

@@ -1,4 +1,4 @@
-//! How far along its load history a problem is.
+//! Load levels: how far a load history has come.
 
 use crate::problem::Step;
 
@@ -16,7 +16,7 @@ pub struct Level {
 }
 
 impl Level {
-    /// Nothing.
+    /// No loads and no motion.
     pub const ZERO: Level = Level {
         indentation: 0.0,
         tangential_displacement: 0.0,
@@ -34,7 +34,7 @@ impl Level {
         }
     }
 
-    /// Everything as given.
+    /// All values as given.
     pub const FULL: Level = Level {
         indentation: 1.0,
         tangential_displacement: 1.0,

@@ -12,7 +12,7 @@ struct Stress {
     /// −1: a pressure pushes against the normal.
     sign: f64,
     values: [BoundaryValue; 2],
-    /// Where the two stand in the load.
+    /// Names of the two values in the load.
     fields: [&'static str; 2],
 }
 
@@ -124,7 +124,7 @@ impl Checks {
         Ok(())
     }
 
-    /// The nodes of a boundary from its start, when there are `count` of them.
+    /// The nodes of a boundary from its start; there must be `count` of them.
     fn nodes_in_order(&mut self, edges: &[Edge], count: usize, pointer: &str) -> Checked<Vec<u32>> {
         let runs = mesh::runs(edges);
         let [run] = &runs[..] else {
@@ -133,7 +133,7 @@ impl Checks {
                 Reason::NotAChain,
                 format!("a boundary of {} pieces", runs.len()),
                 "one chain of edges",
-                "Forces node by node need a boundary that hangs together.",
+                "Forces at nodes need a connected boundary.",
             ));
         };
         let mut nodes = vec![run[0][0]];

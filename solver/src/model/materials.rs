@@ -1,8 +1,6 @@
 //! Materials, and which elements are made of them.
 
-use std::collections::BTreeMap;
-
-use super::checks::Checks;
+use super::checks::{Checks, one_of};
 use crate::elasticity::{self, Moduli, Section};
 use crate::error::{AllChecks, Checked, Reason};
 use crate::mesh::Mesh;
@@ -99,7 +97,7 @@ impl Checks {
                     Reason::Missing,
                     "nothing",
                     format!("a value for `{name}`"),
-                    "Only in plane stress the third direction does not matter.",
+                    "It is optional only in plane stress.",
                 ));
             }
         }
@@ -122,7 +120,7 @@ impl Checks {
                 Reason::OutOfRange,
                 format!("nu12 = {}{nu13}{nu23}", constants.nu12),
                 "constants of a stable material, e.g. nu12² < e1/e2",
-                "Some strain would cost no energy. Check which of nu12 and nu21 is meant: nu12 = −ε_2/ε_1 under σ_1.",
+                "Some strain would need no energy. Check which of nu12 and nu21 is meant: nu12 = −ε_2/ε_1 under σ_1.",
             )
         })
     }
@@ -142,7 +140,7 @@ impl Checks {
                     pointer,
                     Reason::UnknownGroup,
                     name,
-                    known(&mesh.groups),
+                    one_of("a group", mesh.groups.keys()),
                     "Check the spelling, or name a group under /mesh/groups.",
                 ));
                 continue;
@@ -157,7 +155,7 @@ impl Checks {
                         material_of[*e as usize]
                     ),
                     "one material for every element",
-                    "Let the groups of materials not overlap.",
+                    "The groups of two materials must not overlap.",
                 ));
             }
             elements
@@ -171,8 +169,8 @@ impl Checks {
                 format!("/materials/{second}/group"),
                 Reason::WrongCount,
                 "a second material without a group",
-                "one material at most for all that the others do not name",
-                "Name the group of elements that is made of it.",
+                "at most one material without a group",
+                "Name the group of elements that are made of it.",
             ));
         }
         let bare = material_of.iter().position(|m| *m == NONE);
@@ -186,7 +184,7 @@ impl Checks {
                 Reason::Missing,
                 format!("no material for element {e}"),
                 "a material for every element",
-                "Give one material without `group`: it is taken for the rest.",
+                "Give one material without `group`, for the remaining elements.",
             )),
             _ => {}
         }
@@ -197,12 +195,4 @@ impl Checks {
 /// A constant with its name, where it is given.
 fn named(name: &str, value: Option<f64>) -> String {
     value.map_or(String::new(), |value| format!(", {name} = {value}"))
-}
-
-fn known(groups: &BTreeMap<String, Vec<u32>>) -> String {
-    if groups.is_empty() {
-        return "a group; this mesh has none".to_owned();
-    }
-    let names: Vec<String> = groups.keys().map(|name| format!("`{name:.80}`")).collect();
-    format!("one of {}", names.join(", "))
 }

@@ -1,7 +1,7 @@
-//! The only door from a [`Problem`] to something that can be solved.
+//! All checks of a [`Problem`]: the only way to obtain a problem that can be solved.
 //!
-//! `Model::new` checks everything and reports all violations at once; what it lets through is
-//! numbered and can be trusted by every room above.
+//! `Model::new` checks everything and reports all violations at once; the [`Model`] that it returns is
+//! numbered, and every room above relies on it.
 
 mod axis;
 mod boundaries;
@@ -48,26 +48,26 @@ pub struct Model {
     pub loads: Loads,
     /// Contact boundaries with their obstacles.
     pub contacts: Vec<ContactModel>,
-    /// Supports alone leave a rigid motion free, which contact must hold.
+    /// The supports leave a rigid motion free, which contact must prevent.
     pub held_by_contact: bool,
     /// Load steps; none: one step to the values as given.
     pub steps: Vec<Step>,
     /// Tolerance and limits.
     pub controls: SolverControls,
-    /// What the user should know already.
+    /// Warnings known before the solution.
     pub warnings: Vec<Warning>,
 }
 
 impl Model {
-    /// Checks and numbers a problem; `external`: the mesh that it only names or quotes, where it does.
+    /// Checks and numbers a problem; `external`: its mesh, if the problem only names or quotes one.
     pub fn new(problem: &Problem, external: Option<External>) -> Result<Model, Vec<Violation>> {
         let mut checks = Checks::default();
         let model = checks.model(problem, external);
         checks.found.conclude(model)
     }
 
-    /// A rigid motion that neither supports nor the given nodes and directions hinder, in words, and
-    /// a node that moves.
+    /// A rigid motion that neither the supports nor the given nodes and directions prevent, in words, and a node
+    /// that moves.
     pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(&'static str, u32)> {
         supports::motion_left(&self.mesh, &self.section, &self.fixed, hindered)
     }
@@ -75,7 +75,7 @@ impl Model {
 
 impl Checks {
     fn model(&mut self, problem: &Problem, external: Option<External>) -> Checked<Model> {
-        // numbers that are not finite would make nonsense of every later check
+        // the later checks assume finite numbers
         self.finite(problem)?;
         self.counts(problem)?;
         let analysis = problem.analysis;
@@ -96,7 +96,7 @@ impl Checks {
         let mut mesh = self.mesh(&problem.mesh, external, &analysis, problem.contacts.len())?;
         all.check(self.names(&mut mesh, &problem.mesh));
         all.check(self.thesis_elements(problem, &mesh));
-        // wrong materials have been named; the checks that follow need only the theory
+        // faults of materials are reported; the following checks need only the theory
         let section = all
             .check(self.section(analysis, &problem.materials, &mesh))
             .unwrap_or_else(|| Section::uniform(analysis, Default::default()));

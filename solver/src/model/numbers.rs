@@ -1,4 +1,4 @@
-//! Numbers by themselves: finite, and in their range.
+//! Checks of single numbers: finite, and in their range.
 
 use super::checks::Checks;
 use crate::element::{Element, Family};
@@ -11,7 +11,7 @@ use crate::problem::{
 };
 
 impl Checks {
-    /// JSON has no other numbers, but protobuf has.
+    /// NaN and infinity cannot come from JSON, but from protobuf.
     pub(super) fn finite(&mut self, problem: &Problem) -> Checked {
         let mut all = AllChecks::default();
         for pointer in not_finite(problem, MOST_LISTED) {
@@ -26,7 +26,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// Long lists of the same thing are a mistake, and each of them is gone through edge by edge.
+    /// Lengths of lists: very long ones are a mistake, and each entry is checked edge by edge.
     pub(super) fn counts(&mut self, problem: &Problem) -> Checked {
         let mut all = AllChecks::default();
         const MOST: usize = 1000;
@@ -43,16 +43,16 @@ impl Checks {
                 all.fail(self.report(
                     pointer,
                     Reason::TooMany,
-                    format!("{count} of them"),
+                    format!("{count} entries"),
                     format!("at most {MOST}"),
-                    "Name boundaries so that fewer are needed.",
+                    "Name boundaries so that fewer entries are needed.",
                 ));
             }
         }
         all.finish(())
     }
 
-    /// Labels that fit on an axis.
+    /// Names of units must fit on an axis.
     pub(super) fn units(&mut self, units: Option<&Units>) -> Checked {
         const MOST: usize = 20;
         let Some(Units {
@@ -132,7 +132,7 @@ impl Checks {
 
     pub(super) fn steps(&mut self, steps: &[Step]) -> Checked {
         let mut all = AllChecks::default();
-        /// Far beyond any use, and still a bounded time.
+        /// Far beyond practical use, and still a bounded time.
         const MOST_INCREMENTS: u32 = 10_000;
         /// Of all steps: each leaves rows of history.
         const MOST_IN_ALL: u64 = 20_000;
@@ -143,7 +143,7 @@ impl Checks {
                 Reason::TooMany,
                 format!("{total} increments in all"),
                 format!("at most {MOST_IN_ALL}"),
-                "Take fewer increments, or make several jobs of it.",
+                "Use fewer increments, or split it into several jobs.",
             ));
         }
         for (i, step) in steps.iter().enumerate() {
@@ -152,13 +152,13 @@ impl Checks {
                 format!("/steps/{i}/increments"),
                 f64::from(step.increments),
                 &format!("1 … {MOST_INCREMENTS}"),
-                "1 is enough for the total law; the incremental law wants a few dozen for curved obstacles.",
+                "1 is enough for the total law; the incremental law needs a few dozen for curved obstacles.",
             ));
         }
         all.finish(())
     }
 
-    /// The thesis carries stresses to the boundary along rows of Gauss points, which triangles lack.
+    /// The thesis extrapolates stresses to the boundary from rows of Gauss points, which triangles lack.
     pub(super) fn thesis_elements(&mut self, problem: &Problem, mesh: &Mesh) -> Checked {
         let triangle = |element: &Element| element.family() == Family::Triangle;
         if problem.solver.algorithm == Algorithm::Thesis
@@ -175,7 +175,7 @@ impl Checks {
         Ok(())
     }
 
-    /// Choices of the thesis's own iteration, and what it can be used for.
+    /// Options of the thesis's own iteration, and the contacts that it supports.
     pub(super) fn thesis(&mut self, problem: &Problem) -> Checked {
         let mut all = AllChecks::default();
         let controls = &problem.solver;
@@ -184,9 +184,9 @@ impl Checks {
                 return Err(self.report(
                     "/solver/thesis",
                     Reason::NotUsed,
-                    "choices for the thesis's iteration",
-                    "them with \"algorithm\": \"thesis\" only",
-                    "Choose that algorithm, or leave them out.",
+                    "`thesis` options with another algorithm",
+                    "no `thesis` options unless \"algorithm\" is \"thesis\"",
+                    "Choose that algorithm, or remove the options.",
                 ));
             }
             return Ok(());
@@ -196,9 +196,9 @@ impl Checks {
                 all.fail(self.report(
                     format!("/contacts/{i}/condition"),
                     Reason::NotUsed,
-                    "another condition than `unilateral`",
-                    "unilateral contact",
-                    "The thesis's iteration knows no other; choose another algorithm.",
+                    "a condition other than `unilateral`",
+                    "`unilateral`",
+                    "The thesis's iteration supports no other condition; choose another algorithm.",
                 ));
             }
             let surface = |f: &Friction| f.measure == Measure::Surface;
@@ -218,7 +218,7 @@ impl Checks {
                     Reason::NotUsed,
                     "`incremental`",
                     "`total`",
-                    "The thesis's law remembers nothing; choose another algorithm.",
+                    "The thesis's law does not depend on the path; choose another algorithm.",
                 ));
             }
         }
@@ -229,7 +229,7 @@ impl Checks {
                     Reason::NotUsed,
                     "`obstacle`",
                     "`body`",
-                    "The thesis knows the body's normal only; choose another algorithm.",
+                    "The thesis uses the body's normal only; choose another algorithm.",
                 ));
             }
             if contact.friction.as_ref().is_some_and(|f| f.bound.is_some()) {
@@ -260,7 +260,7 @@ impl Checks {
             "/solver/thesis/relaxation",
             options.relaxation,
             "0 < relaxation ≤ 1",
-            "1 takes the new friction force as it is.",
+            "1 applies the new friction force without relaxation.",
         ));
         all.check(self.require(
             [1, 2].contains(&options.friction_force),
@@ -274,7 +274,7 @@ impl Checks {
             "/solver/thesis/local_points",
             f64::from(options.local_points),
             "0 … 100",
-            "0 averages nodal values without regard to the mesh.",
+            "0 averages nodal values independently of the mesh.",
         ));
         if options.local_points > 0 && options.pressure == ThesisPressure::Lumped {
             all.fail(self.report(
@@ -282,7 +282,7 @@ impl Checks {
                 Reason::NotUsed,
                 options.local_points,
                 "0 with lumped pressure",
-                "Local Gauss points carry an extrapolated stress; choose that pressure.",
+                "Local Gauss points need an extrapolated stress: choose \"pressure\": \"extrapolated\".",
             ));
         }
         for (name, [s0, s1]) in &options.contact_guess {
@@ -293,7 +293,7 @@ impl Checks {
                     Reason::UnknownBoundary,
                     name,
                     "the boundary of a contact",
-                    "Guess for the boundaries named under /contacts.",
+                    "Give guesses only for the boundaries named under /contacts.",
                 ));
             }
             if s0 >= s1 {

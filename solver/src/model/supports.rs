@@ -1,4 +1,4 @@
-//! Supports, and whether they (or contact) hold the body.
+//! Supports, and whether they (or contacts) hold the body.
 
 use std::collections::BTreeMap;
 
@@ -43,7 +43,7 @@ impl Held {
         }
     }
 
-    /// With one more prescribed displacement; `Err` has what is prescribed already and differs.
+    /// Adds a prescribed displacement; `Err`: a different value is prescribed already.
     fn and(self, along: [f64; 2], value: f64, rounding: f64) -> Result<Self, f64> {
         if let Some(known) = self.along(along) {
             return if (known - value).abs() <= rounding {
@@ -73,8 +73,8 @@ fn parallel(a: [f64; 2], b: [f64; 2]) -> bool {
 }
 
 impl Checks {
-    /// Prescribed displacements by node, of those supports that are sound; and whether all are. A body of
-    /// revolution cannot leave its axis: there u_r = 0 whether a support says so or not.
+    /// Prescribed displacements by node, of the valid supports; and whether all are valid. A body of revolution
+    /// cannot leave its axis: there u_r = 0, with or without a support.
     pub(super) fn supports(
         &mut self,
         mesh: &Mesh,
@@ -124,7 +124,7 @@ impl Checks {
                 Reason::TooFew,
                 "neither `ux` nor `uy` nor `un` nor `ut`",
                 "at least one of them",
-                "Prescribe a displacement or remove the support.",
+                "Prescribe a displacement, or remove the support.",
             ));
         }
         if (named[0] || named[1]) && (named[2] || named[3]) {
@@ -133,7 +133,7 @@ impl Checks {
                 Reason::WrongCount,
                 "displacements along x, y and along normal, tangent",
                 "one pair of directions",
-                "Write two supports where both are meant.",
+                "Write two supports to prescribe both.",
             ));
         }
         let place = self.place(mesh, support, pointer)?;
@@ -217,7 +217,7 @@ impl Checks {
                     Reason::WrongCount,
                     got,
                     "exactly one of `boundary` and `nodes`",
-                    "Say where the support is.",
+                    "Name the place of the support.",
                 ))
             }
         }
@@ -250,8 +250,7 @@ impl Checks {
         }
     }
 
-    /// Unit outward normals at the nodes of a boundary; the mean of both edges at a corner that is
-    /// hardly one.
+    /// Unit outward normals at the nodes of a boundary; the mean of both edges at a slight corner.
     fn normals(
         &mut self,
         mesh: &Mesh,
@@ -285,15 +284,15 @@ impl Checks {
                 pointer,
                 Reason::TurnsCorner,
                 format!("a boundary that turns by more than 45° at ({x}, {y})"),
-                "a boundary without corners: at one there is no normal",
+                "a boundary without corners, where the normal is not defined",
                 "Give each side a support of its own, with names under /mesh/boundaries.",
             ));
         }
         Ok(normals)
     }
 
-    /// Every part of the body must be held against its rigid motions, by supports or at least by
-    /// contact (if it touches). True where it is contact that does so.
+    /// Every part of the body must be held against rigid motions, by supports or by contacts (if they touch).
+    /// True if a contact is needed for that.
     pub(super) fn freedom(
         &mut self,
         mesh: &Mesh,
@@ -319,7 +318,7 @@ impl Checks {
                         Reason::FreeBody,
                         format!("a body free to move: {direction}, e.g. node {node} at ({x}, {y})"),
                         "supports or contacts against every rigid motion",
-                        "Add a support with `ux` or `uy`. Parts that touch in a corner only do not hold each other.",
+                        "Add a support with `ux` or `uy`. Parts that touch only in a corner do not hold each other.",
                     ));
                 }
             }
@@ -340,7 +339,7 @@ fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<(u32, [f64; 2])> {
     held
 }
 
-/// The motions of its nodes that a contact hinders while it touches.
+/// The motions of its nodes that a contact prevents while it touches.
 fn hindered(contact: &ContactModel) -> Vec<(u32, [f64; 2])> {
     let holds = |law: &FrictionLaw<Average>| law.bound.holds();
     let normal = contact.condition != Condition::None;
@@ -369,7 +368,7 @@ fn largest(value: BoundaryValue) -> f64 {
 /// Displacement of a node.
 type Motion<'a> = Box<dyn Fn(u32) -> [f64; 2] + 'a>;
 
-/// A rigid motion of a part of the body that neither supports nor the given nodes and directions hinder, in
+/// A rigid motion of a part of the body that neither the supports nor the given nodes and directions prevent, in
 /// words, and a node that moves.
 pub(super) fn motion_left(
     mesh: &Mesh,
@@ -392,7 +391,7 @@ fn free_motion(
     held: &[(u32, [f64; 2])],
     part: &[u32],
 ) -> Option<(&'static str, u32)> {
-    // Rotation is taken about the part's centre and scaled by its size, so that all motions compare.
+    // rotation about the centre of the part, scaled by its size: the motions are comparable
     let mean =
         |a: usize| part.iter().map(|&n| mesh.nodes[n as usize][a]).sum::<f64>() / part.len() as f64;
     let centre = [mean(0), mean(1)];
@@ -423,7 +422,7 @@ fn free_motion(
         ]
     };
     let own: std::collections::HashSet<u32> = part.iter().copied().collect();
-    // Gram–Schmidt on the motions as seen by the supports: what has nothing left is free.
+    // Gram–Schmidt on the displacements along the held directions: a motion without a remainder is free
     let mut seen: Vec<(Vec<f64>, &'static str)> = Vec::new();
     for (name, motion) in &motions {
         let mut values: Vec<f64> = held

@@ -9,7 +9,7 @@ use crate::elasticity::Dof;
 /// Steps of the active set before falling back.
 const ACTIVE_SET_STEPS: u32 = 30;
 
-/// Guess the active set, solve for it with one Newton step, correct the guess.
+/// Guesses the active set, solves with one Newton step, and corrects the guess.
 pub(super) fn run(
     system: &System<'_>,
     bound: &[f64],
@@ -31,7 +31,7 @@ pub(super) fn run(
             .for_each(|(&dof, d)| state.v[dof] += d);
         let changed = update_active(system, &mut state);
         let residual = system.kkt_residual(&state, bound);
-        // with the sets settled a step is exact but for rounding: what it does not gain is not there
+        // with settled sets a step is exact up to rounding: no further gain is possible
         let settled = !changed && best.as_ref().is_some_and(|b| residual > 0.5 * b.residual);
         if best.as_ref().is_none_or(|b| residual < b.residual) {
             best = Some(Minimum {

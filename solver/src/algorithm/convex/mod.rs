@@ -3,8 +3,8 @@
 //!   J(v) = ½ vᵀŜv − f̂ᵀv + Σ_g w_g τ_g ψ_ε(u_t(g) − d)     subject to u_n ≤ gap
 //!
 //! First a primal–dual active set with semi-smooth Newton steps, which mostly needs one to five;
-//! where that does not settle, projected Newton with a line search. Which of them was needed shows in
-//! the number of steps; how far they came, in the residual.
+//! where that does not settle, projected Newton with a line search. The number of steps shows which of them
+//! was needed; the residual they reached is reported with it.
 
 mod active_set;
 mod projected_newton;
@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 use crate::algorithm::system::{State, System};
 
 /// Minimises J from `start` until the KKT residual is below `tolerance`, and somewhat further where
-/// that is cheap. `go_on` is asked at every Newton step and may end it early.
+/// that is cheap. `go_on` is called at every Newton step and may stop it.
 pub fn minimise(
     system: &System<'_>,
     bound: &[f64],

@@ -1,4 +1,4 @@
-//! Projected Newton (Bertsekas 1982) with a line search: slower, and it goes downhill at every step.
+//! Projected Newton (Bertsekas 1982) with a line search: slower, but J decreases at every step.
 
 use std::ops::ControlFlow;
 
@@ -10,14 +10,14 @@ use crate::friction::FrictionLaw;
 /// Steps of projected Newton; a dozen are usual.
 const PROJECTED_STEPS: u32 = 300;
 
-/// Steps without gain after which a residual that is good enough is taken.
+/// Steps without gain after which a residual below the tolerance is accepted.
 const PATIENCE: u32 = 5;
 
 /// Projected Newton (Bertsekas): hold the nodes that press against the obstacle, step in the
 /// others, and let the step end on the obstacle where it would pass it.
 ///
-/// A node on the axis is no inequality: it is locked to its neighbour's state, and the whole is
-/// solved again when that state turns out different.
+/// A node on the axis has no inequality: it is locked to its neighbour's state, and the problem is solved again
+/// if that state changes.
 pub(super) fn run(
     system: &System<'_>,
     bound: &[f64],
@@ -105,7 +105,7 @@ fn project(system: &System<'_>, v: &mut [f64], locked: &[bool]) {
     }
 }
 
-/// The active set that a point stands for: nodes on the obstacle and pressed against it.
+/// The active set at a point: nodes on the obstacle and pressed against it.
 fn pressed(system: &System<'_>, v: &[f64], force: &[f64], locked: &[bool]) -> Vec<bool> {
     let state = |(i, node): (usize, &ContactNode)| match (node.normal, node.decides()) {
         (Dof::Fixed(_), _) => false,
@@ -137,7 +137,7 @@ fn binding(system: &System<'_>, v: &[f64], force: &[f64], locked: &[bool]) -> Ve
 }
 
 /// Moves v along d: exactly to the minimum where no obstacle blocks the way, else by Armijo's rule
-/// along the projected path. False when nothing more can be gained.
+/// along the projected path. False if J cannot be reduced further.
 fn line_search(
     system: &System<'_>,
     bound: &[f64],
@@ -201,7 +201,7 @@ pub(in crate::algorithm) fn least_along(
 struct Along<'a> {
     slope: f64,
     curvature: f64,
-    /// w τ, u_t − d, its change along d, and the law, at the friction points that matter.
+    /// w τ, u_t − d, its change along d, and the law, at the friction points with a bound and a change.
     friction: Vec<(f64, f64, f64, &'a FrictionLaw)>,
 }
 
@@ -268,7 +268,7 @@ impl<'a> Along<'a> {
             return most;
         }
         let (mut low, mut high) = (0.0, most);
-        // halving to the last digit costs little: no matrix is touched
+        // halving to the last digit is cheap: it needs no matrix
         for _ in 0..80 {
             let middle = 0.5 * (low + high);
             if self.derivative(middle) <= 0.0 {

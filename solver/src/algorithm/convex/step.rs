@@ -1,10 +1,10 @@
-//! What both ways to the minimum share: the gradient of J, a Newton step, and nodes that are held.
+//! Parts of both methods: the gradient of J, a Newton step, and nodes that are held.
 
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 use crate::linear::solve_positive_definite;
 
-/// The minimiser, as near as it was reached.
+/// The best approximation of the minimiser.
 pub struct Minimum {
     /// The state.
     pub state: State,
@@ -14,11 +14,11 @@ pub struct Minimum {
     pub residual: f64,
 }
 
-/// How far to go: the residual to reach, and a tenth of it to aim at, so that what the inner problem
-/// leaves does not blur the outer residuals. Where rounding allows no more, the first is enough.
+/// Aim at a tenth of the tolerance so that the error of the inner problem does not disturb the outer residuals.
+/// Where rounding prevents that, the tolerance itself is enough.
 pub(super) const AIM: f64 = 0.1;
 
-/// Puts the nodes that are in contact onto the obstacle, and what is held along t where it is held.
+/// Puts the nodes in contact onto the obstacle, and those held along t to their prescribed displacement.
 pub(in crate::algorithm) fn close(system: &System<'_>, state: &mut State) {
     for (node, active) in system.nodes.iter().zip(&state.active) {
         if let (true, Dof::Free(dof)) = (active, node.normal) {
@@ -67,8 +67,8 @@ pub(in crate::algorithm) fn free_dofs(
 }
 
 /// Added to the diagonal of H where Ŝ leaves rigid motions free: a step along one is then long but
-/// finite, until contact ends it. Where contact holds the body it costs a step or two, no accuracy:
-/// the gradient knows nothing of it.
+/// finite, until contact ends it. Where contact holds the body it
+/// costs a step or two but no accuracy, since the gradient does not depend on it.
 pub(in crate::algorithm) fn semidefinite_shift(system: &System<'_>) -> f64 {
     let size = system.stiffness.size().max(1);
     let diagonal: f64 = (0..system.stiffness.size())

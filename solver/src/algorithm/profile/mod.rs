@@ -1,5 +1,5 @@
-//! One contact in the final state: its columns; in files of their own its forces, extents and peaks,
-//! and what to warn of.
+//! One contact in the final state: its columns; its forces, extents, peaks and warnings are in files of
+//! their own.
 
 mod extents;
 mod warnings;
@@ -20,9 +20,9 @@ pub(super) struct PatchView<'a> {
     v: &'a [f64],
     finished: &'a Finished,
     forces: &'a Forces,
-    /// g at start, end and midside of every edge; in the total law nothing.
+    /// g at start, end and midside of every edge; 0 in the total law.
     anchors: Vec<[f64; 3]>,
-    /// σ_t likewise, where it is not the law's: of the thesis's own iteration, and of bonded contacts.
+    /// σ_t likewise, if it does not follow from the law: in the thesis's own iteration and in bonded contacts.
     tractions: Option<Vec<[f64; 3]>>,
 }
 
@@ -111,7 +111,7 @@ impl<'a> PatchView<'a> {
         self.patch.contact.boundary.nodes.len()
     }
 
-    /// True where friction may act: in contact, or without any obstacle.
+    /// Whether friction may act: in contact, or without an obstacle.
     fn engaged(&self, i: usize) -> bool {
         self.active(i) || self.patch.contact.condition == Condition::None
     }
@@ -154,7 +154,7 @@ impl<'a> PatchView<'a> {
         )
     }
 
-    /// σ_t(s) = −τ(s) φ(e(s)), with W at this very s.
+    /// σ_t(s) = −τ(s) φ(e(s)), with W evaluated at s.
     fn tangential_stress_at(&self, edge: usize, xi: f64) -> f64 {
         let h = edge3::shape(xi);
         if let Some(tractions) = &self.tractions {

@@ -1,4 +1,4 @@
-//! What to know before trusting a contact.
+//! Warnings about a contact.
 
 use super::PatchView;
 use crate::contact::edge_nodes;
@@ -10,13 +10,13 @@ use crate::solution::{Outcome, Warning, WarningCode};
 /// Error of a smooth peak times the square of the number of elements across.
 const SMOOTH_PEAK: f64 = 0.28;
 
-/// Part of the friction force that cancels inside edges, from which on stick tractions oscillate.
+/// Stick tractions oscillate if more than this part of the friction force cancels inside edges.
 const OSCILLATING: f64 = 3e-3;
 
-/// One edge may hold this part of it for the sake of a motion that turns there.
+/// One edge may contribute this part, because the motion may turn there.
 const TURN: f64 = 0.02;
 
-/// Fewer edges than this across a contact say little about its pressure.
+/// With fewer edges than this across a contact, its pressure is not reliable.
 const FEWEST_EDGES: usize = 6;
 
 impl PatchView<'_> {
@@ -47,7 +47,7 @@ impl PatchView<'_> {
         if !settled && contact.friction.as_ref().is_some_and(jumps) {
             warn(
                 WarningCode::CohesionJumps,
-                "The friction bound jumps by the cohesion where the pressure ends; without a nonlocal radius the nodes there may come and go for ever. Give a radius of an element or more.".to_owned(),
+                "The friction bound jumps by the cohesion where the pressure ends; without a nonlocal radius the nodes there may enter and leave contact endlessly. Give a radius of at least one element.".to_owned(),
             );
         }
         let touching = (0..self.count()).filter(|&i| self.active(i)).count();
@@ -63,7 +63,7 @@ impl PatchView<'_> {
             };
             let nearest = (0..self.count()).min_by(|&a, &b| opening(a).total_cmp(&opening(b)));
             let smallest = nearest.map_or(f64::INFINITY, opening);
-            // untouched, the body does not feel the obstacle: what the gap lacks is what to indent by
+            // without contact the obstacle does not deform the body: the missing indentation is the gap
             let engages = |i: usize| {
                 let moved = self
                     .system
@@ -74,7 +74,7 @@ impl PatchView<'_> {
             warn(
                 WarningCode::NoContact,
                 format!(
-                    "The body never touches the obstacle: the smallest gap is {smallest:.6e}. An indentation above {needed:.6e} engages it."
+                    "The body never touches the obstacle: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
                 ),
             );
             return;
@@ -83,7 +83,7 @@ impl PatchView<'_> {
             warn(
                 WarningCode::BoundBeyondContact,
                 format!(
-                    "The prescribed friction bound acts on all of the boundary, as Tresca's law has it: up to {tau:.3e} also where the body does not touch. Give it as a table over s that ends with the contact."
+                    "The prescribed friction bound acts on the whole boundary, as in Tresca's law: up to {tau:.3e} also where the body does not touch the obstacle. Give it as a table over s that ends with the contact."
                 ),
             );
         }
@@ -102,7 +102,7 @@ impl PatchView<'_> {
             warn(
                 WarningCode::MeshTooCoarseForContact,
                 format!(
-                    "Only {edges} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a pressure to rely on. {} Refine the mesh there.",
+                    "Only {edges} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a reliable pressure. {} Refine the mesh there.",
                     self.peak_uncertainty(edges)
                 ),
             );
@@ -113,7 +113,7 @@ impl PatchView<'_> {
             warn(
                 WarningCode::ContactReachesObstacleEnd,
                 format!(
-                    "The body presses against the very end of the obstacle, s = {s:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the obstacle goes on there, extend it."
+                    "The body presses against the end of the obstacle, s = {s:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the real obstacle does not end there, extend it."
                 ),
             );
         }
@@ -130,14 +130,14 @@ impl PatchView<'_> {
                 warn(
                     WarningCode::RadiusExceedsContact,
                     format!(
-                        "The nonlocal radius {radius} is larger than the whole contact, {width:.4}: the averaged pressure, and friction with it, is smeared out beyond the contact."
+                        "The nonlocal radius {radius} is larger than the whole contact, {width:.4}: the averaged pressure, and friction with it, extends beyond the contact."
                     ),
                 );
             }
         }
     }
 
-    /// How far the peak pressure may be off with so few elements in contact. The worst of many meshes
+    /// The possible error of the peak pressure with so few elements in contact. The worst of many meshes
     /// of Hertz's cylinder is .28/n², n elements across the whole contact (`tests/verification`).
     fn peak_uncertainty(&self, edges: usize) -> String {
         let count = self.count();
@@ -145,7 +145,7 @@ impl PatchView<'_> {
         let (mirrored, sharp): (Vec<usize>, Vec<usize>) = pressed.partition(|&i| self.symmetric(i));
         let across = edges * (1 + mirrored.len());
         if across == 0 {
-            "Nothing is known of its peak.".to_owned()
+            "Its peak is unknown.".to_owned()
         } else if !sharp.is_empty() {
             "At the obstacle's end its peak has no limit.".to_owned()
         } else {
@@ -154,9 +154,9 @@ impl PatchView<'_> {
         }
     }
 
-    /// Inside an edge the tangential stress changes its sign where the motion turns, mostly once. What
-    /// else cancels inside edges is an oscillation of stick tractions, and `friction_force` is too
-    /// large by about that much.
+    /// Inside an edge the tangential stress changes its sign where the motion turns, mostly once. Any
+    /// other cancellation inside edges is an oscillation of stick tractions, and `friction_force` is too large by
+    /// about that part.
     fn warn_of_oscillation(&self, warnings: &mut Vec<Warning>) {
         let points = self.system.points.iter().zip(&self.finished.tractions);
         let own: Vec<f64> = points
@@ -221,8 +221,8 @@ impl PatchView<'_> {
         (largest > 0.0).then_some(largest)
     }
 
-    /// The edge under the peak of σ_t, where it is longer than ρ; unless all edges are, which was said
-    /// before the solution.
+    /// The edge under the peak of σ_t, if it is longer than ρ; not if all edges are, which is warned of before
+    /// solving.
     fn unresolved_radius(&self) -> Option<(f64, f64)> {
         let contact = &self.patch.contact;
         let radius = contact.friction.as_ref()?.bound.averaged_over()?;

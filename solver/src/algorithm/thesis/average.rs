@@ -7,7 +7,7 @@ use crate::friction::BoundLaw;
 pub(super) struct Stretch<'a> {
     /// Arc length of its start.
     pub(super) from: f64,
-    /// And of its end.
+    /// Arc length of its end.
     pub(super) to: f64,
     /// σ_n at the points of the rule.
     pub(super) values: &'a [f64],
@@ -99,7 +99,7 @@ mod tests {
         ];
         let average = nonlocal(&law, &stretches, rule, 20, 0.9);
         assert!((average - 4.1).abs() < 1e-6, "{average}");
-        // few points miss the shape of the kernel, and an element that is left out its part of it
+        // few points miss the shape of the kernel; without an element its part is missing
         let coarse = nonlocal(&law, &stretches, rule, 2, 0.9);
         assert!((coarse / 4.1 - 1.0).abs() > 0.01, "{coarse}");
         let cut = nonlocal(&law, &stretches[..1], rule, 20, 0.9);

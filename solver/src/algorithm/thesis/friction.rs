@@ -11,12 +11,12 @@ pub(super) struct Friction {
     pub(super) traction: Vec<f64>,
 }
 
-/// σ_t / τ from φ with the sign of the motion.
+/// σ_t / τ from φ: against the motion with option `signed`, else along +t.
 pub(super) fn signed_ratio(phi: f64, options: &ThesisOptions) -> f64 {
     if options.signed { -phi } else { phi.abs() }
 }
 
-/// Takes over a part of the new friction force.
+/// Applies a part of the new friction force.
 pub(super) fn relax(friction: &mut Friction, new: Friction, part: f64) {
     let mix = |old: &mut Vec<f64>, new: Vec<f64>| {
         old.iter_mut()

@@ -1,16 +1,16 @@
 //! The thesis's own iteration (3.1), to the letter.
 //!
-//! It stays because the thesis is our source, and because it shows what the other algorithms repair:
+//! It is kept because the thesis is our source, and because it shows what the other algorithms correct:
 //! at the thesis's parameters it does not solve the problem (formulation 4.5). Friction enters as a
 //! load that is one iteration old, and the gain of that loop, μS/ε × tangential compliance, is in the
 //! hundreds. Without the sign it settles in a false state of full slip, friction pushing along the
-//! motion; with the sign it falls into a cycle of two. So the residuals that come back are those of
-//! the true problem, and the outcome says so when they are large.
+//! motion; with the sign it falls into a cycle of two. So the residuals of the result are those of
+//! the true problem, and the outcome is `FalseConvergence` when they are large.
 //!
 //! Readings: f̂ is a stress along t, so that K u = F − F̂ with σ_n < 0 pushes the body along +t; the
 //! pressure is `lumped` (R/∫h) or `extrapolated` from internal Gauss points (3.3, file `rows`); it is
-//! averaged by the mesh-free W, or with `local_points` as 3.4.2 says (file `average`); a Gauss point lies on Γ_C* where the nodes on either side of it do; R_F is divided by
-//! the relaxation factor.
+//! averaged by the mesh-free W, or with `local_points` as in 3.4.2 (file `average`); a Gauss point lies on
+//! Γ_C* where the nodes on both sides of it do; R_F is divided by the relaxation factor.
 
 mod average;
 mod friction;
@@ -27,7 +27,7 @@ use crate::solution::{Observer, Outcome, Stage};
 use friction::{Friction, relax, signed_ratio};
 use rows::Rows;
 
-/// Iterates; the tractions that the final state was solved with come back beside it.
+/// Iterates; returns the final state with the tractions used for it.
 pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End, Vec<f64>) {
     let system = track.system;
     let options = track.controls.thesis.clone().unwrap_or_default();
@@ -41,7 +41,7 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
     let mut normal_stress: Option<Vec<f64>> = None;
     let mut end: Option<(End, Vec<f64>)> = None;
     for _ in 0..track.controls.max_iterations {
-        // steps 1 and 2; a state that cannot be solved for is the end
+        // steps 1 and 2; the iteration ends where the system cannot be solved
         let Some(v) = solve(system, &state.active, &friction.traction) else {
             break;
         };
@@ -70,7 +70,7 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
             own_r_f: r_f,
         };
         let answer = track.record(&measured, row, observe);
-        // a slow approach passes the same states again and again; only a full step cycles
+        // with relaxation the same states recur on the way to a solution; only full steps cycle
         let cycle = if options.relaxation == 1.0 {
             track.note(&state, r_f.unwrap_or(1.0))
         } else {
@@ -153,7 +153,7 @@ fn next_contact(system: &System<'_>, state: &State, node_stress: &[f64]) -> Vec<
     next
 }
 
-/// Step 5. f̂ = τ φ along Γ_C*, 0 off it; along +t, or against the motion where it has its sign.
+/// Step 5. f̂ = τ φ along Γ_C*, 0 off it; along +t, or against the motion with option `signed`.
 fn new_friction(
     system: &System<'_>,
     state: &State,
@@ -179,7 +179,8 @@ fn new_friction(
     friction
 }
 
-/// τ by the mesh-free average of the nodal pressures at every friction point. φ is taken there (way 1 of 3.2) or carried from the two nearest rows of internal Gauss points (way 2).
+/// τ by the mesh-free average of the nodal pressures at every friction point. φ is taken there (way 1 of 3.2)
+/// or extrapolated from the two nearest rows of internal Gauss points (way 2).
 fn averaged(
     system: &System<'_>,
     state: &State,

@@ -1,4 +1,4 @@
-//! What the two rows of internal Gauss points nearest to Γ_C see, and how it is carried to the
+//! Values at the two rows of internal Gauss points nearest to Γ_C, and their extrapolation to the
 //! boundary: thesis 3.3, 3.4.1 and figs 3.2 and 3.4.
 //!
 //! ```text
@@ -9,7 +9,7 @@
 //!       x      x      x       second row      depth d₂
 //! ```
 //!
-//! A value is carried from the rows to the boundary linearly, v = v₁ + (v₁ − v₂) d₁/(d₂ − d₁), and
+//! A value is extrapolated from the rows to the boundary linearly, v = v₁ + (v₁ − v₂) d₁/(d₂ − d₁), and
 //! from the boundary's Gauss points to the nodes linearly as well: an end from the two points next
 //! to it, the midside from the middle point (from both with the 2 × 2 rule). A node that two edges
 //! share has the mean of both.
@@ -47,11 +47,11 @@ impl EdgeRows {
     }
 }
 
-/// What is known of a state.
+/// Values of a state at the rows and at the boundary.
 pub(super) struct RowValues {
     /// σ_n at every contact node (≤ 0 in compression).
     pub(super) node_stress: Vec<f64>,
-    /// φ with its sign, carried to every friction point.
+    /// φ with its sign, extrapolated to every friction point.
     pub(super) phi: Vec<f64>,
     /// By edge: σ_n on both rows at every Gauss point, and φ likewise.
     stress: Vec<[Vec<f64>; 2]>,
@@ -94,7 +94,7 @@ impl Rows {
         }
     }
 
-    /// Looks at a state; only what the options need.
+    /// Evaluates a state, as far as the options need it.
     pub(super) fn evaluate(
         &self,
         system: &System<'_>,
@@ -129,7 +129,7 @@ impl Rows {
         row_values
     }
 
-    /// The whole field.
+    /// Displacements of all nodes.
     fn displacements(&self, system: &System<'_>, state: &State, traction: &[f64]) -> Vec<[f64; 2]> {
         let mut friction = vec![0.0; state.v.len()];
         system.add_traction_force(traction, &mut friction);
@@ -288,7 +288,7 @@ impl RowValues {
                 bound.push(vec![0.0; self.rule.len()]);
                 continue;
             };
-            // the two-element limit: no further than the next element on either side
+            // the limit of two elements: no further than the next element on each side
             let near = (k.saturating_sub(1)..(k + 2).min(self.edges.len()))
                 .filter(|&other| self.edges[other].0 == *p);
             let neighbours: Vec<average::Stretch<'_>> = near
