@@ -6,9 +6,8 @@ use solver::solution::Warning;
 
 use crate::{abaqus, gmsh, source::ReadError};
 
-/// The mesh that a problem does not hold itself: `stored`, where its caller has it, or read from the text
-/// that the problem quotes. `None` where it needs none. What is wrong with it, and what was changed on the
-/// way, points to its place in the problem.
+/// The mesh that a problem does not contain: `stored`, if its caller has it, or read from the text that the
+/// problem quotes. `None` if it needs none. Violations and warnings point to its place in the problem.
 pub fn external_mesh(problem: &Problem, stored: Option<Mesh>) -> Option<External> {
     match &problem.mesh.source {
         MeshSource::Grid(_) | MeshSource::Inline(_) => None,

@@ -1,4 +1,4 @@
-//! A mesh file of whatever format, told by how it begins.
+//! A mesh file of any format, recognised by its first characters.
 
 use std::io::BufRead;
 
@@ -23,7 +23,7 @@ pub enum MeshFormat {
     Json,
 }
 
-/// Reads a mesh file, with what was changed on the way.
+/// Reads a mesh file, with warnings of what was changed.
 pub fn read_mesh(mut reader: impl BufRead) -> Result<(MeshFormat, Mesh, Vec<Warning>), ReadError> {
     let start = reader.fill_buf().map_err(ReadError::Io)?;
     let first = start.iter().find(|byte| !byte.is_ascii_whitespace());
@@ -32,7 +32,7 @@ pub fn read_mesh(mut reader: impl BufRead) -> Result<(MeshFormat, Mesh, Vec<Warn
         Some(b'*') => abaqus::read(reader).map(|(mesh, notes)| (MeshFormat::Abaqus, mesh, notes)),
         Some(b'{') => json(reader).map(|mesh| (MeshFormat::Json, mesh, Vec::new())),
         _ => Err(invalid(
-            "a file that begins otherwise".to_owned(),
+            "a file that begins differently".to_owned(),
             "a Gmsh mesh ($MeshFormat), an Abaqus or CalculiX deck (*HEADING, *NODE), or an inline mesh as JSON",
             "Send the file as it is, without multipart or compression.",
         )),
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_known_by_how_it_begins() {
+    fn a_format_is_recognised_by_its_first_characters() {
         let square = r#" {"nodes": [[0,0],[1,0],[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]],
             "elements": [[0,1,2,3,4,5,6,7]], "boundaries": {"top": [[3,2,6]]}}"#;
         let (format, mesh, _) = read_mesh(square.as_bytes()).unwrap();

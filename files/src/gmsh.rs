@@ -1,7 +1,7 @@
 //! Meshes from Gmsh: MSH 2.2 and 4.1, ASCII and binary.
 //!
 //! Written by hand: the crate for this format reads 4.1 only and wants the whole file in memory; here a
-//! file streams through, and of its dozen sections we need five.
+//! file is read as a stream, and five of its dozen sections are needed.
 //!
 //! Physical curves become boundaries, physical surfaces groups of elements, physical points sets of
 //! nodes, all by their names (or numbers, where they have none).
@@ -15,7 +15,7 @@ use solver::error::Reason;
 use solver::mesh::{self, Mesh, NO_NODE, RawMesh};
 use solver::solution::Warning;
 
-/// What Gmsh calls the kinds of elements that we read, with their nodes.
+/// Gmsh's numbers of the supported kinds of elements, with their numbers of nodes.
 const KINDS: [(i64, usize, Kind); 8] = [
     (1, 2, Kind::Line),
     (8, 3, Kind::Line),
@@ -35,7 +35,7 @@ enum Kind {
     Quad,
 }
 
-/// Reads a mesh, with what was changed on the way.
+/// Reads a mesh, with warnings of what was changed.
 pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
     let mut file = File::new(reader);
     file.sections()?;
@@ -166,7 +166,7 @@ impl<R: BufRead> File<R> {
 
     fn once(&self, seen: bool, section: &str) -> Result<(), ReadError> {
         if seen {
-            let got = format!("{section} once more");
+            let got = format!("{section} a second time");
             return Err(self.source.fault(
                 Reason::Malformed,
                 &got,
@@ -185,7 +185,7 @@ impl<R: BufRead> File<R> {
                 Reason::Malformed,
                 &format!("`{first:.40}`"),
                 "$MeshFormat in the first line",
-                "A Gmsh mesh (.msh) is expected, not its geometry (.geo).",
+                "Send a Gmsh mesh (.msh), not its geometry (.geo).",
             ));
         }
         let version = self.source.word("a version")?.to_owned();
@@ -220,7 +220,7 @@ impl<R: BufRead> File<R> {
                     Reason::Malformed,
                     "another number",
                     "the number 1",
-                    "Was the file sent as text?",
+                    "Check that the file was not sent as text.",
                 ));
             }
         }
@@ -238,13 +238,13 @@ impl<R: BufRead> File<R> {
             Reason::Malformed,
             &got,
             end,
-            "A count in the section's head does not hold.",
+            "The count at the head of the section is wrong.",
         ))
     }
 
     fn skip_to(&mut self, end: &str) -> Result<(), ReadError> {
         let first = self.source.line;
-        // a binary section may hold anything, so its bytes are not taken for text
+        // a binary section may contain any bytes, also such that are not text
         loop {
             match self.source.advance() {
                 Ok(true) if self.source.text().trim_end().ends_with(end) => return Ok(()),
@@ -346,15 +346,15 @@ impl<R: BufRead> File<R> {
         if self.raw.nodes.len() >= NO_NODE as usize {
             return Err(self.source.fault(
                 Reason::TooMany,
-                "more nodes than can be numbered",
-                "fewer",
-                "Coarsen the mesh.",
+                &format!("more than {NO_NODE} nodes"),
+                "fewer nodes",
+                "Use a coarser mesh.",
             ));
         }
         if !self.labels.add(label) {
             return Err(self.source.fault(
                 Reason::RepeatedNode,
-                &format!("node {label} once more"),
+                &format!("node {label} a second time"),
                 "each node once",
                 "Save the mesh again.",
             ));
@@ -365,10 +365,10 @@ impl<R: BufRead> File<R> {
         Ok(())
     }
 
-    /// Room for what the file promises, but no more than a file of any sane size holds.
+    /// Reserves memory for the announced number of nodes, up to a limit: the number may be wrong.
     fn reserve(&mut self, count: u64) {
-        const SANE: u64 = 1 << 20;
-        let count = count.min(SANE) as usize;
+        const MOST: u64 = 1 << 20;
+        let count = count.min(MOST) as usize;
         self.raw.nodes.reserve_exact(count);
         self.raw.node_labels.reserve_exact(count);
     }
@@ -414,7 +414,7 @@ impl<R: BufRead> File<R> {
         let count: u64 = self.source.number("the number of elements")?;
         let mut read = 0;
         while read < count {
-            // in binary a head stands before a run of elements of one kind
+            // in binary files a head precedes a run of elements of one kind
             let (label, kind, run, tags) = if self.binary {
                 let kind = self.int("a kind of element")?;
                 (
@@ -481,7 +481,7 @@ impl<R: BufRead> File<R> {
         Ok(())
     }
 
-    /// Nodes and kind of what Gmsh numbers so.
+    /// Number of nodes and kind of element, by Gmsh's number.
     fn kind(&self, number: i64) -> Result<(usize, Kind), ReadError> {
         let known = KINDS.iter().find(|kind| kind.0 == number);
         if let Some((_, size, kind)) = known {

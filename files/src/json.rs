@@ -1,7 +1,7 @@
-//! Problems from JSON: strict, and with every structural fault named at once.
+//! Problems from JSON: strict, and with all structural faults reported at once.
 //!
-//! serde is the judge; it stops at the first fault, and inside an enum it forgets where it was. So
-//! when it refuses a text, our own JSON Schema is asked for all the reasons.
+//! serde decides; but it stops at the first fault, and inside an enum it does not know the place. So a
+//! text that it refuses is checked against our JSON Schema, which gives all faults.
 
 use serde_json::Value;
 
@@ -9,7 +9,7 @@ use crate::schema::violations;
 use solver::error::{Reason, Violation, escape};
 use solver::problem::Problem;
 
-/// Reads a problem, or says everything that is wrong with its structure. Pointers are relative to
+/// Reads a problem, or returns all faults of its structure. Pointers are relative to
 /// the problem.
 pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
     serde_json::from_str(text).map_err(|first| explain(text, &first))
@@ -43,7 +43,7 @@ fn explain(text: &str, first: &serde_json::Error) -> Vec<Violation> {
     }
 }
 
-/// A fault that the schema cannot express, such as a repeated name or a number out of its type.
+/// A fault that the schema cannot express, such as a repeated name or a number outside its type.
 fn beyond_the_schema(text: &str, first: &serde_json::Error) -> Violation {
     let mut reader = serde_json::Deserializer::from_str(text);
     let path = serde_path_to_error::deserialize::<_, Problem>(&mut reader).err();
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn every_structural_fault_is_named_with_its_pointer() {
+    fn every_structural_fault_is_reported_with_its_pointer() {
         let text = GOOD
             .replace("\"plane_strain\"", "\"plain_strain\"")
             .replace("[0, 1], \"y\"", "[0, \"one\"], \"y\"")
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_kind_is_answered_with_those_that_exist() {
+    fn an_unknown_kind_is_reported_with_the_known_ones() {
         let found = faults(r#"{"kind": "flat"}"#, r#"{"kind": "sphere", "radius": 1}"#);
         assert_eq!(found.len(), 1, "{found:?}");
         assert_eq!(found[0].0, "/contacts/0/obstacle/kind");
@@ -184,8 +184,8 @@ mod tests {
     }
 
     #[test]
-    fn what_has_several_forms_is_given_in_exactly_one() {
-        let said = |from: &str, to: &str| -> Vec<(String, Reason, String)> {
+    fn alternatives_are_given_in_exactly_one_form() {
+        let reported = |from: &str, to: &str| -> Vec<(String, Reason, String)> {
             assert!(GOOD.contains(from), "{from}");
             let mut list =
                 parse(&GOOD.replacen(from, to, 1)).expect_err("a faulty problem was accepted");
@@ -197,10 +197,10 @@ mod tests {
         let one =
             |pointer: &str, reason, got: &str| vec![(pointer.to_owned(), reason, got.to_owned())];
         let (grid, count) = (r#""grid": {"x": [0, 1], "y": [0, 1]}"#, Reason::WrongCount);
-        assert_eq!(said(grid, ""), one("/mesh", count, "none of them"));
+        assert_eq!(reported(grid, ""), one("/mesh", count, "none of them"));
         let both = format!(r#"{grid}, "stored": "sha256:0""#);
         assert_eq!(
-            said(grid, &both),
+            reported(grid, &both),
             one("/mesh", count, "`grid` and `stored`")
         );
         let expected = &faults(grid, "")[0].2;
@@ -210,7 +210,7 @@ mod tests {
         );
 
         let load = |load: &str| {
-            said(
+            reported(
                 r#""materials""#,
                 &format!(r#""loads": [{load}], "materials""#),
             )
@@ -240,19 +240,19 @@ mod tests {
             .concat()
         );
         assert_eq!(
-            said(r#""youngs_modulus": 1000, "#, ""),
+            reported(r#""youngs_modulus": 1000, "#, ""),
             one("/materials/0/youngs_modulus", Reason::Missing, "nothing")
         );
         let wood = r#""orthotropic": {"e1": 1, "e2": 1, "nu12": 0.3, "g12": 1}, "youngs_modulus""#;
-        let found = said(r#""youngs_modulus""#, wood);
+        let found = reported(r#""youngs_modulus""#, wood);
         let places: Vec<_> = found.iter().map(|v| (&v.0[..], v.1)).collect();
         let excluded = ["/materials/0/poissons_ratio", "/materials/0/youngs_modulus"];
         assert_eq!(places, excluded.map(|place| (place, Reason::NotUsed)));
     }
 
-    /// What the schema says of forms and what the types accept is the same.
+    /// The schema and the types accept the same forms.
     #[test]
-    fn the_schema_refuses_what_is_refused_and_accepts_what_is_accepted() {
+    fn the_schema_accepts_the_same_problems_as_the_types() {
         let names = [
             "boundary",
             "nodes",
@@ -285,7 +285,7 @@ mod tests {
         for load in subsets(&names, &value) {
             let read = serde_json::from_value::<solver::problem::Load>(load.clone());
             assert_eq!(accepts("Load", &load), read.is_ok(), "{load}");
-            // and what was read is written as it was
+            // and it is written as it was read
             if let Ok(read) = read {
                 assert_eq!(serde_json::to_value(read).unwrap(), load);
             }
@@ -346,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_and_lists_out_of_shape_are_said_in_words() {
+    fn wrong_numbers_and_lists_are_described_in_words() {
         let expected = |from: &str, to: &str| faults(from, to).remove(0).2;
         assert_eq!(
             expected(r#""grid": {"x""#, r#""refine": -1, "grid": {"x""#),
@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn text_that_is_no_json_and_numbers_beyond_double_precision_are_named() {
+    fn invalid_json_and_numbers_beyond_double_precision_are_reported() {
         for text in ["{", "", " \n"] {
             assert_eq!(parse(text).unwrap_err()[0].reason, Reason::Malformed);
         }
@@ -367,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_schema_cannot_express_still_has_its_place() {
+    fn faults_beyond_the_schema_have_their_pointer() {
         let found = faults(r#""grid": {"x""#, r#""refine": 1e3, "grid": {"x""#);
         assert_eq!(found[0].0, "/mesh/refine");
         let found = faults(

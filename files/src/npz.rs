@@ -10,7 +10,7 @@ use zip::{CompressionMethod, result::ZipResult};
 use crate::number::Number;
 use crate::table::{Table, Values};
 
-/// An archive being written. `numpy.load` gives it back as arrays by name.
+/// An archive being written. `numpy.load` reads it as arrays by name.
 pub struct Npz {
     zip: ZipWriter<Cursor<Vec<u8>>>,
 }
@@ -25,7 +25,7 @@ impl Default for Npz {
 }
 
 impl Npz {
-    /// Without arrays yet.
+    /// An archive without arrays.
     pub fn new() -> Npz {
         Npz {
             zip: ZipWriter::new(Cursor::new(Vec::new())),
@@ -42,7 +42,7 @@ impl Npz {
     ) -> Result<(), String> {
         if width == 0 || !values.len().is_multiple_of(width) {
             return Err(format!(
-                "{name}: {} numbers are no rows of {width}",
+                "{name}: {} numbers cannot be split into rows of {width}",
                 values.len()
             ));
         }
@@ -98,10 +98,10 @@ impl Npz {
     /// Starts an array: magic, version 1.0, and the header padded so that the data begin at a
     /// multiple of 64 bytes.
     fn begin(&mut self, name: &str, descr: &str, shape: &str) -> ZipResult<()> {
-        // no time of writing: the same result gives the same bytes
+        // no time of writing, so that the same result gives the same bytes
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Deflated)
-            .compression_level(Some(1)) // digits of measured numbers shrink little, whatever the effort
+            .compression_level(Some(1)) // computed digits compress little at any level
             .last_modified_time(zip::DateTime::default())
             .large_file(true);
         self.zip.start_file(format!("{name}.npy"), options)?;
@@ -167,7 +167,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn every_array_has_its_type_its_shape_and_its_bytes() {
+    fn arrays_have_their_type_shape_and_bytes() {
         let mut npz = Npz::new();
         npz.array("a/b", &[1.5, -0.0, f64::NAN, 4.0], 2).unwrap();
         npz.array("n", &[7u32, 8], 1).unwrap();
@@ -193,7 +193,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_table_is_an_archive_of_its_columns_and_always_the_same_one() {
+    fn a_table_always_gives_the_same_archive_of_its_columns() {
         let table = Table::of_history(&history());
         let bytes = file(&table).unwrap();
         assert_eq!(bytes, file(&table).unwrap());
@@ -206,7 +206,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn numbers_that_fill_no_rows_and_a_name_twice_are_errors() {
+    fn incomplete_rows_and_repeated_names_are_errors() {
         let mut npz = Npz::new();
         assert!(npz.array("a", &[1.0, 2.0, 3.0], 2).is_err());
         npz.array("b", &[1.0], 1).unwrap();

@@ -1,9 +1,9 @@
-//! What is wrong with the structure of a problem, by our own JSON Schema: every fault, each in words.
+//! The faults of the structure of a problem, found with our JSON Schema and described in words.
 //!
-//! Of draft 2020-12 this knows the words that the schema of our types has; a test says which they are. Written here
-//! rather than left to a library: those that exist bring regular expressions, URIs and references over the network
-//! (a tenth of the build), and answer in terms of the schema ("not valid under any of the schemas"), where we say
-//! which alternative was meant and what is wrong with it.
+//! Of draft 2020-12 it supports the keywords that the schema of our types has; a test lists them. Written here
+//! rather than left to a library: the existing ones bring regular expressions, URIs and references over the network
+//! (a tenth of the build), and answer in terms of the schema ("not valid under any of the schemas") instead of
+//! naming the intended alternative and its faults.
 
 use std::{fmt::Display, iter, sync::LazyLock};
 
@@ -19,7 +19,7 @@ pub fn schema() -> Value {
 
 static SCHEMA: LazyLock<Value> = LazyLock::new(schema);
 
-/// Everything that is wrong with `value`.
+/// All violations of `value`.
 pub(crate) fn violations(value: &Value) -> Vec<Violation> {
     let mut found = Findings::default();
     let mut walk = Walk {
@@ -31,7 +31,7 @@ pub(crate) fn violations(value: &Value) -> Vec<Violation> {
     found.into_violations()
 }
 
-/// Whether nothing is wrong with `value`.
+/// Whether `value` has no violation.
 fn fits(schema: &Value, value: &Value) -> bool {
     let mut walk = Walk {
         found: None,
@@ -50,7 +50,7 @@ pub(crate) fn accepts(definition: &str, value: &Value) -> bool {
 
 /// A walk through a value and the schema at once.
 struct Walk<'a> {
-    /// Where violations go; nowhere if only their number matters.
+    /// The list of violations; `None` if only their number is needed.
     found: Option<&'a mut Findings>,
     /// The JSON Pointer of the value.
     at: String,
@@ -150,8 +150,8 @@ impl Walk<'_> {
         }
     }
 
-    /// Against the alternative that was meant, judged by the value's type and its `kind`; where none was, or more
-    /// than one could be, all are offered.
+    /// Checks against the intended alternative, judged by the value's type and its `kind`; if none or several could
+    /// be intended, all are listed.
     fn check_alternatives(&mut self, branches: &[Value], value: &Value) {
         if branches.iter().any(|branch| fits(branch, value)) {
             return;
@@ -187,7 +187,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Against the form that was meant, judged by the names that it alone requires: exactly one must be.
+    /// Checks against the intended form, judged by the names that it alone requires: there must be exactly one.
     fn check_forms(&mut self, branches: &[Value], forms: &[Vec<&str>], value: &Value) {
         let given = |name: &str| value.get(name).is_some_and(|value| !value.is_null());
         let mut meant =
@@ -203,7 +203,7 @@ impl Walk<'_> {
         self.report(|at| Violation::new(at, reason, either(&got), expected, hint));
     }
 
-    /// Goes on at a member or an item.
+    /// Continues at a member or an item.
     fn inside(&mut self, token: impl Display, check: impl FnOnce(&mut Self)) {
         let before = self.at.len();
         self.at += "/";
@@ -212,7 +212,7 @@ impl Walk<'_> {
         self.at.truncate(before);
     }
 
-    /// One more violation, of the value where we are.
+    /// Adds a violation at the current value.
     fn report(&mut self, violation: impl FnOnce(&str) -> Violation) {
         self.faults += 1;
         match &mut self.found {
@@ -239,7 +239,7 @@ fn listed(names: &[&str], between: &str) -> String {
     names.join(between)
 }
 
-/// What `$ref` stands for.
+/// The definition that `$ref` names.
 fn resolved(schema: &Value) -> &Value {
     let place = schema.get("$ref").and_then(Value::as_str);
     let place = place.and_then(|place| place.strip_prefix('#'));
@@ -251,7 +251,7 @@ fn branches(schema: &Value) -> Option<&Vec<Value>> {
     schema.get("anyOf").or(schema.get("oneOf"))?.as_array()
 }
 
-/// The names that each form of an object requires and no other does, where forms are told apart by them.
+/// The names that only one form of an object requires, for each form, if they distinguish the forms.
 fn forms(branches: &[Value]) -> Option<Vec<Vec<&str>>> {
     if branches.iter().any(|branch| branch.get("type").is_some()) {
         return None;
@@ -275,7 +275,7 @@ fn all_required(form: &Value) -> Vec<&str> {
     required(form).chain(further).collect()
 }
 
-/// Whether `value` is of the type and the `kind` that `schema` has; alternatives are looked at later.
+/// Whether `value` has the type and the `kind` of `schema`; alternatives are checked later.
 fn resembles(schema: &Value, value: &Value) -> bool {
     let schema = resolved(schema);
     has_type(schema, value)
@@ -288,7 +288,7 @@ fn kind(schema: &Value) -> Option<&Value> {
     schema.pointer("/properties/kind/const")
 }
 
-/// What can be written for `schema`; nothing need be said of `null`.
+/// The values that `schema` allows, in words; without `null`.
 fn offers(schema: &Value) -> Vec<String> {
     let schema = resolved(schema);
     match schema.get("const") {
@@ -324,7 +324,7 @@ fn texts<'a>(schema: &'a Value, word: &str) -> impl Iterator<Item = &'a str> {
     value.into_iter().chain(list).filter_map(Value::as_str)
 }
 
-/// A value as text, cut where it would fill the page.
+/// A value as text, shortened.
 fn quoted(value: &Value) -> String {
     shortened(&value.to_string(), 80)
 }
@@ -335,7 +335,7 @@ mod tests {
 
     use super::*;
 
-    /// What is checked here, and below it what tells something to readers only.
+    /// The keywords that are checked here, and below them those that are only for readers.
     const WORDS: &str = "$ref additionalProperties anyOf const else if items maxItems minItems minimum oneOf properties required then type \
         $defs $schema default description format title";
 
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn every_word_of_the_schema_is_known_here() {
+    fn every_keyword_of_the_schema_is_supported() {
         let mut found = BTreeSet::new();
         words(&SCHEMA, &mut found);
         let unknown: Vec<_> = found

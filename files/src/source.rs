@@ -1,24 +1,24 @@
-//! Reading a file of mesh data: by lines, by words, or by bytes, always knowing the line.
+//! Reads a file of mesh data by lines, words or bytes, and counts the lines.
 
 use std::io::{self, BufRead};
 use std::str::FromStr;
 
 use solver::error::{Reason, Violation};
 
-/// No line of a mesh file is longer; a file that is no text shall not fill the memory.
+/// Longest line of a mesh file: a file that is not text must not fill the memory.
 const LONGEST_LINE: u64 = 1 << 20;
 
 /// Why a mesh could not be read.
 #[derive(Debug)]
 pub enum ReadError {
-    /// The bytes could not be had.
+    /// The bytes could not be read.
     Io(io::Error),
-    /// What is wrong with them; pointers are empty, for only the caller knows where they came from.
+    /// The violations; pointers are empty: only the caller knows the origin of the file.
     Invalid(Vec<Violation>),
 }
 
 impl ReadError {
-    /// What is wrong with a text in memory, whose bytes can always be had.
+    /// The violations of a text in memory, which can always be read.
     pub(crate) fn into_violations(self) -> Vec<Violation> {
         match self {
             ReadError::Invalid(violations) => violations,
@@ -38,11 +38,11 @@ pub(crate) struct Source<R> {
     reader: R,
     /// The current line without its end.
     text: String,
-    /// Where in it the next word begins.
+    /// The start of the next word in it.
     at: usize,
     /// Its number, from 1; in binary sections the number of the section's first line.
     pub(crate) line: u64,
-    /// Bytes are in the other order than this machine's.
+    /// The byte order differs from that of this machine.
     pub(crate) swapped: bool,
 }
 
@@ -77,23 +77,23 @@ impl<R: BufRead> Source<R> {
         if !whole && read as u64 == LONGEST_LINE {
             return Err(self.fault(
                 Reason::Malformed,
-                "a line of more than a MiB",
+                "a line longer than 1 MiB",
                 "a mesh file",
-                "Is it one?",
+                "Check that the file is a mesh.",
             ));
         }
         self.text = String::from_utf8(bytes).map_err(|_| {
             self.fault(
                 Reason::Malformed,
-                "bytes that are no text",
-                "text here",
+                "bytes that are not UTF-8 text",
+                "UTF-8 text",
                 "Save the file again; a binary file must be sent as it is.",
             )
         })?;
         Ok(true)
     }
 
-    /// The current line; its words are taken.
+    /// The current line; its words are then consumed.
     pub(crate) fn text(&mut self) -> &str {
         self.at = self.text.len();
         &self.text
@@ -160,8 +160,8 @@ impl<R: BufRead> Source<R> {
     }
 }
 
-/// Nodes by the file's own numbers. These are mostly dense, so a list does; what lies far beyond goes
-/// into a map, so that one large number does not fill the memory.
+/// Nodes by their numbers in the file. These are mostly dense and kept in a list; numbers far beyond are kept in a
+/// map, so that one large number does not fill the memory.
 #[derive(Default)]
 pub(crate) struct Labels {
     dense: Vec<u32>,
@@ -170,7 +170,7 @@ pub(crate) struct Labels {
 }
 
 impl Labels {
-    /// The next node has this number; false, and nothing done, if another has it already.
+    /// Gives the next node this number; false, without effect, if another node has it.
     pub(crate) fn add(&mut self, label: u64) -> bool {
         if self.get(label).is_some() {
             return false;
@@ -191,8 +191,8 @@ impl Labels {
         true
     }
 
-    /// The places of all numbers first, first + step, … up to last. A range may be as wide as numbers
-    /// go: what is looked at are the numbers that exist.
+    /// The places of all numbers first, first + step, … up to last. A range may be
+    /// very wide: only existing numbers are visited.
     pub(crate) fn range(&self, first: u64, last: u64, step: u64) -> Vec<u32> {
         let inside =
             |label: u64| label >= first && label <= last && (label - first).is_multiple_of(step);
@@ -245,7 +245,7 @@ impl Plane {
         self.extent = self.extent.max(x.abs()).max(y.abs());
     }
 
-    /// What is wrong, if the nodes do not lie in one plane z = const.
+    /// A violation if the nodes do not lie in one plane z = const.
     pub(crate) fn fault(&self) -> Option<Violation> {
         /// Rounding of a file with some nine digits.
         const FLAT: f64 = 1e-9;
@@ -267,12 +267,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_run_over_lines_and_faults_know_theirs() {
+    fn words_continue_on_the_next_line_and_faults_name_their_line() {
         let mut source = Source::new(&b"1 2\r\n\n  x 4"[..]);
         assert_eq!(source.number::<u32>("a number").unwrap(), 1);
         assert_eq!(source.number::<u32>("a number").unwrap(), 2);
         let Err(ReadError::Invalid(list)) = source.number::<u32>("a node number") else {
-            panic!("x is no number");
+            panic!("x is not a number");
         };
         assert_eq!(list[0].got, "line 3: `x`");
         assert_eq!(source.number::<f64>("a number").unwrap(), 4.0);
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_may_be_dense_or_wild_and_come_once() {
+    fn labels_may_be_dense_or_sparse_and_are_unique() {
         let mut labels = Labels::default();
         for label in [1, 2, 3, u64::MAX, 1 << 40] {
             assert!(labels.add(label), "{label}");

@@ -1,7 +1,7 @@
 //! The fields as VTU, the XML unstructured grid that ParaView, VisIt and PyVista open.
 //!
 //! By hand: the crate for it, vtkio, has had only release candidates since 0.6.3, and it writes one
-//! block too many where an array fills its compressed blocks exactly. What is needed of the format
+//! block too many where an array fills its compressed blocks exactly. The needed part of the format
 //! is one page.
 
 use std::io::Write;
@@ -97,7 +97,7 @@ fn data_array<T: Number>(
         plain.clear();
         block.iter().for_each(|value| value.put(&mut plain));
         let before = compressed.len();
-        // digits of computed numbers shrink little, whatever the effort
+        // computed digits compress little at any level
         let mut encoder = ZlibEncoder::new(&mut compressed, Compression::fast());
         encoder.write_all(&plain)?;
         encoder.finish()?;
@@ -114,7 +114,7 @@ mod tests {
     use crate::fields::tests::mixed;
     use std::io::Read;
 
-    /// The bytes of an array, block by block, as a reader goes about it.
+    /// The bytes of an array, read block by block.
     fn read(text: &str, name: &str) -> Vec<u8> {
         let start = text.find(&format!("Name=\"{name}\"")).unwrap();
         let line = text[start..].lines().nth(1).unwrap();
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn arrays_of_no_one_and_several_blocks_full_or_not_are_read_back() {
+    fn arrays_of_any_number_of_blocks_are_read_back() {
         let block = BLOCK / 8;
         for count in [0, 1, block - 1, block, block + 1, 2 * block] {
             let values: Vec<f64> = (0..count).map(|i| i as f64 / 7.0).collect();

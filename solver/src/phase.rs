@@ -1,4 +1,4 @@
-//! The phases of a solution: a room below `error` and `solution`, which both name them.
+//! The phases of a solution, which `error` and `solution` both use.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ use strum::{IntoStaticStr, VariantArray};
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Phase {
-    /// Reading the JSON (the caller's own).
+    /// Reading the JSON (by the caller).
     Parse,
     /// Meshing and checking.
     Mesh,
@@ -32,7 +32,7 @@ pub enum Phase {
     Order,
     /// Numerical factorisation.
     Factor,
-    /// Stiffness and load seen from the contact boundary.
+    /// Stiffness and load reduced to the contact boundary.
     Condense,
     /// Contact and friction.
     Iterate,

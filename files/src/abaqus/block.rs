@@ -5,7 +5,7 @@ use solver::element::{Element, Family};
 use solver::error::Reason;
 use solver::mesh::NO_NODE;
 
-/// What the data lines that follow belong to.
+/// The keyword that the following data lines belong to.
 pub(super) enum Block {
     Skip,
     Title,
@@ -59,7 +59,7 @@ impl Deck {
                     Reason::Malformed,
                     got,
                     &expected,
-                    "Remove the line, or name what it is.",
+                    "Remove the line, or add the keyword that it belongs to.",
                 );
                 *block = Block::Skip;
             }
@@ -124,7 +124,7 @@ impl Deck {
                         Reason::Malformed,
                         format!("`{text:.40}`"),
                         "an element or a set of them, and S1 … S4",
-                        "Say which sides the surface is made of.",
+                        "Name the sides of the surface.",
                     ),
                 }
             }
@@ -173,7 +173,7 @@ impl Deck {
                         line,
                         format!("`{text:.60}`"),
                         "a pressure: element or set, P1 … P4, value (*DSLOAD: surface, P, value)",
-                        "Give other loads in a problem of our own.",
+                        "Give other loads in a problem of Signorini.",
                     ),
                 }
             }
@@ -204,7 +204,7 @@ impl Deck {
         }
     }
 
-    /// The block ends: what was begun must be complete.
+    /// The end of a block, which must be complete.
     pub(super) fn end(&mut self, block: Block, line: u64) {
         match block {
             Block::Elements { kind, pending, .. } if !pending.is_empty() => {
@@ -225,8 +225,8 @@ impl Deck {
                 None => self.doubt(
                     elastic.line,
                     "*ELASTIC",
-                    "it after *MATERIAL, NAME=…",
-                    "Say whose constants these are.",
+                    "*ELASTIC after *MATERIAL, NAME=…",
+                    "Name the material of these constants.",
                 ),
             },
             _ => {}
@@ -258,7 +258,7 @@ impl Deck {
             self.fault(
                 line,
                 Reason::RepeatedNode,
-                format!("node {label} once more"),
+                format!("node {label} a second time"),
                 "each node once",
                 "Renumber it.",
             );
@@ -284,7 +284,7 @@ impl Deck {
                     line,
                     Reason::UnknownNode,
                     format!("node {number} in element {label}"),
-                    "a node of *NODE, which stands before its elements",
+                    "a node of an earlier *NODE",
                     "Correct the number.",
                 );
                 return;
@@ -295,7 +295,7 @@ impl Deck {
             self.fault(
                 line,
                 Reason::RepeatedElement,
-                format!("element {label} once more"),
+                format!("element {label} a second time"),
                 "each element once",
                 "Renumber it.",
             );
@@ -364,7 +364,7 @@ impl Deck {
             _ => None,
         };
         let value = words.get(3).map_or(Some(0.0), |word| number(word));
-        // the third displacement and the rotations of a plane body are zero anyway
+        // the third displacement and the rotations of a plane body are always zero
         let known =
             |(first, last): &(u64, u64)| (1..=6).contains(first) && first <= last && *last <= 6;
         match (components.filter(known), value) {

@@ -1,4 +1,4 @@
-//! A deck in our terms: what was understood of it, and what was not.
+//! The content of a deck: the supported parts, and the violations of the others.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -7,7 +7,7 @@ use solver::element::Family;
 use solver::error::{Findings, Reason, Violation};
 use solver::mesh::RawMesh;
 
-/// The theory that a type of element stands for.
+/// The theory of a type of element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Theory {
     PlaneStrain,
@@ -84,7 +84,7 @@ pub(super) struct Force {
     pub(super) value: f64,
 }
 
-/// Everything that was understood, and what was not.
+/// The supported parts of a deck, and the violations.
 #[derive(Default)]
 pub(super) struct Deck {
     pub(super) raw: RawMesh,
@@ -105,9 +105,9 @@ pub(super) struct Deck {
     pub(super) forces: Vec<Force>,
     pub(super) steps: usize,
     pub(super) title: Option<String>,
-    /// What is wrong with the mesh.
+    /// Violations of the mesh.
     pub(super) faults: Findings,
-    /// What of the analysis was not understood.
+    /// Parts of the analysis that are not supported.
     pub(super) doubts: Findings,
 }
 
@@ -140,7 +140,7 @@ impl Deck {
         let word = word.trim().trim_matches('"');
         match word.parse() {
             Ok(label) => Target::Label(label),
-            // an assembly's sets may name their instance: INSTANCE.SET
+            // sets of an assembly may be named with their instance: INSTANCE.SET
             Err(_) => Target::Set(self.spelled(word.rsplit('.').next().unwrap_or(word))),
         }
     }

@@ -49,7 +49,7 @@ impl Keyword {
 }
 
 impl Deck {
-    /// The block that a keyword begins; `material` is the one that was named last.
+    /// The block that a keyword begins; `material` is the last one that was named.
     pub(super) fn begin(
         &mut self,
         keyword: &Keyword,
@@ -105,13 +105,13 @@ impl Deck {
                 match (name(self, "ELSET"), name(self, "MATERIAL")) {
                     (Some(elements), Some(material)) => {
                         if keyword.has("ORIENTATION") {
-                            self.doubt(line, "*SOLID SECTION with ORIENTATION", "materials along x and y", "Give `orthotropic.angle` in a problem of our own.");
+                            self.doubt(line, "*SOLID SECTION with ORIENTATION", "materials along x and y", "Give `orthotropic.angle` in a problem of Signorini.");
                         }
                         self.sections.push(Section { line, elements, material, thickness: None });
                         Block::Thickness
                     }
                     _ => {
-                        self.doubt(line, "*SOLID SECTION", "it with ELSET and MATERIAL", "Say which elements are made of what.");
+                        self.doubt(line, "*SOLID SECTION", "*SOLID SECTION with ELSET and MATERIAL", "Name the elements and their material.");
                         Block::Skip
                     }
                 }
@@ -123,17 +123,17 @@ impl Deck {
             "STEP" => {
                 self.steps += 1;
                 if keyword.has("NLGEOM") && !keyword.get("NLGEOM").is_some_and(|v| v.eq_ignore_ascii_case("NO")) {
-                    self.doubt(line, "*STEP, NLGEOM", "a linear step", "Displacements are small here; remove NLGEOM.");
+                    self.doubt(line, "*STEP, NLGEOM", "a linear step", "Displacements are assumed small; remove NLGEOM.");
                 }
                 Block::Skip
             }
-            // what a deck says of its output, and of how a linear step is to be solved, changes nothing here
+            // requests for output, and options for solving a linear step, have no effect here
             "STATIC" | "END STEP" | "DENSITY" | "NODE PRINT" | "EL PRINT" | "NODE FILE" | "EL FILE"
             | "NODE OUTPUT" | "ELEMENT OUTPUT" | "OUTPUT" | "CONTACT FILE" | "CONTACT PRINT" | "SECTION PRINT"
             | "ENERGY PRINT" | "PREPRINT" | "PRINT" | "RESTART" | "MONITOR" | "FILE FORMAT" | "NODE RESPONSE"
-            // one part in one place is as good as none
+            // one part in one place is the same as no part
             | "PART" | "END PART" | "ASSEMBLY" | "END ASSEMBLY" | "INSTANCE" | "END INSTANCE" => match &keyword.name[..] {
-                "INSTANCE" => Block::NoData("*INSTANCE, for it must stand where its part does"),
+                "INSTANCE" => Block::NoData("*INSTANCE without data (moving or rotating a part is not supported)"),
                 _ => Block::Skip,
             },
             "INCLUDE" | "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SYSTEM" | "TRANSFORM" => {
@@ -141,7 +141,7 @@ impl Deck {
                 Block::Skip
             }
             name => {
-                self.doubt(line, format!("*{name:.60}"), "a keyword that is understood", "*NODE, *ELEMENT, *NSET, *ELSET, *SURFACE, *MATERIAL, *ELASTIC, *SOLID SECTION, *BOUNDARY, *DLOAD, *DSLOAD, *CLOAD, *STEP, *STATIC and requests for output are.");
+                self.doubt(line, format!("*{name:.60}"), "a supported keyword", "*NODE, *ELEMENT, *NSET, *ELSET, *SURFACE, *MATERIAL, *ELASTIC, *SOLID SECTION, *BOUNDARY, *DLOAD, *DSLOAD, *CLOAD, *STEP, *STATIC and requests for output are supported.");
                 Block::Skip
             }
         }
@@ -158,7 +158,7 @@ impl Deck {
         Block::Skip
     }
 
-    /// A keyword whose parameters would change its meaning.
+    /// A keyword that supports only the parameters `known`, since others change its meaning.
     fn plain(&mut self, keyword: &Keyword, line: u64, known: &[&str], block: Block) -> Block {
         for (name, value) in &keyword.parameters {
             if !known.contains(&&name[..])
@@ -169,7 +169,7 @@ impl Deck {
                 self.doubt(
                     line,
                     format!("*{} with {name:.40}", keyword.name),
-                    "it without that",
+                    &format!("*{} without {name:.40}", keyword.name),
                     "Values are those at the end of one linear step.",
                 );
             }

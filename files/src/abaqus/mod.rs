@@ -1,5 +1,5 @@
-//! Decks of Abaqus and CalculiX (`.inp`): nodes, elements, sets and surfaces, and what of the analysis
-//! maps onto ours.
+//! Decks of Abaqus and CalculiX (`.inp`): nodes, elements, sets and surfaces, and the supported
+//! parts of the analysis.
 //!
 //! Written by hand: there is no crate for the format. A keyword begins with `*`, a comment with `**`,
 //! data lines follow their keyword; names are compared without regard to case, as both programs do,
@@ -20,8 +20,8 @@ use crate::source::ReadError;
 use solver::mesh::{self, Mesh};
 use solver::solution::Warning;
 
-/// Reads the mesh of a deck, with what was changed on the way. What the deck says of the analysis is
-/// not looked at, but that the sets and faces it loads have names: `SET P3` for a pressure on the third
+/// Reads the mesh of a deck, with warnings of what was changed. The analysis of the deck is not used, except that
+/// the sets and faces that it loads get names: `SET P3` for a pressure on the third
 /// sides of the elements of SET, `7` for the node 7.
 pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
     let deck = read::read(reader)?;

@@ -1,4 +1,4 @@
-//! From the deck's names and numbers to places in a mesh.
+//! Resolves the names and numbers of a deck to places in a mesh.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use solver::error::{Findings, Reason, Violation};
 use solver::mesh::RawMesh;
 
 impl Deck {
-    /// The name of what a load or support refers to; as `into_raw` gives it to the mesh.
+    /// The name of the target of a load or support, as `into_raw` gives it to the mesh.
     pub(super) fn name_of(target: &Target, side: Option<usize>) -> String {
         let name = match target {
             Target::Label(label) => label.to_string(),
@@ -21,7 +21,7 @@ impl Deck {
         }
     }
 
-    /// The mesh with all its names, and what is wrong with it.
+    /// The mesh with all its names, and its violations.
     pub(super) fn into_raw(mut self) -> (RawMesh, Findings) {
         let mut faults = std::mem::take(&mut self.faults);
         let element_sets = resolve(
@@ -122,7 +122,7 @@ fn resolve(
     let mut resolved: BTreeMap<String, Vec<u32>> = BTreeMap::new();
     for (name, members) in sets {
         let mut found = Vec::new();
-        // sets of sets; a set that holds itself ends where it was seen
+        // sets may contain sets; one that contains itself is visited once
         let mut open: Vec<&Target> = members.iter().rev().collect();
         let mut seen = vec![name];
         while let Some(target) = open.pop() {
@@ -181,7 +181,7 @@ fn unknown<'a>(
     let names: Vec<&str> = known.take(20).map(|name| &name[..]).collect();
     let hint = match names.is_empty() {
         true => "Correct the number.".to_owned(),
-        false => format!("There are {}.", names.join(", ")),
+        false => format!("Known names: {}.", names.join(", ")),
     };
     faults.add(Violation::new("", Reason::UnknownName, got, expected, hint));
 }
@@ -197,7 +197,7 @@ mod tests {
         *ELEMENT, TYPE=CPE4, ELSET=ALL\n10, 1, 2, 3, 4\n*ELEMENT, TYPE=CPE3, ELSET=ALL\n20, 2, 5, 3\n";
 
     #[test]
-    fn a_fourth_side_of_a_triangle_is_a_violation_and_not_left_out() {
+    fn a_fourth_side_of_a_triangle_is_a_violation() {
         let read = |text: &str| read(format!("{MIXED}{text}").as_bytes());
         let (mesh, _) = read("*DLOAD\nALL, P1, 5.\n").unwrap();
         assert_eq!(mesh.boundaries["ALL P1"].len(), 2);

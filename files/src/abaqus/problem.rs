@@ -1,4 +1,4 @@
-//! A deck as a whole problem: what is not understood is an error with its line.
+//! A deck as a whole problem: a part that is not supported is a violation with its line.
 
 use super::deck::{Deck, Elastic, ElementType, Section, Theory};
 use super::read::read;
@@ -22,7 +22,7 @@ pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
             0,
             got,
             "one *STEP",
-            "Write the load steps in a problem of our own.",
+            "Give the load steps in a problem of Signorini.",
         );
     }
     let supports = supports(&deck);
@@ -55,7 +55,7 @@ fn analysis(deck: &mut Deck) -> Analysis {
             0,
             "elements of different theories",
             "one of CPE, CPS, CAX throughout",
-            "Choose one.",
+            "Use one theory for all elements.",
         );
     }
     let first = deck.sections.first().and_then(|section| section.thickness);
@@ -88,7 +88,7 @@ fn analysis(deck: &mut Deck) -> Analysis {
 }
 
 /// The rule of the quadrilaterals; where there are none that of the triangles, which Abaqus and CalculiX
-/// integrate with three points. In a mixture triangles get the larger rule: no worse, but not the same.
+/// integrate with three points. In a mixed mesh triangles get the larger rule, which is at least as accurate but not the same.
 fn quadrature(deck: &mut Deck) -> u32 {
     if deck.types.iter().all(ElementType::is_triangle) {
         return 2;
@@ -99,8 +99,8 @@ fn quadrature(deck: &mut Deck) -> u32 {
         deck.doubt(
             0,
             "elements of full and of reduced integration",
-            "one of both",
-            "Take off the R.",
+            "one kind of integration",
+            "Remove the R from the element types.",
         );
     }
     if reduced > 0 { 2 } else { 3 }
@@ -111,7 +111,12 @@ fn materials(deck: &mut Deck) -> Vec<Material> {
     for section in deck.sections.clone() {
         let Some(elastic) = deck.materials.get(&section.material).cloned() else {
             let got = format!("the material `{:.60}`", section.material);
-            deck.doubt(section.line, got, "a *MATERIAL with *ELASTIC", "Define it.");
+            deck.doubt(
+                section.line,
+                got,
+                "a *MATERIAL with *ELASTIC",
+                "Define the material.",
+            );
             continue;
         };
         match material(&section, &elastic) {
@@ -160,7 +165,7 @@ fn material(section: &Section, elastic: &Elastic) -> Option<Material> {
     })
 }
 
-/// One support for each row; a later row for the same nodes and component takes the earlier one's place.
+/// One support for each row; a later row for the same nodes and component replaces the earlier one.
 fn supports(deck: &Deck) -> Vec<Support> {
     let mut supports: Vec<Support> = Vec::new();
     for row in &deck.prescribed {
@@ -202,7 +207,7 @@ fn loads(deck: &mut Deck, analysis: &Analysis) -> Vec<Load> {
                 row.line,
                 "*CLOAD on a body of revolution",
                 "a pressure",
-                "Programs differ in what part of the ring it acts on.",
+                "Programs differ in the part of the ring that the force acts on.",
             );
         }
         let force = if row.component == 1 {

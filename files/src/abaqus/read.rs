@@ -9,7 +9,7 @@ use super::deck::Deck;
 use super::keyword::Keyword;
 use crate::source::{ReadError, Source};
 
-/// Reads all of a deck; what is wrong with it is noted there.
+/// Reads a whole deck; its violations are noted in it.
 pub(super) fn read(reader: impl BufRead) -> Result<Deck, ReadError> {
     let mut source = Source::new(reader);
     let mut deck = Deck::default();
@@ -25,7 +25,7 @@ pub(super) fn read(reader: impl BufRead) -> Result<Deck, ReadError> {
             deck.data(&mut block, line, &text);
             continue;
         }
-        // a keyword goes on in the next line where it ends in a comma
+        // a keyword line that ends in a comma continues on the next line
         while text.ends_with(',') && source.advance()? {
             text.push_str(source.text().trim());
         }
@@ -40,7 +40,7 @@ pub(super) fn read(reader: impl BufRead) -> Result<Deck, ReadError> {
             Reason::TooFew,
             "a deck without *NODE",
             "nodes and elements",
-            "Is it an Abaqus or CalculiX deck (.inp)?",
+            "Check that the file is an Abaqus or CalculiX deck (.inp).",
         );
     }
     deck.faults.extend(deck.plane.fault());

@@ -1,17 +1,17 @@
-//! Rigid obstacles: which part of a boundary faces one, and how far away it is.
+//! Rigid obstacles: the part of a boundary that faces one, and its distance.
 
 use crate::contact::ContactBoundary;
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{Along, Obstacle};
 
 /// Positions count as equal to `from`, `to`, a circle's edge and the ends of a polyline within this
-/// part of the boundary's length: they meet grid lines only to rounding.
+/// part of the boundary's length: they coincide with grid lines only up to rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// The part of a boundary that faces an obstacle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Facing {
-    /// Edges whose three nodes all face the obstacle, in runs that hang together.
+    /// Edges whose three nodes all face the obstacle, in connected runs.
     pub runs: Vec<FacingRun>,
     /// Coordinates c of edges that `from` or `to` cut and that were therefore left out.
     pub cut: Vec<[f64; 2]>,
@@ -28,7 +28,7 @@ pub struct FacingRun {
     pub coordinate: Vec<f64>,
 }
 
-/// An obstacle as seen from a place on the boundary.
+/// Distance and slope of an obstacle at a place on the boundary.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Profile {
     /// Distance along the body's normal (length); the indentation is not yet subtracted.
@@ -250,7 +250,7 @@ fn along_normal(
             slope: (direction[0] * n[0] + direction[1] * n[1]) / across,
         });
     }
-    // what lies behind the body faces its other side
+    // an obstacle behind the body faces its other side
     hits.retain(|hit| hit.distance >= -depth);
     let nearest = hits
         .iter()
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_takes_the_edges_between_its_ends_and_says_which_it_cuts() {
+    fn a_flat_covers_the_edges_between_its_ends_and_reports_cut_edges() {
         let punch = Obstacle::Flat {
             from: Some(1.0),
             to: Some(2.5),
@@ -429,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_ends_and_its_kinks_have_the_mean_slope() {
+    fn a_table_has_ends_and_the_mean_slope_at_kinks() {
         let (x, y) = ([0.0, 1.0, 3.0], [1.0, 0.0, 4.0]);
         assert_eq!(tabulated(&x, &y, 1.0, 1e-12), Some((0.0, 0.5)));
         assert_eq!(tabulated(&x, &y, 3.0, 1e-12), Some((4.0, 2.0)));

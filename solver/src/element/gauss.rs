@@ -53,7 +53,7 @@ const fn product<const N: usize, const M: usize>(rule: &[(f64, f64); N]) -> [Gau
     points
 }
 
-/// 3 points of a triangle, exact for polynomials of degree 2; points of best stresses.
+/// 3 points of a triangle, exact for polynomials of degree 2; the points with the most accurate stresses.
 pub const TRIANGLE_2: [GaussPoint; 3] = [
     at(1.0 / 6.0, 1.0 / 6.0, 1.0 / 6.0),
     at(2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0),
@@ -90,7 +90,7 @@ const fn at(xi: f64, eta: f64, weight: f64) -> GaussPoint {
 ///
 /// The points are the roots of the Legendre polynomial P_n, by Newton's method from the usual
 /// cosine guess; the weights are 2/((1 − x²) P_n′²). Written by hand: it is a dozen lines, and a
-/// crate for it would bring a hundred kinds of rules.
+/// crate for it has a hundred other rules.
 pub fn rule(n: usize) -> Vec<(f64, f64)> {
     let root = |i: usize| {
         let mut x = -(std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();

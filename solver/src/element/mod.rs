@@ -23,10 +23,10 @@ pub enum Element {
     Triangle([u32; 6]),
 }
 
-/// Values at the nodes of an element; the last two of a triangle are nothing.
+/// Values at the nodes of an element; the last two of a triangle are not used.
 pub type AtNodes<T> = [T; 8];
 
-/// The family of an element: what does not depend on its nodes.
+/// The family of an element: all that does not depend on its nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Family {
     /// Eight nodes, ξ and η from −1 to 1.
@@ -35,7 +35,7 @@ pub enum Family {
     Triangle,
 }
 
-/// What an integral over a real element needs at one of its points.
+/// The values for an integral over a real element at one of its points.
 #[derive(Clone, Copy, Debug)]
 pub struct Mapped {
     /// h_i.
@@ -49,7 +49,7 @@ pub struct Mapped {
 }
 
 impl Element {
-    /// What kind it is.
+    /// The family of the element.
     pub fn family(&self) -> Family {
         match self {
             Element::Quad(_) => Family::Quad,
@@ -180,8 +180,8 @@ impl Family {
         }
     }
 
-    /// Where stresses are better than elsewhere in the element: they are carried linearly from these
-    /// points to the nodes (bilinearly in a quadrilateral).
+    /// The points with the most accurate stresses, which are extrapolated linearly from there to the nodes
+    /// (bilinearly in a quadrilateral).
     pub fn stress_points(self) -> &'static [GaussPoint] {
         self.rule(2)
     }
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn a_linear_stress_is_carried_to_every_place() {
+    fn a_linear_stress_is_extrapolated_exactly() {
         let linear = |[xi, eta]: [f64; 2]| 3.0 - 2.0 * xi + 0.7 * eta;
         for family in FAMILIES {
             for &place in family.places() {

@@ -3,7 +3,7 @@
 use crate::friction::{Average, Averaging, Chain, Row};
 use crate::problem::PrescribedBound;
 
-/// How the friction bound comes about; `A` as in [`FrictionLaw`](crate::friction::FrictionLaw).
+/// The source of the friction bound; `A` as in [`FrictionLaw`](crate::friction::FrictionLaw).
 #[derive(Clone, Debug, PartialEq)]
 pub enum BoundLaw<A = Averaging> {
     /// τ = min(cap, cohesion + μ S) where S > 0, else 0: thesis (1.3) with an offset and a cap.
@@ -21,12 +21,12 @@ pub enum BoundLaw<A = Averaging> {
     Prescribed(PrescribedBound),
 }
 
-/// Where the bound at one place comes from.
+/// The source of the bound at one place.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     /// The pressures of these nodes.
     Average(Row),
-    /// It is given (stress).
+    /// A prescribed bound (stress).
     Given(f64),
 }
 
@@ -75,7 +75,7 @@ impl BoundLaw<Average> {
         }
     }
 
-    /// ρ > 0 (length), where the bound depends on an average at all: μ > 0.
+    /// ρ > 0 (length), if the bound depends on an average: μ > 0.
     pub fn averaged_over(&self) -> Option<f64> {
         match self {
             BoundLaw::Pressure {
@@ -89,7 +89,7 @@ impl BoundLaw<Average> {
 }
 
 impl<A> BoundLaw<A> {
-    /// Whether there is anything to average or to iterate: with μ = 0 and no cohesion the bound is zero.
+    /// Whether friction acts: with μ = 0 and no cohesion the bound is zero.
     pub fn acts(&self) -> bool {
         match self {
             BoundLaw::Pressure {
@@ -101,7 +101,7 @@ impl<A> BoundLaw<A> {
         }
     }
 
-    /// Whether it can be above zero anywhere, so that friction can hold a body.
+    /// Whether the bound can be above zero, so that friction can hold a body.
     pub fn holds(&self) -> bool {
         match self {
             BoundLaw::Pressure { .. } => self.acts(),
@@ -114,7 +114,7 @@ impl<A> BoundLaw<A> {
 }
 
 impl BoundLaw {
-    /// Where the bound at arc length s comes from.
+    /// The source of the bound at arc length s.
     pub fn source(&self, s: f64) -> Source {
         match self {
             BoundLaw::Pressure { average, .. } => Source::Average(average.row(s)),
@@ -187,7 +187,7 @@ mod tests {
     use crate::problem::BoundTable;
 
     #[test]
-    fn cohesion_and_cap_bound_the_bound() {
+    fn cohesion_and_cap_limit_the_friction_bound() {
         let law = BoundLaw::Pressure {
             coefficient: 0.3,
             cohesion: 2.0,
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_prescribed_bound_knows_nothing_of_pressure() {
+    fn a_prescribed_bound_does_not_depend_on_pressure() {
         let table = BoundTable {
             s: vec![0.0, 1.0, 3.0],
             bound: vec![2.0, 4.0, 0.0],

@@ -3,8 +3,8 @@
 //!   S(s) = ∫ ω_ρ(|s − y|) p(y) dy = Σ_j W_j(s) p_j,   p quadratic on each edge
 //!
 //! Mesh-free: the kernel is integrated over its exact support, split at the ends of edges and at
-//! its own centre, whatever the number of edges under it (the thesis's limit of two, 3.4.2, is
-//! gone).
+//! its own centre, whatever the number of edges under it (without the
+//! thesis's limit of two, 3.4.2).
 
 use std::sync::LazyLock;
 
@@ -17,13 +17,13 @@ const BUMP_INTEGRAL: f64 = 0.443_993_816_168_079;
 /// 1 / ∫ exp(1/(r² − 1)) dA over the unit disc.
 const BUMP_DISC: f64 = 2.143_565_775_8;
 
-/// Points per piece; a piece much shorter than ρ sees almost a constant kernel and needs fewer.
+/// Points per piece; on a piece much shorter than ρ the kernel is almost constant, and fewer are enough.
 static FULL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(40));
 static SHORT_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(12));
 const SHORT: f64 = 0.1;
 
-/// A radius below this part of the chain's length averages over nothing: arc length itself is not
-/// known so well, and the law is Coulomb's.
+/// A radius below this part of the chain's length averages over no point: arc length itself is less accurate,
+/// and the law is Coulomb's.
 const LOCAL: f64 = 1e-9;
 
 /// Γ_C as arc length, and radius where rings count.
@@ -33,7 +33,7 @@ pub struct Chain {
     pub s: Vec<f64>,
     /// Distance of the nodes from the axis, for `Measure::Surface`; not used otherwise.
     pub radius: Vec<f64>,
-    /// The pressure goes on as an even function beyond the first node: a line of symmetry.
+    /// The pressure continues as an even function beyond the first node: a line of symmetry.
     pub mirror_start: bool,
     /// Likewise beyond the last node.
     pub mirror_end: bool,
@@ -51,7 +51,7 @@ impl Chain {
     }
 }
 
-/// S_ρ in numbers.
+/// The parameters of S_ρ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Average {
     /// ρ ≥ 0 (length); 0: Coulomb's local law.
@@ -369,7 +369,7 @@ mod tests {
 
     #[test]
     fn a_mirror_continues_the_pressure_evenly_even_when_the_radius_exceeds_the_first_edges() {
-        // p = 1 + s² is even: averaged at s near 0 it must know nothing of the end of the chain
+        // p = 1 + s² is even: averaged near s = 0 it must not depend on the end of the chain
         let (rho, s) = (0.5, with_midsides(&[0.0, 0.1, 0.3, 2.0]));
         let p: Vec<f64> = s.iter().map(|y| 1.0 + y * y).collect();
         for x in [0.0, 0.05, 0.2, 0.45] {

@@ -14,8 +14,8 @@ use crate::problem::{FrictionPoints, History, Transition};
 /// σ_t = −τ φ_ε(|e|) sign(e): thesis (1.3), (1.8). e = u_t − d in the total law; in the incremental
 /// law e = u_t − d − g with the anchor g of the point, formulation 1.5.
 ///
-/// `A`: its average over the pressure, which a model holds in numbers ([`Average`]) and a system laid along
-/// Γ_C ([`Averaging`]).
+/// `A`: its average over the pressure, which is parameters in a model ([`Average`]) and an operator along Γ_C in a
+/// system ([`Averaging`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionLaw<A = Averaging> {
     /// τ.
@@ -59,8 +59,8 @@ impl<A> FrictionLaw<A> {
         self.elastic_slip * psi(self.transition, slip / self.elastic_slip)
     }
 
-    /// By how much the anchor of a point moves at the end of an increment: what lies beyond the elastic
-    /// slip; all of it where the point is `open` (length).
+    /// The move of a point's anchor at the end of an increment: the slip beyond the elastic slip; the whole slip if
+    /// the point is `open` (length).
     pub fn anchor_move(&self, slip: f64, open: bool) -> f64 {
         match self.history {
             History::Total => 0.0,
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
     use crate::problem::{Kernel, Measure, Normalization};
 
-    /// The average that most tests start from.
+    /// The average of most tests.
     pub(super) fn average(radius: f64) -> Average {
         Average {
             radius,
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn an_anchor_follows_what_slips_and_what_is_open() {
+    fn anchors_of_sliding_and_open_points_move() {
         let law = FrictionLaw {
             bound: BoundLaw::Pressure {
                 coefficient: 0.3,

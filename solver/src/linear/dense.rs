@@ -76,9 +76,9 @@ pub fn solve_general(columns: &[Vec<f64>], b: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// The x for which |Σ x_k a_k − b| is least, by Gram–Schmidt; columns that the others nearly span
-/// are left out. `None` without columns, or when nothing finite comes out.
+/// are left out. `None` without columns, or if the result is not finite.
 pub fn least_squares(columns: &[Vec<f64>], b: &[f64]) -> Option<Vec<f64>> {
-    /// A column whose remainder is below this part of the largest says nothing new.
+    /// A column whose remainder is below this part of the largest is left out.
     const SPANNED: f64 = 1e-8;
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let largest = columns.iter().map(|c| norm(c)).fold(0.0, f64::max);
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn least_squares_are_least_and_forgive_dependent_columns() {
+    fn least_squares_leave_out_dependent_columns() {
         let columns = [vec![1.0, 1.0, 1.0], vec![0.0, 1.0, 2.0]];
         let line = least_squares(&columns, &[1.0, 2.0, 6.0]).unwrap();
         assert!((line[0] - 0.5).abs() < 1e-14 && (line[1] - 2.5).abs() < 1e-14);

@@ -1,6 +1,6 @@
 //! One sparse Cholesky factorisation, with a chosen block of unknowns last.
 //!
-//! With the contact unknowns c last, A = L Lᵀ holds the Schur complement for free:
+//! With the contact unknowns c last, A = L Lᵀ contains the Schur complement:
 //!
 //!   A = | A_ii  A_ic |     Ŝ = A_cc − A_ci A_ii⁻¹ A_ic = L_cc L_ccᵀ
 //!       | A_ci  A_cc |
@@ -23,15 +23,15 @@ use crate::linear::{Dense, Graph, SparseSymmetric};
 /// Parallelism of one job: none. Two jobs use the two cores, and a second thread gained nothing.
 const PAR: Par = Par::Seq;
 
-/// Why there is no factor.
+/// The reason why there is no factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FactorError {
-    /// The matrix has none: elimination met a pivot that is not positive.
+    /// The matrix is not positive definite: a pivot is not positive.
     NotPositiveDefinite {
         /// Its place in the order of elimination.
         pivot: usize,
     },
-    /// The factor has more entries than can be addressed or held.
+    /// The factor has more entries than fit into memory.
     TooLarge,
 }
 
@@ -206,7 +206,7 @@ impl Factor {
 mod tests {
     use super::*;
 
-    /// A 9-point grid operator with a varying diagonal: connected, positive definite, not tidy.
+    /// A 9-point grid operator with a varying diagonal: connected, positive definite, irregular.
     fn grid_matrix(side: usize) -> (SparseSymmetric, Graph) {
         let n = side * side;
         let cells: Vec<[u32; 4]> = (0..side - 1)
@@ -322,8 +322,8 @@ mod tests {
         factor.solve(&mut []);
     }
 
-    /// The smallest and emptiest systems that a body can leave: the factor must still be the kind
-    /// that shows its trailing block.
+    /// The smallest and sparsest systems of a body: the factor must still have the form that contains its trailing
+    /// block.
     #[test]
     fn tiny_and_diagonal_systems_have_their_trailing_block() {
         for n in 1..=4 {

@@ -22,7 +22,7 @@ pub struct Contact {
     /// The direction that gap and normal displacement are measured along.
     #[serde(default)]
     pub normal: NormalOf,
-    /// What the obstacle does to the body.
+    /// The contact condition.
     #[serde(default)]
     pub condition: Condition,
     /// Absent: frictionless.
@@ -30,7 +30,7 @@ pub struct Contact {
     pub friction: Option<Friction>,
 }
 
-/// Whose normal a contact uses. On a sloping obstacle they differ, and forces with them.
+/// The normal that a contact uses. On a sloping obstacle the two differ, and so do the forces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NormalOf {
@@ -41,7 +41,7 @@ pub enum NormalOf {
     Obstacle,
 }
 
-/// What the obstacle does to the body.
+/// The contact condition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Condition {
@@ -54,7 +54,7 @@ pub enum Condition {
     None,
 }
 
-/// Declares the kinds of obstacle, each with the three fields that all of them have.
+/// Declares the kinds of obstacle, each with the three fields that are common to all.
 macro_rules! obstacles {
     ($($(#[$doc:meta])* $kind:ident { $($(#[$attribute:meta])* $field:ident: $type:ty,)* })*) => {
         /// Shape of a rigid obstacle: its distance from the boundary before it is pushed, as a
@@ -64,20 +64,20 @@ macro_rules! obstacles {
         pub enum Obstacle {
             $($(#[$doc])* $kind {
                 $($(#[$attribute])* $field: $type,)*
-                /// Where the obstacle begins; absent: with the boundary.
+                /// Where the obstacle begins; absent: at the start of the boundary.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 from: Option<f64>,
-                /// Where it ends; absent: with the boundary.
+                /// Where it ends; absent: at the end of the boundary.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 to: Option<f64>,
-                /// What c is.
+                /// The coordinate c.
                 #[serde(default)]
                 along: Along,
             },)*
         }
 
         impl Obstacle {
-            /// `from`, `to` and `along`, which every kind has.
+            /// `from`, `to` and `along`, which are common to all kinds.
             pub fn span(&self) -> (Option<f64>, Option<f64>, Along) {
                 match *self {
                     $(Obstacle::$kind { from, to, along, .. } => (from, to, along),)*
@@ -222,8 +222,8 @@ pub struct Friction {
     /// Upper limit of τ, > 0 (stress); absent: no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shear_cap: Option<f64>,
-    /// A prescribed τ ≥ 0 (Tresca's law) instead of coefficient, radius, cohesion and cap. It acts on all
-    /// of Γ_C, touched or not.
+    /// A prescribed τ ≥ 0 (Tresca's law) instead of coefficient, radius, cohesion and cap. It acts on all of Γ_C,
+    /// with or without contact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bound: Option<PrescribedBound>,
 }
@@ -289,7 +289,7 @@ pub enum Normalization {
     /// ∫ω = 1 on a line: tends to Coulomb's law as ρ → 0.
     #[default]
     UnitIntegral,
-    /// ω(0) = 1, the thesis's words taken literally; friction then vanishes with ρ.
+    /// ω(0) = 1, the literal text of the thesis; friction then vanishes with ρ.
     PeakOne,
 }
 

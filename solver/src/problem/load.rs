@@ -19,7 +19,7 @@ pub enum Load {
     /// A stress along x and along y on a boundary.
     Traction(String, [BoundaryValue; 2]),
     /// A stress along the outward normal of a boundary, positive pulls; and one along t, the outward normal
-    /// turned clockwise, where it is given.
+    /// turned clockwise, if it is given.
     Normal(String, BoundaryValue, Option<BoundaryValue>),
     /// A stress along t on a boundary.
     Tangential(String, BoundaryValue),
@@ -33,7 +33,7 @@ pub enum Load {
 }
 
 impl Load {
-    /// The boundary that it acts on, where it acts on one.
+    /// The boundary that it acts on, if any.
     pub fn boundary(&self) -> Option<&str> {
         match self {
             Load::Pressure(boundary, _)
@@ -148,7 +148,7 @@ impl TryFrom<LoadFields> for Load {
                 Reason::WrongCount,
                 either(&given),
                 "exactly one of `pressure`, `traction`, `normal` and `tangential`, `nodal`, `force`, `body_force`",
-                "Write a load for each.",
+                "Give each its own load.",
             )),
         }
     }
@@ -161,7 +161,7 @@ fn on_boundary(boundary: &Option<String>, nodes: &Option<String>) -> Result<Stri
         (_, Some(_)) => (
             "/nodes",
             Reason::NotUsed,
-            "a set of nodes for a load that is no `force`",
+            "a set of nodes for a load other than `force`",
         ),
         (None, None) => ("/boundary", Reason::Missing, "nothing"),
     };
@@ -175,7 +175,7 @@ fn on_nodes(boundary: &Option<String>, nodes: &Option<String>) -> Result<String,
         _ => Err(Violation::new(
             "/nodes",
             Reason::Missing,
-            "no set of nodes, or a boundary beside it",
+            "no set of nodes, or a boundary with it",
             "the name of a set of nodes, and no boundary",
             "A `force` acts on each node of a set; on a boundary give `nodal` forces or a traction.",
         )),
@@ -192,7 +192,7 @@ fn nowhere(boundary: &Option<String>, nodes: &Option<String>) -> Result<(), Viol
         place,
         Reason::NotUsed,
         "a place for a body force",
-        "none: it acts on the whole body",
+        "no place: it acts on the whole body",
         "Remove it, or give a traction.",
     ))
 }

@@ -1,11 +1,11 @@
-//! Linear elasticity, and which elements are made of it.
+//! Linear elastic materials, and the elements that are made of them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Reason, Violation};
 
-/// Linear elasticity: isotropic (`youngs_modulus` and `poissons_ratio`) or `orthotropic`.
+/// A linear elastic material: isotropic (`youngs_modulus` and `poissons_ratio`) or `orthotropic`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "MaterialFields", into = "MaterialFields")]
 #[schemars(extend(
@@ -16,9 +16,9 @@ use crate::error::{Reason, Violation};
 pub struct Material {
     /// Its constants.
     pub elasticity: Elasticity,
-    /// The group of elements that is made of it; absent: all that no other material names.
+    /// The group of elements that are made of it; absent: all elements without another material.
     pub group: Option<String>,
-    /// A name for people.
+    /// A name for readers.
     pub name: Option<String>,
 }
 
@@ -49,10 +49,10 @@ pub struct MaterialFields {
     /// Three axes of symmetry, two of them in the plane.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orthotropic: Option<Orthotropic>,
-    /// The group of elements that is made of it; absent: all that no other material names.
+    /// The group of elements that are made of it; absent: all elements without another material.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
-    /// A name for people.
+    /// A name for readers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
 }
@@ -101,7 +101,7 @@ fn not_used(name: &str) -> Violation {
     Violation::new(
         format!("/{name}"),
         Reason::NotUsed,
-        "an isotropic constant beside `orthotropic`",
+        "an isotropic constant together with `orthotropic`",
         "one of the two forms",
         "Remove it, or remove `orthotropic`.",
     )

@@ -21,7 +21,7 @@ use crate::error::{Reason, Violation, either};
     {"required": ["stored"]},
 ]))]
 pub struct MeshInput {
-    /// Where the elements come from.
+    /// The source of the elements.
     pub source: MeshSource,
     /// How often every element is split into four, or the tolerance that a grid is refined to.
     pub refine: Refine,
@@ -31,7 +31,7 @@ pub struct MeshInput {
     pub groups: BTreeMap<String, ElementRange>,
 }
 
-/// Where the elements come from.
+/// The source of the elements.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeshSource {
     /// A grid of lines.
@@ -57,7 +57,7 @@ impl MeshInput {
         }
     }
 
-    /// The grid, where it is one.
+    /// The grid, if it is one.
     pub fn grid(&self) -> Option<&Grid> {
         match &self.source {
             MeshSource::Grid(grid) => Some(grid),
@@ -65,7 +65,7 @@ impl MeshInput {
         }
     }
 
-    /// The grid, where it is one, to be changed.
+    /// The grid, if it is one, to be changed.
     pub fn grid_mut(&mut self) -> Option<&mut Grid> {
         match &mut self.source {
             MeshSource::Grid(grid) => Some(grid),
@@ -73,7 +73,7 @@ impl MeshInput {
         }
     }
 
-    /// The hash of the stored mesh, where it is one.
+    /// The hash of the stored mesh, if it is one.
     pub fn stored(&self) -> Option<&str> {
         match &self.source {
             MeshSource::Stored(hash) => Some(hash),
@@ -97,8 +97,7 @@ struct MeshFields {
     #[serde(default)]
     gmsh: Option<String>,
     /// The text of an Abaqus or CalculiX deck: surfaces and, where their nodes span edges, node sets
-    /// become boundaries, element sets groups, node sets node sets. What it says of the analysis is
-    /// not used.
+    /// become boundaries, element sets groups, node sets node sets. Its analysis is not used.
     #[serde(default)]
     abaqus: Option<String>,
     /// The hash of a mesh that was uploaded to the service, `sha256:…`.
@@ -147,7 +146,7 @@ impl TryFrom<MeshFields> for MeshInput {
     }
 }
 
-/// By hand: into fields of its own it would be copied first, and it may be large.
+/// Written by hand: a conversion to `MeshFields` would copy the mesh, which may be large.
 impl Serialize for MeshInput {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let MeshInput {
@@ -192,12 +191,12 @@ impl Default for Refine {
     }
 }
 
-/// Goal of adaptive refinement.
+/// The goal of adaptive refinement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptiveRefine {
     /// Largest relative change, from one mesh to the next finer one, of the total forces and of
-    /// the peak stresses that have a limit (0 < tolerance < 1).
+    /// the peak stresses that converge (0 < tolerance < 1).
     pub tolerance: f64,
 }
 
@@ -249,7 +248,7 @@ pub struct InlineMesh {
     pub node_sets: BTreeMap<String, Vec<u32>>,
 }
 
-/// The sides of the body's surface that fit every condition given, ends included.
+/// The sides of the body's surface that meet every given condition, ends included.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundaryPart {

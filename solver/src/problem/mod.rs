@@ -1,7 +1,7 @@
-//! What a client asks for: plain data, the JSON of the API word for word.
+//! The question: plain data, exactly the JSON of the API.
 //!
-//! Strict: unknown names are refused everywhere, and so is what has not exactly one of its forms. Only
-//! `analysis`, `mesh` and `materials` are required, and in `friction` its three numbers. What the fields
+//! Strict: unknown names are refused everywhere, and so are objects without exactly one of their forms. Only
+//! `analysis`, `mesh` and `materials` are required, and in `friction` only `elastic_slip` in all cases. What the fields
 //! *mean together* is checked in [`Model::new`](crate::model::Model::new); nothing here computes.
 
 mod contact;
@@ -26,14 +26,14 @@ pub use support::{BoundaryValue, Support};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A contact problem in linear elasticity. Units are the client's own, used consistently.
+/// A contact problem in linear elasticity. The client chooses consistent units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Problem {
-    /// A title for people; it does not enter `input_hash`.
+    /// A title for readers; it does not enter `input_hash`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
-    /// What the units are called; for figures, and no number is converted.
+    /// Names of the units, for figures; no number is converted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<Units>,
     /// The two-dimensional theory.
@@ -51,13 +51,13 @@ pub struct Problem {
     /// Boundaries that face a rigid obstacle, Γ_C of thesis (1.14). Empty: a plain elastic problem.
     #[serde(default)]
     pub contacts: Vec<Contact>,
-    /// Load steps, one after the other. Empty: one step to the values as they are given.
+    /// Load steps, one after the other. Empty: one step to the given values.
     #[serde(default)]
     pub steps: Vec<Step>,
     /// Gauss points of an element in each direction, 3 or 2 (thesis 2.3).
     #[serde(default = "default_quadrature")]
     pub quadrature: u32,
-    /// How to solve, and how far.
+    /// Algorithm, tolerance and limits.
     #[serde(default)]
     pub solver: SolverControls,
 }
@@ -95,7 +95,7 @@ pub enum Analysis {
     Axisymmetric {},
 }
 
-/// Gauss points of an element in each direction, where a problem says nothing of them.
+/// Gauss points of an element in each direction, if a problem does not give them.
 pub fn default_quadrature() -> u32 {
     3
 }

@@ -1,4 +1,4 @@
-//! Load steps, and how to solve them.
+//! Load steps and the options of the solution.
 
 use std::collections::BTreeMap;
 
@@ -6,11 +6,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One load step: factors on the values given elsewhere, reached in equal or growing increments
-/// from those of the step before (from nothing at first).
+/// from those of the previous step (from zero at first).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Step {
-    /// A name for people.
+    /// A name for readers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Factor on the indentation of every contact at the end of the step.
@@ -39,7 +39,7 @@ pub enum Spacing {
 }
 
 impl Step {
-    /// Everything as it is given, at once.
+    /// All given values at once.
     pub fn whole() -> Self {
         Step {
             name: None,
@@ -53,7 +53,7 @@ impl Step {
     }
 }
 
-/// Everything as it is given, at once, but nothing is dragged.
+/// All loads at once, with no tangential displacement.
 impl Default for Step {
     fn default() -> Self {
         Step {
@@ -63,26 +63,26 @@ impl Default for Step {
     }
 }
 
-/// How to solve, and how far.
+/// Options of the solution: algorithm, tolerance and limits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SolverControls {
-    /// The strategy.
+    /// The algorithm.
     pub algorithm: Algorithm,
     /// All residuals are dimensionless; each must fall below this (0 < tolerance < 1).
     pub tolerance: f64,
     /// Most outer sweeps over the friction bound, per increment (≥ 1).
     pub max_iterations: u32,
-    /// Solve once more from the bonded state, and say whether the two solutions agree.
+    /// Solve once more from the bonded state, and report whether the two solutions agree.
     pub check_uniqueness: bool,
-    /// Solve once more with twice the increments, and say how much the result changes.
+    /// Solve once more with twice the increments, and report how much the result changes.
     pub check_increments: bool,
-    /// Choices that the thesis leaves to its user; for `algorithm: thesis` only.
+    /// Options that the thesis leaves open; for `algorithm: thesis` only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub thesis: Option<ThesisOptions>,
 }
 
-/// The strategy of solution, docs/formulation.md section 4.
+/// The algorithm, docs/formulation.md section 4.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Algorithm {
@@ -94,11 +94,11 @@ pub enum Algorithm {
     /// One semi-smooth Newton iteration for everything, the averaging included.
     Newton,
     /// The thesis's own iteration (3.1), to the letter. At the thesis's parameters it does not
-    /// solve the problem; the result says so.
+    /// solve the problem; the outcome is then `false_convergence`.
     Thesis,
 }
 
-/// Choices of the thesis's own iteration.
+/// Options of the thesis's own iteration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ThesisOptions {
@@ -106,16 +106,16 @@ pub struct ThesisOptions {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub contact_guess: BTreeMap<String, [f64; 2]>,
     /// Way of evaluating the friction force, thesis 3.2: 1 at the boundary's own Gauss points, 2 along
-    /// the two nearest rows of internal Gauss points, carried to the boundary linearly.
+    /// the two nearest rows of internal Gauss points, extrapolated linearly to the boundary.
     pub friction_force: u32,
-    /// Where the normal stress comes from.
+    /// The source of the normal stress.
     pub pressure: ThesisPressure,
     /// Local Gauss points that the kernel is integrated with in each element, thesis 3.4.2, no further
     /// than the next element; for extrapolated pressure only. 0: the mesh-free average of nodal values.
     pub local_points: u32,
-    /// Part of the new friction force that is taken over (0 < relaxation ≤ 1).
+    /// Fraction of the new friction force that is applied (0 < relaxation ≤ 1).
     pub relaxation: f64,
-    /// Let friction oppose the motion, as (1.8) means it, instead of acting along t throughout.
+    /// Let friction oppose the motion, as in (1.8), instead of acting along t everywhere.
     pub signed: bool,
 }
 
@@ -132,14 +132,14 @@ impl Default for ThesisOptions {
     }
 }
 
-/// Where the thesis's iteration takes the normal stress from.
+/// The source of the normal stress in the thesis's iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ThesisPressure {
     /// Nodal reactions / ∫h.
     #[default]
     Lumped,
-    /// Stresses at internal Gauss points carried to the boundary, thesis 3.3.
+    /// Stresses at internal Gauss points, extrapolated to the boundary, thesis 3.3.
     Extrapolated,
 }
 

@@ -15,7 +15,7 @@ pub enum BoundaryValue {
 }
 
 /// Prescribed displacements on a boundary or a set of nodes, along x and y or (on a boundary) along
-/// normal and tangent; what is not named stays free.
+/// normal and tangent; other displacements stay free.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Support {

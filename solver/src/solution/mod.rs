@@ -1,7 +1,7 @@
-//! What comes back: plain data, the JSON of the API word for word.
+//! The answer: plain data, exactly the JSON of the API.
 //!
 //! Signs: stresses are negative in compression; forces are those on the body; `t` is the outward
-//! normal turned clockwise. Forces are of the modelled part: a half model gives half, plane stress
+//! normal turned clockwise. Forces are those of the modelled part: a half model gives half, plane stress
 //! includes the thickness, axisymmetric totals include 2π.
 
 mod sample;
@@ -28,18 +28,18 @@ pub struct Solution {
     pub history: Vec<Iteration>,
     /// Columns along each contact boundary, by its name.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// The same columns at the points where friction acts, see [`ContactProfile`]. No part of the
-    /// document, and of its digest: it is kept and served by itself.
+    /// The same columns at the points where friction acts, see [`ContactProfile`]. Not part of
+    /// the document and its digest: it is stored and served separately.
     #[serde(default, skip_serializing)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
-    /// One entry per load step of the problem; summary, profiles and fields above are of the last.
+    /// One entry per load step of the problem; summary, profiles and fields are those of the last.
     pub steps: Vec<StepSolution>,
     /// Displacements and stresses.
     pub fields: Fields,
 }
 
 impl Solution {
-    /// Whether every number of it is finite, also where it is no part of the document.
+    /// Whether every number is finite, also those that are not part of the document.
     pub fn is_finite(&self) -> bool {
         is_finite(self)
             && is_finite(&self.friction_profiles)
@@ -52,13 +52,13 @@ impl Solution {
 pub struct StepSolution {
     /// Its name in the problem, or its number from 0.
     pub name: String,
-    /// As of a whole solution.
+    /// As in a whole solution.
     pub summary: Summary,
     /// Rows of this step.
     pub history: Vec<Iteration>,
     /// Columns along each contact boundary, by its name.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// As of a whole solution; no part of the document here either.
+    /// As in a whole solution; not part of the document either.
     #[serde(default, skip_serializing)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
 }
@@ -114,17 +114,17 @@ pub struct Summary {
     pub friction_work: f64,
     /// Estimate of the discretisation error.
     pub error_estimate: ErrorEstimate,
-    /// Increments that it took, over all steps so far.
+    /// Increments over all steps so far.
     pub increments: u32,
     /// Increments that did not converge and were halved.
     pub cut_backs: u32,
-    /// What `check_uniqueness` found; absent when it was not asked for.
+    /// Result of `check_uniqueness`; absent without it.
     pub uniqueness: Option<Comparison>,
-    /// What twice the increments change; absent when `check_increments` was not asked for.
+    /// Result of `check_increments`: the effect of twice the increments; absent without it.
     pub doubled_increments: Option<Comparison>,
-    /// The meshes of adaptive refinement, coarsest first; empty without.
+    /// The meshes of adaptive refinement, coarsest first; empty without it.
     pub refinements: Vec<Refinement>,
-    /// What the user should know before trusting the result.
+    /// Points to consider before relying on the result.
     pub warnings: Vec<Warning>,
     /// Unknowns of the body after supports.
     pub dofs: u64,
@@ -150,7 +150,7 @@ pub struct Comparison {
     /// True where the two agree: forces and friction bounds to 1e-6 (uniqueness only; for doubled
     /// increments to `tolerance`).
     pub agrees: bool,
-    /// Whether the second one converged; without that `agrees` says nothing.
+    /// Whether the second one converged; if not, `agrees` has no meaning.
     pub converged: bool,
     /// ∫p of the second.
     pub normal_force: f64,
@@ -162,7 +162,7 @@ pub struct Comparison {
     pub change: f64,
 }
 
-/// One mesh of adaptive refinement and what it gave.
+/// One mesh of adaptive refinement and its results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Refinement {
     /// Elements of the mesh.
@@ -177,9 +177,9 @@ pub struct Refinement {
     pub friction_force: f64,
     /// max|σ_t| over all contacts.
     pub peak_tangential_stress: f64,
-    /// max|σ_n| over all contacts; without mesh limit at a sharp edge.
+    /// max|σ_n| over all contacts; it does not converge at a sharp edge.
     pub peak_normal_stress: f64,
-    /// Largest relative change against the mesh before; absent for the first.
+    /// Largest relative change from the previous mesh; absent for the first.
     pub change: Option<f64>,
 }
 
@@ -232,14 +232,14 @@ pub struct Residuals {
     pub equilibrium: f64,
 }
 
-/// Something the user should know.
+/// A point to consider before relying on a result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {
     /// The kind of warning, stable for programs.
     pub code: WarningCode,
-    /// JSON Pointer to what it is about.
+    /// JSON Pointer to the part of the problem that it concerns.
     pub pointer: String,
-    /// The finding with its figures, and what to do.
+    /// The warning with its numbers, and what to do.
     pub message: String,
 }
 
@@ -325,8 +325,8 @@ impl WarningCode {
 pub enum Stage {
     /// The first solution, without friction.
     Frictionless,
-    /// A solution with u_t = d on all of Γ_C: where `check_uniqueness` starts, and a body that
-    /// only friction holds.
+    /// A solution with u_t = d on all of Γ_C: the start of `check_uniqueness`, and of a body that only friction
+    /// holds.
     Bonded,
     /// A sweep over the friction bound.
     Outer,
@@ -376,7 +376,7 @@ pub struct Iteration {
     pub inner: u32,
 }
 
-/// Nodes in contact and their changes since the row before.
+/// Nodes in contact and their changes since the previous row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactCount {
     /// Nodes in contact.
@@ -409,11 +409,11 @@ pub struct ForcePair {
 /// point where friction acts.
 ///
 /// Those points are three Gauss points per edge, also without friction; with `"points": "nodal"` the
-/// nodes, but for one on the axis. There `normal_stress`, the gap and the displacements are those of
+/// nodes, except one on the axis. There `normal_stress`, the gap and the displacements are those of
 /// the edge, quadratic between its nodes; `nonlocal_pressure`, `friction_bound` and `friction_ratio`
-/// are the law's at the very point; `tangential_stress` is the one that acts in the solution, so that
-/// it adds up to the forces of the summary (at a node it is the law's, which differs by
-/// `Residuals::friction` of the largest); and a point is open where one of the nodes beside it is.
+/// are those of the law at the point; `tangential_stress` is the one that acts in the solution, so that
+/// it adds up to the forces of the summary (at a node it is that of the law, which differs by
+/// `Residuals::friction` of the largest); and a point is open if one of the nodes beside it is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactProfile {
     /// Arc length from the first node of Γ_C.
@@ -456,7 +456,7 @@ impl ContactProfile {
         ]
     }
 
-    /// The same to write to.
+    /// The columns of numbers, to be written.
     #[rustfmt::skip]
     fn columns_mut(&mut self) -> [&mut Vec<f64>; 11] {
         let ContactProfile {
@@ -548,25 +548,25 @@ pub struct GaussFields {
     pub stress_zz: Vec<f64>,
 }
 
-/// What the solver tells its observer.
+/// The messages of the solver to its observer.
 #[derive(Debug)]
 pub enum Progress<'a> {
     /// A phase begins.
     Phase(Phase),
     /// An iteration is done.
     Iteration(&'a Iteration),
-    /// One is done on a mesh that is the last only if its results have settled; then all of its
-    /// iterations are told again. The next mesh counts from 1.
+    /// An iteration is done on a mesh that is the last only if its results have settled; then all its iterations
+    /// are reported again. The next mesh counts from 1.
     Tentative(&'a Iteration),
-    /// A finding, as soon as it is known; all stand in the summary again.
+    /// A warning, as soon as it is known; all are repeated in the summary.
     Warning(&'a Warning),
     /// A load step that is not the last has ended: the solution so far, without fields. Only of
-    /// problems with several steps, and not on the meshes of adaptive refinement; who wants to break
-    /// off says so at the next iteration.
+    /// problems with several steps, and not on the meshes of adaptive refinement. The answer is ignored:
+    /// to stop, return so at the next iteration.
     Step(&'a Solution),
-    /// Nothing to tell: the solver is at work and asks whether to go on.
+    /// The solver is at work, and asks whether to continue.
     Pulse,
 }
 
-/// The observer of a solution: called at every phase and iteration, it may break off.
+/// The observer of a solution: called at every phase and iteration; it may stop the solution.
 pub type Observer<'a> = dyn FnMut(Progress<'_>) -> std::ops::ControlFlow<()> + 'a;

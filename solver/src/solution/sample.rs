@@ -1,25 +1,25 @@
-//! A stored profile at other points: as many as are asked for, without solving anything again.
+//! A stored profile at any number of points, without solving again.
 
 use super::{ContactProfile, NodeState};
 use crate::element::edge3;
 
-/// A place this near to a node, as part of the whole length, is the node: the rounding of `s`.
+/// A place counts as a node within this part of the whole length: the rounding of `s`.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// The columns of a profile at `count` places, equally spaced in arc length from the first node of
 /// Γ_C to the last; units and signs are those of [`ContactProfile`].
 ///
 /// `profile` is at the nodes, `friction` at the friction points of the same Γ_C and the same step (it
-/// may be empty: results stored by older versions have none). Nothing is solved or averaged again:
+/// may be empty: results stored by older versions have none). Nothing is solved or averaged again.
 ///
-/// - positions, gap, displacements and normal stress are the quadratic of their edge between its three
-///   nodes, which is what the solution means by them: exact. (The gap is the one that contact is
-///   asked for, at nodes; between them the obstacle itself may be elsewhere.)
-/// - tangential stress, nonlocal pressure, friction bound and ratio are the law's at nodes and friction
-///   points, five a Gauss edge, and curves between: of the two parabolas in s through a third
+/// - positions, gap, displacements and normal stress are the quadratics through the three nodes of an
+///   edge: exact, since the solution is quadratic. (Contact uses the gap at nodes; between them the obstacle
+///   itself may be elsewhere.)
+/// - tangential stress, nonlocal pressure, friction bound and ratio are those of the law at nodes and
+///   friction points, five per edge with Gauss points, and curves between them: of the two parabolas in s through a third
 ///   neighbour the flatter one, and the straight line where they bend to opposite sides. So a
-///   quadratic is exact, a smooth column is good to third order, and the corners that the law has,
-///   at the end of contact or of stick, do not make their surroundings wave. Bound ≥ 0 and
+///   quadratic is exact, a smooth column is accurate to third order, and the corners of the law, at the end of
+///   contact or of stick, cause no oscillation nearby. Bound ≥ 0 and
 ///   0 ≤ ratio ≤ 1 are kept.
 /// - the state is that of the nearest node or friction point.
 ///
@@ -226,7 +226,7 @@ mod tests {
         assert_eq!(sampled.state[4000], NodeState::Open);
     }
 
-    /// Where stick ends φ has a corner, where contact ends τ has one: neither may wave.
+    /// φ has a corner at the end of stick, τ at the end of contact: neither may cause an oscillation.
     #[test]
     fn corners_of_the_law_stay_within_their_limits() {
         let (mut nodal, mut friction) = profiles(&[0.0, 1.0, 2.0, 3.0]);
