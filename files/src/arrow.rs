@@ -1,4 +1,4 @@
-//! A table as an Arrow IPC file, one record batch: what pandas, polars and DuckDB open without copying.
+//! A table as an Arrow IPC file, one record batch: which pandas, polars and DuckDB open without copying.
 
 use std::sync::Arc;
 
@@ -29,8 +29,8 @@ fn written(table: &Table) -> Result<Vec<u8>, ArrowError> {
     writer.into_inner()
 }
 
-/// Only numbers that may be missing are nullable, and they are by their kind, not by what happens to
-/// be there: files of two jobs have one schema.
+/// Only numbers that may be missing are nullable. That depends on the column, not on its values: the files of two
+/// jobs have one schema.
 fn array(values: &Values) -> (DataType, ArrayRef, bool) {
     match values {
         Values::Real(values) => {
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_number_is_null_and_no_rows_are_a_file_all_the_same() {
+    fn a_missing_number_is_null_and_a_table_may_be_empty() {
         let batch = read(&Table::of_history(&history()));
         let r_f = batch.column_by_name("r_f").unwrap();
         assert!(r_f.is_null(0) && !r_f.is_null(1));

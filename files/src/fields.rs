@@ -1,5 +1,5 @@
 //! The fields as arrays, the same in VTU and NPZ: vectors and tensors by components in VTK's order,
-//! with what is usually drawn of a stress. The NPZ has the integration points beside them.
+//! with the stress measures that are usually drawn. The NPZ has the integration points too.
 
 use crate::npz::Npz;
 use crate::stress::{Stress, principal, von_mises};
@@ -19,7 +19,7 @@ pub(crate) enum Data {
     Small(Vec<i8>),
 }
 
-/// Made one after the other: all of them together are larger than the fields.
+/// The arrays are made one after the other: together they are larger than the fields.
 pub(crate) fn point_data(fields: &Fields) -> impl Iterator<Item = Array> {
     const ARRAYS: [fn(&Fields) -> Array; 5] = [
         |fields| {
@@ -72,7 +72,7 @@ fn stresses(fields: &Fields) -> impl Iterator<Item = Stress> {
 
 /// Adds the fields to an archive, their names after `prefix`.
 ///
-/// Elements stand in two arrays, `quads` and `triangles`, with their numbers in the mesh beside them;
+/// Elements are in two arrays, `quads` and `triangles`, each with an array of their numbers in the mesh;
 /// `error_estimate` has one entry per element of the mesh, `gauss_element` the element of each
 /// integration point.
 pub fn add(npz: &mut Npz, prefix: &str, fields: &Fields) -> Result<(), String> {
@@ -129,8 +129,8 @@ pub fn npz(fields: &Fields) -> Result<Vec<u8>, String> {
     npz.finish()
 }
 
-/// That arrays which belong together have equal length, and elements only nodes that exist: a file
-/// that breaks this crashes the program that reads it.
+/// Checks that related arrays have equal length, and elements only existing nodes: other files crash the programs
+/// that read them.
 pub(crate) fn check(fields: &Fields) -> Result<(), String> {
     let f = fields;
     let nodes = f.x.len();

@@ -1,5 +1,5 @@
-//! Problems and meshes from texts and files, results and figures as files: what goes between `solver`
-//! and the outside. Bytes in, bytes out, never a path.
+//! Problems and meshes from texts and files, results and figures as files: all input and output
+//! of `solver`. Bytes in, bytes out, never a path.
 
 // In: problems as JSON; meshes as Gmsh files and as decks of Abaqus or CalculiX.
 pub mod abaqus;

@@ -1,4 +1,4 @@
-//! The types of number that binary files hold, with their names in each format.
+//! The types of numbers in binary files, with their names in each format.
 
 /// A number with a fixed size.
 pub trait Number: Copy {

@@ -42,7 +42,7 @@ fn fits(schema: &Value, value: &Value) -> bool {
     walk.faults == 0
 }
 
-/// Whether the schema accepts a value as what one of its definitions describes.
+/// Whether one of the definitions of the schema accepts a value.
 #[cfg(test)]
 pub(crate) fn accepts(definition: &str, value: &Value) -> bool {
     fits(&SCHEMA["$defs"][definition], value)
@@ -269,7 +269,7 @@ fn forms(branches: &[Value]) -> Option<Vec<Vec<&str>>> {
     Some(forms)
 }
 
-/// What a form requires, all of it or one of several.
+/// The names that a form requires: all of them, or one of several.
 fn all_required(form: &Value) -> Vec<&str> {
     let further = branches(form).into_iter().flatten().flat_map(all_required);
     required(form).chain(further).collect()
@@ -317,7 +317,7 @@ fn required(schema: &Value) -> impl Iterator<Item = &str> {
     texts(schema, "required")
 }
 
-/// The text after a word of the schema, or each of a list.
+/// The text of a keyword of the schema, or each text of a list.
 fn texts<'a>(schema: &'a Value, word: &str) -> impl Iterator<Item = &'a str> {
     let value = schema.get(word);
     let list = value.and_then(Value::as_array).into_iter().flatten();

@@ -191,8 +191,8 @@ impl Labels {
         true
     }
 
-    /// The places of all numbers first, first + step, … up to last. A range may be
-    /// very wide: only existing numbers are visited.
+    /// The places of all numbers first, first + step, … up to last. A range may be very wide: only
+    /// existing numbers are visited.
     pub(crate) fn range(&self, first: u64, last: u64, step: u64) -> Vec<u32> {
         let inside =
             |label: u64| label >= first && label <= last && (label - first).is_multiple_of(step);

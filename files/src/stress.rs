@@ -1,5 +1,5 @@
-//! What is shown of a stress tensor. Out of the plane there is only σ_zz, so that one principal stress
-//! is σ_zz and the other two are those of Mohr's circle in the plane.
+//! Principal stresses and the von Mises stress. Out of the plane there is only σ_zz, so that one principal
+//! stress is σ_zz and the other two are those of Mohr's circle in the plane.
 
 /// σ_xx, σ_yy, σ_xy, σ_zz of one point.
 pub type Stress = [f64; 4];
@@ -13,7 +13,7 @@ pub fn principal([xx, yy, xy, zz]: Stress) -> [f64; 3] {
     values
 }
 
-/// Equivalent stress of von Mises, from all three directions also in plane strain.
+/// Equivalent stress of von Mises, with σ_zz also in plane strain.
 pub fn von_mises([xx, yy, xy, zz]: Stress) -> f64 {
     let differences = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
     (0.5 * differences + 3.0 * xy * xy).sqrt()

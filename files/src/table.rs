@@ -1,5 +1,5 @@
 //! Columns with names: a profile or a history, written as CSV or JSON Lines (`arrow` and `npz` have
-//! the binary formats). One table for all formats, so that all have the same columns.
+//! the binary formats). All formats use one table, and so have the same columns.
 
 use std::fmt::Write;
 
@@ -15,7 +15,7 @@ pub struct Table {
 /// One quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// Its name in the API; a part of a part is written `contact_active`.
+    /// Its name in the API; a nested field has both names, as in `contact_active`.
     pub name: &'static str,
     /// One entry per row.
     pub values: Values,
@@ -24,7 +24,7 @@ pub struct Column {
 /// The entries of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
-    /// NaN is a missing value: results hold no other.
+    /// NaN is a missing value: results contain no other NaN.
     Real(Vec<f64>),
     /// Numbers and counts.
     Whole(Vec<u32>),
@@ -52,7 +52,7 @@ impl Table {
     /// One row per node of Γ_C, in order of arc length.
     #[rustfmt::skip]
     pub fn of_profile(profile: &ContactProfile) -> Table {
-        // taken apart by all its fields: a column added later does not compile until it stands here
+        // every field is named, so that a new column does not compile until it is added here
         let ContactProfile {
             s, x, y, gap, normal_displacement, tangential_displacement, normal_stress, tangential_stress,
             nonlocal_pressure, friction_bound, friction_ratio, state,
@@ -74,7 +74,7 @@ impl Table {
         ] }
     }
 
-    /// One row per iteration; what stands inside another object of the JSON has both names.
+    /// One row per iteration; a nested field of the JSON has both names.
     #[rustfmt::skip]
     pub fn of_history<'a>(rows: impl IntoIterator<Item = &'a Iteration, IntoIter: Clone>) -> Table {
         let rows = rows.into_iter();
@@ -101,7 +101,7 @@ impl Table {
         ] }
     }
 
-    /// Rows; an `Err` says which column has another number of them.
+    /// The number of rows; `Err`: a column with another number.
     pub fn rows(&self) -> Result<usize, String> {
         let rows = self.columns.first().map_or(0, |first| first.values.len());
         match self.columns.iter().find(|c| c.values.len() != rows) {
@@ -291,7 +291,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn columns_of_unequal_length_are_an_error_and_no_rows_are_none() {
+    fn columns_of_unequal_length_are_an_error() {
         let mut odd = profile();
         odd.gap.pop();
         let error = Table::of_profile(&odd).csv().unwrap_err();

@@ -3,8 +3,8 @@
 //! numbers, and docs/formulation.md as "formulation 4.3".
 //!
 //! A library of pure functions: no clock, thread, file or network; the same problem gives the same
-//! bits. Reading and writing of any format is left to the crate `files`. The
-//! modules are listed from the ground up; each uses only those above it.
+//! bits. Reading and writing of any format is left to the crate `files`. The modules are
+//! listed from the ground up; each uses only those above it.
 
 // The phases of a solution.
 pub mod phase;

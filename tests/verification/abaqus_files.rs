@@ -33,7 +33,7 @@ fn doubts(text: &str) -> Vec<String> {
 
 /// Names keep their first spelling whatever the case later on; a pressure names its sides.
 #[test]
-fn a_deck_becomes_a_problem_with_its_own_names() {
+fn a_deck_becomes_a_problem_with_the_names_of_the_deck() {
     let problem = abaqus::problem(&deck("ring-cps8")).unwrap();
     assert_eq!(problem.title.as_deref(), Some("Quarter ring, CPS8"));
     assert_eq!(problem.analysis, Analysis::PlaneStress { thickness: 0.25 });
@@ -59,7 +59,7 @@ fn a_deck_becomes_a_problem_with_its_own_names() {
 }
 
 #[test]
-fn reduced_integration_and_triangles_choose_the_rule() {
+fn reduced_integration_and_triangles_determine_the_rule() {
     for (name, quadrature) in [
         ("ring-cpe8", 3),
         ("ring-cpe8r", 2),
@@ -110,7 +110,7 @@ Low, ENCASTRE
 /// Corners become elements of second order, and their sets keep what they held; a surface can touch an
 /// obstacle.
 #[test]
-fn a_first_order_mesh_of_a_preprocessor_takes_part_in_contact() {
+fn a_first_order_mesh_of_a_preprocessor_can_be_in_contact() {
     let mesh = read(SQUARES);
     assert_eq!((mesh.nodes.len(), mesh.elements.len()), (13, 2));
     assert_eq!(mesh.node_sets["Low"].len(), 5);
@@ -140,12 +140,12 @@ fn a_first_order_mesh_of_a_preprocessor_takes_part_in_contact() {
 }
 
 #[test]
-fn what_a_mesh_lacks_is_said_with_its_line() {
+fn faults_of_a_mesh_are_reported_with_their_line() {
     let with = |from: &str, to: &str| {
         assert!(SQUARES.contains(from), "{from}");
         SQUARES.replacen(from, to, 1)
     };
-    for (from, to, said) in [
+    for (from, to, reported) in [
         (
             "2, 2, 3, 13, 12",
             "2, 2, 3, 99, 12",
@@ -154,7 +154,7 @@ fn what_a_mesh_lacks_is_said_with_its_line() {
         (
             "2, 2, 3, 13, 12",
             "1, 2, 3, 13, 12",
-            "line 13: element 1 once more",
+            "line 13: element 1 a second time",
         ),
         (
             "2, 2, 3, 13, 12",
@@ -166,7 +166,7 @@ fn what_a_mesh_lacks_is_said_with_its_line() {
         (
             "     13,        2.D+0",
             "     12,        2.D+0",
-            "line 10: node 12 once more",
+            "line 10: node 12 a second time",
         ),
         (
             "      3,          2.0",
@@ -191,17 +191,17 @@ fn what_a_mesh_lacks_is_said_with_its_line() {
         ),
     ] {
         let found = faults(&with(from, to));
-        assert!(found.contains(&said.to_owned()), "{to}: {found:?}");
+        assert!(found.contains(&reported.to_owned()), "{to}: {found:?}");
     }
     assert!(faults("")[0].contains("without *NODE"));
 }
 
 /// In a whole problem every keyword counts.
 #[test]
-fn what_is_not_understood_of_a_whole_deck_is_an_error_with_its_line() {
+fn unsupported_parts_of_a_deck_are_errors_with_their_line() {
     let good = deck("ring-cpe8");
     let line = |text: &str| 1 + good.lines().position(|l| l == text).unwrap();
-    for (from, to, said) in [
+    for (from, to, reported) in [
         ("*STATIC", "*DYNAMIC", "*DYNAMIC".to_owned()),
         ("*STEP", "*STEP, NLGEOM", "*STEP, NLGEOM".to_owned()),
         (
@@ -216,14 +216,14 @@ fn what_is_not_understood_of_a_whole_deck_is_an_error_with_its_line() {
         ),
         ("2.1D3, .3", "2.1D3", "1 elastic constants".to_owned()),
     ] {
-        let at = if said.contains("constants") {
+        let at = if reported.contains("constants") {
             line(from) - 1
         } else {
             line(from)
         };
         let found = doubts(&good.replacen(from, to, 1));
         assert!(
-            found.contains(&format!("line {at}: {said}")),
+            found.contains(&format!("line {at}: {reported}")),
             "{to}: {found:?}"
         );
     }

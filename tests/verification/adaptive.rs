@@ -5,9 +5,9 @@ use solver::problem::{AdaptiveRefine, Refine};
 use crate::record::held;
 use crate::support::{example, solve};
 
-/// The tolerance asked for is what the peak is held to.
+/// The error of the peak is below the tolerance.
 #[test]
-fn example_1_reaches_its_peak_by_itself() {
+fn adaptive_refinement_finds_the_peak_of_example_1() {
     let mut problem = example("rectangular_punch");
     problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.01 });
     let summary = solve(&problem).summary;
@@ -41,7 +41,7 @@ fn example_1_reaches_its_peak_by_itself() {
         14.231,
         0.01,
     );
-    // the sequence is told, and begins with the user's own mesh
+    // the sequence is reported, and begins with the user's own mesh
     assert_eq!(summary.refinements[0].elements, 56);
     assert!((summary.refinements[0].peak_tangential_stress - 443.0).abs() < 1.0);
     assert!(
@@ -53,7 +53,7 @@ fn example_1_reaches_its_peak_by_itself() {
 }
 
 #[test]
-fn a_smooth_contact_reaches_its_values_too() {
+fn adaptive_refinement_finds_the_values_of_a_smooth_contact() {
     let mut problem = example("cylinder");
     problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.005 });
     let summary = solve(&problem).summary;
@@ -86,7 +86,7 @@ fn a_smooth_contact_reaches_its_values_too() {
 }
 
 #[test]
-fn what_cannot_be_refined_is_refused() {
+fn adaptive_refinement_with_a_wrong_tolerance_or_no_contact_is_refused() {
     let mut problem = example("cylinder");
     problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 1.5 });
     problem.contacts.clear();

@@ -269,7 +269,7 @@ fn no_admissible_state_has_less_energy_and_the_variational_inequality_holds() {
 
 /// The inner problem has one solution: from rest and from the end it is the same.
 #[test]
-fn a_solution_restarted_from_itself_stays() {
+fn a_solution_restarted_from_itself_does_not_change() {
     with_solved("cylinder", |_, _, system, finished| {
         let again = solver::algorithm::minimise(
             system,

@@ -50,7 +50,7 @@ fn the_estimate_tends_to_the_error_of_lames_wall() {
 
 /// Errors of elements are the parts of the whole, 2π and thickness included, with either rule.
 #[test]
-fn the_errors_of_elements_make_up_the_whole() {
+fn the_errors_of_elements_add_up_to_the_total() {
     let total = |solution: &Solution| {
         let parts = &solution.fields.element_error;
         parts.iter().map(|e| e * e).sum::<f64>().sqrt()
@@ -68,7 +68,7 @@ fn the_errors_of_elements_make_up_the_whole() {
 
 /// Force × length in the square: twice the thickness of a sheet gives √2 of the error under the same stress.
 #[test]
-fn the_estimate_knows_the_thickness() {
+fn the_estimate_scales_with_the_thickness() {
     let sheet = |thickness: f64| {
         let text = json!({
             "analysis": {"kind": "plane_stress", "thickness": thickness},
@@ -88,7 +88,7 @@ fn the_estimate_knows_the_thickness() {
 /// Two layers stretched side by side: the stress jumps at their interface, as it must, and the elements
 /// are exact. A recovery that averaged across would call that an error.
 #[test]
-fn a_jump_at_an_interface_is_no_error() {
+fn a_jump_at_an_interface_is_not_an_error() {
     let layers = |materials: Value| {
         let text = json!({
             "analysis": {"kind": "plane_strain"},

@@ -85,7 +85,7 @@ fn hold(name: &str, obstacle: &Value, load: f64, start: f64, pressure: impl Fn(f
 }
 
 #[test]
-fn a_wedge_presses_as_its_integral_says() {
+fn a_wedge_has_the_load_of_its_integral() {
     let angle = 5.0;
     let slope = f64::to_radians(angle).tan();
     let exact = |x: f64| E_STAR * slope / std::f64::consts::PI * (1.0 / x).acosh();
@@ -94,7 +94,7 @@ fn a_wedge_presses_as_its_integral_says() {
 }
 
 #[test]
-fn a_profile_of_fourth_power_presses_as_its_integral_says() {
+fn a_profile_of_fourth_power_has_the_load_of_its_integral() {
     let c = 0.05;
     let load = 0.75 * std::f64::consts::PI * E_STAR * c;
     let exact = |x: f64| E_STAR * c * (1.0 + 2.0 * x * x) * (1.0 - x * x).sqrt();

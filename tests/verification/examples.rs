@@ -18,7 +18,7 @@ fn frictionless(problem: &Problem) -> Solution {
 /// Values of exactly this discretisation, printed with six decimals: 1e-6 relative covers the
 /// rounding of their last digit.
 #[test]
-fn the_thesis_size_examples_have_their_discrete_values() {
+fn the_examples_of_the_thesis_size_have_their_discrete_values() {
     for (name, normal, tangential) in [
         ("rectangular_punch", 96.650513, 14.169464),
         ("cylinder", 313.363150, 39.187802),
@@ -193,7 +193,7 @@ fn hard_cases_converge_by_the_fallback() {
 }
 
 /// formulation 3.3: on the thesis-size mesh ε ≤ 1e-5 lets stick tractions oscillate (∫|σ_t| = 14.17,
-/// 15.20, 19.64 for ε = 1e-4, 1e-5, 1e-6), and the user is told.
+/// 15.20, 19.64 for ε = 1e-4, 1e-5, 1e-6), and a warning reports it.
 #[test]
 fn oscillating_stick_tractions_have_their_published_size_and_a_warning() {
     for (elastic_slip, friction_force, warned) in [
@@ -209,10 +209,14 @@ fn oscillating_stick_tractions_have_their_published_size_and_a_warning() {
             "ε = {elastic_slip}: {}",
             summary.friction_force
         );
-        let told = summary
+        let received = summary
             .warnings
             .iter()
             .any(|w| w.code == WarningCode::OscillatingStick);
-        assert_eq!(told, warned, "ε = {elastic_slip}: {:?}", summary.warnings);
+        assert_eq!(
+            received, warned,
+            "ε = {elastic_slip}: {:?}",
+            summary.warnings
+        );
     }
 }

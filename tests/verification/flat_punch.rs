@@ -70,7 +70,7 @@ fn a_plane_punch_presses_as_the_inverse_root() {
 /// Row 11. P = 2 E* a δ and p(0) = P / (2π a²): within 1 % on a block of 200 a, and the error
 /// falls as the block grows and as the mesh is refined.
 #[test]
-fn a_round_punch_has_the_load_of_boussinesq() {
+fn a_round_punch_has_boussinesqs_load() {
     let delta = 0.2;
     let exact = 2.0 * E_STAR * A * delta;
     close(exact, 219.780, 2e-6); // three decimals are published

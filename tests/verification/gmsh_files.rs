@@ -43,7 +43,7 @@ fn area(mesh: &Mesh) -> f64 {
 /// Four forms of one mesh are one mesh; its area is that of the drawing (the parabola through the three
 /// nodes of a side is off a quarter circle by some 1e-5 of it), its boundaries are as long as drawn.
 #[test]
-fn every_form_of_a_file_holds_the_same_mesh() {
+fn every_form_of_a_file_has_the_same_mesh() {
     // 2 × 2 and 2 × 1, and the corner that the fillet fills
     let radius: f64 = 0.5;
     let drawn = 6.0 + radius * radius * (1.0 - std::f64::consts::FRAC_PI_4);
@@ -116,7 +116,7 @@ fn every_form_of_a_file_holds_the_same_mesh() {
 }
 
 #[test]
-fn nine_nodes_lose_their_centre_and_corners_get_midsides() {
+fn centre_nodes_are_dropped_and_midsides_added() {
     let (mesh, notes) = read("fillet-quad9-msh22-ascii");
     assert_eq!(notes, ["centre_nodes_dropped", "lines_inside"]);
     assert_eq!(
@@ -177,7 +177,7 @@ fn on_file(file: &str) -> Value {
 
 /// Contact on each family. The forces of three coarse meshes of one body agree to their own error.
 #[test]
-fn a_block_pressed_on_gmshs_plate_bears_the_same_on_every_family() {
+fn a_block_on_gmshs_plate_bears_the_same_on_every_family() {
     let forces: Vec<[f64; 2]> = FAMILIES
         .iter()
         .map(|family| {
@@ -290,11 +290,11 @@ fn boundaries_are_found_by_box_and_by_normal() {
     );
 }
 
-/// What is wrong with a file is said with its line, its numbers and what would be right.
+/// A fault of a file is reported with its line, its numbers and what is expected.
 #[test]
 fn a_broken_file_is_refused_with_its_line() {
     let good = String::from_utf8(bytes("fillet-mixed-msh22-ascii")).unwrap();
-    let said = |text: &str| {
+    let reported = |text: &str| {
         let Err(files::ReadError::Invalid(list)) = gmsh::read(text.as_bytes()) else {
             panic!("a broken file was read");
         };
@@ -305,7 +305,7 @@ fn a_broken_file_is_refused_with_its_line() {
     let third = line(nodes + 4);
     let broken = third.replacen(' ', " x", 1);
     assert_eq!(
-        said(&good.replacen(third, &broken, 1)),
+        reported(&good.replacen(third, &broken, 1)),
         format!(
             "malformed: line {}: `{}`; x",
             nodes + 4,
@@ -313,13 +313,13 @@ fn a_broken_file_is_refused_with_its_line() {
         )
     );
     assert!(
-        said(&good.replacen("2.2 0 8", "3.1 0 8", 1))
+        reported(&good.replacen("2.2 0 8", "3.1 0 8", 1))
             .starts_with("unsupported: line 2: MSH 3.1; MSH 2.2 or 4.1")
     );
-    assert!(said(&good[..good.len() / 2]).starts_with("truncated"));
-    assert!(said("cube.geo").starts_with("malformed: line 1: `cube.geo`; $MeshFormat"));
+    assert!(reported(&good[..good.len() / 2]).starts_with("truncated"));
+    assert!(reported("cube.geo").starts_with("malformed: line 1: `cube.geo`; $MeshFormat"));
     assert!(
-        said(&good.replacen(
+        reported(&good.replacen(
             third,
             &third.replacen(" 0", " 7", 2).replace(" 07", " 7"),
             1
@@ -333,10 +333,10 @@ fn a_broken_file_is_refused_with_its_line() {
         last.rsplit_once(' ').map_or("", |(start, _)| start)
     );
     assert!(
-        said(&good.replacen(last, &stray, 1)).contains("node 99999 in element"),
+        reported(&good.replacen(last, &stray, 1)).contains("node 99999 in element"),
         "{stray}"
     );
     let mut three_d: Vec<&str> = last.split(' ').collect();
     three_d[1] = "11";
-    assert!(said(&good.replacen(last, &three_d.join(" "), 1)).contains("three dimensions"));
+    assert!(reported(&good.replacen(last, &three_d.join(" "), 1)).contains("three dimensions"));
 }

@@ -37,7 +37,7 @@ fn entries(matrix: &Dense) -> Vec<f64> {
 /// Ŝ, f̂ at a level and displacements, with and without springs. 1e-9: the springs are as stiff as
 /// the body, so that a few digits are lost when they are taken off, and no more.
 #[test]
-fn springs_leave_no_trace_in_a_supported_body() {
+fn springs_do_not_change_a_supported_body() {
     let level = Level {
         loads: 0.7,
         supports: 1.3,
@@ -89,7 +89,7 @@ fn springs_leave_no_trace_in_a_supported_body() {
 /// Without supports Ŝ costs nothing for rigid motions, and for nothing else: as many eigenvalues are
 /// zero to rounding (1e-10 of the largest, with a gap of 1e4 to the next) as there are motions.
 #[test]
-fn an_unsupported_body_costs_nothing_for_its_rigid_motions_only() {
+fn only_rigid_motions_of_an_unsupported_body_need_no_energy() {
     let plane: [fn([f64; 2]) -> [f64; 2]; 3] = [|_| [1.0, 0.0], |_| [0.0, 1.0], |[x, y]| [-y, x]];
     let cases = [("plane_strain", &plane[..]), ("axisymmetric", &plane[1..2])];
     for (kind, motions) in cases {

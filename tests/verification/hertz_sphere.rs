@@ -30,7 +30,7 @@ fn sphere(size: f64, h: f64) -> Solution {
 /// P and p₀ to 1 %, the radius to an element, p to 1 % within .8 a. The load's error is the block's,
 /// 3/2 of the share of δ that the clamped base takes, and falls with its size; the error of p falls with h.
 #[test]
-fn a_sphere_presses_as_hertz_says() {
+fn a_sphere_has_hertzs_solution() {
     let (load, p0) = (
         4.0 * E_STAR / (3.0 * R),
         2.0 * E_STAR / (std::f64::consts::PI * R),

@@ -25,7 +25,7 @@ pub(crate) fn pair(pointer: &str, reason: &str) -> (String, String) {
 
 /// A hundred violations are as many as are listed; what comes after them is refused all the same.
 #[test]
-fn what_fails_after_a_full_list_still_fails() {
+fn a_fault_after_a_full_list_is_still_an_error() {
     // this used to panic: the table, alone on its boundary, was evaluated as if it had points
     let mut p = example("rectangular_punch");
     let bad = Contact {
@@ -62,7 +62,7 @@ fn what_fails_after_a_full_list_still_fails() {
 }
 
 #[test]
-fn every_number_out_of_range_is_named_at_once() {
+fn all_numbers_out_of_range_are_reported_at_once() {
     let mut p = example("rectangular_punch");
     p.materials[0].elasticity = Elasticity::Isotropic {
         youngs_modulus: -1.0,
@@ -97,7 +97,7 @@ fn every_number_out_of_range_is_named_at_once() {
 }
 
 #[test]
-fn numbers_that_are_not_finite_are_refused_wherever_they_stand() {
+fn nan_and_infinity_are_refused_everywhere() {
     let mut p = example("cylinder");
     p.contacts[0].indentation = f64::NAN;
     p.mesh.grid_mut().unwrap().x[3] = f64::INFINITY;
@@ -151,7 +151,7 @@ fn a_body_free_to_move_is_refused_with_node_and_direction() {
 /// Contact could hold these bodies; it does not, since nothing presses them against the obstacle. Peers
 /// answer "converged" here, with forces of rounding.
 #[test]
-fn a_body_that_contact_could_hold_and_does_not_is_an_error_with_its_motion() {
+fn a_body_not_held_by_its_contacts_is_an_error_with_its_motion() {
     for (name, motion) in [
         ("rectangular_punch", "along y"),
         ("cylinder_on_end", "along the axis"),
@@ -169,7 +169,7 @@ fn a_body_that_contact_could_hold_and_does_not_is_an_error_with_its_motion() {
 /// A block on a rigid flat, pressed down from above and held by nothing else: the pressure below is
 /// that above, to rounding.
 #[test]
-fn a_block_that_only_contact_holds_stands_on_its_pressure() {
+fn a_block_held_only_by_contact_is_in_equilibrium() {
     for friction in [
         "null",
         r#"{"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}"#,
@@ -192,7 +192,7 @@ fn a_block_that_only_contact_holds_stands_on_its_pressure() {
 
 /// Pushed sideways, nothing but friction holds it: it sticks below μ N, and is not held above.
 #[test]
-fn a_block_that_only_friction_holds_sticks_or_slides_away() {
+fn a_block_held_only_by_friction_sticks_or_slides_away() {
     let solve = |push: f64| {
         let json = format!(
             r#"{{"analysis": {{"kind": "plane_strain"}}, "mesh": {{"grid": {{"x": [0, 1, 2, 3, 4], "y": [0, 0.5, 1]}}}},
@@ -218,7 +218,7 @@ fn a_block_that_only_friction_holds_sticks_or_slides_away() {
 }
 
 #[test]
-fn an_obstacle_that_covers_no_node_is_refused_and_one_that_cuts_an_edge_is_warned_of() {
+fn an_obstacle_that_covers_no_edge_is_refused_and_one_that_cuts_an_edge_gives_a_warning() {
     let mut p = example("rectangular_punch");
     let obstacle = |json: &str| serde_json::from_str(json).unwrap();
     p.contacts[0].obstacle = obstacle(r#"{"kind": "flat", "from": 10, "to": 11}"#);
@@ -238,7 +238,7 @@ fn an_obstacle_that_covers_no_node_is_refused_and_one_that_cuts_an_edge_is_warne
 }
 
 #[test]
-fn a_contact_that_turns_a_corner_is_warned_of() {
+fn a_contact_with_a_corner_gives_a_warning() {
     let mut p = example("sheet");
     let part = p.mesh.boundaries.get_mut("taper").unwrap();
     (part.x, p.mesh.grid_mut().unwrap().top) =
@@ -260,7 +260,7 @@ fn a_contact_that_turns_a_corner_is_warned_of() {
 }
 
 #[test]
-fn inverted_elements_are_named_with_their_gauss_point() {
+fn inverted_elements_are_reported_with_their_gauss_point() {
     let p = problem(
         r#"{"analysis": {"kind": "plane_strain"}, "materials": [{"youngs_modulus": 1, "poissons_ratio": 0}],
             "mesh": {"inline": {
@@ -319,7 +319,7 @@ fn a_body_held_everywhere_and_one_element_alone_are_solved() {
 }
 
 #[test]
-fn a_contact_that_never_engages_is_said_with_its_smallest_gap() {
+fn a_contact_that_never_engages_is_reported_with_its_smallest_gap() {
     let mut p = example("cylinder");
     p.contacts[0].indentation = -0.125;
     let solution = solve(&p);
@@ -359,7 +359,7 @@ fn an_iteration_limit_is_an_outcome_with_its_history() {
 }
 
 #[test]
-fn an_observer_that_stops_gets_the_state_it_has_seen() {
+fn an_observer_that_stops_gets_the_last_state() {
     let mut rows = 0;
     let solution = solver::solve(&example("cylinder"), &mut |progress| {
         if matches!(progress, solver::solution::Progress::Iteration(_)) {
@@ -379,7 +379,7 @@ fn an_observer_that_stops_gets_the_state_it_has_seen() {
 }
 
 #[test]
-fn an_observer_that_stops_before_the_first_state_gets_none() {
+fn an_observer_that_stops_before_the_first_state_gets_an_error() {
     let end = solver::solve(&example("cylinder"), &mut |_| {
         std::ops::ControlFlow::Break(())
     });
@@ -389,7 +389,7 @@ fn an_observer_that_stops_before_the_first_state_gets_none() {
 /// What a running job can show of a problem in steps: every step but the last, as the solution of
 /// the problem that ends there has it.
 #[test]
-fn an_observer_is_told_the_solution_so_far_after_every_step_but_the_last() {
+fn an_observer_gets_the_solution_so_far_after_every_step_but_the_last() {
     let mut p = example("cylinder");
     let step = |indentation: f64, increments: u32| solver::problem::Step {
         indentation,
@@ -397,16 +397,16 @@ fn an_observer_is_told_the_solution_so_far_after_every_step_but_the_last() {
         ..solver::problem::Step::whole()
     };
     p.steps = vec![step(0.3, 2), step(0.6, 1), step(1.0, 1)];
-    let mut told = Vec::new();
+    let mut received = Vec::new();
     let solution = solver::solve(&p, &mut |progress| {
         if let solver::solution::Progress::Step(so_far) = progress {
-            told.push(so_far.clone());
+            received.push(so_far.clone());
         }
         std::ops::ControlFlow::Continue(())
     })
     .unwrap();
-    assert_eq!(told.len(), 2);
-    for (k, so_far) in told.iter().enumerate() {
+    assert_eq!(received.len(), 2);
+    for (k, so_far) in received.iter().enumerate() {
         assert_eq!(so_far.fields, solver::solution::Fields::default());
         assert_eq!(so_far.steps, solution.steps[..=k]);
         let rows = so_far.history.len();
@@ -420,16 +420,16 @@ fn an_observer_is_told_the_solution_so_far_after_every_step_but_the_last() {
     }
     assert!(!solution.fields.ux.is_empty());
 
-    let mut told = 0;
+    let mut received = 0;
     for steps in [vec![], vec![step(1.0, 3)]] {
         p.steps = steps;
         solver::solve(&p, &mut |progress| {
-            told += u32::from(matches!(progress, solver::solution::Progress::Step(_)));
+            received += u32::from(matches!(progress, solver::solution::Progress::Step(_)));
             std::ops::ControlFlow::Continue(())
         })
         .unwrap();
     }
-    assert_eq!(told, 0, "one step has no partial result");
+    assert_eq!(received, 0, "one step has no partial result");
 }
 
 /// A mechanism must not come back as converged: two squares that touch in a corner only.
@@ -482,7 +482,7 @@ fn a_solution_stopped_at_its_first_row_is_the_state_of_that_row() {
 
 /// ρ far below the mesh's rounding is Coulomb's law; ρ far beyond the contact is refused.
 #[test]
-fn a_radius_of_nothing_is_local_and_an_endless_one_refused() {
+fn a_tiny_radius_is_local_and_a_huge_one_is_refused() {
     let with_radius = |radius: f64| {
         let mut p = example("rectangular_punch");
         p.contacts[0].friction.as_mut().unwrap().nonlocal_radius = Some(radius);
@@ -565,7 +565,7 @@ fn contacts_without_area_normal_or_coordinate_are_refused() {
 
 /// A hostile problem costs little: many violations are counted, long lists refused.
 #[test]
-fn endless_lists_of_faults_are_cut_short() {
+fn long_lists_of_faults_are_shortened() {
     let mut p = example("rectangular_punch");
     let stray = solver::problem::Support {
         boundary: Some("nowhere".to_owned()),
@@ -586,7 +586,7 @@ fn endless_lists_of_faults_are_cut_short() {
 /// Far from the origin differences of coordinates lose digits: the inner problem must notice that
 /// no more can be had, instead of trying to the end.
 #[test]
-fn a_body_far_from_the_origin_is_solved_without_endless_inner_steps() {
+fn a_body_far_from_the_origin_needs_few_inner_steps() {
     let mut p = example("rectangular_punch");
     let shift = 1e5;
     let grid = p.mesh.grid_mut().unwrap();

@@ -8,7 +8,7 @@ use crate::support::{example, solve};
 /// A cylinder pressed and lifted off again: without load the body returns to rest, to rounding of what
 /// it has borne, whatever the mesh; and no increment is cut back on the way.
 #[test]
-fn a_cylinder_that_is_lifted_off_leaves_nothing() {
+fn a_cylinder_that_is_lifted_off_leaves_no_forces() {
     for (refine, friction) in [(0, true), (2, false), (2, true), (5, false)] {
         let mut problem = example("cylinder");
         problem.mesh.refine = solver::problem::Refine::Times(refine);

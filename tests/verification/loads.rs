@@ -68,7 +68,7 @@ fn pressure_traction_normal_and_tangential_are_one_stress() {
 /// axisymmetry those of whole rings, 2π ∫ r h ds, which is linear shape times quadratic: on an edge
 /// from r₁ to r₂ of length L they are 2πL (r₁/6, (r₁ + r₂)/3, r₂/6).
 #[test]
-fn nodal_forces_are_whole_and_of_whole_rings() {
+fn nodal_forces_are_those_of_whole_rings() {
     let stress = [3.0, -2.0];
     for analysis in theories() {
         let (round, depth) = (

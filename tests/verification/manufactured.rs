@@ -297,11 +297,11 @@ fn rates(kind: &str, analysis: Analysis, size: [f64; 2], exact: Exact) {
 }
 
 #[test]
-fn a_plane_field_comes_back_with_the_rates_of_quadratic_elements() {
+fn a_plane_field_converges_at_the_rates_of_quadratic_elements() {
     rates("plane strain", Analysis::PlaneStrain {}, [1.0, 1.0], plane);
 }
 
 #[test]
-fn a_field_of_revolution_comes_back_with_the_rates_of_quadratic_elements() {
+fn a_field_of_revolution_converges_at_the_rates_of_quadratic_elements() {
     rates("axisymmetric", Analysis::Axisymmetric {}, [1.0, 2.0], round);
 }

@@ -50,7 +50,7 @@ fn the_gap_to_a_line_is_its_perpendicular_distance() {
 
 /// The same line as a slope, a table and a polyline.
 #[test]
-fn one_face_in_four_ways_is_one_obstacle() {
+fn one_face_described_in_four_ways_is_one_obstacle() {
     let slope = 30f64.to_radians().tan();
     let at = |x: f64| 0.5 + slope * x;
     let line = top(
@@ -109,7 +109,7 @@ fn a_wedge_has_the_bodys_normal_at_its_apex() {
 
 /// A boundary that runs against x: the bottom's t is −x, and the slope of its profile turns sign with it.
 #[test]
-fn a_lower_boundary_turns_its_normal_the_other_way() {
+fn a_lower_boundary_turns_its_normal_in_the_other_direction() {
     let text = json!({
         "analysis": {"kind": "plane_strain"},
         "mesh": {"grid": {"x": [0, 1, 2], "y": [0, 1]}},
@@ -182,7 +182,7 @@ fn cylinder(normal: &str, friction: Value) -> solver::solution::Solution {
 /// The vertical load as an independent finite element program (GetFEM) finds it with either normal, full
 /// load: a tenth of a percent, for its mesh is another.
 #[test]
-fn a_peer_finds_the_same_vertical_loads_with_either_normal() {
+fn the_vertical_loads_agree_with_another_program_for_both_normals() {
     let friction =
         json!({"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-6, "points": "nodal"});
     for (normal, friction, published) in [
@@ -228,7 +228,7 @@ fn a_peer_finds_the_same_vertical_loads_with_either_normal() {
 /// The obstacle moves straight down, and what sticks to its sloping face with it; before that a node
 /// meets the face along the face's normal. Only the elastic slip lies between.
 #[test]
-fn what_sticks_to_a_sloping_face_moves_with_it() {
+fn points_that_stick_to_a_sloping_face_move_with_it() {
     let friction =
         json!({"coefficient": 50, "nonlocal_radius": 0, "elastic_slip": 1e-6, "points": "nodal"});
     let solution = cylinder("obstacle", friction);
@@ -257,7 +257,7 @@ fn what_sticks_to_a_sloping_face_moves_with_it() {
 /// A curve that runs round the body faces each side with the part in front of it: the one behind, though
 /// nearer, lies beyond the body's other side.
 #[test]
-fn what_lies_behind_the_body_is_not_in_contact_with_it() {
+fn an_obstacle_behind_the_body_is_not_in_contact() {
     let text = json!({
         "analysis": {"kind": "plane_strain"},
         "mesh": {"grid": {"x": [0, 1, 2], "y": [-4, -2, 0]}},
@@ -285,7 +285,7 @@ fn what_lies_behind_the_body_is_not_in_contact_with_it() {
 
 /// The indentation that a warning names is the obstacle's own, not its part along a turned normal.
 #[test]
-fn the_indentation_that_engages_a_sloping_obstacle_is_its_own() {
+fn the_indentation_that_engages_a_sloping_obstacle_is_measured_along_its_push() {
     let solution = |indentation: f64| {
         let text = json!({
             "analysis": {"kind": "plane_strain"},
@@ -313,9 +313,9 @@ fn the_indentation_that_engages_a_sloping_obstacle_is_its_own() {
     assert!(solution(1.01).summary.normal_force > 0.0);
 }
 
-/// Tresca's bound acts on the whole boundary; where the body does not touch, that is said.
+/// Tresca's bound acts on the whole boundary; where the body does not touch, a warning reports it.
 #[test]
-fn a_given_bound_beyond_the_contact_is_said() {
+fn a_given_bound_beyond_the_contact_is_warned_of() {
     let bound = |bound: Value| {
         let solution = cylinder("body", json!({"elastic_slip": 1e-4, "bound": bound}));
         let mut codes = solution.summary.warnings.into_iter().map(|w| w.code);

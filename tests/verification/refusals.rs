@@ -142,7 +142,7 @@ fn a_material_has_one_complete_form() {
 }
 
 #[test]
-fn groups_have_a_name_of_their_own_and_an_element() {
+fn groups_have_a_unique_name_and_an_element() {
     refused(
         &[("/mesh/groups", json!({"thin": {"x": [0.2, 0.8]}}))],
         &[("/mesh/groups/thin", "empty_group")],
@@ -166,7 +166,7 @@ fn groups_have_a_name_of_their_own_and_an_element() {
 
 /// Refinement gives every group the children of its elements: a stiff half stays that half.
 #[test]
-fn refinement_carries_groups() {
+fn refinement_keeps_groups() {
     let bar = |mesh: Value, refine: u32| {
         let mut mesh = mesh;
         mesh["refine"] = json!(refine);
@@ -256,7 +256,7 @@ fn supports_name_one_pair_of_directions_and_no_corner() {
 }
 
 #[test]
-fn a_load_has_one_form_and_its_boundary() {
+fn a_load_has_one_form_and_its_own_place() {
     let refused = |load: Value, expected: &[(&str, &str)]| {
         refused(&[("/loads", json!([load]))], expected);
     };
@@ -384,7 +384,7 @@ fn a_supported_contact_node_stays_outside_the_obstacle_at_every_step() {
 }
 
 #[test]
-fn adaptive_refinement_wants_a_tolerance_a_grid_and_a_contact() {
+fn adaptive_refinement_needs_a_tolerance_a_grid_and_a_contact() {
     let contacts = json!([{"boundary": "top", "obstacle": {"kind": "flat"}}]);
     let grid = json!({"x": [0, 1, 2], "y": [0, 1, 2]});
     for tolerance in [0.0, 1.0, -0.1] {
@@ -415,7 +415,7 @@ fn adaptive_refinement_wants_a_tolerance_a_grid_and_a_contact() {
 }
 
 #[test]
-fn the_thesis_has_no_triangles_and_an_element_no_seven_nodes() {
+fn the_thesis_supports_no_triangles_and_no_element_has_seven_nodes() {
     let mesh = json!({"inline": {"nodes": [[0,0],[1,0],[0,1],[0.5,0],[0.5,0.5],[0,0.5]], "elements": [[0,1,2,3,4,5]],
         "boundaries": {"bottom": [[1,0,3]], "left": [[0,2,5]]}}});
     let contacts = json!([{"boundary": "left", "obstacle": {"kind": "flat"}}]);
@@ -435,7 +435,7 @@ fn the_thesis_has_no_triangles_and_an_element_no_seven_nodes() {
 }
 
 #[test]
-fn what_would_take_all_memory_is_refused() {
+fn a_problem_that_exceeds_all_memory_is_refused() {
     let contacts = json!([{"boundary": "top", "obstacle": {"kind": "flat"}}]);
     let lines: Vec<u32> = (0..=1500).collect();
     let mesh = json!({"grid": {"x": lines, "y": lines}, "refine": {"tolerance": 0.01}});

@@ -144,7 +144,7 @@ fn a_sliding_punch_presses_harder_at_its_trailing_edge() {
 /// tangential problem but for β = .02: few increments, for each locks in a little shear that the
 /// theory does not have. 1 %.
 #[test]
-fn a_drag_and_its_reversal_slip_as_cattaneo_and_mindlin_say() {
+fn a_drag_and_its_reversal_follow_cattaneo_and_mindlin() {
     let (mu, h) = (0.3, 0.0125);
     let x: Vec<f64> = (0..=96).map(|k| f64::from(k) * h).collect();
     let solve = |history: &str| {

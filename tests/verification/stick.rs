@@ -75,7 +75,7 @@ fn a_bonded_punch_needs_more_load() {
 /// Row 18, coupled: where a flat punch sticks, Coulomb limit, on a block of 4,000 a. 1 %. With an
 /// elastic slip far below 1e-6 it is the elements that tell stick from slip, and c moves by theirs.
 #[test]
-fn a_flat_punch_sticks_out_to_its_published_radius() {
+fn a_flat_punch_sticks_up_to_its_published_radius() {
     for (kind, nu, exact) in [
         ("plane_strain", 0.3, 0.6891),
         ("axisymmetric", 0.3, 0.8960),
@@ -114,7 +114,7 @@ fn a_flat_punch_sticks_out_to_its_published_radius() {
 /// Row 18, uncoupled: the frictionless reactions as loads, no obstacle, and the bound τ = μ p₀
 /// prescribed; K(√(1−k²))/K(k) = β/μ.
 #[test]
-fn with_a_given_bound_the_stick_zone_is_the_elliptic_one() {
+fn a_prescribed_bound_has_the_stick_zone_of_the_elliptic_integral() {
     let base = punch("plane_strain", 0.3, 4000.0, json!({}));
     let first = solved(&base);
     let profile = &first.profiles["top"];
@@ -188,7 +188,7 @@ fn the_total_law_sticks_least_under_a_parabola() {
 
 /// Row 19, incremental law in the plane: .6891, which 80 steps of equal contact width come near to.
 #[test]
-fn the_incremental_law_remembers_in_the_plane() {
+fn the_incremental_law_depends_on_the_path_in_the_plane() {
     let ratio = stick_ratio(&solve(&parabola("plane_strain", 150, "incremental", 80)).summary);
     held(
         19,
@@ -202,7 +202,7 @@ fn the_incremental_law_remembers_in_the_plane() {
 
 /// And in axisymmetry: .8960.
 #[test]
-fn the_incremental_law_remembers_in_axisymmetry() {
+fn the_incremental_law_depends_on_the_path_in_axisymmetry() {
     let ratio = stick_ratio(&solve(&parabola("axisymmetric", 150, "incremental", 80)).summary);
     held(
         19,
@@ -249,7 +249,7 @@ fn more_increments_change_less() {
 /// Row 19. Under a flat punch all points move along from the start: both laws agree to 1e-9 for any
 /// number of steps.
 #[test]
-fn under_a_flat_punch_both_laws_are_one() {
+fn under_a_flat_punch_both_laws_agree() {
     let mut p = example("rectangular_punch");
     p.mesh.refine = solver::problem::Refine::Times(1);
     p.solver.tolerance = 1e-12;

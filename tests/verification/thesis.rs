@@ -26,7 +26,7 @@ fn extrapolated(friction_force: u32, local_points: u32) -> ThesisOptions {
 
 /// Half a percent, as the published values were given: they come from an independent program.
 #[test]
-fn without_the_sign_it_settles_in_full_slip_and_says_so() {
+fn without_the_sign_it_settles_in_full_slip_and_reports_false_convergence() {
     let punch = example("rectangular_punch");
     let truth = solve(&punch).summary.tangential_force;
     close(truth, 14.169464, 1e-6);
@@ -52,7 +52,7 @@ fn without_the_sign_it_settles_in_full_slip_and_says_so() {
             "{name}: {}",
             summary.iterations
         );
-        // R_F sees nothing, the true residual everything, and the user is told
+        // R_F does not show the error, the true residual does, and a warning reports it
         let last = &solution.history[solution.history.len() - 1];
         assert!(last.r_f.unwrap() <= 1e-10, "{name}");
         assert!(summary.residuals.monolithic > 0.1, "{name}");
@@ -79,11 +79,11 @@ fn with_the_sign_it_falls_into_a_cycle_of_two() {
     };
     let summary = by_thesis(&example("rectangular_punch"), options, 200).summary;
     assert_eq!(summary.outcome, Outcome::ContactCycling);
-    let told = summary
+    let received = summary
         .warnings
         .iter()
         .find(|w| w.code == WarningCode::ContactCycling);
-    let message = &told.unwrap().message;
+    let message = &received.unwrap().message;
     assert!(
         message.contains("every 2 iterations") && message.contains("contact nodes [0, 1"),
         "{message}"
@@ -93,7 +93,7 @@ fn with_the_sign_it_falls_into_a_cycle_of_two() {
 /// Relaxed by .01 the signed iteration does arrive, in some two thousand steps; the true residual is
 /// then the tolerance divided by the relaxation factor at most.
 #[test]
-fn relaxed_to_a_hundredth_it_arrives_after_thousands_of_iterations() {
+fn with_relaxation_of_a_hundredth_it_converges_after_thousands_of_iterations() {
     let options = ThesisOptions {
         signed: true,
         relaxation: 0.01,
@@ -134,7 +134,7 @@ fn both_ways_of_evaluating_the_friction_force_are_similar() {
 
 /// A step ends at its own level, also where every increment settles in a false state.
 #[test]
-fn a_false_state_goes_on_to_the_end_of_its_step() {
+fn after_a_false_state_the_increments_of_a_step_continue() {
     let punch = example("rectangular_punch");
     let whole = by_thesis(&punch, ThesisOptions::default(), 200).summary;
     let mut steps = punch.clone();
@@ -149,7 +149,7 @@ fn a_false_state_goes_on_to_the_end_of_its_step() {
 /// What the two-element limit of 3.4.2 and the interpolation that goes with it change on example 2 with
 /// ρ = .05, elements of .05.
 #[test]
-fn the_two_element_limit_costs_little_on_example_2() {
+fn the_two_element_limit_changes_example_2_little() {
     let difference = |radius: f64| {
         let mut problem = example("cylinder");
         problem.contacts[0]
@@ -174,7 +174,7 @@ fn the_two_element_limit_costs_little_on_example_2() {
 
 /// The thesis's first guess, and what it cannot be used for.
 #[test]
-fn a_first_guess_is_taken_and_misuse_is_refused() {
+fn a_first_guess_is_used_and_wrong_options_are_refused() {
     let mut options = ThesisOptions::default();
     options.contact_guess.insert("top".to_owned(), [0.0, 0.3]);
     let punch = example("rectangular_punch");

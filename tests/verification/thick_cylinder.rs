@@ -74,13 +74,13 @@ fn hold(kind: &str, fields: &Fields, hoop: &[f64]) {
 }
 
 #[test]
-fn a_pressurised_ring_in_plane_strain_is_lames() {
+fn a_pressurised_ring_in_plane_strain_has_lames_solution() {
     let fields = solve(&ring(8, 8)).fields;
     hold("plane strain", &fields, &fields.stress_yy); // on y = 0 the hoop direction is y
 }
 
 #[test]
-fn a_pressurised_wall_in_axisymmetry_is_lames() {
+fn a_pressurised_wall_in_axisymmetry_has_lames_solution() {
     let fields = solve(&wall(8)).fields;
     hold("axisymmetric", &fields, &fields.stress_zz);
 }

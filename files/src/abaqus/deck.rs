@@ -15,7 +15,7 @@ pub(super) enum Theory {
     Axisymmetric,
 }
 
-/// What a set or a load refers to.
+/// The target of a set or a load.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Target {
     Label(u64),

@@ -1,4 +1,4 @@
-//! Keyword lines: `*NAME, PARAMETER=value, …`, and which block of data each of them begins.
+//! Keyword lines: `*NAME, PARAMETER=value, …`, and the block of data that each begins.
 
 use super::block::Block;
 use super::deck::{Deck, Elastic, ElementType, Section, Theory};

@@ -88,7 +88,8 @@ fn analysis(deck: &mut Deck) -> Analysis {
 }
 
 /// The rule of the quadrilaterals; where there are none that of the triangles, which Abaqus and CalculiX
-/// integrate with three points. In a mixed mesh triangles get the larger rule, which is at least as accurate but not the same.
+/// integrate with three points. In a mixed mesh triangles get the larger rule, which is at least as accurate but
+/// not the same.
 fn quadrature(deck: &mut Deck) -> u32 {
     if deck.types.iter().all(ElementType::is_triangle) {
         return 2;

@@ -9,7 +9,7 @@ use super::page::{self, Area, Fallible, WIDTH, number, px, round_up};
 use super::theme::{Theme, hex, viridis};
 use solver::element::{Element, Family};
 
-/// No more bands than this, and about half as many at least.
+/// Most bands; there are at least about half as many.
 const BANDS: f64 = 14.0;
 /// Side of the cells that an element is cut into (pixels), and most of them along a side.
 const CELL: f64 = 6.0;
@@ -25,14 +25,14 @@ pub(super) const BAR: i32 = 76;
 pub(super) struct Bands {
     /// The limits, one more than bands.
     edges: Vec<f64>,
-    /// What the field reaches beyond the first and the last.
+    /// The extremes of the field, if beyond the first and the last limit.
     beyond: [Option<f64>; 2],
 }
 
 impl Bands {
-    /// For values at nodes. `near`: value and area of those where the reader looks. At a sharp edge a
-    /// few nodes may dwarf all others, and have no mesh limit: then the bands end half their width
-    /// beyond what 97 % of that area stays within, and the bar says what the field reaches.
+    /// For values at nodes. `near`: value and area of those in the last window. At a sharp edge a few
+    /// nodes may exceed all others, and do not converge: then the bands end half their width beyond the values of
+    /// 97 % of that area, and the bar shows the extremes of the field.
     pub(super) fn of(values: &[f64], mut near: Vec<(f64, f64)>) -> Bands {
         let extreme = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick);
         let least = extreme(f64::min).unwrap_or(0.0);
@@ -81,7 +81,7 @@ impl Bands {
         self.edges.len() - 1
     }
 
-    /// The band of a value; what is beyond belongs to the first or the last.
+    /// The band of a value; values beyond belong to the first or the last.
     fn band(&self, value: f64) -> usize {
         let above = self.edges.partition_point(|edge| *edge <= value);
         above.saturating_sub(1).min(self.count() - 1)
@@ -176,7 +176,7 @@ impl Bands {
             paths[low].polygon(&places(cell));
             return;
         }
-        // only in a triangle the field is linear
+        // the field is linear only in a triangle
         for k in 1..cell.len() - 1 {
             let triangle = [cell[0], cell[k], cell[k + 1]];
             for band in low..=high {
@@ -219,7 +219,7 @@ impl Bands {
             [(edge(0), upper), (edge(count), lower)],
             axis,
         ))?;
-        // every number, or every other one where they would touch
+        // every number, or every other one if they would touch
         let labels: Vec<String> = self.edges.iter().map(|edge| number(*edge)).collect();
         let widest = labels.iter().map(|l| page::width(l)).max().unwrap_or(0);
         let stride = (widest + 8 + each - 1) / each.max(1);
@@ -247,7 +247,7 @@ impl Bands {
     }
 }
 
-/// To three digits: more would be read as if they were known.
+/// Three digits: more would suggest an accuracy that there is not.
 fn rounded(value: f64) -> f64 {
     let unit = 10f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 2.0);
     (value / unit).round() * unit
@@ -321,7 +321,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bands_end_on_round_numbers_and_a_lone_peak_is_said_not_shown() {
+    fn bands_end_on_round_numbers_and_a_lone_peak_is_only_a_number() {
         let even: Vec<f64> = (0..=100).map(f64::from).collect();
         let bands = Bands::of(&even, vec![]);
         assert_eq!((bands.count(), bands.beyond), (10, [None, None]));

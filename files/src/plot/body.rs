@@ -1,5 +1,5 @@
-//! Bodies between equal axes. What lies inside of the axes is written as paths: they are clipped,
-//! keep the parabolas that the sides of elements are, and one path may hold thousands of shapes.
+//! Bodies between equal axes. The content is written as paths: they are clipped, have the
+//! parabolas of the sides of elements, and one path may contain thousands of shapes.
 
 use std::fmt::Write;
 
@@ -83,7 +83,7 @@ impl Frame {
         ]
     }
 
-    /// Whether something between two corners (as of `at`) is to be seen.
+    /// Whether something between two corners (as of `at`) is visible.
     pub(super) fn shows(&self, low: [f64; 2], high: [f64; 2]) -> bool {
         (0..2).all(|a| high[a] >= 0.0 && low[a] <= f64::from(self.size[a]))
     }
@@ -169,7 +169,7 @@ pub(super) fn axes(
     draw_text(area, theme, caption, corner)
 }
 
-/// What is inside of the axes, clipped, in a border; goes on top of the page.
+/// The content of the axes, clipped, in a border; put on top of the page.
 pub(super) fn inside(theme: Theme, frame: &Frame, content: &str) -> String {
     let ([x, y], [w, h]) = (frame.corner, frame.size);
     let y = y + px(HEAD);
@@ -190,7 +190,7 @@ pub(super) fn inside(theme: Theme, frame: &Frame, content: &str) -> String {
 pub(super) struct Path(pub(super) String);
 
 impl Path {
-    /// A closed polygon; nothing where it has shrunk to a point.
+    /// A closed polygon; nothing if it has shrunk to a point.
     pub(super) fn polygon(&mut self, points: &[[f64; 2]]) {
         let points: Vec<[i64; 2]> = points.iter().map(|p| p.map(round)).collect();
         let Some((first, rest)) = points.split_first() else {
@@ -233,7 +233,7 @@ impl Path {
         }
     }
 
-    /// As an element of SVG with these attributes; nothing when it is empty.
+    /// An element of SVG with these attributes; nothing if the path is empty.
     pub(super) fn drawn(&self, attributes: &str) -> String {
         match self.0.is_empty() {
             true => String::new(),
@@ -242,7 +242,7 @@ impl Path {
     }
 }
 
-/// Far outside is outside: larger numbers say no more, and some viewers fail on them.
+/// Limits coordinates far outside of the page: some viewers fail on large numbers.
 fn round(x: f64) -> i64 {
     x.clamp(-1e6, 1e6).round() as i64
 }
@@ -268,13 +268,13 @@ impl Sides {
         }
         let alone = |side: &&[u32; 3]| seen[side[2] as usize] == 1;
         let surface: Vec<[u32; 3]> = all.iter().filter(alone).copied().collect();
-        // one after the other, so that dashes go on from side to side
+        // one after the other, so that dashes continue from side to side
         let surface = runs(&surface).concat();
         Sides { all, surface }
     }
 }
 
-/// Coordinates as the theory names them.
+/// Names of the coordinates in the theory.
 pub(super) fn coordinates(analysis: &solver::problem::Analysis) -> [&'static str; 2] {
     match analysis {
         solver::problem::Analysis::Axisymmetric {} => ["r", "z"],
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn the_surface_is_what_one_element_has_alone() {
+    fn the_surface_consists_of_sides_with_one_element() {
         let strip = solver::mesh::grid_mesh(&solver::problem::Grid {
             x: vec![0.0, 1.0, 2.0],
             y: vec![0.0, 1.0],

@@ -1,4 +1,4 @@
-//! How the iterations went: residuals, and the contact set.
+//! Residuals and the contact set by iteration.
 
 use super::figure::{Curve, LineStyle, Panel, Scale, figure};
 use super::theme::Theme;
@@ -7,7 +7,7 @@ use solver::problem::Problem;
 use solver::solution::Iteration;
 
 /// Every residual on a logarithmic axis with the tolerance above, the contact set below, against the
-/// number of the iteration; vertical lines where load steps begin. `Err` says why it could not be drawn.
+/// number of the iteration; vertical lines where load steps begin. `Err`: the reason why it could not be drawn.
 pub fn convergence_svg(
     theme: Theme,
     problem: &Problem,

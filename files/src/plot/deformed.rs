@@ -16,7 +16,7 @@ const VISIBLE: f64 = 0.1;
 /// A contact below this part of the body gets a window of its own, twice its size.
 const SMALL: f64 = 0.2;
 
-/// What the contours show.
+/// The stress that the contours show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stress {
     /// √(½((σ_xx − σ_yy)² + (σ_yy − σ_zz)² + (σ_zz − σ_xx)²) + 3σ_xy²).
@@ -78,8 +78,8 @@ impl Stress {
 }
 
 /// The deformed body with contours of a stress and its undeformed outline; a second panel shows the
-/// contact where it is small. Displacements are scaled so that they are seen, and each panel says by
-/// how much. `Err` says why it could not be drawn.
+/// contact where it is small. Displacements are scaled so that they are visible, and each panel shows
+/// the factor. `Err`: the reason why it could not be drawn.
 pub fn deformed_svg(
     theme: Theme,
     problem: &Problem,
@@ -148,13 +148,13 @@ pub fn deformed_svg(
 }
 
 /// The factor on displacements, 1, 2 or 5 times a power of ten, that makes the largest one about
-/// `wanted`; true to scale where that is near enough.
+/// `wanted`; 1 if that is near enough.
 fn visible(wanted: f64, largest: f64) -> f64 {
     let factor = wanted / largest;
     if !factor.is_normal() || (0.25..2.0).contains(&factor) {
         return 1.0;
     }
-    // rounded down, that is up between the reciprocals
+    // rounded down: the reciprocal is rounded up
     1.0 / page::round_up(1.0 / factor, &[1.0, 2.0, 5.0])
 }
 
@@ -164,7 +164,7 @@ struct Body<'a> {
 }
 
 impl Body<'_> {
-    /// Fields come from a file or a store: columns may be too short.
+    /// Checks the lengths of columns: fields may come from a file or a store.
     fn check(&self) -> Result<(), String> {
         let f = self.fields;
         let nodes = f.x.len();
@@ -187,7 +187,7 @@ impl Body<'_> {
         self.fields.ux[node as usize].hypot(self.fields.uy[node as usize])
     }
 
-    /// The part of the body's area that belongs to each node: of its elements, equal parts.
+    /// The part of the body's area that belongs to each node: equal parts of its elements.
     fn areas(&self) -> Vec<f64> {
         let mut areas = vec![0.0; self.fields.x.len()];
         for element in &self.fields.elements {
@@ -205,13 +205,13 @@ impl Body<'_> {
         areas
     }
 
-    /// The nodes in contact and beside it; profiles know them by their places.
+    /// The nodes in contact and beside it; profiles identify them by their positions.
     fn contact(&self, profiles: &BTreeMap<String, ContactProfile>) -> Vec<u32> {
         let bits = |x: f64, y: f64| (x.to_bits(), y.to_bits());
         let touching: BTreeSet<(u64, u64)> = profiles
             .values()
             .flat_map(|profile| {
-                // with a neighbour on each side: also one node has an extent
+                // with a neighbour on each side, so that one node has an extent too
                 let near = |i: usize| {
                     let states = profile.state.get(i.saturating_sub(1)..).unwrap_or_default();
                     let three = if i == 0 { 2 } else { 3 };
@@ -237,7 +237,7 @@ impl Body<'_> {
     fn near(&self, contact: &[u32], touching: &Window, whole: &Window) -> (Window, f64) {
         let side = (2.0 * touching.largest()).max(0.002 * whole.largest());
         let largest = contact.iter().map(|&n| self.moved(n)).fold(0.0, f64::max);
-        // not smaller than true: the window follows the contact where that has moved far
+        // at least 1: the window follows a contact that has moved far
         let factor = visible(VISIBLE * side, largest).max(1.0);
         let places = |nodes: &mut dyn Iterator<Item = u32>, factor: f64| {
             Window::around(nodes.map(|n| self.place(n, factor)))

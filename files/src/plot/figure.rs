@@ -18,7 +18,7 @@ const LEFT: i32 = 92;
 /// Decades that a logarithmic axis spans at most, from the largest value down.
 const DECADES: f64 = 18.0;
 
-/// How a curve looks.
+/// The style of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineStyle {
     /// A line in one of six colours, counted from 0.
@@ -36,34 +36,34 @@ pub enum LineStyle {
 /// One curve.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// In the legend; empty: not there.
+    /// Its name in the legend; empty: it has no entry.
     pub label: String,
-    /// How it looks.
+    /// The style of its line.
     pub style: LineStyle,
     /// In order of x.
     pub points: Vec<(f64, f64)>,
 }
 
-/// What the vertical axis does with the values.
+/// The scale of the vertical axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// Linear; a peak without mesh limit is cut off, and the legend says so.
+    /// Linear; a peak that does not converge is cut off, with a note in the legend.
     #[default]
     Stress,
     /// Linear from 0, over whole numbers.
     Count,
-    /// Logarithmic, over whole numbers; what is not positive is left out.
+    /// Logarithmic, over whole numbers; values ≤ 0 are left out.
     Log,
 }
 
 /// One pair of axes.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
-    /// What x is.
+    /// Name of the x axis.
     pub x: String,
-    /// What y is.
+    /// Name of the y axis.
     pub y: String,
-    /// How y is shown.
+    /// Scale of the y axis.
     pub scale: Scale,
     /// Drawn in this order.
     pub curves: Vec<Curve>,
@@ -71,7 +71,7 @@ pub struct Panel {
     pub marks: Vec<(f64, String)>,
 }
 
-/// Panels below one another under a title. `Err` says why the figure could not be drawn.
+/// Panels below one another under a title. `Err`: the reason why the figure could not be drawn.
 pub fn figure(theme: Theme, title: &str, panels: &[Panel]) -> Result<String, String> {
     if panels
         .iter()
@@ -220,7 +220,7 @@ fn style(palette: &Palette, style: LineStyle) -> ShapeStyle {
     }
 }
 
-/// What the legend says of a curve, and how wide that is (pixels).
+/// The text of a curve in the legend, and its width (pixels).
 fn entry(curve: &Curve, limit: f64) -> (String, i32) {
     let larger = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
     let peak = curve.points.iter().map(|p| p.1).fold(0.0, larger);
@@ -257,7 +257,7 @@ fn rows(panel: &Panel) -> i32 {
     places.last().map_or(1, |(row, _)| row + 1)
 }
 
-/// Samples above the panel, where they hide nothing.
+/// Samples of the curves, above the panel so that they cover no curve.
 fn legend(area: &Area<'_>, theme: Theme, panel: &Panel, limit: f64) -> Fallible<()> {
     let palette = theme.palette();
     let named = panel.curves.iter().filter(|curve| !curve.label.is_empty());
@@ -325,8 +325,8 @@ fn decades(exponents: impl Iterator<Item = f64>) -> Range<f64> {
     (low - 0.1).floor().max(top - DECADES).min(top - 2.0)..top
 }
 
-/// The largest |stress| that is drawn. At a sharp edge one node may dwarf all others, and has no
-/// mesh limit: what exceeds the value that 97 % of the contact stays below is cut off at twice that.
+/// The largest |stress| that is drawn. At a sharp edge one node may exceed all others, and does not
+/// converge: what exceeds the value that 97 % of the contact stays below is cut off at twice that.
 fn readable_limit(panel: &Panel) -> f64 {
     if panel.scale != Scale::Stress {
         return f64::INFINITY;
@@ -377,7 +377,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_legend_takes_more_lines_and_nothing_is_no_figure() {
+    fn a_long_legend_takes_more_lines_and_a_figure_needs_a_curve() {
         let curve = |label: &str| Curve {
             label: label.to_owned(),
             style: LineStyle::Line(0),

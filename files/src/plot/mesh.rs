@@ -23,11 +23,11 @@ const WIDTHS: [f64; 3] = [5.0, 2.4, 1.2];
 /// With more elements than this only the outline is drawn: the lines would cover the body, and viewers refuse
 /// files of some ten megabytes.
 const DRAWN: usize = 30_000;
-/// More boundaries than this are not named.
+/// Most boundaries with a name.
 const MOST: usize = 24;
 
 /// Elements between equal axes, each named boundary in a colour of its own. The elements are those of
-/// `fields`, which adaptive refinement makes, or without them those of the problem. `Err` says why it
+/// `fields`, which adaptive refinement makes, or without them those of the problem. `Err`: the reason why it
 /// could not be drawn.
 pub fn mesh_svg(
     theme: Theme,
@@ -75,7 +75,7 @@ pub fn mesh_svg(
             );
         }
     } else {
-        // what lies between its outline and its holes
+        // the area between its outline and its holes
         inside.sides(
             &sides.surface.iter().map(on_page).collect::<Vec<_>>(),
             false,
@@ -90,7 +90,7 @@ pub fn mesh_svg(
         r#"fill="none" stroke="{line}" stroke-width="{finest}""#
     ));
 
-    // what lies on another boundary is drawn thinner, so that both are seen
+    // a boundary on top of another one is drawn thinner, so that both are visible
     let mut covered: BTreeMap<u32, usize> = BTreeMap::new();
     let names = in_order(problem, mesh.boundaries.keys().cloned().collect());
     for (k, name) in names.iter().take(MOST).enumerate() {
@@ -162,7 +162,7 @@ fn in_order(problem: &Problem, mut names: Vec<String>) -> Vec<String> {
     names
 }
 
-/// The name, and what the problem does there.
+/// The name, and its use in the problem.
 fn label(problem: &Problem, name: &str) -> String {
     let contact = problem.contacts.iter().any(|c| c.boundary == name);
     let support = problem
@@ -170,8 +170,8 @@ fn label(problem: &Problem, name: &str) -> String {
         .iter()
         .any(|s| s.boundary.as_deref() == Some(name));
     let load = problem.loads.iter().any(|l| l.boundary() == Some(name));
-    let said = [(contact, "contact"), (support, "support"), (load, "load")];
-    let roles: Vec<&str> = said
+    let uses = [(contact, "contact"), (support, "support"), (load, "load")];
+    let roles: Vec<&str> = uses
         .into_iter()
         .filter(|(is, _)| *is)
         .map(|(_, role)| role)
@@ -207,7 +207,7 @@ mod tests {
     use solver::problem::{MeshInput, MeshSource, Refine};
 
     #[test]
-    fn of_a_very_fine_mesh_the_outline_is_drawn() {
+    fn a_very_fine_mesh_is_drawn_as_its_outline() {
         let mut problem = problem();
         let size = |problem: &Problem| {
             let svg = mesh_svg(Theme::Light, problem, None, &Fields::default()).unwrap();
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_that_is_none_is_said_to_be_so() {
+    fn a_problem_without_a_mesh_is_an_error() {
         let mut problem = problem();
         problem.mesh = MeshInput::new(MeshSource::Stored("sha256:0".to_owned()));
         assert!(

@@ -1,6 +1,6 @@
-//! Figures as SVG, made to be put into a paper: 720 pixels wide, light or dark.
+//! Figures as SVG, for use in a paper: 720 pixels wide, light or dark.
 //!
-//! Axes, text and curves are drawn by plotters; bodies (`body`) are paths of our own, since plotters
+//! Axes, text and curves are drawn by plotters; bodies (`body`) are paths written here, since plotters
 //! neither clips nor joins shapes.
 
 mod bands;
@@ -27,7 +27,7 @@ use solver::problem::Problem;
 use solver::solution::{ContactProfile, Fields, Iteration};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
-/// What can be drawn of a problem and its solution.
+/// The figures of a problem and its solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum Plot {
@@ -51,8 +51,7 @@ impl Plot {
     }
 }
 
-/// The parts of a solution that figures are drawn from. Each figure needs its own; what it does not
-/// need may be empty.
+/// The parts of a solution that figures are drawn from. Parts that a figure does not need may be empty.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts<'a> {
     /// For `convergence`.
@@ -61,7 +60,7 @@ pub struct Parts<'a> {
     pub profiles: &'a BTreeMap<String, ContactProfile>,
     /// For `deformed`; `mesh` draws the problem's own mesh without them.
     pub fields: &'a Fields,
-    /// The mesh that the problem names by its hash, where it does; for `mesh`.
+    /// The mesh that the problem names by its hash, if it does; for `mesh`.
     pub stored: Option<&'a Mesh>,
 }
 
@@ -70,7 +69,7 @@ pub struct Parts<'a> {
 pub struct Style {
     /// Its colours.
     pub theme: Theme,
-    /// What the contours of `deformed` show.
+    /// The stress that the contours of `deformed` show.
     pub stress: Stress,
 }
 
@@ -83,7 +82,7 @@ impl From<Theme> for Style {
     }
 }
 
-/// Draws one figure. `Err` says why it could not be drawn.
+/// Draws one figure. `Err`: the reason why it could not be drawn.
 pub fn draw(
     plot: Plot,
     style: impl Into<Style>,

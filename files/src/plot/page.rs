@@ -28,8 +28,8 @@ pub(super) const fn px(pixels: i32) -> i32 {
     pixels * FINE
 }
 
-/// A page `height` pixels high below its title. `draw` gets the area below the title, and answers with
-/// SVG of its own that goes on top, in the units of the drawing from the corner of the page.
+/// A page `height` pixels high below its title. `draw` gets the area below the title, and returns
+/// further SVG that is put on top, in the units of the drawing from the corner of the page.
 pub(super) fn page(
     theme: Theme,
     title: &str,
@@ -56,11 +56,11 @@ pub(super) fn page(
         Ok(over)
     };
     let over = drawn().map_err(|error| error.to_string())?;
-    // the view box stays fine; the size is said in pixels
+    // the view box stays fine; the size is given in pixels
     let fine = format!(r#"width="{}" height="{}""#, px(size.0), px(size.1));
-    let said = format!(r#"width="{}" height="{}""#, size.0, size.1);
-    let mut svg = svg.replacen(&fine, &said, 1);
-    // names are a client's, and XML has no word for these
+    let size = format!(r#"width="{}" height="{}""#, size.0, size.1);
+    let mut svg = svg.replacen(&fine, &size, 1);
+    // names come from clients, and XML does not allow these characters
     svg.retain(|c| c == '\n' || !(c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}')));
     match svg.rfind("</svg>") {
         Some(end) => Ok(format!("{}{over}{}", &svg[..end], &svg[end..])),
@@ -116,7 +116,7 @@ pub(super) fn number(value: f64) -> String {
     digits(value).replace('-', "−")
 }
 
-/// The number of a tick on an axis of some length: what sums leave of zero is zero.
+/// The number of a tick on an axis of some length: a rounding error beside zero is zero.
 pub(super) fn tick(value: f64, length: f64) -> String {
     let small = value.abs() < 1e-9 * length.abs();
     number(if small { 0.0 } else { value })
@@ -141,7 +141,7 @@ fn digits(value: f64) -> String {
 pub(super) fn round_up(value: f64, steps: &[f64]) -> f64 {
     let power = 10f64.powf(value.log10().floor());
     let mut rounds = steps.iter().map(|step| step * power);
-    // a hair above counts as equal
+    // up to rounding above counts as equal
     let fits = rounds.find(|round| *round >= value * (1.0 - 1e-9));
     fits.unwrap_or(10.0 * power)
 }
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_of_zero_is_zero() {
+    fn a_rounding_error_beside_zero_is_shown_as_zero() {
         assert_eq!(tick(1.388e-17, 0.1), "0");
         assert_eq!(tick(1.388e-17, 1e-16), "1.388e−17");
     }
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_user_s_text_is_text_and_is_shortened() {
+    fn a_title_is_escaped_and_shortened() {
         let title = format!("<script>&\u{1}{}", "x".repeat(200));
         let svg = page(Theme::Dark, &title, 50, |_| Ok("<g/>".to_owned())).unwrap();
         assert!(

@@ -11,7 +11,7 @@ use solver::problem::{Contact, Problem};
 use solver::solution::ContactProfile;
 
 /// For each contact boundary: σ_n above, and where there is friction σ_t with its bound ±τ below, against arc
-/// length. Stresses are negative in compression. `Err` says why a figure could not be drawn.
+/// length. Stresses are negative in compression. `Err`: the reason why a figure could not be drawn.
 pub fn profile_svg(
     theme: Theme,
     problem: &Problem,
@@ -77,7 +77,7 @@ fn stressed(profile: &ContactProfile) -> Range<usize> {
     let high = profile
         .s
         .partition_point(|s| *s <= profile.s[last] + margin);
-    // one node beyond, so that the curves are seen to return to zero
+    // one node beyond, so that the curves visibly return to zero
     low.min(first.saturating_sub(1))..high.max(last + 2).min(nodes)
 }
 
@@ -87,7 +87,7 @@ mod tests {
     use crate::plot::tests::problem;
 
     #[test]
-    fn a_figure_holds_its_curves_and_survives_a_flat_profile() {
+    fn a_figure_has_its_curves_also_for_a_flat_profile() {
         let profile = ContactProfile {
             s: vec![0.0, 0.5, 1.0],
             normal_stress: vec![-1.0, -2.0, -4.0],

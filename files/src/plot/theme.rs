@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use plotters::style::RGBColor;
 
-/// What a figure is drawn on.
+/// The background of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Theme {
     /// Paper.
@@ -36,7 +36,7 @@ pub(super) struct Palette {
     pub(super) reference: RGBColor,
     /// Inside of a body without contours.
     pub(super) body: RGBColor,
-    /// Curves and boundaries, told apart also by who sees no red or green.
+    /// Curves and boundaries, distinguishable also with red–green colour blindness.
     pub(super) curves: [RGBColor; 6],
 }
 
@@ -79,7 +79,7 @@ impl Theme {
     }
 }
 
-/// Viridis at t from 0 to 1: even steps for the eye, in grey too and for who sees no red or green.
+/// Viridis at t from 0 to 1: even steps for the eye, also in grey and with red–green colour blindness.
 pub(super) fn viridis(t: f64) -> RGBColor {
     const STOPS: [[f64; 3]; 9] = [
         [68.0, 1.0, 84.0],

@@ -338,7 +338,7 @@ impl<'a> System<'a> {
             .sum()
     }
 
-    /// e = u_t − d − g at a friction point: what friction answers to.
+    /// e = u_t − d − g at a friction point: the displacement that friction acts on.
     pub fn slip(&self, v: &[f64], point: &Point) -> f64 {
         self.relative_displacement(v, point) - point.anchor
     }
@@ -351,7 +351,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Ŝ v − f̂: the force that the body asks for on its contact unknowns.
+    /// Ŝ v − f̂: the elastic force on the contact unknowns.
     pub fn elastic_force(&self, v: &[f64]) -> Vec<f64> {
         self.stiffness
             .times(v)
@@ -470,7 +470,7 @@ impl<'a> System<'a> {
                 .max(self.reference_force),
             reaction => reaction,
         };
-        // without any force in the whole problem there is nothing to compare with, and no defect
+        // a problem without any force has no scale, and no defect
         if defect == 0.0 {
             0.0
         } else {

@@ -20,7 +20,7 @@ pub struct Place {
     pub rows: u32,
 }
 
-/// A state with the friction bound it was found for, and what the two imply.
+/// A state with the friction bound used for it, and the quantities that both imply.
 #[derive(Clone)]
 pub(super) struct Measured {
     pub(super) state: State,

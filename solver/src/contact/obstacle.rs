@@ -436,7 +436,7 @@ mod tests {
         assert_eq!(tabulated(&x, &y, 3.1, 1e-12), None);
     }
 
-    /// A roof over a flat top: distances and slopes along its normal, nothing beside it.
+    /// A roof over a flat top: distances and slopes along its normal, no obstacle beside it.
     #[test]
     fn curves_in_space_are_met_along_the_normal() {
         let (from, to, along) = (None, None, Along::X);

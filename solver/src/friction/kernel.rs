@@ -3,8 +3,8 @@
 //!   S(s) = ∫ ω_ρ(|s − y|) p(y) dy = Σ_j W_j(s) p_j,   p quadratic on each edge
 //!
 //! Mesh-free: the kernel is integrated over its exact support, split at the ends of edges and at
-//! its own centre, whatever the number of edges under it (without the
-//! thesis's limit of two, 3.4.2).
+//! its own centre, whatever the number of edges under it (without the thesis's limit of
+//! two, 3.4.2).
 
 use std::sync::LazyLock;
 

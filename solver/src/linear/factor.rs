@@ -20,7 +20,7 @@ use faer::{Conj, MatMut, Par, Side};
 
 use crate::linear::{Dense, Graph, SparseSymmetric};
 
-/// Parallelism of one job: none. Two jobs use the two cores, and a second thread gained nothing.
+/// Parallelism of one job: none. Two jobs use the two cores, and a second thread gave no speed-up.
 const PAR: Par = Par::Seq;
 
 /// The reason why there is no factor.

@@ -296,7 +296,7 @@ impl Owners {
                     owners.first[mid] = e as u32;
                 } else {
                     let first = owners.first[mid] as usize;
-                    // the neighbour runs along the same side the other way
+                    // the neighbour runs along the same side in the other direction
                     let shared = raw.elements[first].sides().any(|s| s == [b, a, mid as u32]);
                     if owners.count[mid] >= 2 || !shared {
                         all.fail(nonconforming(raw, first, e, found));

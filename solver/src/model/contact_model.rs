@@ -5,7 +5,7 @@ use crate::contact::ContactBoundary;
 use crate::friction::{Average, FrictionLaw};
 use crate::problem::{Condition, NormalOf};
 
-/// A contact boundary and what it faces.
+/// A contact boundary, its obstacle and its friction law.
 #[derive(Clone, Debug)]
 pub struct ContactModel {
     /// Name of the boundary.

@@ -17,7 +17,7 @@ enum Place<'a> {
     Nodes(&'a [u32]),
 }
 
-/// What supports prescribe at a node.
+/// The displacements that supports prescribe at a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Held {
     /// The displacement along one direction.
@@ -101,7 +101,7 @@ impl Checks {
         (fixed, all.finish(()))
     }
 
-    /// Adds what one support prescribes to what is `fixed` already; two values agree to `rounding`.
+    /// Adds the displacements that a support prescribes to those `fixed` already; two values agree to `rounding`.
     fn support(
         &mut self,
         mesh: &Mesh,

@@ -16,8 +16,8 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 ///   edge: exact, since the solution is quadratic. (Contact uses the gap at nodes; between them the obstacle
 ///   itself may be elsewhere.)
 /// - tangential stress, nonlocal pressure, friction bound and ratio are those of the law at nodes and
-///   friction points, five per edge with Gauss points, and curves between them: of the two parabolas in s through a third
-///   neighbour the flatter one, and the straight line where they bend to opposite sides. So a
+///   friction points, five per edge with Gauss points, and curves between them: of the two parabolas in s through a
+///   third neighbour the flatter one, and the straight line where they bend to opposite sides. So a
 ///   quadratic is exact, a smooth column is accurate to third order, and the corners of the law, at the end of
 ///   contact or of stick, cause no oscillation nearby. Bound ≥ 0 and
 ///   0 ≤ ratio ≤ 1 are kept.

@@ -67,8 +67,8 @@ pub(in crate::algorithm) fn free_dofs(
 }
 
 /// Added to the diagonal of H where Ŝ leaves rigid motions free: a step along one is then long but
-/// finite, until contact ends it. Where contact holds the body it
-/// costs a step or two but no accuracy, since the gradient does not depend on it.
+/// finite, until contact ends it. Where contact holds the body it costs a step or two but no accuracy, since the
+/// gradient does not depend on it.
 pub(in crate::algorithm) fn semidefinite_shift(system: &System<'_>) -> f64 {
     let size = system.stiffness.size().max(1);
     let diagonal: f64 = (0..system.stiffness.size())

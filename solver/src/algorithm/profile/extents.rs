@@ -75,7 +75,7 @@ impl PatchView<'_> {
                 } else {
                     &mut slip
                 };
-                // pieces that meet were divided for nothing
+                // adjacent pieces in the same state are one
                 match list.last_mut() {
                     Some([_, end]) if *end == pair[0] => *end = pair[1],
                     _ => list.push([pair[0], pair[1]]),

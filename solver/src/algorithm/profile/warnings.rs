@@ -172,8 +172,8 @@ impl PatchView<'_> {
         };
         let total: f64 = own.iter().map(|force| force.abs()).sum();
         let mut canceling: f64 = own.chunks(3).map(cancels).sum();
-        // the motion may turn once, within a coarse edge; but not from the full bound one way to the
-        // full bound the other way
+        // the motion may turn once, within a coarse edge; but not from the full bound in one direction to
+        // the full bound in the other
         let reached: Vec<bool> = self
             .system
             .points
