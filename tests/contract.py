@@ -1,11 +1,11 @@
-"""Generated calls against the API as /openapi.json describes it: schemathesis makes them, from good data and
-bad, and checks that every answer is one that is described (status, type, headers, schema, code), none a 5xx.
+"""Generated calls against the API as /openapi.json describes it: schemathesis makes them from valid and invalid
+data, and checks that every answer is a described one (status, type, headers, schema, code), and none a 5xx.
 
-    tests/contract.py [CALLS]        at least so many, 2000 when nothing is said
+    tests/contract.py [CALLS]        minimum number of calls, by default 2000
 
-Two servers: the first keeps its jobs, so that names resolve; what deletes or cancels many at once, or holds
-up the queue, runs against the second. The jobs whose events are asked for have ended: a stream that does not
-end would be waited for (tests/service reads those).
+Two servers: the first keeps its jobs, so that names resolve; operations that delete or cancel many jobs, or pause
+the queue, run against the second. The jobs whose events are requested have ended: schemathesis would wait for the
+end of a stream that does not end (tests/service reads such streams).
 """
 
 # Operations: GetOpenApi
@@ -27,19 +27,19 @@ import schemathesis
 
 TOP = pathlib.Path(__file__).resolve().parents[1]
 SIGNORINI = TOP / "target/release/signorini"
-# of the environment that runs this
+# of the Python environment that runs this script
 SCHEMATHESIS = pathlib.Path(sys.executable).with_name("schemathesis")
 # seconds after which a run that hangs is ended
 PATIENCE = 240
-# what deletes or cancels many, or holds up the queue
+# operations that delete or cancel many jobs, or pause the queue
 DRASTIC = "^(DELETE |POST /v1/jobs/cancel|POST /v1/queue/)"
-# A fresh seed each time: over the weeks that finds more than the same calls every day.
+# A new seed each time: over many runs that finds more than the same calls every day.
 SETTINGS = """
 hooks = "contract"
 continue-on-failure = true
 request-timeout = 30
 suppress-health-check = ["all"]
-# more threads trip over a fault of CPython 3.11: "AST constructor recursion depth mismatch"
+# more threads trigger a fault of CPython 3.11: "AST constructor recursion depth mismatch"
 workers = 1
 warnings = false
 
@@ -50,13 +50,13 @@ max-examples = {examples}
 stateful.enabled = false
 
 [checks]
-# Good data by the schema may still mean nothing: a boundary that does not exist, a body free to move.
+# Data valid by the schema may still be refused: a boundary that does not exist, a body that is free to move.
 positive_data_acceptance.enabled = false
-# Nobody has to prove who he is.
+# There is no authentication.
 ignored_auth.enabled = false
 
 [[operations]]
-# What is wrong with a problem is what it answers.
+# The violations of a problem are its answer.
 include-operation-id = "ValidateProblem"
 checks.negative_data_rejection.enabled = false
 
@@ -69,7 +69,7 @@ checks.negative_data_rejection.enabled = false
 
 
 class Server:
-    """A server of its own, with jobs at every end of a job's life."""
+    """A server of its own, with jobs of every terminal status."""
 
     def __init__(self, folder):
         self.process = subprocess.Popen(
@@ -114,16 +114,16 @@ class Server:
 
 @schemathesis.hook
 def before_call(context, case, kwargs):
-    """A job that has ended does not change: who waits for that, waits in vain, for a minute."""
+    """A job that has ended does not change: waiting for a change would take a minute in vain."""
     try:
         if case.operation.path == "/v1/jobs/{id}" and 0.05 < float(case.query["wait"]) <= 60:
             case.query["wait"] = 0.05
     except (KeyError, TypeError, ValueError):
-        pass  # nothing that would be waited for
+        pass  # the request does not wait
 
 
 def settings(known, examples):
-    """Three names of four exist: with made-up ones alone, nearly every answer would be 404."""
+    """Three names of four exist: with random ones alone, nearly every answer would be 404."""
     dictionaries = "".join(f"{name} = {{ values = {json.dumps(values)} }}\n" for name, values in known.items())
     bound = '"path.{0}" = {{ dictionary = "{0}", probability = 0.75 }}\n'
     return SETTINGS.format(
@@ -132,7 +132,7 @@ def settings(known, examples):
 
 
 def run(folder, examples, *which):
-    """Schemathesis against a server of its own: how many calls it made, and what is wrong if anything is."""
+    """Schemathesis against a server of its own: the number of calls, and the faults found."""
     folder.mkdir()
     server = Server(folder)
     try:

@@ -26,7 +26,7 @@ BINARY = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else TOP / "target/relea
 QUADRATIC_TRIANGLE, QUADRATIC_QUAD = 22, 23
 STATES = {"open": 0, "stick": 1, "slip": 2}
 
-# its default reads a last bit wrong before pandas 3.1, which warns of the argument that mends it
+# its default misreads a last bit before pandas 3.1, which warns about the argument that corrects it
 warnings.filterwarnings("ignore", message=".*float_precision.*")
 
 checks = 0
@@ -53,7 +53,7 @@ def same(found, expected, what):
 
 
 def solve(problem, folder, *names):
-    """Every file in one run; gives the document."""
+    """Writes every file in one run; returns the document."""
     paths = [folder / name for name in names]
     arguments = [part for path in paths for part in ("-o", path)]
     done = subprocess.run([BINARY, "solve", problem, *arguments], capture_output=True, text=True)
@@ -74,7 +74,7 @@ def columns(rows):
 
 
 def array(values):
-    """As NumPy has it: missing numbers are NaN."""
+    """As NumPy arrays: missing numbers are NaN."""
     if any(isinstance(value, str) for value in values):
         return np.array(values, dtype=object)
     if any(value is None or isinstance(value, float) for value in values):
@@ -83,7 +83,7 @@ def array(values):
 
 
 def check_table(folder, stem, expected):
-    """The same columns out of CSV, JSON Lines, Arrow and NPZ."""
+    """The same columns, read from CSV, JSON Lines, Arrow and NPZ."""
     expected = {name: array(values) for name, values in expected.items()}
     rows = len(next(iter(expected.values())))
     reals = {name: np.float64 for name, values in expected.items() if values.dtype.kind == "f"}
@@ -171,7 +171,7 @@ def check_vtu(path, fields, exact, rounded):
         check(cell.GetCellType() == kind, "cell %d is of type %d" % (i, cell.GetCellType()))
         found = [cell.GetPointId(k) for k in range(cell.GetNumberOfPoints())]
         check(found == nodes, "cell %d has the nodes %s" % (i, found))
-    # were midsides in another order, VTK's own areas would tell
+    # if midsides were in another order, VTK's own areas would differ
     size = vtkCellSizeFilter()
     size.SetInputData(grid)
     size.Update()

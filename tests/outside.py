@@ -1,4 +1,4 @@
-"""What every test from outside needs: a server of its own, a little HTTP, the examples. Nothing here
+"""The common parts of the tests from outside: a server of their own, a small HTTP client, the examples. Nothing here
 knows more of the service than its clients do.
 """
 
@@ -18,7 +18,7 @@ import urllib.parse
 TOP = pathlib.Path(__file__).resolve().parent.parent
 BINARY = pathlib.Path(os.environ.get("SIGNORINI_BINARY", TOP / "target/release/signorini"))
 TERMINAL = ("succeeded", "failed", "canceled")
-# a proxy of this machine has no business between two of its own processes
+# a proxy must not be used between two processes of this machine
 os.environ.update(NO_PROXY="127.0.0.1", no_proxy="127.0.0.1", no_grpc_proxy="127.0.0.1")
 
 checks = 0
@@ -48,7 +48,7 @@ def talkative(increments, **mesh):
 
 
 def submission(problem, **envelope):
-    """The body of a submit. Nothing is answered from the cache, so that what is counted has run."""
+    """The body of a submission. No job is answered from the cache, so that every counted job has run."""
     return json.dumps({"cache": "off", **envelope, "problem": problem}).encode()
 
 
@@ -92,7 +92,7 @@ class Server:
         self.folder.cleanup()
 
     def start(self):
-        """Starts it, and gives the seconds until it said that it is ready."""
+        """Starts it, and returns the seconds until it is ready."""
         began = time.monotonic()
         command = [*self.wrapper, BINARY, "serve", "--listen", "127.0.0.1:0", "--data", self.data, *self.options]
         with self.log.open("a") as log:
@@ -135,13 +135,13 @@ class Server:
         return answer.json()
 
     def submit(self, problem, **envelope):
-        """Hands in a job; gives its id."""
+        """Submits a job; returns its id."""
         answer = self.call("POST", "/v1/jobs", submission(problem, **envelope))
         equal(answer.status, 202, "submit, %r" % answer)
         return answer.json()["id"]
 
     def finished(self, job):
-        """Waits for the job's end; gives the terminal job."""
+        """Waits for the job's end; returns the terminal job."""
         while True:
             self.call("GET", "/v1/jobs/%s/events" % job)  # closes after `done`
             found = self.json("/v1/jobs/" + job)
@@ -166,7 +166,7 @@ class Server:
 
 
 class Lost(Exception):
-    """The connection broke before the answer was there."""
+    """The connection broke before the answer was complete."""
 
 
 class Connection:
@@ -209,7 +209,7 @@ class Connection:
             pieces.append(piece)
 
     async def call_until_answered(self, *request, **headers):
-        """Sends the same again while the connection breaks: for clients of a server that is killed."""
+        """Repeats the request as long as the connection breaks: for clients of a server that is killed."""
         while True:
             try:
                 return await self.call(*request, **headers)

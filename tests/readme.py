@@ -19,7 +19,7 @@ BLOCK = re.compile(r"<!-- (run|serve) -->\n```(\w+)\n(.*?)```", re.DOTALL)
 
 
 def free_address():
-    """127.0.0.1:8080, as the README has it, or a free port when that is taken."""
+    """127.0.0.1:8080, as in the README, or a free port if that one is in use."""
     for port in (8080, 0):
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -39,7 +39,7 @@ def main():
         sys.exit("README.md has lost its marked commands: found %d and %d" % (len(serve), len(runs)))
     address = free_address()
     with tempfile.TemporaryDirectory() as data:
-        # a proxy of this machine has no business between two of its own processes
+        # a proxy must not be used between two processes of this machine
         os.environ.update(NO_PROXY="127.0.0.1", no_proxy="127.0.0.1")
         environment = dict(os.environ, SIGNORINI_LISTEN=address, SIGNORINI_DATA=data)
         server = subprocess.Popen(
@@ -55,7 +55,7 @@ def main():
                 print("--- %s: %s" % (language, code.strip().splitlines()[0]), flush=True)
                 done = subprocess.run(command + [code], cwd=TOP, capture_output=True, text=True, timeout=300)
                 print(done.stdout[-1500:], flush=True)
-                # curl and python say nothing of a job that failed or of an error document
+                # curl and python do not fail for a failed job or an error document
                 wrong = [w for w in ('"status":4', '"status":5', "not_converged", '"failed"') if w in done.stdout]
                 if done.returncode != 0 or wrong or not (done.stdout or done.stderr):
                     sys.exit("this command of the README failed (%s, %s):\n%s%s" % (done.returncode, wrong, code, done.stderr))

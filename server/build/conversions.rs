@@ -10,11 +10,11 @@ const PACKAGE: &str = "signorini.v1";
 const HEAD: &str = "\
 // Written by server/build/conversions.rs, from proto/signorini/v1/signorini.proto and the list of types in
 // server/build/mirrors.rs. An error here is a field or a value that only one of the two sides has, or that
-// has another type there: add it to the message or to the type that stand above the impl, or tell the list
-// of the difference.
+// has another type there: add it to the message or to the type that stand above the impl, or enter the
+// difference in that list.
 ";
 
-/// All of them, as the text of a module.
+/// All conversions, as the text of a module.
 pub(crate) fn source(pool: &DescriptorPool) -> Result<String, Box<dyn std::error::Error>> {
     let mut text = String::new();
     for mirror in MIRRORS {
@@ -24,7 +24,12 @@ pub(crate) fn source(pool: &DescriptorPool) -> Result<String, Box<dyn std::error
         text += &match (mirror.shape, message, names) {
             (Shape::Names, None, Some(names)) => names_of(mirror, &names),
             (_, Some(message), None) => message_of(mirror, &message),
-            _ => return Err(format!("server/build/mirrors.rs: what is {name}?").into()),
+            _ => {
+                return Err(format!(
+                    "server/build/mirrors.rs: the contract has no message or enum {name}"
+                )
+                .into());
+            }
         };
     }
     Ok(HEAD.to_owned() + &prettyplease::unparse(&syn::parse_file(&text)?))
@@ -70,7 +75,7 @@ struct Bodies {
     write: String,
 }
 
-/// Of a struct.
+/// The bodies for a struct.
 fn by_fields(mirror: &Mirror, fields: &[Field]) -> Bodies {
     let Mirror { message, rust, .. } = mirror;
     let names = list(fields, Field::theirs);
@@ -97,7 +102,7 @@ fn by_fields(mirror: &Mirror, fields: &[Field]) -> Bodies {
     Bodies { read, write }
 }
 
-/// Of an enum whose variants are the alternatives of a message.
+/// The bodies for an enum whose variants are the alternatives of a message.
 fn by_kinds(mirror: &Mirror, message: &MessageDescriptor, fields: &[Field]) -> Bodies {
     let (name, rust) = (mirror.message, mirror.rust);
     let shared: Vec<&Field> = fields.iter().filter(|field| field.name != "kind").collect();
@@ -141,7 +146,7 @@ fn is_kind(field: &FieldDescriptor) -> bool {
         .is_some_and(|oneof| oneof.name() == "kind")
 }
 
-/// Of an array.
+/// The bodies for an array.
 fn by_places(mirror: &Mirror, fields: &[Field]) -> Bodies {
     let name = mirror.message;
     let names = list(fields, Field::theirs);
@@ -157,7 +162,7 @@ fn by_places(mirror: &Mirror, fields: &[Field]) -> Bodies {
     Bodies { read, write }
 }
 
-/// Of what is in the only field.
+/// The bodies for a type that is the only field of its message.
 fn by_content(mirror: &Mirror, fields: &[Field]) -> Bodies {
     let name = mirror.message;
     let content = fields.iter().map(Field::theirs).collect::<String>();
@@ -216,7 +221,7 @@ fn names_of(mirror: &Mirror, names: &EnumDescriptor) -> String {
     )
 }
 
-/// A field of a message, or its alternatives together.
+/// A field of a message, or a group of alternatives.
 struct Field {
     /// Its name in the contract, and in JSON.
     name: String,
@@ -238,7 +243,7 @@ fn fields(mirror: &Mirror, message: &MessageDescriptor) -> Vec<Field> {
             None => field.name(),
         };
         if found.iter().any(|field| field.name == name) {
-            continue; // another one of the same alternatives
+            continue; // another alternative of the same group
         }
         let renamed = mirror.renamed.filter(|(theirs, _)| *theirs == name);
         found.push(Field {
@@ -251,12 +256,12 @@ fn fields(mirror: &Mirror, message: &MessageDescriptor) -> Vec<Field> {
 }
 
 impl Field {
-    /// In a pattern of the message, after which this is the name of its value.
+    /// The field in a pattern of the message; it binds the value to this name.
     fn theirs(&self) -> String {
         ident(&self.name)
     }
 
-    /// In a pattern of our type.
+    /// The field in a pattern of our type.
     fn ours(&self) -> String {
         match self.rust == self.name {
             true => self.theirs(),
@@ -264,18 +269,18 @@ impl Field {
         }
     }
 
-    /// In a literal of our type, made of what could be read.
+    /// The field in a literal of our type, with the value that was read.
     fn found(&self) -> String {
         format!("{}: {}?", ident(&self.rust), self.theirs())
     }
 
-    /// In a literal of the message.
+    /// The field in a literal of the message.
     fn value(&self) -> String {
         format!("{0}: {0}.into_message()", self.theirs())
     }
 }
 
-/// Statements that read fields; after them the names stand for what was read, if it could be.
+/// Statements that read fields; each binds the name of a field to its value, or to `None` if it is not readable.
 fn reads<'a>(mirror: &Mirror, fields: impl IntoIterator<Item = &'a Field>) -> String {
     let read = |field: &Field| {
         let (name, value) = (&field.name, field.theirs());
@@ -296,7 +301,7 @@ fn reads<'a>(mirror: &Mirror, fields: impl IntoIterator<Item = &'a Field>) -> St
     fields.into_iter().map(read).collect()
 }
 
-/// With commas.
+/// The items, each followed by a comma.
 fn list<T>(items: impl IntoIterator<Item = T>, item: impl Fn(T) -> String) -> String {
     items.into_iter().map(|one| item(one) + ", ").collect()
 }

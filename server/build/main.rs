@@ -1,6 +1,6 @@
-//! Generates the gRPC types, the conversions between them and ours, and the descriptor that reflection
-//! serves. protox compiles the contract in Rust, so that nobody has to install protoc. And unpacks the page
-//! of `/docs`.
+//! Generates the gRPC types, the conversions between them and our types, and the descriptor that reflection
+//! serves. protox compiles the contract in Rust, so that protoc need not be installed. Also unpacks the page of
+//! `/docs`.
 
 mod conversions;
 mod mirrors;
@@ -24,14 +24,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     fs::write(out.join("descriptors.bin"), descriptors.encode_to_vec())?;
     let pool = DescriptorPool::from_file_descriptor_set(descriptors.clone())?;
     fs::write(out.join("conversions.rs"), conversions::source(&pool)?)?;
-    // Ordered maps: the same answer is the same bytes.
+    // Ordered maps, so that equal responses have equal bytes.
     tonic_prost_build::configure()
         .btree_map(".")
         .compile_fds(descriptors)?;
     swagger_ui(&out)
 }
 
-/// Takes what `/docs` serves out of the archive of Swagger UI: 1.7 of its 6 MB.
+/// Extracts the files that `/docs` serves from the archive of Swagger UI: 1.7 of its 6 MB.
 fn swagger_ui(out: &Path) -> Result<(), Box<dyn Error>> {
     let archive = io::Cursor::new(utoipa_swagger_ui_vendored::SWAGGER_UI_VENDORED);
     let mut archive = zip::ZipArchive::new(archive)?;

@@ -1,31 +1,31 @@
-//! Which type of ours mirrors which message or enum of the contract. From this list and the contract
+//! Which Rust type mirrors which message or enum of the contract. From this list and the contract
 //! `conversions` writes the code between the two, field by field and value by value: a field or a value that
 //! only one side has does not compile, or is named here.
 //!
-//! Not in this list are the shapes that differ; `src/convert` has them by hand.
+//! Types whose shape differs from that of the message are not in this list; `src/convert` converts them by hand.
 
-/// A message or an enum of the contract, and the type of ours that says the same.
+/// A message or an enum of the contract, and the Rust type with the same content.
 pub(crate) struct Mirror {
     /// Its name in the contract.
     pub message: &'static str,
-    /// The type, as `src/convert/mirrors.rs` names it.
+    /// The type, by the names that `src/convert/conversions.rs` imports.
     pub rust: &'static str,
     pub shape: Shape,
-    /// It comes in requests. All go out in answers, or in our own clients' requests.
+    /// It is read from requests. Every type is written, to responses or to the requests of our own clients.
     pub read: bool,
-    /// What a message leaves out is as in the type's `Default`.
+    /// Fields that a message leaves out have the values of the type's `Default`.
     pub defaulted: bool,
-    /// The same for a single field: its name, and what it is then.
+    /// The same for a single field: its name and its default.
     pub otherwise: Option<(&'static str, &'static str)>,
-    /// A field that our type has under another name.
+    /// A field that has another name in our type, and that name.
     pub renamed: Option<(&'static str, &'static str)>,
-    /// Fields of our type that are not fields of the message: how a pattern takes them apart.
+    /// Fields of our type that are not fields of the message: the patterns that match them.
     pub ours: &'static [&'static str],
-    /// Fields of the message that our type does not have: how a literal sets them.
+    /// Fields of the message that our type does not have: their values in a literal.
     pub theirs: &'static [&'static str],
 }
 
-/// What of a message stands where in our type.
+/// How our type holds the content of a message.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Shape {
     /// A struct with the fields of the message. Alternatives (`oneof`) are one field, of their common name.
@@ -35,7 +35,7 @@ pub(crate) enum Shape {
     Kinds,
     /// An array of the fields.
     Array,
-    /// What is in the only field.
+    /// The content of the only field.
     Content,
     /// An enum without data, with the names of the contract.
     Names,
@@ -87,7 +87,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     names("ThesisPressure", "problem::ThesisPressure").defaulted(),
     names("Algorithm", "problem::Algorithm").defaulted(),
 
-    // what is said of a problem
+    // the checks of a problem
     fields("ValidateProblemResponse", "problems::Validation").answer(),
     fields("Violation", "solver::error::Violation").answer(),
     fields("Warning", "solution::Warning").answer(),
@@ -103,8 +103,8 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("JobProgress", "job::Progress").answer(),
     fields("Failure", "job::Failure").answer(),
     fields("CountJobsResponse", "lists::Count").answer(),
-    fields("CancelJobsResponse", "bulk::Many").answer(),
-    fields("DeleteJobsResponse", "bulk::Many").answer(),
+    fields("CancelJobsResponse", "bulk::BulkResult").answer(),
+    fields("DeleteJobsResponse", "bulk::BulkResult").answer(),
     names("CancelJobResponse.Outcome", "jobs::Cancellation").answer(),
 
     // results

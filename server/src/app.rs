@@ -1,5 +1,5 @@
-//! The running service: open the store, take care of what a crash left, start the queue, listen;
-//! and the same backwards.
+//! The running service: opens the store, requeues the jobs that a crash interrupted, starts the queue, listens,
+//! and stops in reverse order.
 
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 
@@ -26,22 +26,22 @@ pub struct App {
 }
 
 impl App {
-    /// Starts everything. When this returns, the address answers.
+    /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
         let store = Store::open(&config.data).await?;
-        // Before the listener opens: nobody sees a job running that nobody runs.
+        // Before the listener opens: no client sees a job as running that no worker solves.
         let interrupted = store.requeue_interrupted().await?;
         if interrupted > 0 {
             info!(
                 interrupted,
-                "{interrupted} jobs were interrupted by the last end of the service"
+                "{interrupted} jobs were interrupted when the service last ended"
             );
         }
         let orphans = store.remove_orphaned_mesh_pieces().await?;
         if orphans > 0 {
             info!(
                 orphans,
-                "{orphans} pieces of meshes were left by uploads that broke off"
+                "{orphans} pieces of meshes from interrupted uploads were removed"
             );
         }
         let queue = Queue::new(store.clone(), solver::solve_on, config.workers);
@@ -53,7 +53,7 @@ impl App {
             .await
             .with_context(|| format!("cannot listen on {}", config.listen))?;
         let address = listener.local_addr()?;
-        // Events are small and should not wait for company.
+        // Events are small and should be sent at once.
         let listener = listener.tap_io(|connection| {
             if let Err(error) = connection.set_nodelay(true) {
                 tracing::debug!(%error, "TCP_NODELAY: {error}");
@@ -69,7 +69,7 @@ impl App {
         queue.start();
         info!(%address, workers = config.workers, "listening on {address}");
         if !address.ip().is_loopback() {
-            warn!(%address, "whoever can reach {address} may do anything here: there is no authentication");
+            warn!(%address, "anyone who can reach {address} can do everything: there is no authentication");
         }
         Ok(App {
             address,
@@ -82,29 +82,29 @@ impl App {
         })
     }
 
-    /// Where the service answers.
+    /// The address of the service.
     pub fn url(&self) -> String {
         format!("http://{}", self.address)
     }
 
-    /// Stops in the order that loses nothing: no new jobs, running ones back to the queue, streams
-    /// ended, open requests answered, store closed. Solvers may still be at work on their threads
-    /// when this returns; nobody waits for what they find.
+    /// Stops in the order that loses nothing: starts no more jobs, requeues the running ones, ends the streams,
+    /// answers open requests, closes the store. Solvers may still run on their threads when this returns; their
+    /// results are dropped.
     pub async fn stop(self) {
         grpc::report_draining(&self.health).await;
         self.queue.drain().await;
         self.closing.cancel();
         match timeout(self.grace, self.server).await {
             Ok(Ok(Ok(()))) => {}
-            Ok(ended) => warn!(?ended, "the listener ended badly"),
+            Ok(ended) => warn!(?ended, "the listener ended with an error"),
             Err(_) => warn!("connections still open after the grace time are cut"),
         }
-        // The recorder of a deaf solver may hold a statement; what it writes no longer counts.
+        // The recorder of an unresponsive solver may hold a statement; what it writes no longer counts.
         if timeout(Duration::from_millis(500), self.store.close())
             .await
             .is_err()
         {
-            warn!("the store was left open");
+            warn!("the store did not close in time");
         }
         info!("stopped");
     }

@@ -29,7 +29,7 @@ pub enum Scope {
     Submit,
     /// Cancel and delete them.
     Cancel,
-    /// All of that with what belongs to others, and pause the queue.
+    /// All of these on the jobs of every owner, and pause the queue.
     Admin,
 }
 
@@ -66,8 +66,8 @@ impl Caller {
         self.scopes.iter().copied()
     }
 
-    /// Whose jobs this caller sees.
-    pub fn sees(&self) -> Owners<'_> {
+    /// The owners whose jobs this caller sees.
+    pub fn visible_owners(&self) -> Owners<'_> {
         match self.scopes.contains(&Scope::Admin) {
             true => Owners::All,
             false => Owners::Only(&self.owner),
@@ -75,17 +75,17 @@ impl Caller {
     }
 }
 
-/// Whose things a question to the store is about.
+/// The owners whose jobs a query to the store is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Owners<'a> {
-    /// Everybody's.
+    /// Every owner.
     All,
-    /// Those of this owner.
+    /// This owner.
     Only(&'a str),
 }
 
 impl Owners<'_> {
-    /// Whether what belongs to `owner` is among them.
+    /// Whether `owner` is one of them.
     pub fn include(self, owner: &str) -> bool {
         match self {
             Owners::All => true,
@@ -99,12 +99,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_is_no_administrator_sees_only_what_is_their_own() {
+    fn a_caller_who_is_not_an_administrator_sees_only_their_own_jobs() {
         let local = Caller::local();
-        assert_eq!(local.sees(), Owners::All);
+        assert_eq!(local.visible_owners(), Owners::All);
         let ada = Caller::new("ada", [Scope::Read, Scope::Submit]);
-        assert_eq!(ada.sees(), Owners::Only("ada"));
-        assert!(ada.sees().include("ada") && !ada.sees().include("bob"));
-        assert!(local.sees().include("bob"));
+        assert_eq!(ada.visible_owners(), Owners::Only("ada"));
+        assert!(ada.visible_owners().include("ada") && !ada.visible_owners().include("bob"));
+        assert!(local.visible_owners().include("bob"));
     }
 }

@@ -13,9 +13,9 @@ pub struct Kind {
     pub code: &'static str,
     /// One line, the same every time.
     pub title: &'static str,
-    /// The HTTP status; none for what only jobs end with.
+    /// The HTTP status; absent for a reason that only jobs end with.
     pub status: Option<u16>,
-    /// The gRPC code; likewise.
+    /// The gRPC code; absent for a reason that only jobs end with.
     #[serde(serialize_with = "grpc_name")]
     #[schemars(with = "Option<String>")]
     pub grpc: Option<Grpc>,
@@ -71,7 +71,7 @@ fn grpc_name<S: serde::Serializer>(code: &Option<Grpc>, serializer: S) -> Result
     code.map(grpc_code_name).serialize(serializer)
 }
 
-/// What a request may be answered with.
+/// A kind of error that a request may be answered with.
 fn of_request(
     code: &'static str,
     title: &'static str,
@@ -90,7 +90,7 @@ fn of_request(
     }
 }
 
-/// What only jobs end with.
+/// A reason that only jobs end with.
 fn of_job(code: &'static str, title: &'static str, explanation: &'static str) -> Kind {
     Kind {
         code,
@@ -132,11 +132,11 @@ catalog! {
     UnknownParameter: of_request("Unknown parameter", 400, Grpc::InvalidArgument, None,
         "The query has a parameter that this operation does not have; it would have been ignored. `detail` lists the parameters of the operation."),
     BadParameter: of_request("Invalid parameter value", 400, Grpc::InvalidArgument, None,
-        "A query parameter, header or field has an invalid value. `detail` says what was expected."),
+        "A query parameter, header or field has an invalid value. `detail` gives the expected values."),
     BadPageToken: of_request("Invalid page token", 400, Grpc::InvalidArgument, None,
         "A page token is valid only for the list that returned it, with the same filters and order. Start again without one."),
     MissingFilter: of_request("A filter is required", 400, Grpc::InvalidArgument, None,
-        "Canceling or deleting many jobs requires at least one filter, so that nobody does it to all jobs by accident. To mean all jobs, write status=queued,running,succeeded,failed,canceled."),
+        "Canceling or deleting many jobs requires at least one filter, so that it is not done to all jobs by accident. To mean all jobs, write status=queued,running,succeeded,failed,canceled."),
     NotFound: of_request("Not found", 404, Grpc::NotFound, None,
         "There is no such path, job, mesh, boundary or load step. Ids must be written as they were returned: job_ and a UUID in lower case."),
     NoResult: of_request("The job has no result", 404, Grpc::NotFound, None,
@@ -150,7 +150,7 @@ catalog! {
     ResultNotReady: of_request("The result is not ready", 409, Grpc::FailedPrecondition, Some(1),
         "The job is queued or running and has no result yet. Wait for it: GET /v1/jobs/{id}?wait=30&until=terminal, WaitJob, or its events."),
     IdConflict: of_request("The id belongs to another job", 409, Grpc::AlreadyExists, None,
-        "A job with this id was submitted with other content. An id stands for one job; make a new one."),
+        "A job with this id was submitted with other content. An id belongs to one job; use a new one."),
     Deleted: of_request("The job was deleted", 410, Grpc::NotFound, None,
         "The job was deleted within the last 7 days, with its events and its result. After that its id is unknown."),
     StaleVersion: of_request("The job has changed", 412, Grpc::Aborted, None,
@@ -166,11 +166,11 @@ catalog! {
     InvalidProblem: of_request("The problem or its request is invalid", 422, Grpc::InvalidArgument, None,
         "The problem, or the request that contains it, has violations. `errors` lists all of them: where (a JSON Pointer), what was found, what is expected and what to do. The schema is at /v1/schema/problem.json."),
     IdempotencyKeyReuse: of_request("The key was used for another request", 422, Grpc::AlreadyExists, None,
-        "This Idempotency-Key (request_id) was used before with another payload. One key stands for one request; use a new one."),
+        "This Idempotency-Key (request_id) was used before with another payload. A key belongs to one request; use a new one."),
     RateLimited: of_request("Too many requests at once", 429, Grpc::ResourceExhausted, Some(1),
         "More requests, mostly lists and counts, arrive at the same time than can be answered soon. Ask less often, or follow jobs by their events."),
     Internal: of_request("Internal error", 500, Grpc::Internal, Some(1),
-        "Something unexpected happened in the service; the request is not to blame. The cause is in the service's log under the number of the incident; please report it."),
+        "Something unexpected happened in the service; the request is not the cause. The cause is in the service's log under the number of the incident; please report it."),
     QueueFull: of_request("The queue is full", 503, Grpc::Unavailable, Some(10),
         "The queue holds as many jobs as it may. Reading, watching and canceling still work. Try again when some jobs have run."),
     Draining: of_request("The service is stopping", 503, Grpc::Unavailable, Some(5),
@@ -178,13 +178,13 @@ catalog! {
     StorageFull: of_request("The disk is full", 507, Grpc::ResourceExhausted, Some(60),
         "Nothing more can be stored. Reading still works, and running jobs wait; the operator can free space."),
     NotConverged: of_job("The iteration did not converge",
-        "max_iterations was reached with a residual above the tolerance. The last state and the whole history are kept as a partial result. Look at the convergence plot: refine the mesh, raise elastic_slip, apply the load in more increments, or choose algorithm auto."),
+        "The residual is still above the tolerance: max_iterations was reached, or the iteration stopped making progress, or Newton's method failed. The last state and the whole history are kept as a partial result. Look at the convergence plot: refine the mesh, raise elastic_slip, apply the load in more increments, or choose algorithm auto."),
     ContactCycling: of_job("The iteration cycles between contact sets",
         "The iteration visits the same contact sets again and again. Refine the mesh there, raise elastic_slip, or choose algorithm auto; relaxation helps the thesis's own iteration."),
     FalseConvergence: of_job("The iteration settled in a state that is not a solution",
         "The method's own test was met, but the true residual is above the tolerance or the forces do not balance: the state is not a solution. Use algorithm auto, and check the supports if the forces do not balance."),
     SingularSystem: of_job("The stiffness matrix is singular",
-        "The body can move without resistance: its supports and contacts do not hold it. `detail` names a node and a direction."),
+        "The body can move without resistance because its supports and contacts do not hold it (`detail` then names the motion and a node), or the matrix is singular to working precision (`detail` then names a pivot)."),
     NonFinite: of_job("A number is not finite",
         "A NaN or an infinity arose during the solution; the numbers of the problem are too large or too small compared with each other."),
     TimedOut: of_job("The job exceeded its time limit",
@@ -196,7 +196,7 @@ catalog! {
     WorkerLost: of_job("The worker was lost too often",
         "The process died during each of max_attempts attempts at this job. Other jobs continue. If the job is the cause, please report it."),
     UserCancel: of_job("The job was canceled",
-        "A client asked for it."),
+        "A client canceled the job."),
 }
 
 #[cfg(test)]

@@ -80,7 +80,7 @@ impl MemoryBudget {
 
 /// Memory of this machine, or of the container that the process runs in.
 fn machine_memory() -> u64 {
-    // Unknown is no reason to refuse everything; 8 GiB is a common small machine.
+    // If the memory is unknown, problems are not refused for it; 8 GiB is a common small machine.
     const UNKNOWN: u64 = 8 << 30;
     let total = std::fs::read_to_string("/proc/meminfo")
         .ok()

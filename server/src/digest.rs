@@ -8,8 +8,8 @@ use serde_json::json;
 use sha2::{Digest, Sha256};
 use solver::{problem::Problem, solution::Solution};
 
-/// Fingerprint of a problem with its defaults filled in. The title is for people and has no part.
-/// Units have one: problems are stored once per fingerprint, and figures show them.
+/// Fingerprint of a problem with its defaults filled in. The title is for people and not included. Units are:
+/// problems are stored once per fingerprint, and figures show their units.
 pub fn input_hash(problem: &Problem) -> serde_json::Result<String> {
     let untitled = Problem {
         title: None,
@@ -25,8 +25,8 @@ pub fn of_json(value: &impl Serialize) -> serde_json::Result<String> {
     Ok(hash.text())
 }
 
-/// Fingerprint of a result: equal digests mean equal bits. Times and the program's version have
-/// no part. All numbers must be finite: others have no canonical form.
+/// Fingerprint of a result: equal digests mean equal bits. Times and the program's version are not
+/// included. All numbers must be finite: others have no canonical form.
 pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<String> {
     let mut summary = serde_json::to_value(&solution.summary)?;
     summary["input_hash"] = json!(input_hash);
@@ -42,7 +42,7 @@ pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<Strin
     Ok(hash.text())
 }
 
-/// A finished hash as it is written everywhere.
+/// A finished hash in its text form.
 pub fn sha256_text(hash: Sha256) -> String {
     format!("sha256:{}", hex(&hash.finalize()))
 }

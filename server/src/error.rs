@@ -23,14 +23,14 @@ pub enum ApiError {
     #[error("{0}")]
     MalformedJson(String),
     /// A query parameter that this operation does not have.
-    #[error("there is no parameter {name:?} here; known are: {known}")]
+    #[error("this operation has no parameter {name:?}; it has: {known}")]
     UnknownParameter {
         /// What was sent.
         name: String,
         /// The parameters that it has.
         known: String,
     },
-    /// A query parameter or header with a value that it cannot have.
+    /// A query parameter or header with an invalid value.
     #[error("{name}: expected {expected}, got {got:?}")]
     BadParameter {
         /// Its name.
@@ -83,8 +83,8 @@ pub enum ApiError {
     /// The job has another version now.
     #[error("the job has version {0}")]
     StaleVersion(i64),
-    /// A range that begins behind the end.
-    #[error("there are {0} bytes")]
+    /// A range that begins after the end.
+    #[error("the data has {0} bytes")]
     RangeNotSatisfiable(u64),
     /// Jobs that wait or run need the mesh.
     #[error("queued or running jobs use this mesh; cancel them or wait for their end")]
@@ -106,7 +106,7 @@ pub enum ApiError {
         /// Where it is available.
         instead: &'static str,
     },
-    /// The job would need too much memory.
+    /// The job needs more memory than the budget allows.
     #[error(
         "the job has {} unknowns and needs about {} of memory; the budget is {}; use a coarser mesh or less refinement",
         count(estimate.dofs), size(estimate.memory_bytes), size(*budget_bytes)
@@ -144,7 +144,7 @@ pub enum ApiError {
 }
 
 impl ApiError {
-    /// Logs an unexpected cause, here and once; clients are not shown it.
+    /// Logs an unexpected cause, here and only here; clients do not see it.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
         let incident = Uuid::now_v7();
         tracing::error!(%incident, %cause, "incident {incident}: {cause}");
@@ -197,7 +197,7 @@ impl ApiError {
         self.code().kind().retry_after_s
     }
 
-    /// The problem document of RFC 9457; `instance` is the path that was asked for.
+    /// The problem document of RFC 9457; `instance` is the path of the request.
     pub fn document(&self, instance: &str) -> Value {
         let kind = self.code().kind();
         let Kind {
@@ -265,8 +265,8 @@ impl From<ApiError> for Status {
         if let Some(seconds) = kind.retry_after_s {
             details.set_retry_info(Some(std::time::Duration::from_secs(seconds)));
         }
-        // the details are sent in a header beside the message, a third longer by its coding; clients accept 8 KiB of
-        // headers
+        // the details are sent in a header in addition to the message, a third longer because of their encoding;
+        // clients accept 8 KiB of headers
         const MOST_BYTES: usize = 2400;
         let mut bytes = 0;
         let all = error.violations();
@@ -275,7 +275,7 @@ impl From<ApiError> for Status {
                 "{}: expected {}, got {}. {}",
                 v.reason, v.expected, v.got, v.hint
             );
-            // they quote the input, and may be as long as that
+            // they quote the input and may be as long as it
             let (pointer, text) = (shortened(&v.pointer, 300), shortened(&text, 300));
             bytes += pointer.len() + text.len() + 10;
             if bytes > MOST_BYTES {
@@ -292,7 +292,7 @@ impl From<ApiError> for Status {
     }
 }
 
-/// Bytes for people.
+/// A number of bytes as text for people.
 pub fn size(bytes: u64) -> String {
     match bytes {
         u64::MAX => "more than 10^10 GiB".into(),
@@ -301,7 +301,7 @@ pub fn size(bytes: u64) -> String {
     }
 }
 
-/// A number of unknowns for people; estimates are bounded by the largest number.
+/// A number of unknowns as text for people; `u64::MAX` stands for any larger number.
 pub fn count(unknowns: u64) -> String {
     match unknowns {
         u64::MAX => "more than 10^19".into(),
@@ -377,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn a_temporary_error_says_when_to_retry() {
+    fn a_temporary_error_has_a_time_to_retry() {
         let status = Status::from(ApiError::Draining);
         assert_eq!(status.code(), Code::Unavailable);
         assert!(status.get_error_details().retry_info().is_some());

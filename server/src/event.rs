@@ -1,4 +1,4 @@
-//! The events of a job, as those who watch it receive them.
+//! The events of a job, as its watchers receive them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -29,7 +29,7 @@ pub struct Event {
 #[serde(tag = "type", rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Payload {
-    /// The job changed its status, but has not ended.
+    /// The status of the job has changed, but the job has not ended.
     Status {
         /// The new status.
         status: Status,
@@ -39,21 +39,21 @@ pub enum Payload {
     },
     /// A phase of the solution began.
     Stage {
-        /// Which.
+        /// The phase.
         stage: Phase,
     },
-    /// One more iteration.
+    /// An iteration.
     Iteration(TimedIteration),
     /// A warning about the problem or its solution.
     Warning(Warning),
-    /// The end, and the job as it ended. There is exactly one of these, and it is the last.
+    /// The job has ended. A job has exactly one such event, and it is the last.
     Done {
         /// The terminal job.
         job: Box<Job>,
     },
 }
 
-/// A row of history, and when it was computed.
+/// A row of the history, and the time at which it was computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(rename = "Iteration")]
 pub struct TimedIteration {
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_worker_has_one_name() {
+    fn a_lost_worker_has_the_same_name_as_event_and_as_failure() {
         let (lost, failed) = (Requeue::WorkerLost, crate::job::Reason::WorkerLost);
         assert_eq!(<&str>::from(lost), <&str>::from(failed));
     }

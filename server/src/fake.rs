@@ -1,4 +1,4 @@
-//! A problem and a solver for the unit tests of this crate: plausible, quick, and obedient.
+//! A problem and a solver for the unit tests of this crate: plausible and quick, and it stops when asked.
 
 use std::{ops::ControlFlow, sync::LazyLock};
 
@@ -74,7 +74,7 @@ pub(crate) fn iteration(k: u32) -> Iteration {
     }
 }
 
-/// The same after `k` half seconds.
+/// The same row, computed after `k` half seconds.
 pub(crate) fn timed(k: u32) -> TimedIteration {
     TimedIteration {
         row: iteration(k),
@@ -82,7 +82,7 @@ pub(crate) fn timed(k: u32) -> TimedIteration {
     }
 }
 
-/// Solves anything at once, as [`solution`].
+/// Solves any problem at once, with the result [`solution`].
 pub(crate) fn solve(
     _: &Problem,
     _: Option<External>,

@@ -1,5 +1,5 @@
-//! What a result can be written as: one list of formats, and one way to write each, for the data
-//! routes and for `signorini solve -o`.
+//! The formats of a result: one list, and one way to write each format, for the data routes and for
+//! `signorini solve -o`.
 
 use files::{
     npz::Npz,
@@ -11,13 +11,13 @@ use strum::{IntoStaticStr, VariantArray};
 
 use crate::{event::TimedIteration, run::Document};
 
-/// How data are written.
+/// A format of data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum Format {
-    /// The API's own.
+    /// JSON, as in the API.
     Json,
-    /// A line of names, a line per row.
+    /// CSV: a line of names, then a line per row.
     Csv,
     /// A JSON object per row.
     Jsonl,
@@ -32,7 +32,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// What rows are served as, the default first.
+    /// The formats of rows, the default first.
     pub const OF_TABLES: &[Format] = &[
         Format::Json,
         Format::Csv,
@@ -40,15 +40,15 @@ impl Format {
         Format::Arrow,
         Format::Npz,
     ];
-    /// What fields are served as, the default first.
+    /// The formats of fields, the default first.
     pub const OF_FIELDS: &[Format] = &[Format::Vtu, Format::Npz, Format::Json];
 
-    /// The value of `format`, and the ending of a file.
+    /// The value of `format`, and the extension of a file.
     pub fn name(self) -> &'static str {
         self.into()
     }
 
-    /// The name of the media type, as in `Accept`; a registered one where there is one.
+    /// The media type, as in `Accept`; the registered one if there is one.
     pub fn media_type(self) -> &'static str {
         match self {
             Format::Json => "application/json",
@@ -76,7 +76,7 @@ impl Format {
     }
 }
 
-/// A profile in that format. `Err` says why it could not be written.
+/// A profile in that format. `Err` is the reason why it could not be written.
 pub fn profile(profile: &ContactProfile, format: Format) -> Result<Vec<u8>, String> {
     rows(profile, Table::of_profile, format)
 }

@@ -26,7 +26,7 @@ pub struct Job {
     /// The key under which the store keeps its result.
     #[serde(skip)]
     pub result_key: i64,
-    /// The key of the job that it is coalesced into: it is not solved itself, but ends with that one's result.
+    /// The key of the job that it is coalesced into: it is not solved itself, but ends with the result of that job.
     #[serde(skip)]
     pub coalesced_into: Option<i64>,
     /// Whether an earlier result may answer it.
@@ -62,7 +62,7 @@ pub struct Job {
     /// The job that this one retries.
     #[serde(default)]
     pub parent: Option<JobId>,
-    /// Never removed by age.
+    /// Never deleted because of its age.
     #[serde(default)]
     pub pinned: bool,
     /// When it was accepted.
@@ -77,7 +77,7 @@ pub struct Job {
     pub run_s: Option<f64>,
     /// Its position in the queue, while it waits.
     pub queue: Option<QueuePosition>,
-    /// How far it has come, once it was started.
+    /// Its progress, once it was started.
     pub progress: Option<Progress>,
     /// Its time limits.
     #[serde(default)]
@@ -223,13 +223,13 @@ impl Status {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Reason {
-    /// `max_iterations` reached.
+    /// The residual stayed above the tolerance: `max_iterations` reached, no more progress, or Newton's method failed.
     NotConverged,
     /// The contact set repeats itself.
     ContactCycling,
     /// The method's own test was met, but the true residual is above the tolerance or the forces do not balance.
     FalseConvergence,
-    /// The stiffness matrix has no factor.
+    /// The stiffness matrix is singular, or nothing holds the body.
     SingularSystem,
     /// A number became infinite or not a number.
     NonFinite,
@@ -237,7 +237,7 @@ pub enum Reason {
     TimedOut,
     /// It waited longer than `limits.queue_ttl_s`.
     QueueExpired,
-    /// It needs more memory than there is.
+    /// It needs more memory than is available.
     ResourceExhausted,
     /// The process died during each of `max_attempts` attempts.
     WorkerLost,
@@ -367,11 +367,11 @@ pub struct QueuePosition {
     pub position: i64,
     /// Jobs before this one.
     pub ahead: i64,
-    /// What it waits for.
+    /// Why it waits.
     pub reason: Waiting,
 }
 
-/// What a queued job waits for.
+/// Why a queued job waits.
 #[derive(
     Clone,
     Copy,
@@ -396,7 +396,7 @@ pub enum Waiting {
     Coalesced,
 }
 
-/// How far a job has come.
+/// The progress of a job.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Progress {
     /// The phase that began last: mesh, assemble, …, recover.
@@ -405,13 +405,13 @@ pub struct Progress {
     pub iteration: u32,
     /// The larger of the two residuals of the last iteration (dimensionless).
     pub residual: Option<f64>,
-    /// What both must fall below.
+    /// The tolerance that both must reach.
     pub tolerance: Option<f64>,
     /// Nodes that entered or left contact in the last iteration.
     pub contact_changes: Option<u32>,
     /// Factor by which an iteration reduces the residual.
     pub rate: Option<f64>,
-    /// Seconds to the end, extrapolated from the rate.
+    /// Estimated seconds to the end, extrapolated from the rate.
     pub eta_s: Option<f64>,
 }
 
@@ -490,7 +490,7 @@ mod tests {
     }
 
     #[test]
-    fn a_word_is_the_same_in_the_store_and_in_json() {
+    fn a_value_is_the_same_word_in_the_store_and_in_json() {
         has_words::<Status>();
         has_words::<Reason>();
         has_words::<ResultAvailable>();
@@ -510,7 +510,7 @@ mod tests {
     }
 
     #[test]
-    fn a_job_id_has_one_spelling() {
+    fn a_job_id_has_one_valid_spelling() {
         let id = JobId::new();
         let text = id.to_string();
         assert_eq!(JobId::parse(&text), Some(id));

@@ -1,8 +1,7 @@
 //! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms of its own
 //! group and of the groups above it; ARCHITECTURE.md has the finer order.
 
-// What everybody may know: who asks, kinds of errors, points in time, a job and its moves, what its watchers are
-// told.
+// Basic types, for every module: callers, kinds of errors, points in time, jobs and their changes of status, events.
 pub mod caller;
 pub mod catalog;
 pub mod event;
@@ -10,32 +9,32 @@ pub mod job;
 pub mod mesh;
 pub mod time;
 
-// What a request can be told went wrong, what it may say beside its body, and what can be set.
+// Errors of requests, their parameters, and the configuration.
 pub mod config;
 pub mod error;
 pub mod parameters;
 pub mod violations;
 
-// Solve one problem and measure it; fingerprints of problem and result; the formats of a result.
+// Solves one problem and measures it; fingerprints of problem and result; the formats of a result.
 pub mod digest;
 pub mod formats;
 pub mod run;
 
-// Remember: everything durable, and the only SQL.
+// Everything durable, and the only SQL.
 pub mod store;
 
-// Take, solve, record, end, cancel.
+// Takes jobs from the queue, solves them, records and ends them.
 pub mod queue;
 
-// What the service does, once.
+// The operations of the service, whatever the protocol.
 pub mod verbs;
 
-// Two skins that only translate; `convert` is between the types of proto and ours.
+// The two protocols; they only translate. `convert` converts between the generated gRPC types and ours.
 pub mod convert;
 pub mod grpc;
 pub mod rest;
 
-// Open, recover, listen, stop; and the commands.
+// Starts and stops the service; and the commands.
 pub mod app;
 pub mod cli;
 
@@ -55,7 +54,7 @@ mod fake;
 mod tests {
     #[test]
     #[should_panic(expected = "attempt to add with overflow")]
-    fn an_overflow_is_a_panic_in_the_profile_that_ships() {
+    fn an_overflow_panics_in_the_release_profile() {
         let most = std::hint::black_box(u32::MAX);
         std::hint::black_box(most + 1);
     }

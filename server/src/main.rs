@@ -1,4 +1,4 @@
-//! Arguments, logging, hand over.
+//! Starts the command line.
 
 use std::process::ExitCode;
 

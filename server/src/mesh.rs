@@ -1,4 +1,4 @@
-//! What is said of a stored mesh.
+//! Description of a stored mesh.
 
 use std::collections::BTreeMap;
 
@@ -17,9 +17,9 @@ use crate::time::Time;
 /// A stored mesh, without its nodes and elements.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeshInfo {
-    /// `sha256:…` of the file; what a problem's `mesh.stored` names.
+    /// `sha256:…` of the file; a problem refers to it as `mesh.stored`.
     pub hash: String,
-    /// What kind of file it was.
+    /// The format of the file.
     pub format: MeshFormat,
     /// Size of the file.
     pub bytes: u64,
@@ -29,7 +29,7 @@ pub struct MeshInfo {
     pub quadrilaterals: u64,
     /// 6-node elements.
     pub triangles: u64,
-    /// Displacements, before supports.
+    /// Displacement unknowns, before supports.
     pub dofs: u64,
     /// Ranges of x and y (length).
     pub extent: [[f64; 2]; 2],
@@ -41,7 +41,7 @@ pub struct MeshInfo {
     pub node_sets: BTreeMap<String, u64>,
     /// Shape of the elements.
     pub quality: Quality,
-    /// What was changed when it was read.
+    /// Changes that were made when it was read.
     pub warnings: Vec<Warning>,
     /// When it was stored.
     pub created_at: Time,
@@ -50,23 +50,23 @@ pub struct MeshInfo {
 /// A named boundary of a stored mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BoundaryInfo {
-    /// Sides.
+    /// Number of element sides.
     pub edges: u64,
     /// Their length, from corner to corner.
     pub length: f64,
 }
 
-/// How far the elements are from being folded.
+/// How close the elements are to being folded.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Quality {
     /// Least ratio of the smallest to the largest det J within an element: 1 is best, 0 is folded.
     pub least_jacobian_ratio: f64,
-    /// The element that has it, from 0.
+    /// The number of the element with this ratio, from 0.
     pub worst_element: u64,
 }
 
 impl MeshInfo {
-    /// Of a mesh that was just read.
+    /// The description of a mesh that was just read.
     pub fn new(
         hash: String,
         bytes: u64,
@@ -113,7 +113,7 @@ impl MeshInfo {
         }
     }
 
-    /// What an estimate needs.
+    /// The numbers that an estimate needs.
     pub fn size(&self) -> MeshSize {
         let edges = |(name, info): (&String, &BoundaryInfo)| (name.clone(), info.edges);
         MeshSize {

@@ -32,7 +32,7 @@ impl Time {
         self.0
     }
 
-    /// So many seconds later.
+    /// This time plus a number of seconds.
     pub fn after_s(self, seconds: f64) -> Self {
         Time(self.0.saturating_add((seconds * 1e6) as i64))
     }
@@ -47,7 +47,7 @@ impl fmt::Display for Time {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match Timestamp::from_microsecond(self.0) {
             Ok(time) => write!(f, "{time:.6}"),
-            Err(_) => write!(f, "{} µs", self.0), // beyond the year 9999: no clock of ours says so
+            Err(_) => write!(f, "{} µs", self.0), // beyond the year 9999, which no clock gives
         }
     }
 }
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_survives_its_text() {
+    fn a_time_is_read_back_from_its_text() {
         let time = Time::from_micros(1_700_000_000_000_001);
         assert_eq!(time.to_string(), "2023-11-14T22:13:20.000001Z");
         assert_eq!(

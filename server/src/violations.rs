@@ -1,11 +1,11 @@
-//! What is wrong with a request: where it stands there, and how it is quoted.
+//! Violations of a request: their places in it, and how it is quoted in them.
 
 use solver::error::{Violation, shortened};
 
-/// Where requests carry the problem; pointers start there.
-pub const AT: &str = "/problem";
+/// The place of the problem in a request; pointers start there.
+pub const PROBLEM: &str = "/problem";
 
-/// Moves violations to where their subject stands in a request.
+/// Violations with pointers that start at `prefix`, the place of their subject in the request.
 pub fn prefixed(prefix: &str, violations: Vec<Violation>) -> Vec<Violation> {
     violations
         .into_iter()
@@ -16,8 +16,8 @@ pub fn prefixed(prefix: &str, violations: Vec<Violation>) -> Vec<Violation> {
         .collect()
 }
 
-/// A name from a request as messages quote it: it may be as long as the request.
-pub fn name(text: &str) -> String {
+/// A name from a request as messages quote it: shortened, since it may be as long as the request.
+pub fn quoted(text: &str) -> String {
     shortened(text, 80)
 }
 
@@ -26,8 +26,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_name_is_cut_between_characters() {
-        assert_eq!(name("top"), "top");
-        assert_eq!(name(&"ä".repeat(81)), format!("{}…", "ä".repeat(80)));
+    fn a_long_name_is_truncated_between_characters() {
+        assert_eq!(quoted("top"), "top");
+        assert_eq!(quoted(&"ä".repeat(81)), format!("{}…", "ä".repeat(80)));
     }
 }

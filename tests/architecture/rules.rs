@@ -76,7 +76,7 @@ fn upward(uses: &[Use], floors: &Floors) -> Vec<String> {
                 (inside, own, floors.of(&to.krate, to.room()))
                 && to_floor <= own
             {
-                let wrong = found.entry((&used.file, said(to))).or_insert(used);
+                let wrong = found.entry((&used.file, name_of(to))).or_insert(used);
                 if used.line < wrong.line {
                     *wrong = used;
                 }
@@ -92,13 +92,13 @@ fn upward(uses: &[Use], floors: &Floors) -> Vec<String> {
         } = used;
         format!(
             "{file}:{line}: `{written}` leads from {} to {to}, which is no lower floor",
-            said(from)
+            name_of(from)
         )
     });
     lines.collect()
 }
 
-fn said(place: &Place) -> String {
+fn name_of(place: &Place) -> String {
     format!("`{}` of `{}`", place.room(), place.krate)
 }
 

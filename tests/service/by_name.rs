@@ -1,6 +1,5 @@
-//! Messages by the names in the contract, and by nothing else: JSON as a message and a message as JSON, for
-//! tests that hold the service's own conversions to them. Every field has one name in both; what follows are
-//! the few shapes that differ.
+//! Conversion between JSON and messages by the names in the contract alone, for tests that compare the service's own
+//! conversions with it. Every field has one name in both; the few shapes that differ are listed here.
 
 use std::collections::BTreeSet;
 
@@ -19,12 +18,12 @@ pub(crate) fn descriptor(name: &str) -> MessageDescriptor {
     message.unwrap_or_else(|| panic!("{name} is no message"))
 }
 
-/// A message that says what the JSON says.
+/// The message with the content of this JSON.
 pub(crate) fn message<M: Message + Default>(name: &str, json: &Json) -> M {
     write(&descriptor(name), json).transcode_to().unwrap()
 }
 
-/// The JSON that says what a message says.
+/// The JSON with the content of this message.
 pub(crate) fn json(name: &str, message: &impl Message) -> Json {
     read(&dynamic(name, message))
 }
@@ -34,8 +33,8 @@ pub(crate) fn dynamic(name: &str, message: &impl Message) -> DynamicMessage {
     DynamicMessage::decode(descriptor(name), message.encode_to_vec().as_slice()).unwrap()
 }
 
-/// Holds two forms of JSON against each other, and names the first place where they differ. Nothing, and
-/// what has nothing in it, are the same: messages do not tell them apart.
+/// Compares two JSON values, and panics with the first place where they differ. An absent value and an empty one are
+/// equal, since messages do not distinguish them.
 pub(crate) fn assert_same(one: &Json, other: &Json, what: &str) {
     if let Some(difference) = difference("", one, other) {
         panic!("{what}: {difference}");
@@ -70,12 +69,12 @@ fn is_nothing(json: &Json) -> bool {
     }
 }
 
-/// What JSON has instead of an object with the message's fields.
+/// The form that JSON has instead of an object with the message's fields.
 enum Shape {
     Object,
     /// A list of the fields.
     Array,
-    /// What is in the only field.
+    /// The content of the only field.
     Content,
     /// An object with the fields of one alternative, and its name in the field named here.
     Tagged(&'static str),
@@ -99,7 +98,7 @@ fn shape(message: &MessageDescriptor) -> Shape {
     }
 }
 
-/// Fields that JSON has elsewhere: the message, its field, and the way there.
+/// Fields that have another place in JSON: the message, its field, and the path to it.
 const ELSEWHERE: &[(&str, &str, &[&str])] = &[
     ("Friction", "constant_bound", &["bound"]),
     ("Friction", "bound_table", &["bound"]),
@@ -205,7 +204,7 @@ fn single(value: &Value, kind: &Kind) -> Json {
         Value::String(value) => json!(value),
         Value::EnumNumber(number) => json!(word(kind.as_enum().unwrap(), *number)),
         Value::Message(message) => read(message),
-        other => panic!("{other:?} stands in no answer of JSON"),
+        other => panic!("{other:?} is in no JSON answer"),
     }
 }
 
@@ -314,6 +313,6 @@ fn one(kind: &Kind, json: &Json) -> Value {
             Value::EnumNumber(names.get_value_by_name(&name).unwrap().number())
         }
         Kind::Message(message) => Value::Message(write(message, json)),
-        other => panic!("{other:?} stands in no problem"),
+        other => panic!("{other:?} is in no problem"),
     }
 }

@@ -37,7 +37,7 @@ async fn the_same_input_is_answered_from_the_first_result() {
         .collect();
     assert_eq!(kinds, ["status", "status", "done"]);
 
-    // everything of the source's is there, also when the source is not
+    // all results of the source exist, even after the source is deleted
     let everything = async |id: &str| {
         let at = |what: &str| format!("/v1/jobs/{id}/{what}");
         let mut all = vec![];
@@ -63,7 +63,7 @@ async fn the_same_input_is_answered_from_the_first_result() {
         "the title is for people"
     );
 
-    // over gRPC likewise, and in the two other ways not
+    // the same over gRPC; not with the two other values of `cache`
     let mut grpc = connect(&server).await;
     let create = |cache: pb::Cache| pb::CreateJobRequest {
         problem: Some(message(&example("cylinder"))),
@@ -88,7 +88,7 @@ async fn the_same_input_is_answered_from_the_first_result() {
 
 /// Operations: CreateJob, CancelJob
 #[tokio::test]
-async fn two_of_the_same_input_are_solved_once_and_canceled_apart() {
+async fn two_jobs_of_the_same_input_are_solved_once_and_canceled_separately() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "2"]).await;
     let post = async || {
         let job = server
@@ -115,7 +115,7 @@ async fn two_of_the_same_input_are_solved_once_and_canceled_apart() {
         server.json(&format!("/v1/jobs/{id}/result")).await["summary"]["digest"].take()
     };
     assert_eq!(digest(&source).await, digest(&coalesced).await);
-    // a problem that does not converge fails both of them, with what there is
+    // if the problem does not converge, both fail, with the partial result
     let mut problem = block(60, 60);
     problem["solver"] = json!({ "max_iterations": 2 });
     let post = async || {

@@ -32,13 +32,13 @@ async fn a_queued_job_is_canceled_at_once_and_never_runs() {
     server.cancel(&front).await;
 }
 
-/// In every phase, the factorisation that cannot be interrupted among them.
+/// In every phase, also during the factorisation, which cannot be interrupted.
 /// Operations: CancelJob
 #[tokio::test]
 async fn a_running_large_job_is_canceled_within_half_a_second_in_any_phase() {
     let server = Server::start_alone(SIGNORINI, &[]).await;
     for stage in ["mesh", "assemble", "order", "factor", "condense", "iterate"] {
-        let beside = server.submit(&large()).await; // the other core is busy too
+        let other = server.submit(&large()).await; // the other core is busy too
         let id = server.submit(&large()).await;
         server
             .until(&id, |event| {
@@ -60,7 +60,7 @@ async fn a_running_large_job_is_canceled_within_half_a_second_in_any_phase() {
             (&json!("user_cancel"), &json!(true))
         );
         assert!(ended < Duration::from_millis(500), "in {stage}: {ended:?}");
-        server.cancel(&beside).await;
+        server.cancel(&other).await;
     }
 }
 
@@ -71,7 +71,7 @@ async fn a_canceled_job_has_one_end_and_the_next_job_runs() {
     let id = server.submit(&block(100, 100)).await;
     server.until_running(&id).await;
     server.cancel(&id).await;
-    server.cancel(&id).await; // to ask twice does no harm
+    server.cancel(&id).await; // a second request changes nothing
     server.until_done(&id).await;
     let next = server.submit(&example_json("sheet")).await;
     assert_eq!(server.until_done(&next).await["status"], "succeeded");
@@ -88,7 +88,7 @@ async fn a_canceled_job_has_one_end_and_the_next_job_runs() {
 
 /// Operations: CancelJob
 #[tokio::test]
-async fn a_finished_job_is_not_touched() {
+async fn canceling_a_finished_job_does_not_change_it() {
     let server = server().await;
     let id = server.submit(&example_json("sheet")).await;
     let done = server.until_done(&id).await;

@@ -1,4 +1,4 @@
-//! What is done to jobs and the queue: retry, edit, delete, many at once, pause.
+//! Control of jobs and of the queue: retry, edit, delete, bulk operations, pause.
 
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
@@ -13,7 +13,7 @@ use crate::{SIGNORINI, grpc::connect, server};
 
 /// Operations: RetryJob
 #[tokio::test]
-async fn a_job_that_has_ended_is_tried_again_as_a_new_one() {
+async fn an_ended_job_is_retried_as_a_new_one() {
     let server = server().await;
     let mut problem = example_json("rectangular_punch");
     problem["solver"] = json!({ "max_iterations": 3 });
@@ -62,7 +62,7 @@ async fn a_job_that_has_ended_is_tried_again_as_a_new_one() {
 
 /// Operations: RetryJob
 #[tokio::test]
-async fn a_job_that_ran_out_of_time_is_given_more() {
+async fn a_job_that_timed_out_is_retried_with_a_higher_limit() {
     let server = server().await;
     let body = json!({ "problem": large(), "cache": "off", "limits": { "timeout_s": 0.2, "queue_ttl_s": 60 } });
     let first = server.solve(&body).await;
@@ -84,7 +84,7 @@ async fn a_job_that_ran_out_of_time_is_given_more() {
     );
     assert_eq!(second["parent"], first["id"]);
     server.cancel(second["id"].as_str().unwrap()).await;
-    // what it does not know, and what is out of bounds
+    // unknown fields, and values out of bounds
     for (body, pointer) in [
         (json!({ "timeout_s": 900 }), "/timeout_s"),
         (
@@ -150,7 +150,7 @@ async fn a_job_that_waits_or_runs_is_neither_retried_nor_deleted() {
 
 /// Operations: DeleteJob
 #[tokio::test]
-async fn a_deleted_job_is_gone_with_all_that_belonged_to_it() {
+async fn a_deleted_job_is_removed_with_its_events_and_result() {
     let server = server().await;
     let id = server.submit(&example_json("sheet")).await;
     server.until_done(&id).await;
@@ -192,7 +192,7 @@ async fn a_deleted_job_is_gone_with_all_that_belonged_to_it() {
 
 /// Operations: UpdateJob
 #[tokio::test]
-async fn name_labels_priority_and_pin_are_changed_if_the_version_is_the_one_that_was_seen() {
+async fn name_labels_priority_and_pin_are_changed_if_the_version_matches() {
     let server = server().await;
     let id = server.submit(&example_json("sheet")).await;
     let done = server.until_done(&id).await;
@@ -229,7 +229,7 @@ async fn name_labels_priority_and_pin_are_changed_if_the_version_is_the_one_that
     let (status, refused) = patch(json!({ "name": 7, "priority": 99, "color": "red" }), None).await;
     assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
     let errors = refused["errors"].as_array().unwrap();
-    assert_eq!(errors.len(), 2, "{errors:?}"); // the range is looked at when the shape is right
+    assert_eq!(errors.len(), 2, "{errors:?}"); // ranges are checked only if the types are right
     let (status, _) = patch(json!({ "priority": 11 }), None).await;
     assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
     let (_, job) = patch(json!({ "name": null }), None).await;
@@ -269,7 +269,7 @@ async fn name_labels_priority_and_pin_are_changed_if_the_version_is_the_one_that
 
 /// Operations: CancelJobs, DeleteJobs
 #[tokio::test]
-async fn many_jobs_are_canceled_and_deleted_by_a_filter_and_not_without_one() {
+async fn bulk_cancel_and_delete_require_a_filter() {
     let server = Server::start(SIGNORINI, &["--workers", "1"]).await;
     let front = server.submit(&large()).await;
     let mut labeled = vec![];
@@ -298,7 +298,7 @@ async fn many_jobs_are_canceled_and_deleted_by_a_filter_and_not_without_one() {
         let expected = if n % 2 == 1 { "canceled" } else { "queued" };
         assert_eq!(server.job(id).await["status"], expected);
     }
-    // only what has ended is deleted
+    // only ended jobs are deleted
     let (_, many) = act(Method::DELETE, "/v1/jobs?status=queued,canceled").await;
     assert_eq!(many, json!({ "matched": 6, "changed": 3 }));
     let mut grpc = connect(&server).await;
@@ -326,7 +326,7 @@ async fn many_jobs_are_canceled_and_deleted_by_a_filter_and_not_without_one() {
 
 /// Operations: GetQueue, PauseQueue, ResumeQueue
 #[tokio::test]
-async fn a_paused_queue_accepts_and_does_not_start() {
+async fn a_paused_queue_accepts_jobs_and_does_not_start_them() {
     let mut server = server().await;
     let act = async |server: &Server, verb: &str| -> Value {
         server

@@ -1,4 +1,4 @@
-//! What the service says of its own API.
+//! The service's description of its own API.
 
 use serde_json::Value;
 use suite::harness::{Server, client};
@@ -21,7 +21,7 @@ fn references<'a>(value: &'a Value, found: &mut Vec<&'a str>) {
 
 /// Operations: GetOpenApi, GetProblemSchema
 #[tokio::test]
-async fn the_description_is_whole_and_says_what_each_error_is() {
+async fn the_description_is_complete_and_explains_each_error() {
     let document = server().await.json("/openapi.json").await;
     assert_eq!(document["openapi"], "3.1.0");
     let mut found = vec![];
@@ -40,7 +40,7 @@ async fn the_description_is_whole_and_says_what_each_error_is() {
             }
         }
     }
-    // a problem is described as `signorini schema` has it
+    // the schema of a problem is that of `signorini schema`
     let problem = &document["components"]["schemas"]["Problem"]["properties"];
     let names =
         |schema: &Value| -> Vec<String> { schema.as_object().unwrap().keys().cloned().collect() };
@@ -48,7 +48,7 @@ async fn the_description_is_whole_and_says_what_each_error_is() {
     assert_eq!(names(problem), names(&schema["properties"]));
 }
 
-/// A variable of a path, such that nothing but the parameter is wrong with the request.
+/// A valid value for a variable of a path, so that only the parameter of the request is invalid.
 fn filled(path: &str) -> String {
     path.replace("{id}", "job_01a1fd7a-0018-72af-8a1b-e7e5d5106dae")
         .replace("{hash}", &format!("sha256:{}", "0".repeat(64)))
@@ -60,7 +60,7 @@ fn filled(path: &str) -> String {
 
 /// Operations: GetOpenApi
 #[tokio::test]
-async fn every_route_is_there_and_knows_the_parameters_that_are_described() {
+async fn every_described_route_exists_and_has_the_described_parameters() {
     let server = server().await;
     let document = server.json("/openapi.json").await;
     for (path, operations) in document["paths"].as_object().unwrap() {
@@ -76,7 +76,7 @@ async fn every_route_is_there_and_knows_the_parameters_that_are_described() {
             let error: Value = answer.json().await.unwrap();
             assert_eq!(error["code"], "unknown-parameter", "{what}: {error:#}");
             let detail = error["detail"].as_str().unwrap();
-            let known = detail.split("known are: ").nth(1).unwrap();
+            let known = detail.split("it has: ").nth(1).unwrap();
             let mut known: Vec<&str> = known.split(", ").filter(|name| *name != "none").collect();
             let parameters = operation["parameters"].as_array().into_iter().flatten();
             let mut described: Vec<&str> = parameters
@@ -92,7 +92,7 @@ async fn every_route_is_there_and_knows_the_parameters_that_are_described() {
 
 /// Operations: GetDocs, GetDocsFile
 #[tokio::test]
-async fn the_page_of_the_api_loads_from_here_and_from_nowhere_else() {
+async fn the_page_of_the_api_loads_files_from_this_service_only() {
     let server = server().await;
     let page = server.get("/docs").send().await.unwrap();
     let policy = page.headers()["content-security-policy"].to_str().unwrap();
@@ -114,7 +114,7 @@ async fn the_page_of_the_api_loads_from_here_and_from_nowhere_else() {
 
 /// Operations: GetProto
 #[tokio::test]
-async fn the_contract_of_grpc_is_served_as_it_was_written() {
+async fn the_contract_of_grpc_is_served_unchanged() {
     let served = server().await.get("/proto/signorini.proto").send().await;
     let served = served.unwrap().text().await.unwrap();
     let written = include_str!("../../proto/signorini/v1/signorini.proto");
@@ -123,7 +123,7 @@ async fn the_contract_of_grpc_is_served_as_it_was_written() {
 
 /// Operations: GetError
 #[tokio::test]
-async fn every_error_has_its_page_for_programs_and_for_people() {
+async fn every_error_is_explained_to_programs_and_people() {
     let server = server().await;
     let document = server.json("/openapi.json").await;
     let path = &document["paths"]["/v1/errors/{code}"]["get"];

@@ -34,7 +34,7 @@ async fn refused(request: RequestBuilder) -> (StatusCode, Value) {
 
 /// Operations: GetJob, WatchJob, GetResult
 #[tokio::test]
-async fn unknown_things_are_not_found() {
+async fn unknown_resources_are_not_found() {
     let server = server().await;
     let unknown = "job_01900000-0000-7000-8000-000000000000";
     for path in [
@@ -59,7 +59,7 @@ async fn unknown_things_are_not_found() {
 }
 
 #[tokio::test]
-async fn a_wrong_method_is_told_the_right_ones() {
+async fn a_wrong_method_is_answered_with_the_allowed_ones() {
     let server = server().await;
     let client = suite::harness::client();
     for (method, path, allowed) in [
@@ -69,17 +69,17 @@ async fn a_wrong_method_is_told_the_right_ones() {
     ] {
         let request = client.request(method, format!("{}{path}", server.url));
         let response = request.try_clone().unwrap().send().await.unwrap();
-        // in whatever order
-        let told = response.headers()["allow"].to_str().unwrap();
-        let told: BTreeSet<&str> = told.split(',').collect();
-        assert_eq!(told, allowed.split(',').collect(), "{path}");
+        // in any order
+        let header = response.headers()["allow"].to_str().unwrap();
+        let methods: BTreeSet<&str> = header.split(',').collect();
+        assert_eq!(methods, allowed.split(',').collect(), "{path}");
         assert_eq!(refused(request).await.0, StatusCode::METHOD_NOT_ALLOWED);
     }
 }
 
 /// Operations: CreateJob
 #[tokio::test]
-async fn a_body_that_is_no_json_is_told_apart_from_a_wrong_one() {
+async fn malformed_json_is_distinguished_from_an_invalid_body() {
     let server = server().await;
     let post = |kind: &str, body: &str| {
         server
@@ -126,7 +126,7 @@ async fn a_body_that_is_no_json_is_told_apart_from_a_wrong_one() {
 
 /// Operations: ListJobs
 #[tokio::test]
-async fn parameters_are_known_and_make_sense() {
+async fn unknown_parameters_and_invalid_values_are_refused() {
     let server = server().await;
     for (query, code) in [
         ("color=red", "unknown-parameter"),

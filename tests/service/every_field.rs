@@ -1,6 +1,6 @@
-//! Every field of every message of problems and answers arrives where its name says, in both directions.
-//! The messages are made from the contract alone, with another value in every field: two fields of the same
-//! type that change places are found, and a field that is added is among them by itself.
+//! Every field of every message of problems and answers is converted under its name, in both directions.
+//! The messages are made from the contract alone, with a different value in every field: two fields of the same
+//! type that are interchanged are found, and new fields are included automatically.
 
 use prost::Message;
 use prost_reflect::{
@@ -17,7 +17,8 @@ use solver::{
 
 use crate::by_name::{assert_same, descriptor, dynamic, read};
 
-/// So often every message is filled, each time with the next of its alternatives: as many as the most have.
+/// How many times every message is filled, each time with the next of its alternatives: as often as any has
+/// alternatives.
 fn rounds() -> usize {
     let problem = descriptor("Problem");
     let messages = problem.parent_pool().all_messages();
@@ -75,7 +76,7 @@ fn answer<T: DeserializeOwned + Into<M>, M: Message>(name: &str) {
     }
 }
 
-/// A job has addresses over REST, and in no message.
+/// A job has links over REST, but not in messages.
 fn with_links(mut answer: Json) -> Json {
     for place in ["", "/job"] {
         let job = answer.pointer_mut(place);
@@ -86,8 +87,8 @@ fn with_links(mut answer: Json) -> Json {
     answer
 }
 
-/// Fields that are alternatives although no `oneof` says so. Each round has those of one of the lines, beside all
-/// fields that stand in none.
+/// Fields that are alternatives without being in a `oneof`. Each round has those of one of the lines, beside all
+/// fields that are in none.
 const FORMS: &[(&str, &[&[&str]])] = &[
     (
         "Material",
@@ -126,7 +127,7 @@ impl Filler {
         message
     }
 
-    /// Whether the field, if it is one of several alternatives, is that of this round.
+    /// Whether the field, if it is one of several alternatives, is the one of this round.
     fn is_chosen(&self, message: &str, field: &FieldDescriptor) -> bool {
         if let Some(alternatives) = field.containing_oneof() {
             let mut alternatives = alternatives.fields();
@@ -172,7 +173,7 @@ impl Filler {
         self.count += 1;
         let count = self.count;
         match kind {
-            // two of them differ in some round
+            // so that any two of them differ in some round
             Kind::Bool => Value::Bool((count >> (self.round % 8)) & 1 == 1),
             Kind::Int32 => Value::I32(count as i32),
             Kind::Int64 => Value::I64(count as i64),
@@ -188,22 +189,22 @@ impl Filler {
                 Value::Message(time)
             }
             Kind::Message(message) => Value::Message(self.message(message)),
-            other => panic!("{other:?} stands in no problem and no answer"),
+            other => panic!("{other:?} is in no problem and no answer"),
         }
     }
 
-    /// Any value but the unspecified.
+    /// Any value except the unspecified one.
     fn named(&self, names: &EnumDescriptor) -> i32 {
-        let said = names.values().len() - 1;
+        let specified = names.values().len() - 1;
         names
             .values()
-            .nth(1 + (self.count + self.round) % said)
+            .nth(1 + (self.count + self.round) % specified)
             .unwrap()
             .number()
     }
 }
 
-/// A text of its own, where any will do.
+/// A unique text, for fields where any text is valid.
 fn text(message: &str, field: &str, count: usize) -> String {
     match (message, field) {
         ("Job", "id" | "cached_from" | "parent") => {

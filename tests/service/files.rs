@@ -1,4 +1,4 @@
-//! Data as files: entity tags, digests, ranges; over gRPC pieces from any byte on.
+//! Data as files: entity tags, digests, ranges; over gRPC chunks from any offset.
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use reqwest::StatusCode;
@@ -11,7 +11,7 @@ use crate::{grpc::connect, server};
 
 /// Operations: StreamResult
 #[tokio::test]
-async fn fields_are_fetched_in_ranges_that_make_up_the_whole() {
+async fn ranges_of_fields_add_up_to_the_whole_file() {
     let server = server().await;
     let id = server.submit(&block(40, 40)).await;
     server.until_done(&id).await;

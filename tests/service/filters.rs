@@ -33,7 +33,7 @@ async fn listed(server: &Server, query: &str) -> Vec<String> {
 
 /// Operations: ListJobs, CountJobs
 #[tokio::test]
-async fn every_filter_finds_its_jobs_alone_and_with_others() {
+async fn every_filter_finds_its_jobs_alone_and_combined() {
     let server = server().await;
     let mut jobs = vec![];
     for n in 0..9 {
@@ -98,7 +98,7 @@ async fn every_filter_finds_its_jobs_alone_and_with_others() {
 
 /// Operations: ListJobs
 #[tokio::test]
-async fn lists_go_by_the_time_that_is_asked_for_in_both_directions() {
+async fn lists_are_ordered_by_the_requested_time_in_both_directions() {
     let server = Server::start(SIGNORINI, &["--workers", "1"]).await;
     server.post("/v1/queue/pause").send().await.unwrap();
     let mut ids = vec![];
@@ -124,7 +124,7 @@ async fn lists_go_by_the_time_that_is_asked_for_in_both_directions() {
     assert_eq!(order("").await, [4, 3, 2, 1, 0]);
     assert_eq!(order("order_by=created_at").await, [4, 3, 2, 1, 0]);
     assert_eq!(order("order_by=created_at%20asc").await, [0, 1, 2, 3, 4]);
-    // by the end: by priority, and without the one that has none
+    // by the time of the end: by priority, without the job that has not ended
     assert_eq!(order("order_by=finished_at%20asc").await, [3, 1, 0, 2]);
     assert_eq!(order("order_by=finished_at").await, [2, 0, 1, 3]);
     assert_eq!(

@@ -1,4 +1,4 @@
-//! The eight calls of `signorini.v1.JobService`, and what stands beside them.
+//! Calls of `signorini.v1.JobService`, health and reflection.
 
 use reqwest::StatusCode;
 use serde_json::json;
@@ -16,14 +16,14 @@ pub(crate) async fn connect(server: &Server) -> JobServiceClient<Channel> {
     JobServiceClient::connect(server.url.clone()).await.unwrap()
 }
 
-/// A problem as a message: by its names, not by the code under test.
+/// A problem as a message: converted by its names, not by the code under test.
 pub(crate) fn message(text: &str) -> pb::Problem {
     by_name::message("Problem", &serde_json::from_str(text).unwrap())
 }
 
 /// Operations: CreateJob, GetJob, ListJobs, WatchJob, CancelJob, GetResult, GetProfile
 #[tokio::test]
-async fn a_job_goes_all_the_way_over_grpc() {
+async fn a_job_is_submitted_watched_and_fetched_over_grpc() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     let problem = message(&example("rectangular_punch"));
@@ -109,7 +109,7 @@ async fn a_job_goes_all_the_way_over_grpc() {
 
 /// Operations: CreateJob
 #[tokio::test]
-async fn who_waits_over_grpc_gets_the_terminal_job() {
+async fn a_wait_over_grpc_returns_the_terminal_job() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     let problem = Some(message(&example("sheet")));
@@ -182,7 +182,7 @@ async fn errors_carry_codes_and_details() {
             .any(|v| v.field == "/problem/mesh")
     );
 
-    // Many violations, each of some length, still fit into what a client takes for headers.
+    // many long violations still fit into the headers that a client accepts
     let mut problem = message(&example("sheet"));
     let wrong = pb::Load {
         boundary: Some("b".repeat(1000)),
@@ -200,8 +200,8 @@ async fn errors_carry_codes_and_details() {
     let many = grpc.create_job(request).await.unwrap_err();
     assert_eq!(many.code(), Code::InvalidArgument, "{many}");
     let details = many.get_error_details();
-    let told = &details.bad_request().unwrap().field_violations;
-    assert!(told.len() > 5 && told.last().unwrap().description.contains("more"));
+    let shown = &details.bad_request().unwrap().field_violations;
+    assert!(shown.len() > 5 && shown.last().unwrap().description.contains("more"));
     let long = pb::GetJobRequest {
         id: "x".repeat(1 << 19),
     };
@@ -220,10 +220,10 @@ async fn errors_carry_codes_and_details() {
     assert_eq!(details.error_info().unwrap().reason, "payload-too-large");
 }
 
-/// What REST has accepted and gives in one piece may be too much for a message.
+/// Jobs and problems that REST returns in one response may be too large for a message.
 /// Operations: ListJobs, GetJobProblem
 #[tokio::test]
-async fn no_answer_is_larger_than_a_message_may_be() {
+async fn no_answer_exceeds_the_limit_of_a_message() {
     use prost::Message;
     const MOST: usize = 1 << 20;
     let server = Server::start(SIGNORINI, &[]).await;

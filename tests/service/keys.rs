@@ -1,4 +1,4 @@
-//! Requests that are made again: idempotency keys, and names of the client's own.
+//! Repeated requests: idempotency keys, and ids chosen by the client.
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -27,7 +27,7 @@ fn grpc_body(name: &str) -> pb::CreateJobRequest {
 
 /// Operations: CreateJob
 #[tokio::test]
-async fn a_key_answers_with_the_same_job_as_it_is_now() {
+async fn a_repeated_key_returns_the_current_state_of_the_same_job() {
     let server = server().await;
     let post = async |body: Value, key: &str| {
         let request = server.post("/v1/jobs").header("Idempotency-Key", key);
@@ -71,7 +71,7 @@ async fn a_key_answers_with_the_same_job_as_it_is_now() {
     let refused = grpc.create_job(request("b")).await.unwrap_err();
     assert_eq!(refused.code(), Code::AlreadyExists);
 
-    // a key outlives its job, and says so
+    // a key outlives its job, and is answered with *deleted*
     let deleted = server
         .delete(&format!("/v1/jobs/{id}"))
         .send()
@@ -113,7 +113,7 @@ async fn many_clients_with_the_same_key_at_once_make_one_job() {
 
 /// Operations: PutJob
 #[tokio::test]
-async fn a_job_may_have_a_name_of_the_clients_own() {
+async fn a_job_may_have_an_id_chosen_by_the_client() {
     let server = server().await;
     let id = "job_01890a5d-ac96-774b-bcce-b302099a8057";
     let put = async |id: &str, body: Value| {
@@ -155,7 +155,7 @@ async fn a_job_may_have_a_name_of_the_clients_own() {
 
 /// Operations: BatchCreateJobs
 #[tokio::test]
-async fn a_batch_is_accepted_whole_or_not_at_all() {
+async fn a_batch_is_accepted_completely_or_not_at_all() {
     let server = server().await;
     let post = async |body: Value| {
         let request = server.post("/v1/jobs/batch").header("Idempotency-Key", "b");

@@ -1,4 +1,4 @@
-//! What is too much is refused, and the rest goes on.
+//! Requests over a limit are refused, and others continue.
 
 use std::time::{Duration, Instant};
 
@@ -27,7 +27,7 @@ async fn a_body_over_the_limit_is_refused() {
         response.json::<Value>().await.unwrap()["code"],
         "payload-too-large"
     );
-    // Also when the length is not announced.
+    // also if the length is not declared
     let pieces = body
         .into_bytes()
         .chunks(1 << 16)
@@ -42,7 +42,7 @@ async fn a_body_over_the_limit_is_refused() {
     assert_eq!(response.status(), StatusCode::PAYLOAD_TOO_LARGE);
 }
 
-/// Each support is wrong in five ways, to be explained one by one.
+/// Each support has five violations, each of which is reported.
 fn faulty(supports: usize) -> Value {
     let mut problem = example_json("sheet");
     let wrong = json!({ "bundary": "left", "ux": "0", "uy": "0", "uz": 0 });
@@ -52,11 +52,11 @@ fn faulty(supports: usize) -> Value {
 
 /// Operations: CreateJob
 #[tokio::test]
-async fn bodies_that_take_long_to_explain_do_not_hold_up_the_others() {
+async fn bodies_with_many_violations_do_not_delay_other_requests() {
     let server = Server::start_alone(SIGNORINI, &[]).await;
     let body = faulty(14_000).to_string();
     assert!(body.len() > 600_000, "{}", body.len());
-    // As many as there are cores, and so as many as there are async threads.
+    // as many as there are cores, and so as many as there are async threads
     let cores = std::thread::available_parallelism().unwrap().get();
     let sent = (0..cores).map(|_| {
         let post = server.post("/v1/problems/validate");
@@ -86,7 +86,7 @@ async fn bodies_that_take_long_to_explain_do_not_hold_up_the_others() {
 
 /// Operations: CreateJob
 #[tokio::test]
-async fn a_problem_over_the_memory_budget_is_refused_with_the_figures() {
+async fn a_problem_over_the_memory_budget_is_refused_with_the_estimate() {
     let server = Server::start(SIGNORINI, &["--memory-budget-bytes", "1000000000"]).await;
     let body = json!({ "problem": large() });
     let (status, document) = answer(server.post("/v1/jobs").json(&body)).await;
@@ -98,7 +98,7 @@ async fn a_problem_over_the_memory_budget_is_refused_with_the_figures() {
     assert_eq!(document["memory_budget_bytes"], 1_000_000_000);
     let detail = document["detail"].as_str().unwrap();
     assert!(detail.contains("the budget is 953.7 MiB"), "{detail}");
-    // who only asks is answered, with the same figures
+    // a validation is answered with the same numbers
     let (status, judgement) = answer(server.post("/v1/problems/validate").json(&body)).await;
     assert_eq!(
         (status, &judgement["valid"]),
@@ -110,7 +110,7 @@ async fn a_problem_over_the_memory_budget_is_refused_with_the_figures() {
         (&json!("/problem/mesh"), &json!("too_large"))
     );
     assert_eq!(judgement["estimate"], document["estimate"]);
-    // A size beyond all numbers is refused as quickly.
+    // a size beyond all integers is refused as quickly
     let mut hopeless = example_json("sheet");
     hopeless["mesh"]["refine"] = json!(4_000_000_000u32);
     let response = server
@@ -124,7 +124,7 @@ async fn a_problem_over_the_memory_budget_is_refused_with_the_figures() {
 
 /// Operations: CreateJob
 #[tokio::test]
-async fn a_full_queue_refuses_jobs_and_nothing_else() {
+async fn a_full_queue_refuses_jobs_and_no_other_request() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1", "--max-queued", "2"]).await;
     let front = server.submit(&large()).await;
     server.until_running(&front).await;
@@ -157,7 +157,7 @@ async fn two_large_jobs_run_at_once_and_a_third_waits() {
     );
     assert_eq!(status(&third).await, "queued");
     assert_eq!(server.job(&third).await["queue"]["position"], 1);
-    // The third starts when one of the two has ended; all three find the same bits.
+    // The third starts when one of the two has ended; all three have bit-identical results.
     server.until_running(&third).await;
     let running = server.json("/v1/jobs?status=running").await;
     assert!(running["jobs"].as_array().unwrap().len() <= 2);

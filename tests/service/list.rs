@@ -8,7 +8,7 @@ use crate::{SIGNORINI, server};
 
 /// Operations: ListJobs
 #[tokio::test]
-async fn pages_hold_every_job_once_newest_first() {
+async fn pages_contain_every_job_once_newest_first() {
     let server = server().await;
     let mut ids = vec![];
     for _ in 0..7 {
@@ -36,7 +36,7 @@ async fn pages_hold_every_job_once_newest_first() {
 
 /// Operations: ListJobs
 #[tokio::test]
-async fn jobs_are_found_by_status_and_know_their_place() {
+async fn jobs_are_found_by_status_with_their_queue_positions() {
     let server = suite::harness::Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
     let front = server.submit(&large()).await;
     server.until_running(&front).await;

@@ -1,5 +1,5 @@
-//! What the service promises, held against the real binary on a free port with its own store.
-//! Nothing sleeps to wait: a test listens to events.
+//! Tests of the service's promises with the real binary, on a free port with its own store.
+//! Tests do not sleep to wait: they follow events.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod by_name;

@@ -1,4 +1,4 @@
-//! Stored meshes: uploaded once, over either protocol, and named by jobs.
+//! Stored meshes: uploaded once, over either protocol, and referred to by jobs.
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -33,11 +33,11 @@ async fn solved(server: &Server, problem: &Value) -> Value {
     server.json(&path).await["summary"].take()
 }
 
-/// Every family that Gmsh wrote, in each form of its format, solves through REST; the four forms of a
-/// mesh give one answer.
+/// Every mesh family written by Gmsh, in each form of its format, is solved over REST; the four forms of a
+/// mesh give equal results.
 /// Operations: UploadMesh, CreateJob
 #[tokio::test]
-async fn what_gmsh_wrote_is_stored_and_solved() {
+async fn meshes_from_gmsh_are_stored_and_solved() {
     let server = server().await;
     for (geometry, problem) in [("fillet", pressed as fn(Value) -> Value), ("sheet", pulled)] {
         for family in ["quad8", "tri6", "mixed"] {
@@ -62,7 +62,7 @@ async fn what_gmsh_wrote_is_stored_and_solved() {
 
 /// Operations: UploadMesh, ListMeshes, GetMesh
 #[tokio::test]
-async fn a_mesh_is_stored_once_and_told_apart_by_its_content() {
+async fn a_mesh_is_stored_once_and_identified_by_its_content() {
     let server = server().await;
     let bytes = file("gmsh/fillet-mixed-msh41-binary.msh");
     let (status, first) = upload(&server, bytes.clone()).await;
@@ -113,9 +113,9 @@ async fn a_mesh_is_stored_once_and_told_apart_by_its_content() {
 
 /// Operations: UploadMesh
 #[tokio::test]
-async fn what_is_no_mesh_is_refused_with_its_line() {
+async fn a_file_that_is_not_a_mesh_is_refused_with_its_line() {
     let server = server().await;
-    for (bytes, said) in [
+    for (bytes, expected) in [
         (b"solid cube".to_vec(), "a file that begins otherwise"),
         (Vec::new(), "a file that begins otherwise"),
         (
@@ -134,7 +134,7 @@ async fn what_is_no_mesh_is_refused_with_its_line() {
         let (status, problem) = upload(&server, bytes).await;
         assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
         let got = problem["errors"][0]["got"].as_str().unwrap();
-        assert!(got.contains(said), "{got}");
+        assert!(got.contains(expected), "{got}");
     }
     let unknown = pressed(json!({"stored": "sha256:0"}));
     let response = server
@@ -161,7 +161,7 @@ async fn what_is_no_mesh_is_refused_with_its_line() {
 
 /// Operations: UploadMesh
 #[tokio::test]
-async fn too_large_a_mesh_is_refused_whether_it_says_its_size_or_not() {
+async fn a_mesh_that_is_too_large_is_refused_with_or_without_a_declared_size() {
     let server = Server::start(SIGNORINI, &["--max-mesh-bytes", "10000"]).await;
     let bytes = file("gmsh/fillet-quad9-msh22-ascii.msh");
     let pieces: Vec<std::io::Result<Vec<u8>>> =
@@ -173,14 +173,14 @@ async fn too_large_a_mesh_is_refused_whether_it_says_its_size_or_not() {
     }
 }
 
-/// A mesh stays as long as a job needs it, also over a crash, and what an upload left is cleared.
+/// A mesh is kept as long as a job needs it, also after a crash, and the pieces of interrupted uploads are removed.
 /// Operations: DeleteMesh
 #[tokio::test]
-async fn a_mesh_is_kept_for_the_jobs_that_wait_for_it() {
+async fn a_mesh_is_kept_for_the_jobs_that_need_it() {
     let mut server = server().await;
     let (_, info) = upload(&server, file("gmsh/fillet-tri6-msh22-ascii.msh")).await;
     let mesh = format!("/v1/meshes/{}", info["hash"].as_str().unwrap());
-    // the workers are busy with something long
+    // the workers are busy with long jobs
     for _ in 0..2 {
         server.submit(&suite::harness::block(150, 150)).await;
     }
@@ -201,7 +201,7 @@ async fn a_mesh_is_kept_for_the_jobs_that_wait_for_it() {
 
 /// Operations: UploadMesh, ListMeshes, GetMesh, DeleteMesh
 #[tokio::test]
-async fn grpc_stores_and_tells_the_same() {
+async fn grpc_and_rest_report_the_same() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     let bytes = file("gmsh/sheet-mixed-msh41-binary.msh");
@@ -337,7 +337,7 @@ async fn a_mesh_of_a_million_nodes_streams_through() {
     let bytes = gmsh_grid(580, 575);
     for over_grpc in [false, true] {
         let server = Server::start_alone(SIGNORINI, &[]).await;
-        // the first request of all warms up what every server needs
+        // the very first request allocates memory that every server needs
         upload(&server, file("gmsh/sheet-tri6-msh22-ascii.msh")).await;
         let (before, cpu) = (server.memory("VmRSS"), server.cpu_s());
         let (nodes, elements) = if over_grpc {

@@ -39,11 +39,11 @@ async fn every_plot_of_a_result_is_an_svg_in_both_themes() {
 
 /// Operations: GetPlot
 #[tokio::test]
-async fn a_plot_or_a_theme_that_is_not_known_is_refused_with_what_is() {
+async fn an_unknown_plot_or_theme_is_refused_with_the_known_ones() {
     let server = server().await;
     let id = server.submit(&example_json("sheet")).await;
     server.until_done(&id).await;
-    for (path, status, said) in [
+    for (path, status, expected) in [
         ("forces.svg", StatusCode::NOT_FOUND, "convergence.svg"),
         ("mesh", StatusCode::NOT_FOUND, "mesh.svg"),
         (
@@ -61,13 +61,13 @@ async fn a_plot_or_a_theme_that_is_not_known_is_refused_with_what_is() {
         let path = format!("/v1/jobs/{id}/plots/{path}");
         let answer = server.get(&path).send().await.unwrap();
         assert_eq!(answer.status(), status, "{path}");
-        assert!(answer.text().await.unwrap().contains(said), "{path}");
+        assert!(answer.text().await.unwrap().contains(expected), "{path}");
     }
 }
 
 /// Operations: GetPlot
 #[tokio::test]
-async fn what_a_result_does_not_have_is_not_drawn() {
+async fn plots_without_data_are_not_found() {
     let server = server().await;
     let mut elastic = example_json("rectangular_punch");
     elastic["contacts"] = json!([]);
@@ -90,7 +90,7 @@ async fn what_a_result_does_not_have_is_not_drawn() {
 
 /// Operations: GetPlot
 #[tokio::test]
-async fn a_plot_is_there_as_soon_as_what_it_shows() {
+async fn a_plot_is_available_as_soon_as_its_data() {
     let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
     let front = server.submit(&large()).await;
     let waiting = server.submit(&example_json("sheet")).await;

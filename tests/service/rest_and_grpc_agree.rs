@@ -1,4 +1,4 @@
-//! One problem, three doors, the same bits.
+//! One problem over REST, over gRPC and from the command line gives bit-identical results.
 
 use std::process::Command;
 
@@ -26,7 +26,7 @@ const EXAMPLES: [&str; 5] = [
 
 /// Operations: CreateJob, GetResult
 #[tokio::test]
-async fn rest_grpc_and_the_command_line_find_the_same_bits() {
+async fn rest_grpc_and_the_command_line_give_bit_identical_results() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     let folder = tempfile::tempdir().unwrap();
@@ -91,7 +91,7 @@ async fn rest_grpc_and_the_command_line_find_the_same_bits() {
 
 /// Operations: GetJob
 #[tokio::test]
-async fn both_protocols_say_the_same_of_a_job_that_failed() {
+async fn both_protocols_report_a_failed_job_equally() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     let mut problem = example_json("rectangular_punch");
@@ -104,7 +104,7 @@ async fn both_protocols_say_the_same_of_a_job_that_failed() {
     agree(&job, "Job", &over_grpc.into_inner());
 }
 
-/// All that REST says, but for its addresses, is in the message, and nothing else.
+/// The message has the content of the JSON except for its links, and nothing else.
 fn agree(by_rest: &Value, name: &str, by_grpc: &impl prost::Message) {
     let mut by_rest = by_rest.clone();
     for part in ["", "/job"] {
@@ -116,7 +116,7 @@ fn agree(by_rest: &Value, name: &str, by_grpc: &impl prost::Message) {
 
 /// Operations: WatchJob, GetProfile
 #[tokio::test]
-async fn both_protocols_tell_the_same_story_of_one_job() {
+async fn both_protocols_report_the_same_events_and_profiles_of_a_job() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     let id = server.submit(&example_json("cylinder")).await;
@@ -153,7 +153,7 @@ async fn both_protocols_tell_the_same_story_of_one_job() {
     agree(&profile, "ContactProfile", &over_grpc);
 }
 
-/// Load steps: indented, then dragged, by the incremental law; the second solution asked for.
+/// Load steps: indentation, then tangential displacement, by the incremental law; with the second solution.
 /// Operations: GetResult, GetProfile
 #[tokio::test]
 async fn both_protocols_serve_every_load_step() {
@@ -211,7 +211,7 @@ async fn both_protocols_serve_every_load_step() {
 }
 
 #[tokio::test]
-async fn both_protocols_give_a_problem_back_as_it_was_handed_in() {
+async fn both_protocols_return_a_problem_as_it_was_submitted() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     server.post("/v1/queue/pause").send().await.unwrap();
@@ -236,8 +236,8 @@ async fn both_protocols_give_a_problem_back_as_it_was_handed_in() {
 }
 
 #[tokio::test]
-async fn both_protocols_say_the_same_of_the_service_of_meshes_and_of_problems() {
-    // alone: the queue must stand still between the two questions
+async fn both_protocols_report_the_service_meshes_and_problems_equally() {
+    // alone: the queue must not change between the two requests
     let server = Server::start_alone(SIGNORINI, &[]).await;
     let mut grpc = connect(&server).await;
     // right after the start the dispatcher holds a worker while it looks for a job

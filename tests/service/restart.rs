@@ -1,4 +1,4 @@
-//! The end of the service, by force or by request, is not the end of its jobs.
+//! Jobs survive the end of the service, by a crash or on request.
 
 use std::process::Command;
 
@@ -42,7 +42,7 @@ async fn a_job_killed_in_the_middle_is_finished_after_the_restart() {
 }
 
 #[tokio::test]
-async fn a_stop_under_load_puts_running_jobs_back_and_exits_with_0() {
+async fn a_stop_under_load_requeues_running_jobs_and_exits_with_0() {
     let mut server = Server::start_alone(SIGNORINI, &["--grace-s", "5"]).await;
     let mut ids = vec![server.submit(&large()).await, server.submit(&large()).await];
     for _ in 0..5 {
@@ -95,7 +95,7 @@ async fn a_job_asked_to_stop_just_before_a_crash_is_canceled_after_it() {
 }
 
 #[tokio::test]
-async fn what_was_found_is_still_there_after_a_restart() {
+async fn results_are_kept_across_a_restart() {
     let mut server = Server::start(SIGNORINI, &[]).await;
     let id = server.submit(&example_json("cylinder")).await;
     let job = server.until_done(&id).await;
@@ -115,10 +115,10 @@ async fn a_second_server_on_the_same_folder_is_refused_in_one_line() {
         .output()
         .unwrap();
     assert!(!second.status.success());
-    let said = String::from_utf8(second.stderr).unwrap();
+    let output = String::from_utf8(second.stderr).unwrap();
     assert!(
-        said.lines().count() == 1 && said.contains("another server"),
-        "{said}"
+        output.lines().count() == 1 && output.contains("another server"),
+        "{output}"
     );
     assert!(second.stdout.is_empty());
 }
@@ -134,10 +134,10 @@ async fn a_port_in_use_is_refused_in_one_line() {
         .output()
         .unwrap();
     assert!(!second.status.success());
-    let said = String::from_utf8(second.stderr).unwrap();
+    let output = String::from_utf8(second.stderr).unwrap();
     assert!(
-        said.lines().count() == 1 && said.contains("cannot listen"),
-        "{said}"
+        output.lines().count() == 1 && output.contains("cannot listen"),
+        "{output}"
     );
 }
 

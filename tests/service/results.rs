@@ -1,4 +1,4 @@
-//! What a job has found: /result, /history, /profiles/{boundary}, /fields.
+//! Results of a job: /result, /history, /profiles/{boundary}, /fields.
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -65,7 +65,7 @@ async fn a_result_has_its_summary_profiles_and_fields() {
         .unwrap();
     assert_eq!(csv, accepted.text().await.unwrap());
     assert_eq!(csv.lines().count(), s.len() + 1);
-    // Every number reads back as the very same.
+    // every number is read back bit-identically
     let column = csv
         .lines()
         .next()
@@ -89,17 +89,17 @@ async fn a_result_has_its_summary_profiles_and_fields() {
         .await;
     let nodes = fields["x"].as_array().unwrap().len();
     assert!(nodes > 100 && fields["stress_zz"].as_array().unwrap().len() == nodes);
-    // What the nodes of the profile are told there is told here too, and of no other node.
+    // the contact state of the profile's nodes is also in the fields, and that of no other node
     let states = fields["contact_state"].as_array().unwrap();
     assert_eq!(states.len(), nodes);
     let count = |state: i64| states.iter().filter(|s| s.as_i64() == Some(state)).count();
-    let said = |state: &str| {
-        let said = profile["state"].as_array().unwrap();
-        said.iter().filter(|s| s.as_str() == Some(state)).count()
+    let found = |state: &str| {
+        let states = profile["state"].as_array().unwrap();
+        states.iter().filter(|s| s.as_str() == Some(state)).count()
     };
     assert_eq!(
         [count(0), count(1), count(2)],
-        [said("open"), said("stick"), said("slip")]
+        [found("open"), found("stick"), found("slip")]
     );
 }
 
@@ -151,19 +151,19 @@ async fn every_format_has_its_type_its_name_and_its_first_bytes() {
 
 /// Operations: ListIterations
 #[tokio::test]
-async fn a_history_has_the_rows_that_were_told_and_no_more_than_asked_for() {
+async fn a_history_has_the_rows_of_the_events_and_at_most_the_requested_number() {
     let server = server().await;
     let id = server.submit(&example_json("rectangular_punch")).await;
     server.until_done(&id).await;
     let history = server.json(&format!("/v1/jobs/{id}/history")).await;
     let rows = history.as_array().unwrap();
-    let mut told = server.events(&id, 0).await.rest().await;
-    told.retain(|event| event["type"] == "iteration");
+    let mut events = server.events(&id, 0).await.rest().await;
+    events.retain(|event| event["type"] == "iteration");
     assert!(rows.len() > 4);
-    assert_eq!(rows.len(), told.len());
-    for (row, told) in rows.iter().zip(&told) {
+    assert_eq!(rows.len(), events.len());
+    for (row, event) in rows.iter().zip(&events) {
         for (name, value) in row.as_object().unwrap() {
-            assert_eq!(value, &told[name], "{name}");
+            assert_eq!(value, &event[name], "{name}");
         }
     }
     let few = server
@@ -187,7 +187,7 @@ async fn a_history_has_the_rows_that_were_told_and_no_more_than_asked_for() {
 
 /// Operations: ListIterations
 #[tokio::test]
-async fn a_job_without_a_result_has_the_history_that_was_told_so_far() {
+async fn a_job_without_a_result_has_the_history_of_its_events_so_far() {
     let server = suite::harness::Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
     let running = server.submit(&large()).await;
     let waiting = server.submit(&example_json("sheet")).await;
@@ -204,7 +204,7 @@ async fn a_job_without_a_result_has_the_history_that_was_told_so_far() {
 
 /// Operations: ListIterations, GetProfile, StreamResult
 #[tokio::test]
-async fn what_is_not_there_is_said_with_what_is() {
+async fn an_unknown_name_is_rejected_with_the_known_ones() {
     let server = server().await;
     let id = server.submit(&example_json("rectangular_punch")).await;
     server.until_done(&id).await;
@@ -232,7 +232,7 @@ async fn what_is_not_there_is_said_with_what_is() {
 
 /// Operations: GetResult
 #[tokio::test]
-async fn a_result_is_not_there_before_the_end_nor_after_an_end_without_one() {
+async fn there_is_no_result_before_the_end_or_after_an_end_without_one() {
     let server = suite::harness::Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
     let front = server.submit(&large()).await;
     let waiting = server.submit(&example_json("sheet")).await;
@@ -258,7 +258,7 @@ async fn a_result_is_not_there_before_the_end_nor_after_an_end_without_one() {
     assert_eq!(never.json::<Value>().await.unwrap()["code"], "no-result");
 }
 
-/// Names and numbers of load steps mean the same one.
+/// The name and the number of a load step select the same one.
 /// Operations: GetResult, GetProfile
 #[tokio::test]
 async fn load_steps_without_names_are_numbered_from_0() {
@@ -289,7 +289,7 @@ async fn load_steps_without_names_are_numbered_from_0() {
     assert!(forces[0] < forces[2] && forces[2] < forces[1], "{forces:?}");
 }
 
-/// Load steps: while the second runs, what the first has found is there.
+/// Load steps: while the second runs, the results of the first are available.
 /// Operations: GetResult
 #[tokio::test]
 async fn finished_load_steps_of_a_running_job_are_served() {
@@ -317,7 +317,7 @@ async fn finished_load_steps_of_a_running_job_are_served() {
     let result = server.json(&at("result")).await;
     let steps = result["steps"].as_array().unwrap();
     assert_eq!((steps.len(), &steps[0]["name"]), (1, &json!("indent")));
-    // its summary has converged; that there is more to come is said beside it
+    // its summary has converged; `result_available` shows that the result is partial
     assert_eq!(
         (&result["result_available"], &result["summary"]["converged"]),
         (&json!("partial"), &json!(true))
@@ -334,7 +334,7 @@ async fn finished_load_steps_of_a_running_job_are_served() {
     assert_eq!(plot.status(), StatusCode::OK);
     let plot = server.get(&at("plots/deformed.svg")).send().await.unwrap();
     assert_eq!(plot.status(), StatusCode::CONFLICT);
-    // and stays when the job does not come to its end
+    // and is kept if the job does not finish
     server.cancel(&id).await;
     let done = server.until_done(&id).await;
     assert_eq!(
@@ -348,7 +348,7 @@ async fn finished_load_steps_of_a_running_job_are_served() {
 
 /// Operations: GetProfile
 #[tokio::test]
-async fn a_profile_is_given_at_nodes_at_friction_points_or_at_any_number_of_places() {
+async fn a_profile_is_given_at_nodes_at_friction_points_or_at_any_number_of_points() {
     let server = server().await;
     let mut grpc = crate::grpc::connect(&server).await;
     let id = server.submit(&example_json("rectangular_punch")).await;

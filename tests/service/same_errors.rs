@@ -1,5 +1,4 @@
-//! What one protocol refuses the other refuses too, with the same code, the same words and the same list of
-//! violations.
+//! Both protocols reject the same requests, with the same code, the same message and the same list of violations.
 
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -26,7 +25,7 @@ fn refused<T>(answer: Result<Response<T>, Status>) -> (String, String) {
 
 /// Operations: CreateJob, BatchCreateJobs, GetJob, GetJobProblem, WatchJob, WaitJob, GetResult, ListIterations, StreamResult, GetProfile, CancelJob, RetryJob, DeleteJob, UpdateJob, ListJobs, CountJobs, CancelJobs, DeleteJobs, GetMesh, DeleteMesh
 #[tokio::test]
-async fn what_one_protocol_refuses_the_other_refuses_alike() {
+async fn both_protocols_reject_the_same_requests() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     let done = server.submit(&example_json("sheet")).await;
@@ -268,7 +267,7 @@ async fn what_one_protocol_refuses_the_other_refuses_alike() {
 
 /// Operations: GetServerInfo, GetCaller, GetQueue, CountJobs, ListJobs, GetJobProblem, ListIterations
 #[tokio::test]
-async fn what_both_protocols_answer_about_the_service_is_the_same() {
+async fn both_protocols_return_the_same_about_the_service() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     let info = server.json("/v1/info").await;

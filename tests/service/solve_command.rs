@@ -20,7 +20,7 @@ fn solve(problem: &str, arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn a_converged_problem_is_summed_up_and_exits_with_0() {
+fn a_converged_problem_is_summarized_and_exits_with_0() {
     let output = solve(&example("rectangular_punch"), &[]);
     assert_eq!(output.status.code(), Some(0));
     let summary = String::from_utf8(output.stdout).unwrap();
@@ -58,7 +58,7 @@ fn the_whole_document_can_go_to_standard_output() {
 }
 
 #[test]
-fn a_figure_is_named_before_its_ending() {
+fn a_figure_is_named_before_the_extension() {
     let folder = tempfile::tempdir().unwrap();
     let drawn = |name: &str, more: &[&str]| {
         let file = folder.path().join(name);
@@ -80,7 +80,7 @@ fn a_figure_is_named_before_its_ending() {
 }
 
 #[test]
-fn a_problem_that_does_not_converge_exits_with_9_and_is_written_all_the_same() {
+fn a_problem_that_does_not_converge_exits_with_9_and_is_still_written() {
     let mut problem = example_json("rectangular_punch");
     problem["solver"] = json!({ "max_iterations": 1 });
     let output = solve(&problem.to_string(), &["-o", "-"]);
@@ -96,9 +96,9 @@ fn an_invalid_problem_exits_with_2_and_every_violation() {
     problem["supports"][1]["boundary"] = json!("botom");
     let output = solve(&problem.to_string(), &[]);
     assert_eq!(output.status.code(), Some(2));
-    let said = String::from_utf8(output.stderr).unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
     for pointer in ["/materials/0/youngs_modulus", "/supports/1/boundary"] {
-        assert!(said.contains(pointer), "{said}");
+        assert!(errors.contains(pointer), "{errors}");
     }
     assert_eq!(
         solve("{", &[]).status.code(),
@@ -118,7 +118,7 @@ fn a_missing_file_exits_with_1_in_one_line() {
 }
 
 #[test]
-fn every_ending_is_written_in_one_go_and_leaves_nothing_else() {
+fn every_format_is_written_and_no_other_file_is_left() {
     let folder = tempfile::tempdir().unwrap();
     let names = [
         "p.json",
@@ -140,7 +140,7 @@ fn every_ending_is_written_in_one_go_and_leaves_nothing_else() {
     assert_eq!(output.status.code(), Some(0));
     assert!(
         output.stdout.is_empty(),
-        "a file is asked for, not a summary"
+        "a file is requested, not a summary"
     );
     assert_eq!(
         std::fs::read_dir(folder.path()).unwrap().count(),
@@ -166,13 +166,13 @@ fn every_ending_is_written_in_one_go_and_leaves_nothing_else() {
 }
 
 #[test]
-fn what_cannot_be_written_is_said_before_anything_is_solved() {
+fn an_invalid_output_is_rejected_before_solving() {
     let mut two = example_json("rectangular_punch");
     two["supports"] = json!([{ "boundary": "left", "ux": 0 }]);
     let mut below = two["contacts"][0].clone();
     below["boundary"] = json!("bottom");
     two["contacts"].as_array_mut().unwrap().push(below);
-    for (name, said) in [
+    for (name, expected) in [
         ("p.xlsx", ".vtu"),
         ("p", ".json"),
         ("p.fields.csv", ".npz"),
@@ -184,7 +184,7 @@ fn what_cannot_be_written_is_said_before_anything_is_solved() {
         assert_eq!(output.status.code(), Some(2), "{name}");
         let error = String::from_utf8(output.stderr).unwrap();
         assert!(
-            error.contains(said) && error.lines().count() == 1,
+            error.contains(expected) && error.lines().count() == 1,
             "{error}"
         );
     }

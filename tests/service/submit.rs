@@ -27,7 +27,7 @@ async fn a_submitted_job_is_accepted_with_its_address_and_version() {
         (&job["name"], &job["labels"]["a"], &job["priority"]),
         (&json!("first"), &json!("b"), &json!(3))
     );
-    // both workers are free: the job is in the hands of one with the commit that accepts it
+    // both workers are free: the commit that accepts the job also starts it
     assert_eq!(
         (&job["status"], &job["attempt"], &job["owner"]),
         (&json!("running"), &json!(1), &json!("local"))
@@ -37,7 +37,7 @@ async fn a_submitted_job_is_accepted_with_its_address_and_version() {
 
 /// Operations: CreateJob
 #[tokio::test]
-async fn who_prefers_to_wait_gets_the_terminal_job() {
+async fn a_preference_to_wait_returns_the_terminal_job() {
     let server = server().await;
     let body = json!({ "problem": example_json("rectangular_punch") });
     let response = server
@@ -59,7 +59,7 @@ async fn who_prefers_to_wait_gets_the_terminal_job() {
 
 /// Operations: CreateJob
 #[tokio::test]
-async fn who_waits_too_short_gets_the_job_as_it_is() {
+async fn a_wait_that_is_too_short_returns_the_job_as_it_is() {
     let server = server().await;
     let body = json!({ "problem": suite::harness::block(150, 150) });
     let response = server
@@ -124,7 +124,7 @@ async fn a_problem_that_does_not_converge_fails_and_keeps_its_state() {
 
 /// Operations: CreateJob
 #[tokio::test]
-async fn everything_wrong_with_a_job_is_said_at_once() {
+async fn all_violations_of_a_job_are_reported_together() {
     let server = server().await;
     let mut problem = example_json("rectangular_punch");
     problem["materials"][0]["poissons_ratio"] = json!(0.7);

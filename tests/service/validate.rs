@@ -8,7 +8,7 @@ use crate::server;
 
 /// Operations: ValidateProblem
 #[tokio::test]
-async fn a_good_problem_is_valid_and_has_a_price() {
+async fn a_valid_problem_has_a_cost_estimate() {
     let server = server().await;
     let body = json!({ "problem": example_json("cylinder") });
     let response = server
@@ -39,9 +39,9 @@ async fn a_good_problem_is_valid_and_has_a_price() {
 
 /// Operations: ValidateProblem
 #[tokio::test]
-async fn a_bad_problem_is_an_answer_and_not_an_error() {
+async fn an_invalid_problem_is_answered_with_200() {
     let server = server().await;
-    // Structural faults first: names and types …
+    // first the violations of structure: names and types …
     let mut problem = example_json("cylinder");
     problem["contact"] = json!([]);
     problem["mesh"]["grid"]["x"][1] = json!("far");
@@ -56,7 +56,7 @@ async fn a_bad_problem_is_an_answer_and_not_an_error() {
         pointers.contains(&"/problem/mesh/grid/x/1".into()),
         "{pointers:?}"
     );
-    // … then those of meaning.
+    // … then those of content
     let mut problem = example_json("cylinder");
     problem["supports"][0]["boundary"] = json!("lft");
     let judgement = validate(&server, &problem).await;
@@ -71,7 +71,7 @@ async fn a_bad_problem_is_an_answer_and_not_an_error() {
 
 /// Operations: ValidateProblem
 #[tokio::test]
-async fn a_body_without_a_problem_is_told_so() {
+async fn a_body_without_a_problem_is_rejected_by_name() {
     let server = server().await;
     let response = server
         .post("/v1/problems/validate")

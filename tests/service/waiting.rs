@@ -18,7 +18,7 @@ use crate::{
 
 /// Operations: GetJob
 #[tokio::test]
-async fn a_client_that_has_the_job_already_is_told_so() {
+async fn a_client_that_has_the_current_version_is_answered_with_304() {
     let server = server().await;
     let id = server.submit(&example_json("sheet")).await;
     server.until_done(&id).await;
@@ -59,16 +59,16 @@ async fn a_long_poll_returns_with_the_next_version_or_at_its_limit() {
         let response = request.send().await.unwrap();
         (response.status(), start.elapsed())
     };
-    // nothing happens: at the limit 304, or without a tag the job
+    // no change: at the limit 304, or the job if there is no tag
     let (status, time) = poll("wait=0.2", Some(version)).await;
     assert_eq!(status, StatusCode::NOT_MODIFIED);
     assert!(time >= Duration::from_millis(200));
     assert_eq!(poll("wait=0.2", None).await.0, StatusCode::OK);
-    // another version is known already: at once
+    // the client has another version: answered at once
     let (status, time) = poll("wait=30", Some(version - 1)).await;
     assert_eq!(status, StatusCode::OK);
     assert!(time < Duration::from_secs(5));
-    // an edit, and then the start, wake who waits
+    // an edit, and then the start, end the wait
     let waiting = poll("wait=30", Some(version));
     let edit = async {
         tokio::time::sleep(Duration::from_millis(100)).await;
@@ -86,7 +86,7 @@ async fn a_long_poll_returns_with_the_next_version_or_at_its_limit() {
     assert_eq!(status, StatusCode::OK);
     assert!(time < Duration::from_secs(20), "{time:?}");
     assert_eq!(server.job(&id).await["status"], "succeeded");
-    // terminal already: at once, also for a client that knows no version and comes too late
+    // terminal already: answered at once, also for a client that knows no version
     for query in ["wait=30&until=terminal", "wait=30"] {
         let (status, time) = poll(query, None).await;
         assert_eq!(status, StatusCode::OK);
@@ -118,7 +118,7 @@ async fn a_long_poll_returns_with_the_next_version_or_at_its_limit() {
 
 /// Operations: CreateJob, SubmitAndWatch
 #[tokio::test]
-async fn a_job_is_handed_in_and_followed_in_one_request() {
+async fn a_job_is_submitted_and_followed_in_one_request() {
     let server = server().await;
     let request = server
         .post("/v1/jobs")
@@ -163,10 +163,10 @@ async fn a_job_is_handed_in_and_followed_in_one_request() {
 
 /// Operations: WatchJob, CreateJob
 #[tokio::test]
-async fn events_come_as_lines_to_who_prefers_lines() {
+async fn events_are_sent_as_lines_if_the_client_prefers_them() {
     let server = server().await;
     let id = server.submit(&example_json("sheet")).await;
-    let told = server.events(&id, 0).await.rest().await;
+    let events = server.events(&id, 0).await.rest().await;
     for media in ["application/jsonl", "application/x-ndjson"] {
         let request = server.get(&format!("/v1/jobs/{id}/events?after_seq=2"));
         let response = request.header("Accept", media).send().await.unwrap();
@@ -176,7 +176,7 @@ async fn events_come_as_lines_to_who_prefers_lines() {
             .lines()
             .map(|line| serde_json::from_str(line).unwrap())
             .collect();
-        assert_eq!(lines, told[2..]);
+        assert_eq!(lines, events[2..]);
     }
     let request = server.get(&format!("/v1/jobs/{id}/events"));
     let (status, refused) = answer(request.header("Accept", "image/png")).await;
@@ -186,7 +186,7 @@ async fn events_come_as_lines_to_who_prefers_lines() {
         detail,
         "not available as image/png; available: text/event-stream, application/jsonl"
     );
-    // and to who hands a job in
+    // also for a submission
     let body = json!({ "problem": example_json("sheet"), "cache": "off" });
     let request = server
         .post("/v1/jobs")

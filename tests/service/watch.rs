@@ -11,7 +11,7 @@ use crate::{SIGNORINI, server};
 
 /// Operations: WatchJob
 #[tokio::test]
-async fn the_story_of_a_job_is_told_in_order_and_can_be_told_again() {
+async fn the_events_of_a_job_are_in_order_and_can_be_replayed() {
     let server = server().await;
     let id = server.submit(&example_json("rectangular_punch")).await;
     let live = server.events(&id, 0).await.rest().await;
@@ -50,13 +50,13 @@ async fn the_story_of_a_job_is_told_in_order_and_can_be_told_again() {
 
 /// Operations: WatchJob
 #[tokio::test]
-async fn a_stream_goes_on_where_it_was_left() {
+async fn a_stream_continues_after_the_last_received_event() {
     let server = server().await;
     let id = server.submit(&example_json("rectangular_punch")).await;
     let all = server.events(&id, 0).await.rest().await;
     let n = all.len();
     assert_eq!(server.events(&id, 5).await.rest().await, all[5..]);
-    // The parameter does the same, and the header wins over it.
+    // the parameter does the same; the header takes precedence
     let get = |after: usize| server.get(&format!("/v1/jobs/{id}/events?after_seq={after}"));
     let text = get(n - 1).send().await.unwrap().text().await.unwrap();
     assert!(text.starts_with(&format!("id: {n}\n")), "{text}");
@@ -69,7 +69,7 @@ async fn a_stream_goes_on_where_it_was_left() {
         .await
         .unwrap();
     assert!(text.starts_with(&format!("id: {n}\n")), "{text}");
-    // Nothing lies after the last.
+    // there are no events after the last
     let silent = get(n).send().await.unwrap();
     assert_eq!(silent.status(), StatusCode::NO_CONTENT);
     for wrong in ["-1", "last", ""] {
@@ -78,7 +78,7 @@ async fn a_stream_goes_on_where_it_was_left() {
     }
 }
 
-/// Over both protocols: the client that lost count is not left waiting for ever.
+/// Over both protocols: a client with a wrong number does not wait without end.
 /// Operations: WatchJob
 #[tokio::test]
 async fn a_stream_from_beyond_the_last_event_ends_with_the_job() {
@@ -110,8 +110,8 @@ async fn closing_a_stream_does_not_cancel_the_job() {
     assert_eq!(server.until_done(&id).await["status"], "succeeded");
 }
 
-/// The client hangs up after each event and comes back with the number of the last; meanwhile the
-/// service is killed before the job starts, killed in mid-job, and stopped in mid-job.
+/// The client disconnects after each event and reconnects with the number of the last; meanwhile the
+/// service is killed before the job starts, killed during the job, and stopped during the job.
 /// Operations: WatchJob
 #[tokio::test]
 async fn a_client_that_reconnects_after_each_event_gets_every_event_exactly_once() {
@@ -131,7 +131,7 @@ async fn a_client_that_reconnects_after_each_event_gets_every_event_exactly_once
             connections_before_start += 1;
         }
         if !started && story.len() == 1 && ends_of_the_service == 0 {
-            // Connected, and waiting for the start that does not come: the service dies under us.
+            // connected, and waiting for the start, which does not come: the service is killed
             server.kill().await;
             assert_eq!(stream.next().await, None, "the line is dead");
             server.restart().await;
@@ -179,7 +179,7 @@ async fn a_client_that_reconnects_after_each_event_gets_every_event_exactly_once
     assert_eq!(reasons, ["worker_lost", "drain"]);
 }
 
-/// seq is dense from 1, and there is exactly one end.
+/// seq counts from 1 without gaps, and there is exactly one end.
 fn assert_dense(events: &[Value]) {
     let numbers: Vec<i64> = events
         .iter()

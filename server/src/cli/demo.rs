@@ -1,5 +1,5 @@
 //! `signorini demo`: a service on a free port with a temporary store, to which the five examples are
-//! submitted over both protocols, as any client would do it.
+//! submitted over both protocols, as any client submits them.
 
 use std::io::{IsTerminal, Write};
 

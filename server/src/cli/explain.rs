@@ -20,7 +20,7 @@ pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
         }
         return Ok(Exit::Ok);
     };
-    // a job's reason is the same word with underscores, the type of an error its page
+    // a job's reason is the code with underscores; the type of an error is the address of its page
     let word = code.rsplit('/').next().unwrap_or_default();
     let Ok(found) = word.replace('_', "-").parse::<Code>() else {
         eprintln!(

@@ -38,7 +38,7 @@ enum Command {
     Explain(explain::Arguments),
     /// Print the OpenAPI 3.1 description of the REST API
     Openapi {
-        /// Print the reference in Markdown instead, with rpcs and tests: docs/api.md
+        /// Print the reference in Markdown instead, with the rpcs: docs/api.md
         #[arg(long)]
         reference: bool,
     },
@@ -105,7 +105,7 @@ fn log(default: LevelFilter) {
         .init();
 }
 
-/// What is logged. A filter that cannot be read is said to be so, and ignored.
+/// What is logged. An invalid filter is reported and ignored.
 fn filter(asked: &str, default: LevelFilter) -> Targets {
     let default = Targets::new().with_default(default);
     if asked.trim().is_empty() {

@@ -34,7 +34,7 @@ pub(super) fn help() -> String {
 /// One file to write.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Output {
-    /// None is standard output.
+    /// The file; `None` is standard output.
     path: Option<PathBuf>,
     part: Part,
     format: Format,
@@ -43,7 +43,7 @@ pub(super) struct Output {
 #[derive(Clone, Debug, PartialEq)]
 enum Part {
     Everything,
-    /// Of this contact boundary.
+    /// The profile of this contact boundary.
     Profile(String),
     History,
     Fields,
@@ -51,7 +51,7 @@ enum Part {
 }
 
 impl Output {
-    /// What `path` asks for, in a problem with these contact boundaries; an `Err` says why it cannot be
+    /// What to write to `path`, in a problem with these contact boundaries; an `Err` is the reason why it cannot be
     /// written. Called before the problem is solved, which may take hours.
     pub(super) fn parse(path: &Path, contacts: &[&str]) -> Result<Output, String> {
         if path.as_os_str() == "-" {
@@ -61,7 +61,7 @@ impl Output {
                 format: Format::Json,
             });
         }
-        let said = |problem: String| format!("-o {}: {problem}", path.display());
+        let error = |problem: String| format!("-o {}: {problem}", path.display());
         let name = path.file_name().and_then(|name| name.to_str());
         let (stem, ending) = name
             .and_then(|name| name.rsplit_once('.'))
@@ -72,7 +72,7 @@ impl Output {
             .find(|format| format.name() == ending);
         let format = *format.ok_or_else(|| {
             let endings = Format::endings(Format::VARIANTS);
-            said(format!(
+            error(format!(
                 "the file must have one of the extensions {endings}, or be - for JSON on standard output"
             ))
         })?;
@@ -80,11 +80,11 @@ impl Output {
             .parent()
             .filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-            return Err(said(format!("there is no folder {}", folder.display())));
+            return Err(error(format!("there is no folder {}", folder.display())));
         }
         Ok(Output {
             path: Some(path.to_path_buf()),
-            part: part(format, stem, contacts).map_err(said)?,
+            part: part(format, stem, contacts).map_err(error)?,
             format,
         })
     }
@@ -112,7 +112,7 @@ impl Output {
     ) -> anyhow::Result<()> {
         let mut out = BufWriter::new(out);
         let bytes = match &self.part {
-            // the fields of a large problem are not held a second time
+            // without a second copy of the fields, which may be large
             Part::Everything if self.format == Format::Json => {
                 serde_json::to_writer(&mut out, document)?;
                 Ok(vec![])
@@ -154,7 +154,7 @@ fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
     if format == Format::Svg {
         return Ok(Part::Plot(last.parse().unwrap_or(Plot::Profile)));
     }
-    // a boundary may have any name, with dots or one of the words below: a name that exists wins
+    // a boundary may have any name, also with dots or one of the words below: an existing name takes precedence
     let after = words.iter().enumerate();
     let after = after.filter(|(_, word)| **word == "profile");
     let mut named: Vec<String> = after
@@ -205,8 +205,8 @@ fn one_of(contacts: &[&str], asked: Option<String>, ending: &str) -> Result<Stri
     }
 }
 
-/// Writes a temporary file beside `path` and renames it, so that there is never half a file of that
-/// name and an older one stays until the new one is complete. A pipe or device is written directly.
+/// Writes a temporary file beside `path` and renames it, so that there is never an incomplete file of that
+/// name, and an older one is kept until the new one is complete. A pipe or device is written directly.
 fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
@@ -225,7 +225,7 @@ fn replace(
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // as any other new file (the umask applies), not for the owner's eyes only
+        // with the permissions of any other new file (by the umask), not readable by the owner only
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     let mut file = builder.tempfile_in(folder)?;
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_says_what_the_file_holds() {
+    fn the_name_of_a_file_determines_its_content() {
         let top = || Part::Profile("top".into());
         for (name, part, format) in [
             ("-", Part::Everything, Format::Json),
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_said_with_what_can() {
+    fn an_output_that_cannot_be_written_is_rejected_with_what_can() {
         for (name, contacts, part) in [
             ("punch", vec!["top"], ".json, .csv"),
             ("punch.xlsx", vec!["top"], ".vtu"),
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_there_whole_or_not_at_all() {
+    fn a_file_is_written_completely_or_not_at_all() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         let link = folder.path().join("link.csv");

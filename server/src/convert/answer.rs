@@ -1,4 +1,4 @@
-//! What our answers have in another shape than their messages: points in time, names, words, events, and
+//! Parts of answers whose shape differs from that of their messages: points in time, names, words, events, and
 //! what the service adds to a summary.
 
 use prost_types::Timestamp;
@@ -45,7 +45,7 @@ impl IntoMessage<String> for JobId {
     }
 }
 
-/// Words of JSON that are words in messages too.
+/// Enums that are texts both in JSON and in messages.
 macro_rules! words {
     ($($type:ty),*) => {
         $(impl IntoMessage<String> for $type {

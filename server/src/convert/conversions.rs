@@ -1,4 +1,5 @@
-//! What the build has written: the list is `server/build/mirrors.rs`, the writer `conversions.rs` beside it.
+//! The generated conversions: the list of types is `server/build/mirrors.rs`, the generator `conversions.rs` beside
+//! it.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +13,7 @@ use crate::{
     verbs::{bulk, info, jobs, lists, problems, queue, results},
 };
 
-/// A type that is written as a message, alone and as a field that is always there.
+/// A type that is written as a message, by itself and as a field that is always set.
 macro_rules! written {
     ($ours:ty => $message:ty) => {
         impl IntoMessage<$message> for $ours {
@@ -29,7 +30,7 @@ macro_rules! written {
     };
 }
 
-/// A type that is read from a message that has to be there.
+/// A type that is read from a message that must be set.
 macro_rules! required {
     ($message:ty => $ours:ty, $expected:literal) => {
         impl FromMessage<Option<$message>> for $ours {

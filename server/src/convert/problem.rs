@@ -1,5 +1,5 @@
-//! What a problem has in another shape than its message: alternatives that JSON tells apart by their form or
-//! by which of them is there, and lists of a fixed length.
+//! Parts of a problem whose shape differs from that of its message: alternatives that JSON distinguishes by their
+//! form or by which of them is set, and lists of a fixed length.
 
 use solver::{
     element::Element,
@@ -77,7 +77,7 @@ impl From<MeshInput> for pb::Mesh {
     }
 }
 
-/// What is written with fields of which not all may stand together.
+/// A type that is written with fields of which not all may be set together.
 macro_rules! checked {
     ($($message:ty => $fields:ty => $ours:ty),*) => { $(
         impl FromMessage<$message> for $ours {

@@ -1,6 +1,5 @@
-//! From messages. What a message can say and JSON cannot (an absent message, an enum number that nobody
-//! knows, a number that is not finite) is found here, all of it, with the pointers that the JSON form would
-//! have.
+//! From messages. Errors that are possible in a message but not in JSON (an absent message, an unknown enum
+//! number, a number that is not finite) are all found here, with the pointers that the JSON form would have.
 
 use std::collections::BTreeMap;
 
@@ -13,24 +12,24 @@ use solver::error::{Findings, Reason, Violation, escape};
     note = "`server/build/mirrors.rs` lists what is converted field by field, `server/src/convert` has the rest"
 )]
 pub trait FromMessage<M>: Sized {
-    /// `None` where it cannot be read; then `read` has noted why.
+    /// `None` if it cannot be read; `read` then holds the violation.
     fn from_message(message: M, read: &mut Reader) -> Option<Self>;
 }
 
 /// A field that a message may leave out.
 pub trait FromOptional<M>: Sized {
-    /// `default` where it is left out.
+    /// `default` if it is left out.
     fn from_optional(message: Option<M>, default: Self, read: &mut Reader) -> Option<Self>;
 }
 
-/// Reads a message, or names everything that is wrong with it.
+/// Reads a message, or returns all its violations.
 pub fn read<M, T: FromMessage<M>>(message: M) -> Result<T, Vec<Violation>> {
     let mut read = Reader::default();
     let value = T::from_message(message, &mut read);
     read.found(value)
 }
 
-/// Where in a message we are, and what was found wrong so far.
+/// The current place in a message, and the violations found so far.
 #[derive(Debug, Default)]
 pub struct Reader {
     place: Vec<Token>,
@@ -67,12 +66,12 @@ impl Reader {
         self.at(Token::Index(index), |read| T::from_message(message, read))
     }
 
-    /// A message that has to be there is not.
+    /// A message that must be set is absent.
     pub fn missing<T>(&mut self, expected: &str) -> Option<T> {
         self.wrong(Reason::Missing, "nothing", expected)
     }
 
-    /// None of the alternatives of `kind` is there.
+    /// None of the alternatives of `kind` is set.
     pub fn no_kind<T>(&mut self, kinds: &str) -> Option<T> {
         let kinds = format!("one of {kinds}");
         self.at(Token::Name("kind"), |read| read.missing(&kinds))
@@ -87,13 +86,13 @@ impl Reader {
         )
     }
 
-    /// Something is wrong where we are.
+    /// A violation at the current place.
     pub fn wrong<T>(&mut self, reason: Reason, got: impl ToString, expected: &str) -> Option<T> {
         let hint = "See the comments in signorini.proto.";
         self.violation(Violation::new("", reason, got, expected, hint))
     }
 
-    /// Something is wrong at or below where we are.
+    /// A violation at or below the current place.
     pub fn violation<T>(&mut self, violation: Violation) -> Option<T> {
         let token = |token: &Token| match token {
             Token::Name(name) => format!("/{name}"),
@@ -108,7 +107,7 @@ impl Reader {
         None
     }
 
-    /// What was read, if nothing at all is wrong.
+    /// The value, if there are no violations.
     pub fn found<T>(self, value: Option<T>) -> Result<T, Vec<Violation>> {
         match value {
             Some(value) => self.found.into_result(value),
@@ -164,7 +163,7 @@ impl<M, T: FromMessage<M>> FromMessage<Option<M>> for Option<T> {
 impl<M, T: FromMessage<M>> FromMessage<Vec<M>> for Vec<T> {
     fn from_message(messages: Vec<M>, read: &mut Reader) -> Option<Self> {
         let each = |(index, message)| read.place(index, message);
-        // all of them, also after one that cannot be read
+        // reads all of them, also after one that cannot be read
         let entries: Vec<Option<T>> = messages.into_iter().enumerate().map(each).collect();
         entries.into_iter().collect()
     }

@@ -59,7 +59,8 @@ pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
         finished_before,
     } = message.unwrap_or_default();
     let status = |number| {
-        read(number).map_err(|_| bad(STATUS.name, number, "a value of the enum other than 0"))
+        read(number)
+            .map_err(|_| invalid_field(STATUS.name, number, "a value of the enum other than 0"))
     };
     filters::checked(Filter {
         statuses: numbers.into_iter().map(status).collect::<Result<_, _>>()?,
@@ -84,7 +85,11 @@ fn time(name: &'static str, stamp: Option<Timestamp>) -> Result<Option<Time>, Ap
         Some(micros) if (0..1_000_000_000).contains(&stamp.nanos) => {
             Ok(Some(Time::from_micros(micros)))
         }
-        _ => Err(bad(name, stamp, "a time within the range of a Timestamp")),
+        _ => Err(invalid_field(
+            name,
+            stamp,
+            "a time within the range of a Timestamp",
+        )),
     }
 }
 
@@ -115,7 +120,7 @@ pub fn edit(request: pb::UpdateJobRequest) -> Result<Edit, ApiError> {
             "priority" => edit.priority = Some(priority.unwrap_or_default()),
             "pinned" => edit.pinned = Some(pinned.unwrap_or_default()),
             _ => {
-                return Err(bad(
+                return Err(invalid_field(
                     "update_mask",
                     path,
                     "paths among name, labels, priority, pinned",
@@ -127,7 +132,11 @@ pub fn edit(request: pb::UpdateJobRequest) -> Result<Edit, ApiError> {
 }
 
 /// A field with a value that it cannot have.
-pub fn bad(name: &'static str, got: impl ToString, expected: impl Into<String>) -> ApiError {
+pub fn invalid_field(
+    name: &'static str,
+    got: impl ToString,
+    expected: impl Into<String>,
+) -> ApiError {
     ApiError::BadParameter {
         name,
         got: got.to_string(),

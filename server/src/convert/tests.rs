@@ -1,5 +1,5 @@
-//! What messages can say and JSON cannot, and what they leave out. That every field arrives where its name
-//! says is held against the contract in tests/service/every_field.rs.
+//! What is possible in messages but not in JSON, and fields that they leave out. tests/service/every_field.rs
+//! checks against the contract that every field arrives under its name.
 #![allow(clippy::unwrap_used)]
 
 use solver::{error::Violation, problem::Problem};
@@ -14,7 +14,7 @@ fn refused(message: pb::Problem) -> Vec<Violation> {
 }
 
 #[test]
-fn every_example_survives_the_way_through_grpc() {
+fn every_example_is_unchanged_by_conversion_to_a_message_and_back() {
     for (name, text) in examples::ALL {
         let problem: Problem = files::parse(text).unwrap();
         let message = pb::Problem::from(problem.clone());
@@ -69,7 +69,7 @@ fn what_a_message_leaves_out_has_the_defaults_of_the_json() {
 }
 
 #[test]
-fn a_hundred_violations_are_enough() {
+fn at_most_a_hundred_violations_are_reported() {
     let message = pb::Problem {
         supports: vec![
             pb::Support {
@@ -87,7 +87,7 @@ fn a_hundred_violations_are_enough() {
 }
 
 #[test]
-fn everything_that_a_message_leaves_out_is_named_at_once() {
+fn all_missing_fields_of_a_message_are_reported_together() {
     let message = pb::Problem {
         loads: vec![pb::Load {
             traction: Some(pb::Traction::default()),
@@ -113,7 +113,7 @@ fn everything_that_a_message_leaves_out_is_named_at_once() {
 }
 
 #[test]
-fn numbers_that_json_cannot_say_are_refused() {
+fn numbers_that_json_cannot_express_are_refused() {
     let mut message = pb::Problem::from(fake::problem());
     message.materials[0].youngs_modulus = Some(f64::NAN);
     message.contacts[0].friction.as_mut().unwrap().kernel = 99;

@@ -5,7 +5,7 @@ use tonic::{Request, Response, metadata::MetadataValue};
 
 use crate::{
     caller::Caller,
-    convert::bad,
+    convert::invalid_field,
     error::ApiError,
     parameters::{Parameter, Values},
     pb,
@@ -16,15 +16,15 @@ use crate::{
     },
 };
 
-/// Largest message, both ways; the contract's promise.
+/// Largest message in either direction, as the contract promises.
 pub(super) const MAX_MESSAGE_BYTES: usize = 1 << 20;
-/// Rows of a history in one answer, some 200 bytes each: it must not be larger either.
+/// Most rows of a history in one answer, some 200 bytes each, so that it fits into a message.
 pub(super) const MAX_ROWS: usize = 4000;
-/// Places of a profile in one answer, some 90 bytes each.
+/// Most points of a profile in one answer, some 90 bytes each.
 const MAX_PLACES: usize = 10_000;
 
-/// So many of these jobs fit into one message; at least one.
-pub(super) fn fitting(jobs: &[pb::Job]) -> usize {
+/// How many of these jobs fit into one message; at least one.
+pub(super) fn jobs_that_fit(jobs: &[pb::Job]) -> usize {
     const AROUND: usize = 16; // tag and length of each, and the page's token
     let mut bytes = 0;
     let fits = |job: &&pb::Job| {
@@ -35,15 +35,15 @@ pub(super) fn fitting(jobs: &[pb::Job]) -> usize {
 }
 
 /// The caller and the message of a request.
-pub(super) fn asked<T>(mut request: Request<T>) -> Result<(Caller, T), ApiError> {
+pub(super) fn caller_and_message<T>(mut request: Request<T>) -> Result<(Caller, T), ApiError> {
     let caller = request.extensions_mut().remove::<Caller>();
     let caller =
         caller.ok_or_else(|| ApiError::internal("the caller of a request was not identified"))?;
     Ok((caller, request.into_inner()))
 }
 
-/// The value of a field that is empty when it is left out.
-pub(super) fn given<V: Values>(
+/// The value of a text field, or `None` if it is empty, that is, left out.
+pub(super) fn read_if_set<V: Values>(
     parameter: &Parameter<V>,
     text: &str,
 ) -> Result<Option<V::Value>, ApiError> {
@@ -53,7 +53,7 @@ pub(super) fn given<V: Values>(
     }
 }
 
-/// What part of a list is asked for; a size of 0 means the default.
+/// The requested part of a list; a size of 0 means the default.
 pub(super) fn paging(size: i32, token: String) -> Result<Paging, ApiError> {
     let size = match size {
         0 => None,
@@ -71,7 +71,7 @@ pub(super) fn key(request_id: Option<String>) -> Result<Option<Key>, ApiError> {
     key.transpose()
 }
 
-/// Where a profile is wanted, as far as it fits into a message.
+/// The points at which a profile is requested, if it fits into a message.
 pub(super) fn points(text: Option<&str>) -> Result<Points, ApiError> {
     let Some(text) = text else {
         return Ok(Points::default());
@@ -81,13 +81,13 @@ pub(super) fn points(text: Option<&str>) -> Result<Points, ApiError> {
             let expected = POINTS.values.expected();
             let expected =
                 format!("at most {MAX_PLACES} places in one message; over REST {expected}");
-            Err(bad(POINTS.name, text, expected))
+            Err(invalid_field(POINTS.name, text, expected))
         }
         points => Ok(points),
     }
 }
 
-/// The same header as over REST, as metadata.
+/// Adds the metadata that corresponds to the header over REST, if the request is a repetition.
 pub(super) fn noting_replay<T>(mut response: Response<T>, replayed: bool) -> Response<T> {
     if replayed {
         let value = MetadataValue::from_static("true");
@@ -98,8 +98,8 @@ pub(super) fn noting_replay<T>(mut response: Response<T>, replayed: bool) -> Res
     response
 }
 
-/// An offset behind the end.
-pub(super) fn beyond(offset: u64, total: u64) -> Result<(), ApiError> {
+/// Refuses an offset after the end.
+pub(super) fn check_offset(offset: u64, total: u64) -> Result<(), ApiError> {
     if offset > total {
         Err(ApiError::RangeNotSatisfiable(total))
     } else {

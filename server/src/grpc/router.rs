@@ -1,4 +1,4 @@
-//! The routes of gRPC: the service, its health, its description.
+//! The routes of gRPC: the service, its health, its reflection.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::{
     verbs::Service,
 };
 
-/// The gRPC routes, to share a port with REST, and the handle on what health reports.
+/// The gRPC routes, which share a port with REST, and the handle that sets the reported health.
 pub async fn router(
     service: Arc<Service>,
 ) -> Result<(Router, HealthReporter), tonic_reflection::server::Error> {
@@ -34,8 +34,8 @@ pub async fn router(
     Ok((router.layer(map_response(too_large)), reporter))
 }
 
-/// tonic refuses a message over the limit before it reaches us, and without details. All that we refuse has
-/// some.
+/// tonic refuses a message over the limit before it reaches a method, and without details. This adds the details
+/// that every error of a method has.
 async fn too_large(response: axum::response::Response) -> axum::response::Response {
     let bare = Status::from_header_map(response.headers())
         .is_some_and(|status| status.code() == Code::OutOfRange && status.details().is_empty());

@@ -8,11 +8,12 @@ use sha2::{Digest, Sha256};
 use tonic::{Request, Response, Status, Streaming};
 
 use super::messages::{
-    MAX_MESSAGE_BYTES, MAX_ROWS, asked, beyond, fitting, given, key, noting_replay, paging, points,
+    MAX_MESSAGE_BYTES, MAX_ROWS, caller_and_message, check_offset, jobs_that_fit, key,
+    noting_replay, paging, points, read_if_set,
 };
 use crate::{
     caller::Caller,
-    convert::{bad, edit, filter, job_request, read},
+    convert::{edit, filter, invalid_field, job_request, read},
     error::ApiError,
     event::Event,
     formats::Format,
@@ -21,7 +22,7 @@ use crate::{
     store::PIECE_BYTES,
     verbs::{
         Service,
-        bulk::{self, Many},
+        bulk::{self, BulkResult},
         envelope::JobRequest,
         fields,
         history::{self, MAX_POINTS},
@@ -38,7 +39,7 @@ use crate::{
     violations,
 };
 
-/// The contract, translated to verbs.
+/// The methods of the contract, translated to verbs.
 #[derive(Debug)]
 pub(super) struct Grpc {
     service: Arc<Service>,
@@ -52,16 +53,17 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::ValidateProblemRequest>,
     ) -> Reply<pb::ValidateProblemResponse> {
-        let (caller, request) = asked(request)?;
-        let message = request.problem.unwrap_or_default(); // an empty one lacks everything, which is reported
-        let problem = || read(message).map_err(|found| violations::prefixed(violations::AT, found));
+        let (caller, request) = caller_and_message(request)?;
+        let message = request.problem.unwrap_or_default(); // an empty one: all required fields are reported
+        let problem =
+            || read(message).map_err(|found| violations::prefixed(violations::PROBLEM, found));
         let problem = self.service.work(problem).await?;
         let found = problems::validate(&self.service, &caller, problem).await?;
         Ok(Response::new(found.into()))
     }
 
     async fn create_job(&self, request: Request<pb::CreateJobRequest>) -> Reply<pb::Job> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let wait_s = request.wait.map(|seconds| WAIT.check(seconds));
         let wait_s = wait_s.transpose()?;
         let Submitted {
@@ -78,10 +80,10 @@ impl JobService for Grpc {
     type SubmitAndWatchStream = EventStream;
 
     async fn submit_and_watch(&self, request: Request<pb::CreateJobRequest>) -> Reply<EventStream> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         if request.wait.is_some() {
-            let none = "none: the events tell when the job has ended";
-            return Err(bad(WAIT.name, "a time", none).into());
+            let none = "no `wait`: the stream ends with the job";
+            return Err(invalid_field(WAIT.name, "a time", none).into());
         }
         let submitted = self.submit(&caller, request).await?;
         let id = submitted.accepted.id;
@@ -96,13 +98,16 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::BatchCreateJobsRequest>,
     ) -> Reply<pb::BatchCreateJobsResponse> {
-        let (caller, pb::BatchCreateJobsRequest { jobs, request_id }) = asked(request)?;
+        let (caller, pb::BatchCreateJobsRequest { jobs, request_id }) =
+            caller_and_message(request)?;
         let own = |job: &pb::CreateJobRequest| {
             job.wait.is_some() || job.request_id.is_some() || job.job_id.is_some()
         };
         if let Some(n) = jobs.iter().position(own) {
             let expected = "jobs without wait, request_id and job_id";
-            return Err(bad("jobs", format!("one, number {n}, with them"), expected).into());
+            return Err(
+                invalid_field("jobs", format!("job {n} sets one of them"), expected).into(),
+            );
         }
         let key = key(request_id)?;
         let read = move || jobs.into_iter().map(job_request).collect();
@@ -114,7 +119,7 @@ impl JobService for Grpc {
     }
 
     async fn get_job(&self, request: Request<pb::GetJobRequest>) -> Reply<pb::Job> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let job = jobs::get(&self.service, &caller, ID.read(&request.id)?).await?;
         Ok(Response::new(job.into()))
     }
@@ -123,7 +128,7 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::GetJobProblemRequest>,
     ) -> Reply<pb::Problem> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let problem = jobs::problem(&self.service, &caller, ID.read(&request.id)?).await?;
         let message = pb::Problem::from(problem);
         if message.encoded_len() > MAX_MESSAGE_BYTES {
@@ -139,14 +144,14 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::ListJobsRequest>,
     ) -> Reply<pb::ListJobsResponse> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let pb::ListJobsRequest {
             filter: jobs,
             page_size,
             page_token,
             order_by,
         } = request;
-        let order = given(&ORDER_BY, &order_by)?;
+        let order = read_if_set(&ORDER_BY, &order_by)?;
         let filter = filter(jobs)?;
         let paging = paging(page_size, page_token)?;
         let list = async |paging: &Paging| {
@@ -155,9 +160,9 @@ impl JobService for Grpc {
             Ok::<_, ApiError>((jobs, page.next))
         };
         let (mut jobs, mut next) = list(&paging).await?;
-        let fitting = fitting(&jobs);
+        let fitting = jobs_that_fit(&jobs);
         if fitting < jobs.len() {
-            // a shorter page, whose token goes on where it ends
+            // a shorter page, whose token continues where it ends
             let size = Some(fitting as i64);
             (jobs, next) = list(&Paging { size, ..paging }).await?;
         }
@@ -171,8 +176,8 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::CountJobsRequest>,
     ) -> Reply<pb::CountJobsResponse> {
-        let (caller, request) = asked(request)?;
-        let group_by = given(&GROUP_BY, &request.group_by)?;
+        let (caller, request) = caller_and_message(request)?;
+        let group_by = read_if_set(&GROUP_BY, &request.group_by)?;
         let filter = filter(request.filter)?;
         let count = lists::count(&self.service, &caller, &filter, group_by).await?;
         Ok(Response::new(pb::CountJobsResponse {
@@ -182,7 +187,7 @@ impl JobService for Grpc {
     }
 
     async fn wait_job(&self, request: Request<pb::WaitJobRequest>) -> Reply<pb::WaitJobResponse> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let (id, wait_s) = (ID.read(&request.id)?, WAIT.check(request.wait)?);
         let until = match (request.until_terminal, request.version) {
             (true, _) => Until::Terminal,
@@ -199,14 +204,14 @@ impl JobService for Grpc {
     type WatchJobStream = EventStream;
 
     async fn watch_job(&self, request: Request<pb::WatchJobRequest>) -> Reply<EventStream> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let (after, id) = (AFTER_SEQ.check(request.after_seq)?, ID.read(&request.id)?);
         let events = watch::watch(&self.service, &caller, id, after).await?;
         Ok(Response::new(messages(events)))
     }
 
     async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let result = results::result(&self.service, &caller, ID.read(&request.id)?).await?;
         Ok(Response::new(result.into()))
     }
@@ -215,7 +220,7 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::GetProfileRequest>,
     ) -> Reply<pb::ContactProfile> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let (id, boundary) = (ID.read(&request.id)?, &request.boundary);
         let (step, points) = (request.step.as_deref(), points(request.points.as_deref())?);
         let profile = profiles::profile(&self.service, &caller, id, boundary, step, points);
@@ -226,7 +231,7 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::ListIterationsRequest>,
     ) -> Reply<pb::ListIterationsResponse> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let max_points = request.max_points.map(|most| MAX_POINTS.check(most));
         let (id, most) = (ID.read(&request.id)?, max_points.transpose()?);
         let mut rows = history::history(&self.service, &caller, id, most).await?;
@@ -246,25 +251,29 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::StreamResultRequest>,
     ) -> Reply<Self::StreamResultStream> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let pb::StreamResultRequest { id, format, offset } = request;
         let id = ID.read(&id)?;
         let format = match pb::FieldFormat::try_from(format) {
             Ok(pb::FieldFormat::Unspecified | pb::FieldFormat::Vtu) => Format::Vtu,
             Ok(pb::FieldFormat::Npz) => Format::Npz,
             Ok(pb::FieldFormat::Json) => Format::Json,
-            Err(_) => return Err(bad("format", format, "a value of the enum FieldFormat").into()),
+            Err(_) => {
+                return Err(
+                    invalid_field("format", format, "a value of the enum FieldFormat").into(),
+                );
+            }
         };
         let (pieces, total_bytes, sha256) = if format == Format::Json {
             let fields = fields::fields(&self.service, &caller, id).await?;
             let info = fields.info.clone();
-            beyond(offset, info.bytes)?;
+            check_offset(offset, info.bytes)?;
             let pieces = fields.bytes(&self.service, offset, info.bytes).boxed();
             (pieces, info.bytes, info.digest)
         } else {
             let bytes = fields::converted_fields(&self.service, &caller, id, format).await?;
             let total = bytes.len() as u64;
-            beyond(offset, total)?;
+            check_offset(offset, total)?;
             let digest = Sha256::digest(&bytes).to_vec();
             let pieces = async_stream::stream! {
                 for piece in bytes[offset as usize..].chunks(PIECE_BYTES) {
@@ -292,14 +301,14 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::CancelJobsRequest>,
     ) -> Reply<pb::CancelJobsResponse> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let many = bulk::cancel_many(&self.service, &caller, filter(request.filter)?);
-        let Many { matched, changed } = many.await?;
+        let BulkResult { matched, changed } = many.await?;
         Ok(Response::new(pb::CancelJobsResponse { matched, changed }))
     }
 
     async fn retry_job(&self, request: Request<pb::RetryJobRequest>) -> Reply<pb::Job> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let pb::RetryJobRequest {
             id,
             request_id,
@@ -322,7 +331,7 @@ impl JobService for Grpc {
     }
 
     async fn update_job(&self, request: Request<pb::UpdateJobRequest>) -> Reply<pb::Job> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let (id, versions) = (
             ID.read(&request.id)?,
             request.version.map(|only| vec![only]),
@@ -335,7 +344,7 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::DeleteJobRequest>,
     ) -> Reply<pb::DeleteJobResponse> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         jobs::delete(&self.service, &caller, ID.read(&request.id)?).await?;
         Ok(Response::new(pb::DeleteJobResponse {}))
     }
@@ -344,9 +353,9 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::DeleteJobsRequest>,
     ) -> Reply<pb::DeleteJobsResponse> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let many = bulk::delete_many(&self.service, &caller, filter(request.filter)?);
-        let Many { matched, changed } = many.await?;
+        let BulkResult { matched, changed } = many.await?;
         Ok(Response::new(pb::DeleteJobsResponse { matched, changed }))
     }
 
@@ -354,22 +363,22 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::GetServerInfoRequest>,
     ) -> Reply<pb::ServerInfo> {
-        let (caller, _) = asked(request)?;
+        let (caller, _) = caller_and_message(request)?;
         Ok(Response::new(info::info(&self.service, &caller).into()))
     }
 
     async fn get_caller(&self, request: Request<pb::GetCallerRequest>) -> Reply<pb::Caller> {
-        let (caller, _) = asked(request)?;
+        let (caller, _) = caller_and_message(request)?;
         Ok(Response::new(caller.into()))
     }
 
     async fn get_queue(&self, request: Request<pb::GetQueueRequest>) -> Reply<pb::QueueState> {
-        let (caller, _) = asked(request)?;
+        let (caller, _) = caller_and_message(request)?;
         Ok(Response::new(queue::state(&self.service, &caller).into()))
     }
 
     async fn pause_queue(&self, request: Request<pb::PauseQueueRequest>) -> Reply<pb::QueueState> {
-        let (caller, _) = asked(request)?;
+        let (caller, _) = caller_and_message(request)?;
         let state = queue::pause(&self.service, &caller).await?;
         Ok(Response::new(state.into()))
     }
@@ -378,7 +387,7 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::ResumeQueueRequest>,
     ) -> Reply<pb::QueueState> {
-        let (caller, _) = asked(request)?;
+        let (caller, _) = caller_and_message(request)?;
         let state = queue::resume(&self.service, &caller).await?;
         Ok(Response::new(state.into()))
     }
@@ -387,7 +396,7 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::CancelJobRequest>,
     ) -> Reply<pb::CancelJobResponse> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let (outcome, job) = jobs::cancel(&self.service, &caller, ID.read(&request.id)?).await?;
         let outcome: pb::cancel_job_response::Outcome = outcome.into();
         Ok(Response::new(pb::CancelJobResponse {
@@ -400,9 +409,9 @@ impl JobService for Grpc {
         &self,
         request: Request<Streaming<pb::UploadMeshRequest>>,
     ) -> Reply<pb::UploadMeshResponse> {
-        let (caller, stream) = asked(request)?;
+        let (caller, stream) = caller_and_message(request)?;
         let broken =
-            |status: Status| ApiError::MalformedJson(format!("the stream broke off: {status}"));
+            |status: Status| ApiError::MalformedJson(format!("the stream is incomplete: {status}"));
         let pieces = stream.map(|piece| piece.map(|piece| piece.data).map_err(broken));
         let (mesh, new) = meshes::upload(&self.service, &caller, pieces).await?;
         Ok(Response::new(pb::UploadMeshResponse {
@@ -412,7 +421,7 @@ impl JobService for Grpc {
     }
 
     async fn get_mesh(&self, request: Request<pb::GetMeshRequest>) -> Reply<pb::MeshInfo> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let mesh = meshes::get(&self.service, &caller, &HASH.read(&request.hash)?).await?;
         Ok(Response::new(mesh.into()))
     }
@@ -421,7 +430,7 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::ListMeshesRequest>,
     ) -> Reply<pb::ListMeshesResponse> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         let paging = paging(request.page_size, request.page_token)?;
         let page = meshes::list(&self.service, &caller, &paging).await?;
         Ok(Response::new(pb::ListMeshesResponse {
@@ -434,7 +443,7 @@ impl JobService for Grpc {
         &self,
         request: Request<pb::DeleteMeshRequest>,
     ) -> Reply<pb::DeleteMeshResponse> {
-        let (caller, request) = asked(request)?;
+        let (caller, request) = caller_and_message(request)?;
         meshes::delete(&self.service, &caller, &HASH.read(&request.hash)?).await?;
         Ok(Response::new(pb::DeleteMeshResponse {}))
     }
@@ -442,7 +451,7 @@ impl JobService for Grpc {
 
 type EventStream = Pin<Box<dyn Stream<Item = Result<pb::Event, Status>> + Send>>;
 
-/// Events as messages; none are a stream that has ended.
+/// Events as messages; `None` becomes a stream that has ended.
 fn messages(
     events: Option<impl Stream<Item = Result<Event, ApiError>> + Send + 'static>,
 ) -> EventStream {

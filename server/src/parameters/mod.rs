@@ -5,4 +5,5 @@ mod parameter;
 mod values;
 
 pub use parameter::{Description, Parameter, Place, Variable};
-pub use values::{Seconds, Text, Times, Values, Whole, Words};
+// `Whole` is the earlier name, which `verbs::envelope` still uses.
+pub use values::{Integers, Seconds, Text, Times, Values, Words};

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::values::{Seconds, Values, Whole};
+use super::values::{Integers, Seconds, Values};
 use crate::{error::ApiError, violations};
 
 /// An input of a request: a query parameter or a header over REST, a field of a message over gRPC.
@@ -17,21 +17,21 @@ pub struct Parameter<V> {
 }
 
 impl<V: Values> Parameter<V> {
-    /// The value of this text.
+    /// Reads a value from its text.
     pub fn read(&self, text: &str) -> Result<V::Value, ApiError> {
-        self.values.read(text).ok_or_else(|| self.bad(text))
+        self.values.read(text).ok_or_else(|| self.invalid(text))
     }
 
-    /// The error that this is not one of its values.
-    pub fn bad(&self, got: impl ToString) -> ApiError {
+    /// The error for a value that is not allowed.
+    pub fn invalid(&self, got: impl ToString) -> ApiError {
         ApiError::BadParameter {
             name: self.name,
-            got: violations::name(&got.to_string()),
+            got: violations::quoted(&got.to_string()),
             expected: self.values.expected(),
         }
     }
 
-    /// Of a query, with one value.
+    /// Describes it as a query parameter with one value.
     pub fn describe(&self) -> Description {
         Description {
             place: Place::Query,
@@ -42,7 +42,7 @@ impl<V: Values> Parameter<V> {
         }
     }
 
-    /// Of a query, any number of times.
+    /// Describes it as a query parameter that may be repeated.
     pub fn describe_several(&self) -> Description {
         Description {
             schema: json!({ "type": "array", "items": self.values.schema() }),
@@ -52,51 +52,51 @@ impl<V: Values> Parameter<V> {
     }
 }
 
-impl Parameter<Whole> {
-    /// The number of a message's field, if it is within bounds.
+impl Parameter<Integers> {
+    /// Checks that the number in a message's field is within bounds.
     pub fn check(&self, number: impl Into<i64>) -> Result<i64, ApiError> {
         let number = number.into();
         match self.values.0.contains(&number) {
             true => Ok(number),
-            false => Err(self.bad(number)),
+            false => Err(self.invalid(number)),
         }
     }
 }
 
 impl Parameter<Seconds> {
-    /// The seconds of a message's field, if they are within bounds.
+    /// Checks that the seconds in a message's field are within bounds.
     pub fn check(&self, seconds: f64) -> Result<f64, ApiError> {
         match self.values.0.contains(&seconds) {
             true => Ok(seconds),
-            false => Err(self.bad(seconds)),
+            false => Err(self.invalid(seconds)),
         }
     }
 }
 
-/// A variable of a path. Any name that is not among its values is not found.
+/// A variable of a path. A text that is not one of its values is answered with *not found*.
 #[derive(Clone, Copy, Debug)]
 pub struct Variable<V> {
     /// Its name in the path, in braces; the field's is the same.
     pub name: &'static str,
-    /// What is named by it, for errors: `job`, `plot`.
+    /// What it refers to, for errors: `job`, `plot`.
     pub kind: &'static str,
     /// What it means: one line, without a full stop.
     pub meaning: &'static str,
-    /// The names that there are.
+    /// The names that exist.
     pub values: V,
 }
 
 impl<V: Values> Variable<V> {
-    /// The value of this name.
+    /// Reads a value from its name.
     pub fn read(&self, text: &str) -> Result<V::Value, ApiError> {
         self.values.read(text).ok_or_else(|| {
-            let (kind, name) = (self.kind, violations::name(text));
+            let (kind, name) = (self.kind, violations::quoted(text));
             let expected = self.values.expected();
             ApiError::NotFound(format!("there is no {kind} {name:?}: expected {expected}"))
         })
     }
 
-    /// Of a path.
+    /// Describes it as a variable of a path.
     pub fn describe(&self) -> Description {
         Description {
             place: Place::Path,
@@ -108,7 +108,7 @@ impl<V: Values> Variable<V> {
     }
 }
 
-/// Where a request over REST has a parameter.
+/// The place of a parameter in a request over REST.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum Place {
@@ -120,10 +120,10 @@ pub enum Place {
     Header,
 }
 
-/// A parameter as the description of the API has it.
+/// A parameter in the description of the API.
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// Where it is sent.
+    /// Its place in the request.
     pub place: Place,
     /// Its name; with `{key}` at its end it is a name for each key.
     pub name: &'static str,

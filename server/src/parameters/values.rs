@@ -1,4 +1,4 @@
-//! The values that a parameter may have: how they are described, read, and named where one is wrong.
+//! The values that a parameter may have: how they are described, read, and listed in errors.
 
 use std::ops::RangeInclusive;
 
@@ -18,7 +18,7 @@ pub trait Values {
     /// The same in words, for errors.
     fn expected(&self) -> String;
 
-    /// The meaning of this text; none if it is not in the set.
+    /// The meaning of this text; `None` if it is not in the set.
     fn read(&self, text: &str) -> Option<Self::Value>;
 }
 
@@ -44,9 +44,9 @@ impl Values for Text {
 
 /// Whole numbers within bounds.
 #[derive(Clone, Debug)]
-pub struct Whole(pub RangeInclusive<i64>);
+pub struct Integers(pub RangeInclusive<i64>);
 
-impl Values for Whole {
+impl Values for Integers {
     type Value = i64;
 
     fn schema(&self) -> serde_json::Value {
@@ -106,7 +106,7 @@ impl Values for Times {
     }
 }
 
-/// A few values, a word each, as a list of both.
+/// A few values, each with its word, as a list of pairs.
 #[derive(Clone, Copy, Debug)]
 pub struct Words<T>(pub fn() -> Vec<(&'static str, T)>);
 
@@ -157,14 +157,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_value_is_read_if_it_is_within_what_is_expected() {
-        let pages = Whole(1..=1000);
+    fn a_value_is_read_if_it_is_allowed() {
+        let pages = Integers(1..=1000);
         assert_eq!(pages.expected(), "a whole number from 1 to 1000");
         assert_eq!(pages.read("1000"), Some(1000));
         for wrong in ["0", "1001", "1.5", "many", ""] {
             assert_eq!(pages.read(wrong), None, "{wrong}");
         }
-        assert_eq!(Whole(0..=i64::MAX).expected(), "a whole number, 0 or more");
+        assert_eq!(
+            Integers(0..=i64::MAX).expected(),
+            "a whole number, 0 or more"
+        );
         let wait = Seconds(0.0..=60.0);
         assert_eq!(wait.expected(), "0 … 60 seconds");
         assert_eq!(wait.read("0.5"), Some(0.5));
@@ -175,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn words_are_listed_where_another_was_said() {
+    fn valid_words_are_listed_when_another_was_given() {
         let letters = Words(|| vec![("a", 1), ("b", 2), ("c", 3)]);
         assert_eq!(letters.expected(), "a, b or c");
         assert_eq!((letters.read("b"), letters.read("d")), (Some(2), None));

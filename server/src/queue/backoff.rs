@@ -1,10 +1,10 @@
-//! Retrying what could not be stored.
+//! Waiting before a failed write to the store is retried.
 
 use std::time::Duration;
 
 use tokio_util::sync::CancellationToken;
 
-/// Longer and longer waits between attempts to store what must not be lost.
+/// Increasing waits between attempts to store data that must not be lost.
 #[derive(Debug)]
 pub(super) struct Backoff(Duration);
 

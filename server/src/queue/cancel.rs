@@ -13,8 +13,8 @@ use crate::{
     store::{CancelOutcome, Ending, Result},
 };
 
-/// How long a solver that was asked to stop may take; then its job is canceled without waiting for it, and only the
-/// worker stays busy. Half of what the API promises: the rest is for commits.
+/// How long a solver may take to stop; then its job is canceled without waiting for it, and only the worker stays
+/// busy. Half of the time that the API promises: the rest is for commits.
 pub(super) const CANCEL_GRACE: Duration = Duration::from_millis(250);
 
 impl Queue {
@@ -31,7 +31,7 @@ impl Queue {
                     running.stop(StopReason::Unwanted);
                     tokio::spawn(self.clone().force_cancel(key, running.attempt));
                 }
-                // its worker has released it, as the service stops: nobody else would end it
+                // its worker has released it because the service stops: nothing else would end it
                 None => {
                     let ended = self.end_attempt(key, attempt, &Ending::canceled()).await?;
                     outcome = match ended {
@@ -48,7 +48,7 @@ impl Queue {
         Ok(outcome)
     }
 
-    /// Cancels a job whose solver does not stop in time; nothing happens if it did.
+    /// Cancels a job whose solver does not stop in time; does nothing if it has stopped.
     async fn force_cancel(self: Arc<Self>, key: i64, attempt: i32) {
         tokio::time::sleep(CANCEL_GRACE).await;
         if let Err(cause) = self.end_attempt(key, attempt, &Ending::canceled()).await {

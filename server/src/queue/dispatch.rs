@@ -1,4 +1,4 @@
-//! Starting jobs: whenever a worker is free and a job waits. And what is done from time to time.
+//! Starting jobs, whenever a worker is free and a job waits; and periodic tasks.
 
 use std::{sync::Arc, time::Duration};
 
@@ -22,8 +22,8 @@ impl Queue {
         tokio::spawn(self.clone().run_periodic_tasks());
     }
 
-    /// Accepts jobs. They are on the disk when this returns; if a worker is free, it is given the next job of the
-    /// queue in the same commit.
+    /// Accepts jobs. They are stored on the disk when this returns; a free worker is given the next job of the queue in
+    /// the same commit.
     pub async fn submit(self: &Arc<Self>, submission: Submission) -> Result<Accepted> {
         let Some(slot) = self.free_slot() else {
             let mut accepted = self.store.submit(submission, false).await?;
@@ -57,7 +57,7 @@ impl Queue {
     /// Claims whenever a slot is free and a job waits, until the service stops.
     async fn dispatch(self: Arc<Self>) {
         loop {
-            // a notification from here on is kept for the wait below: none is missed
+            // a notification from here on is kept for the wait below, so that none is missed
             while let Some(slot) = self.free_slot() {
                 match self.claim(slot).await {
                     Ok(true) => {}
@@ -94,7 +94,7 @@ impl Queue {
         match claim {
             Some(claim) => self.start_worker(claim, slot),
             None if changed.is_empty() => return Ok(false),
-            None => {} // some were answered; there may be more
+            None => {} // some were answered from results; there may be more
         }
         Ok(true)
     }
@@ -114,7 +114,7 @@ impl Queue {
         });
     }
 
-    /// Ends jobs that have waited too long, and forgets what was deleted long ago, until the service stops.
+    /// Ends jobs that have waited too long, and removes the ids of jobs deleted long ago, until the service stops.
     async fn run_periodic_tasks(self: Arc<Self>) {
         loop {
             match self.store.expire_queued(Time::now()).await {

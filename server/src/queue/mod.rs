@@ -1,16 +1,16 @@
-//! The queue: which task may do what, and what wakes it.
+//! The queue: its tasks, and what wakes each of them.
 //!
 //! `workers` slots each hold one job at a time. The dispatcher claims the next job of the store whenever a
 //! slot is free; a submit that finds one free does that in its own transaction, and starts the claimed job in
 //! that slot. Each claim is solved on a blocking thread. Beside each running solver a recorder task commits
 //! its events in batches and then announces that there are some; watchers read them from the store. No event
-//! travels through a channel to a watcher, so none is seen twice, missed, or taken back by a crash.
+//! travels through a channel to a watcher, so none is repeated, missed, or undone by a crash.
 //!
 //! A job may be ended by its worker, by a cancel, by a time limit, or requeued when the service stops. Several of
 //! them may try at once: the store accepts the first, since it checks in the same transaction that the attempt is
 //! still the current one.
 
-// From the ground up: none uses a file below it.
+// In order of use: no file uses one below it.
 mod backoff;
 mod running;
 mod watchers;

@@ -20,12 +20,12 @@ use crate::{
     time::Time,
 };
 
-/// Most events of a batch …
+/// Most events in a batch …
 const MOST_EVENTS: usize = 50;
 /// … and the longest time from its first event until it is stored.
 const LATENCY: Duration = Duration::from_millis(50);
 
-/// What a solver reports.
+/// A report of a solver.
 #[derive(Debug)]
 pub(super) enum Report {
     /// An event, with the time when it happened.
@@ -48,9 +48,9 @@ struct Batch {
     last: bool,
 }
 
-/// Stores what the solver reports until it ends, and returns its last events: these are stored together with the
-/// end of the job, in one commit. What cannot be stored is retried while the solver waits, since the disk may be full
-/// for a while. When the attempt is no longer the current one, the solver is told to stop and the rest is dropped.
+/// Stores the reports of the solver until it ends, and returns its last events: these are stored together with the
+/// end of the job, in one commit. A failed write is retried while the solver waits, since the disk may be full for a
+/// while. When the attempt is no longer the current one, the solver is asked to stop and the rest is dropped.
 pub(super) async fn record(
     queue: &Queue,
     job: &Job,
@@ -182,8 +182,8 @@ fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) 
     }
 }
 
-/// Seconds to the end: the iterations still to do, if each reduces the residual by the factor q and takes as long as
-/// those before:
+/// Seconds to the end: the time of the remaining iterations, if each reduces the residual by the factor q and takes
+/// as long as those before:
 /// n = ln(tolerance / residual) / ln q.
 fn eta_s(TimedIteration { row, wall_s }: &TimedIteration) -> Option<f64> {
     let q = row.contraction.filter(|q| (1e-6..1.0).contains(q))?;
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn the_time_to_the_end_follows_from_the_rate() {
+    fn the_time_to_the_end_is_extrapolated_from_the_rate() {
         let mut timed = fake::timed(4);
         timed.wall_s = 8.0;
         let row = &mut timed.row;

@@ -1,20 +1,20 @@
-//! The handle on a solver at work.
+//! The handle on a running solver.
 
 use std::sync::{Arc, OnceLock};
 
-/// The handle on a solver at work.
+/// The handle on a running solver.
 #[derive(Clone, Debug)]
 pub(super) struct Running {
     /// The number of the attempt.
     pub(super) attempt: i32,
-    /// Set to ask the solver to stop; it looks at this in every iteration.
+    /// Set to ask the solver to stop; it checks this in every iteration.
     pub(super) stop: Arc<OnceLock<StopReason>>,
 }
 
 impl Running {
-    /// Asks the solver to stop. The first reason given is the one that counts.
+    /// Asks the solver to stop. The first reason is kept.
     pub(super) fn stop(&self, reason: StopReason) {
-        let _ = self.stop.set(reason); // fails if there is one already, which stays
+        let _ = self.stop.set(reason); // fails if a reason is set already, which is kept
     }
 }
 

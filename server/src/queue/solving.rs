@@ -30,8 +30,8 @@ pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Mesh, Unsolved> {
     postcard::from_bytes(&body).map_err(|error| failed(&error))
 }
 
-/// Reads the problem and solves it. `report` is called with everything that is to be recorded, and with nothing where
-/// the solver only asks whether to go on. On a blocking thread.
+/// Reads the problem and solves it. `report` is called with every report to record, and with `None` if the solver
+/// only asks whether to continue. On a blocking thread.
 pub(super) fn solve_and_report(
     problem: &str,
     mesh: Option<Mesh>,
@@ -46,7 +46,7 @@ pub(super) fn solve_and_report(
         && problem.steps.iter().all(single)
         && matches!(problem.mesh.refine, Refine::Times(_))
     {
-        // whether to stop is asked again at the next report
+        // the next report asks again whether to stop
         let _ = report(Some(Report::OneLevel));
     }
     let event = |payload| Some(Report::Event(Time::now(), payload));
@@ -73,19 +73,19 @@ pub(super) fn solve_and_report(
 }
 
 /// Decides when the results of finished load steps are stored as a partial result: not after each, since all of it is
-/// written each time and a problem may have a thousand steps; and no longer once it has grown large.
+/// written each time and a problem may have a thousand steps; and not at all once the partial result has grown large.
 #[derive(Default)]
 struct Partials {
-    /// Not before this time.
+    /// The earliest time of the next one.
     next: Option<Instant>,
 }
 
 impl Partials {
     /// The partial result, if it is time to store it.
     fn next(&mut self, partial: &PartialSolution<'_>) -> Option<Report> {
-        /// It is written in one transaction, which holds up the single writer for some 40 ms.
+        /// A result of this size is written in one transaction, which occupies the single writer for some 40 ms.
         const MOST_BYTES: usize = 4 << 20;
-        /// It takes at most a tenth of the time, and happens at most once a second.
+        /// Storing takes at most a tenth of the time, and happens at most once a second.
         const SHARE: u32 = 10;
         const PAUSE: Duration = Duration::from_secs(1);
         let start = Instant::now();

@@ -1,4 +1,4 @@
-//! What all tasks of the queue share, and the state of the queue.
+//! The data that all tasks of the queue share, and the state of the queue.
 
 use std::{
     collections::HashMap,
@@ -23,7 +23,7 @@ use crate::{
     store::{self, Ending, FinalBatch, Store},
 };
 
-/// The solver, or what stands in for it in a test.
+/// The solver, or its substitute in a test.
 pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Solution, SolveError>;
 
 /// Runs, cancels and announces jobs.
@@ -39,8 +39,8 @@ pub struct Queue {
     pub(super) watchers: Watchers,
     /// Jobs that a worker of this process is solving.
     pub(super) running: Mutex<HashMap<i64, Running>>,
-    /// Held for reading while a job is claimed and entered into `running`, for writing while one is asked to stop:
-    /// no cancel falls between the two.
+    /// Held for reading while a job is claimed and entered into `running`, for writing while one is asked to stop, so
+    /// that no cancel comes between the two steps.
     pub(super) claiming: RwLock<()>,
     /// Canceled when the service is about to stop.
     pub(super) stopping: CancellationToken,
@@ -82,7 +82,7 @@ impl Queue {
         self.watchers.subscribe(key)
     }
 
-    /// Tells those who watch these jobs that there is something new to read.
+    /// Notifies the watchers of these jobs that there is something new to read.
     pub fn announce(&self, jobs: &[i64]) {
         jobs.iter().for_each(|key| self.watchers.announce(*key));
     }
@@ -103,7 +103,7 @@ impl Queue {
         }
     }
 
-    /// Starts no more jobs until the queue is resumed, also across restarts; those that run go on.
+    /// Starts no more jobs until the queue is resumed, also after a restart; running jobs continue.
     pub async fn pause(&self) -> store::Result<()> {
         let _guard = self.claiming.write().await; // no claim is under way
         self.store.set_paused(true).await

@@ -1,4 +1,4 @@
-//! How those who watch a job learn that there is something new. They are not told what: they read the store.
+//! The watchers of a job are notified of changes, without their content: they read the store.
 
 use std::{
     collections::HashMap,
@@ -7,14 +7,14 @@ use std::{
 
 use tokio::sync::watch;
 
-/// The jobs that somebody watches.
+/// The jobs that are watched.
 #[derive(Debug, Default)]
 pub(super) struct Watchers {
     watched: Mutex<HashMap<i64, watch::Sender<()>>>,
 }
 
 impl Watchers {
-    /// Tells those who watch a job that there is something new in the store.
+    /// Notifies the watchers of a job that there is something new in the store.
     pub(super) fn announce(&self, key: i64) {
         if let Some(sender) = self.watched().get(&key) {
             sender.send_replace(());
@@ -49,8 +49,8 @@ pub struct Subscription<'a> {
 }
 
 impl Subscription<'_> {
-    /// Returns when something was announced since the subscription or the last call.
-    pub async fn news(&mut self) {
+    /// Returns when a change was announced since the subscription or the last call.
+    pub async fn changed(&mut self) {
         // an error would mean that the sender is gone, but it lives as long as this subscription
         let _ = self.receiver.changed().await;
     }
@@ -59,7 +59,7 @@ impl Subscription<'_> {
 impl Drop for Subscription<'_> {
     fn drop(&mut self) {
         let mut watched = self.watchers.watched();
-        // nobody subscribes meanwhile, under the lock: the one receiver left is this one
+        // the lock keeps others from subscribing meanwhile: the only receiver left is this one
         if watched
             .get(&self.key)
             .is_some_and(|sender| sender.receiver_count() <= 1)
@@ -74,15 +74,15 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn an_announcement_between_subscribing_and_listening_is_heard() {
+    async fn an_announcement_between_subscribing_and_waiting_is_received() {
         let watchers = Watchers::default();
         let mut subscription = watchers.subscribe(7);
         watchers.announce(7);
-        subscription.news().await;
+        subscription.changed().await;
     }
 
     #[test]
-    fn nothing_is_kept_for_a_job_that_nobody_watches() {
+    fn nothing_is_kept_for_a_job_without_watchers() {
         let watchers = Watchers::default();
         let (one, two) = (watchers.subscribe(7), watchers.subscribe(7));
         drop(one);

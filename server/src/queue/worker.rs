@@ -18,7 +18,7 @@ use crate::{
     store::{Claim, Ending, FinalBatch, Parts},
 };
 
-/// Most reports of a solver that are not recorded yet; then it waits.
+/// Most reports of a solver that are not recorded yet; if there are more, the solver waits.
 const MOST_UNRECORDED: usize = 256;
 
 /// How long the solver of a job that has reached its time limit may take to return its last state (see `Limits`).
@@ -37,7 +37,7 @@ pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Runni
     let solving = tokio::task::spawn_blocking(move || {
         let mesh = mesh.map(|hash| stored_mesh(&store, &hash)).transpose()?;
         solve_and_report(&problem, mesh, solve, |report| {
-            // an error means that the recorder has ended: there is nobody to solve for
+            // an error means that the recorder has ended: the result is not needed
             let recording = report.is_none_or(|report| sender.blocking_send(report).is_ok());
             if recording && stop.get().is_none() {
                 ControlFlow::Continue(())
@@ -68,7 +68,7 @@ async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
     tokio::time::sleep(Duration::from_secs_f64(job.limits.timeout_s)).await;
     running.stop(StopReason::OutOfTime);
     tokio::time::sleep(TIMEOUT_GRACE).await;
-    // in a task of its own: a solver that returns now stops this timer, but not a commit that has begun
+    // in its own task: a solver that returns now stops this timer, but not a commit that has begun
     tokio::spawn(async move {
         let ending = timed_out(&job);
         if let Err(cause) = queue.end_attempt(job.key, running.attempt, &ending).await {

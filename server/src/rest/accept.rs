@@ -11,7 +11,7 @@ use crate::{
     violations,
 };
 
-/// One of these formats: by the parameter `format`, else by `Accept`, else the first.
+/// One of these formats, chosen by the parameter `format`, else by `Accept`, else the first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FormatOf(pub(super) &'static [Format]);
 
@@ -27,7 +27,7 @@ impl Input for FormatOf {
             place: Place::Query,
             name: FORMAT,
             schema: json!({ "type": "string", "enum": names }),
-            meaning: "The format of the data; it takes precedence over Accept",
+            meaning: "Format of the data; takes precedence over Accept",
             repeatable: false,
         }]
     }
@@ -37,7 +37,7 @@ impl Input for FormatOf {
     }
 }
 
-/// The format to answer in: the parameter overrides the header, the first is the default.
+/// The format of the answer: the parameter overrides the header, the first format is the default.
 fn choose(
     formats: &[Format],
     parameter: Option<&str>,
@@ -45,7 +45,7 @@ fn choose(
 ) -> Result<Format, ApiError> {
     let names: Vec<&str> = formats.iter().map(|format| format.name()).collect();
     let none = |got: &str| ApiError::NotAcceptable {
-        got: violations::name(got),
+        got: violations::quoted(got),
         available: names.join(", "),
     };
     if let Some(wanted) = parameter {
@@ -56,7 +56,7 @@ fn choose(
     if accept.is_empty() {
         return formats.first().copied().ok_or_else(|| none("anything"));
     }
-    // Each range with its weight; the best wanted format wins, ours first among equals.
+    // the format with the largest weight; of equal ones the first in our list
     let mut best: Option<(f32, Format)> = None;
     for format in formats {
         let (weight, ..) = weight(&accept, format.media_type());
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_client_prefers_to_json_goes_by_its_weights() {
+    fn a_client_prefers_a_format_to_json_by_its_weights() {
         let prefers = |accept: &str| {
             let mut headers = HeaderMap::new();
             headers.insert("accept", accept.parse().unwrap());

@@ -22,7 +22,7 @@ use crate::{
         retry::Changes,
         submit::MAX_BATCH,
     },
-    violations::{AT, prefixed},
+    violations::{PROBLEM, prefixed},
 };
 
 /// A body that submits a job; for its schema only, since it is read by hand: the errors of the
@@ -50,7 +50,7 @@ pub(super) struct Submission {
     cache: Option<Cache>,
 }
 
-/// A body with many of them; for its schema only.
+/// A body that submits many jobs; for its schema only.
 #[derive(JsonSchema)]
 #[schemars(deny_unknown_fields)]
 #[allow(dead_code)]
@@ -60,7 +60,7 @@ pub(super) struct Submissions {
     jobs: Vec<Submission>,
 }
 
-/// A body that changes a job: what is absent stays; for its schema only.
+/// A body that changes a job: absent fields stay unchanged; for its schema only.
 #[derive(JsonSchema)]
 #[schemars(deny_unknown_fields)]
 #[allow(dead_code)]
@@ -74,17 +74,17 @@ pub(super) struct Edits {
     /// Jobs of higher priority run first.
     #[schemars(default, range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
     priority: Option<i32>,
-    /// Kept whatever its age; it can still be deleted on request.
+    /// Never deleted because of its age; it can still be deleted on request.
     #[schemars(default)]
     pinned: Option<bool>,
 }
 
-/// A body that changes the new job of a retry: what is absent stays; for its schema only.
+/// A body that changes the new job of a retry: absent fields stay unchanged; for its schema only.
 #[derive(JsonSchema)]
 #[schemars(deny_unknown_fields)]
 #[allow(dead_code)]
 pub(super) struct Retry {
-    /// Time limits; those that are absent stay.
+    /// Time limits; absent ones stay unchanged.
     #[schemars(default)]
     limits: Option<NewLimits>,
     /// Jobs of higher priority run first.
@@ -98,7 +98,7 @@ pub(super) struct Retry {
 pub(super) struct NewLimits {
     /// Seconds from a start to the end.
     timeout_s: Option<f64>,
-    /// Seconds that it may wait in the queue.
+    /// Seconds that the job may wait in the queue.
     queue_ttl_s: Option<f64>,
 }
 
@@ -117,11 +117,11 @@ pub(super) struct BareProblem {
     problem: Problem,
 }
 
-/// A body `{problem, name, labels, priority, limits, cache}`. The problem's text goes to the solver's own
-/// strict parser; what is wrong with it comes together with what is wrong around it.
+/// A body `{problem, name, labels, priority, limits, cache}`. The problem's text is read by `files::parse`, which is
+/// strict; its violations are reported together with those of the other fields.
 pub(super) fn submission(text: &str) -> Result<JobRequest, ApiError> {
     let mut body = Object::open(text, "an object with the field problem")?;
-    if let Some(violation) = unwrapped(&body) {
+    if let Some(violation) = missing_envelope(&body) {
         return Ok(JobRequest {
             envelope: Envelope::default(),
             problem: Err(vec![violation]),
@@ -142,7 +142,7 @@ pub(super) fn submission(text: &str) -> Result<JobRequest, ApiError> {
     let known = "problem, name, labels, priority, limits, cache";
     Ok(JobRequest {
         envelope,
-        problem: body.close(known, problem),
+        problem: body.finish(known, problem),
     })
 }
 
@@ -159,7 +159,7 @@ pub(super) fn batch(text: &str) -> Result<Read<Vec<JobRequest>>, ApiError> {
         texts
     });
     let mut requests = vec![];
-    // one more than allowed: the verb reports that they are too many
+    // one more than allowed: the verb reports the excess
     for (n, text) in texts.iter().flatten().take(MAX_BATCH + 1).enumerate() {
         let at = format!("/jobs/{n}");
         match submission(text.get()) {
@@ -173,10 +173,10 @@ pub(super) fn batch(text: &str) -> Result<Read<Vec<JobRequest>>, ApiError> {
             Err(other) => return Err(other),
         }
     }
-    Ok(body.close("jobs", Some(requests)))
+    Ok(body.finish("jobs", Some(requests)))
 }
 
-/// A body `{name, labels, priority, pinned}`: what is absent stays, and a name or labels of null are taken away.
+/// A body `{name, labels, priority, pinned}`: absent fields stay unchanged; null removes a name or labels.
 pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
     let mut body = Object::open(text, "an object with what to change")?;
     let (unnamed, unlabeled) = (body.is_null("name"), body.is_null("labels"));
@@ -189,11 +189,11 @@ pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
         pinned: body.take("pinned", "true or false"),
     };
     let known = "name, labels, priority, pinned";
-    body.close(known, Some(edit))
+    body.finish(known, Some(edit))
         .map_err(ApiError::InvalidProblem)
 }
 
-/// A body `{limits, priority}`: what is absent stays.
+/// A body `{limits, priority}`: absent fields stay unchanged.
 pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
     let mut body = Object::open(text, "an object with what to change")?;
     let NewLimits {
@@ -205,26 +205,26 @@ pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
         queue_ttl_s,
         priority: body.take("priority", &PRIORITIES.expected()),
     };
-    let changes = body.close("limits, priority", Some(changes));
+    let changes = body.finish("limits, priority", Some(changes));
     changes.map_err(ApiError::InvalidProblem)
 }
 
 /// A body `{problem}`.
 pub(super) fn bare_problem(text: &str) -> Result<Read<Problem>, ApiError> {
     let mut body = Object::open(text, "an object with the field problem")?;
-    if let Some(violation) = unwrapped(&body) {
+    if let Some(violation) = missing_envelope(&body) {
         return Ok(Err(vec![violation]));
     }
     let problem = problem(&mut body);
-    Ok(body.close("problem", problem))
+    Ok(body.finish("problem", problem))
 }
 
-/// The problem itself where an envelope around it was expected: one violation says so, instead of one for each of
-/// its names.
-fn unwrapped(body: &Object<'_>) -> Option<Violation> {
+/// The violation of a body that is the problem itself instead of an object with the field `problem`: one, not one
+/// for each field of the problem.
+fn missing_envelope(body: &Object<'_>) -> Option<Violation> {
     let bare = body.has("analysis") || body.has("mesh");
     (bare && !body.has("problem")).then(|| Violation {
-        pointer: AT.into(),
+        pointer: PROBLEM.into(),
         reason: Reason::Missing,
         got: "the bare problem".into(),
         expected: "an object with the field problem".into(),
@@ -238,7 +238,7 @@ fn problem(body: &mut Object<'_>) -> Option<Problem> {
     let raw = body.require("problem", "the problem to solve", hint)?;
     let problem = files::parse(raw.get());
     problem
-        .map_err(|found| body.violations.extend(prefixed(AT, found)))
+        .map_err(|found| body.violations.extend(prefixed(PROBLEM, found)))
         .ok()
 }
 
@@ -260,7 +260,7 @@ mod tests {
             .collect()
     }
 
-    /// What a body may have, by the violation that reports an unknown name.
+    /// The fields that a body may have, taken from the violation that reports an unknown one.
     fn known(found: Vec<Violation>) -> Vec<String> {
         let unknown = |v: &&Violation| v.reason == Reason::UnknownName;
         let unknown = found.iter().find(unknown).unwrap();
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_described_of_a_body_is_what_is_read() {
+    fn the_described_fields_of_a_body_are_those_that_are_read() {
         const OTHER: &str = r#"{"other": 1}"#;
         let ApiError::InvalidProblem(edits) = edit(OTHER).unwrap_err() else {
             unreachable!("it is well-formed");
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_wrong_with_an_envelope_is_said_at_once() {
+    fn all_violations_of_an_envelope_are_reported_together() {
         let text = r#"{"name": 7, "labels": {"a": 1}, "priority": 0.5, "wait": 3}"#;
         assert_eq!(
             pointers(text),
@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thousand_unknown_names_are_a_hundred_violations_and_a_long_one_is_cut() {
+    fn at_most_a_hundred_unknown_names_are_reported_and_long_ones_are_truncated() {
         let names: Vec<String> = (0..1000).map(|n| format!("\"n{n}\": 1")).collect();
         let text = format!("{{\"problem\": {{}}, {}}}", names.join(", "));
         assert_eq!(pointers(&text).len(), 100);
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_json_is_told_apart_from_a_wrong_shape() {
+    fn malformed_json_is_distinguished_from_a_wrong_type() {
         assert!(matches!(
             submission("{\"problem\": "),
             Err(ApiError::MalformedJson(_))

@@ -10,7 +10,7 @@ use futures_util::StreamExt;
 
 use crate::error::ApiError;
 
-/// The body as text, if it says that it is JSON and is not too large.
+/// The body as text, if it is declared as JSON and is not too large.
 pub(super) async fn json_text(
     headers: &HeaderMap,
     body: Body,
@@ -26,7 +26,7 @@ pub(super) async fn json_text(
         .unwrap_or_default()
         .trim()
         .to_ascii_lowercase();
-    // a patch format has a meaning of its own, which is not ours
+    // a patch format has another meaning
     let json = essence.starts_with("application/")
         && essence.ends_with("+json")
         && !essence.ends_with("-patch+json");
@@ -38,7 +38,7 @@ pub(super) async fn json_text(
     {
         let coding = String::from_utf8_lossy(coding.as_bytes());
         return Err(ApiError::UnsupportedMedia(format!(
-            "a body coded as {coding}"
+            "a body with the encoding {coding}"
         )));
     }
     let mut pieces = body.into_data_stream();
@@ -47,7 +47,7 @@ pub(super) async fn json_text(
     let mut too_large = length.is_some_and(|length| length > limit_bytes);
     while !too_large && let Some(piece) = pieces.next().await {
         let piece = piece
-            .map_err(|error| ApiError::MalformedJson(format!("the body broke off: {error}")))?;
+            .map_err(|error| ApiError::MalformedJson(format!("the body is incomplete: {error}")))?;
         too_large = bytes.len() + piece.len() > limit_bytes;
         if !too_large {
             bytes.extend_from_slice(&piece);
@@ -60,14 +60,14 @@ pub(super) async fn json_text(
     String::from_utf8(bytes).map_err(|error| ApiError::MalformedJson(error.to_string()))
 }
 
-/// How long the body says that it is.
+/// The length of the body that the headers declare.
 pub(super) fn declared_length(headers: &HeaderMap) -> Option<usize> {
     let value = headers.get(header::CONTENT_LENGTH)?;
     value.to_str().ok()?.parse().ok()
 }
 
-/// Reads the rest of a refused body for a while, and drops it: many clients read the answer only after they have
-/// sent everything, and see a broken connection if the server closes it before.
+/// Reads the rest of a refused body for a limited time, and drops it: many clients read the answer only after they
+/// have sent everything, and see a broken connection if the server closes it before.
 pub(super) async fn discard(mut pieces: BodyDataStream) {
     const MOST_BYTES: usize = 256 << 20;
     const LONGEST: Duration = Duration::from_secs(10);
@@ -80,5 +80,5 @@ pub(super) async fn discard(mut pieces: BodyDataStream) {
             }
         }
     };
-    let _ = tokio::time::timeout(LONGEST, all).await; // late or not, it is over
+    let _ = tokio::time::timeout(LONGEST, all).await; // complete or not, reading ends here
 }

@@ -17,15 +17,15 @@ use super::{
 };
 use crate::{caller::Caller, error::ApiError, verbs::Service};
 
-/// What all handlers work with.
+/// The state that all handlers share.
 #[derive(Clone, Debug)]
 pub(super) struct AppState {
     pub(super) service: Arc<Service>,
-    /// The description of the API, which is made of all operations and served by one of them.
+    /// The description of the API, made from all operations and served by one of them.
     pub(super) openapi: fn() -> &'static Value,
 }
 
-/// A request without its input, which handlers receive beside it.
+/// A request without its input, which handlers receive as separate arguments.
 pub(super) struct Call {
     pub(super) service: Arc<Service>,
     pub(super) caller: Caller,
@@ -35,21 +35,22 @@ pub(super) struct Call {
 }
 
 impl Call {
-    /// The body as text, if it says that it is JSON and is not too large.
+    /// The body as text, if it is declared as JSON and is not too large.
     pub(super) async fn json(&mut self) -> Result<String, ApiError> {
         let body = std::mem::take(&mut self.body);
         body::json_text(&self.headers, body, self.service.max_body_bytes).await
     }
 
-    /// Whether anything was sent as body.
+    /// Whether the request has a body.
     pub(super) fn has_body(&self) -> bool {
         !self.body.is_end_stream()
     }
 }
 
-/// What does an operation: an async function of the call and of the operation's input, in the order of the table.
+/// The handler of an operation: an async function of the call and of the operation's input, in the order of its
+/// entry in the list.
 pub(super) trait Handler<Values>: Clone + Send + Sync + 'static {
-    /// Does it.
+    /// Runs the operation.
     fn handle(
         &self,
         call: Call,
@@ -74,7 +75,7 @@ macro_rules! functions {
 }
 functions!(() (A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E G));
 
-/// The route of an operation. A `strict` one refuses parameters that it does not know.
+/// The route of an operation. A `strict` one refuses unknown parameters.
 pub(super) fn route<T, H>(
     method: MethodFilter,
     input: T,

@@ -11,19 +11,19 @@ use base64::{Engine, engine::general_purpose::STANDARD};
 use sha2::{Digest, Sha256};
 
 use super::{
-    headers::{Tags, header as described, like, text},
+    headers::{Tags, header as described, recommended_pattern, text},
     input::{Input, RawInput},
 };
 use crate::{digest::hex, error::ApiError, formats::Format, parameters::Description};
 
-/// The part of a file that is asked for.
+/// The part of a file that is requested.
 pub(super) const PART: PartHeaders = PartHeaders;
 
-/// The headers that ask for a part of a file, or only for one that is not known yet.
+/// The headers that request a part of a file, or a file only if the client does not have it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PartHeaders;
 
-/// What of a file is asked for, and what is known of it; as it was sent.
+/// Which part of a file is requested, and what the client has already; as it was sent.
 #[derive(Debug, Default)]
 pub(super) struct Part {
     known: Option<Tags>,
@@ -36,16 +36,20 @@ impl Input for PartHeaders {
 
     fn descriptions(&self) -> Vec<Description> {
         vec![
-            described("If-None-Match", text(), "The ETag of a file that is known"),
+            described(
+                "If-None-Match",
+                text(),
+                "ETag of the file that the client has; 304 if it is still current",
+            ),
             described(
                 "Range",
-                like("^bytes=([0-9]{1,6}-[0-9]{0,6}|-[0-9]{1,6})$"),
+                recommended_pattern("^bytes=([0-9]{1,6}-[0-9]{0,6}|-[0-9]{1,6})$"),
                 "bytes=FIRST-LAST: a part of the file",
             ),
             described(
                 "If-Range",
                 text(),
-                "The ETag of the file that the part belongs to; if it is another one, the whole file is sent",
+                "ETag of the file that the part belongs to; the whole file is sent if it has changed",
             ),
         ]
     }
@@ -63,10 +67,10 @@ impl Input for PartHeaders {
     }
 }
 
-/// What a file is, before its bytes are looked at.
+/// The description of a file, known before its bytes are read.
 pub(super) struct File {
     pub(super) format: Format,
-    /// Without its ending.
+    /// Its name without the extension.
     pub(super) name: String,
     pub(super) bytes: u64,
     /// SHA-256.
@@ -132,7 +136,7 @@ pub(super) fn answer(
     };
     let range = range.unwrap_or(0..file.bytes);
     let length = range.end - range.start;
-    // the name of a boundary may be any text; that of a file must be valid on every system
+    // a boundary may have any name; that of a file must be valid on every system
     let plain = |c: char| {
         if c.is_ascii_alphanumeric() || "._-".contains(c) {
             c
@@ -163,17 +167,17 @@ fn with<const N: usize>(mut response: Response, headers: [(HeaderName, String); 
     response
 }
 
-/// What of a file is sent.
+/// The part of a file that is sent.
 #[derive(Debug, PartialEq, Eq)]
 enum Selection {
     All,
     Part(Range<u64>),
-    /// A range behind its end was asked for.
+    /// Nothing: the requested range begins after the end.
     Nothing,
 }
 
-/// The one range of a request, unless it holds for another version of the file. Several ranges, and what
-/// is not understood, are answered with everything, as RFC 9110 has it.
+/// The one range of a request, unless it belongs to another version of the file. Several ranges, and ranges that
+/// cannot be read, are answered with the whole file, as RFC 9110 specifies.
 fn select(part: &Part, tag: &str, length: u64) -> Selection {
     if part.if_range.as_ref().is_some_and(|of| of != tag) {
         return Selection::All;
@@ -218,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_are_read_as_the_rfc_has_them() {
+    fn ranges_are_read_as_the_rfc_specifies() {
         assert_eq!(asked("bytes=0-3"), Selection::Part(0..4));
         assert_eq!(asked("bytes=3-"), Selection::Part(3..10));
         assert_eq!(asked("bytes=-3"), Selection::Part(7..10));

@@ -20,22 +20,22 @@ use crate::{
     error::ApiError,
     event::Event,
     job::JobId,
-    parameters::{Parameter, Whole},
+    parameters::{Integers, Parameter},
     verbs::watch::{AFTER_SEQ, watch},
     violations,
 };
 
-/// Tells proxies and clients that the connection is alive.
+/// Interval of the comments that keep the connection open through proxies and clients.
 const PING: Duration = Duration::from_secs(15);
 /// Server-sent events.
 const SSE: &str = "text/event-stream";
-/// A JSON object per line, by its names.
+/// The media types of JSON Lines, a JSON object per line.
 const LINES: [&str; 2] = ["application/jsonl", "application/x-ndjson"];
 
-/// A browser that reconnects asks for the same address, and sends this beside it.
-pub(super) const LAST_EVENT_ID: Parameter<Whole> = Parameter {
+/// A browser that reconnects requests the same address again and adds this header.
+pub(super) const LAST_EVENT_ID: Parameter<Integers> = Parameter {
     name: "Last-Event-ID",
-    meaning: "The same; it takes precedence",
+    meaning: "Same as after_seq; takes precedence over it",
     values: AFTER_SEQ.values,
 };
 
@@ -58,7 +58,7 @@ pub(super) async fn events(
             .any(some)
     {
         return Err(ApiError::NotAcceptable {
-            got: violations::name(&accepted.join(", ")),
+            got: violations::quoted(&accepted.join(", ")),
             available: format!("{SSE}, {}", LINES[0]),
         });
     }
@@ -68,16 +68,16 @@ pub(super) async fn events(
     ))
 }
 
-/// How events are written.
+/// The format of a stream of events.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Encoding {
     /// As server-sent events.
     Stream,
-    /// A line each.
+    /// As JSON Lines.
     Lines,
 }
 
-/// How the client wants the events of a job, if it prefers them to JSON.
+/// The format in which the client prefers the events of a job to a JSON answer, if it does.
 pub(super) fn preferred(headers: &HeaderMap) -> Option<Encoding> {
     if prefers(headers, &[SSE]) {
         return Some(Encoding::Stream);
@@ -85,7 +85,7 @@ pub(super) fn preferred(headers: &HeaderMap) -> Option<Encoding> {
     prefers(headers, &LINES).then_some(Encoding::Lines)
 }
 
-/// Events as they come. An error just ends the stream: without `done` the client knows that it is incomplete.
+/// A stream of events. An error ends the stream: without `done` the client knows that it is incomplete.
 pub(super) fn write(
     events: impl Stream<Item = Result<Event, ApiError>> + Send + 'static,
     encoding: Encoding,

@@ -11,7 +11,7 @@ use crate::{
     },
 };
 
-/// All filters; none leaves no job out.
+/// All filters; without any, every job matches.
 pub(super) const FILTERS: Filters = Filters;
 
 /// The filters.

@@ -34,7 +34,7 @@ impl<V: Values> Input for Header<V> {
         };
         let unreadable = |_| ApiError::BadParameter {
             name,
-            got: violations::name(&String::from_utf8_lossy(value.as_bytes())),
+            got: violations::quoted(&String::from_utf8_lossy(value.as_bytes())),
             expected: "printable ASCII".into(),
         };
         let text = value.to_str().map_err(unreadable)?;
@@ -42,7 +42,7 @@ impl<V: Values> Input for Header<V> {
     }
 }
 
-/// A header as it is described, of a request or of an answer.
+/// The description of a header, of a request or of an answer.
 pub(super) fn header(name: &'static str, schema: Value, meaning: &'static str) -> Description {
     Description {
         place: Place::Header,
@@ -58,21 +58,21 @@ pub(super) fn text() -> Value {
     json!({ "type": "string" })
 }
 
-/// A pattern that HTTP only recommends: preferences and ranges of another form are ignored.
-pub(super) fn like(pattern: &str) -> Value {
+/// A text for which a pattern is recommended: preferences and ranges of another form are ignored, not refused.
+pub(super) fn recommended_pattern(pattern: &str) -> Value {
     json!({ "type": "string", "anyOf": [{ "pattern": pattern }, {}] })
 }
 
-/// The job is answered only if it has changed.
+/// The job is sent only if it has changed.
 pub(super) const IF_NONE_MATCH: Condition = Condition {
     name: "If-None-Match",
-    meaning: "The ETag that is known: 304 while it holds",
+    meaning: "ETag that the client has; 304 if it is still current",
 };
 
 /// The change is made only if the job has not changed.
 pub(super) const IF_MATCH: Condition = Condition {
     name: "If-Match",
-    meaning: "The ETag of the job that the change is meant for",
+    meaning: "ETag of the job; the change is made only if it is still current",
 };
 
 /// A header of entity tags.
@@ -94,12 +94,12 @@ impl Input for Condition {
     }
 }
 
-/// Entity tags of a conditional request; those that are not ours match nothing.
+/// Entity tags of a conditional request; tags of another form match nothing.
 #[derive(Debug)]
 pub(super) struct Tags(Vec<String>);
 
 impl Tags {
-    /// The tags of that header; none if it is absent.
+    /// The tags of this header; `None` if it is absent.
     pub(super) fn of(headers: &HeaderMap, name: &str) -> Option<Tags> {
         headers.get(name)?;
         let values = headers.get_all(name).iter();
@@ -133,7 +133,7 @@ impl Tags {
     }
 }
 
-/// A wait for the end of a job that is submitted, in whole seconds (RFC 7240).
+/// How long to wait for the end of a submitted job, in whole seconds (RFC 7240).
 pub(super) const PREFER: PreferWait = PreferWait;
 
 /// The `wait` of a `Prefer` header.
@@ -141,14 +141,14 @@ pub(super) const PREFER: PreferWait = PreferWait;
 pub(super) struct PreferWait;
 
 impl Input for PreferWait {
-    /// At most what may be waited.
+    /// Seconds, at most the longest wait allowed.
     type Value = Option<u64>;
 
     fn descriptions(&self) -> Vec<Description> {
         vec![header(
             "Prefer",
-            like("^wait=([0-9]|[1-5][0-9]|60)$"),
-            "wait=0…60: answer with the terminal job if it ends within so many seconds",
+            recommended_pattern("^wait=([0-9]|[1-5][0-9]|60)$"),
+            "wait=0…60: answer with the terminal job if it ends within that many seconds",
         )]
     }
 
@@ -158,7 +158,7 @@ impl Input for PreferWait {
     }
 }
 
-/// The first wait that makes sense.
+/// The first valid wait.
 fn preferred_wait_s(headers: &HeaderMap) -> Option<u64> {
     headers
         .get_all("prefer")

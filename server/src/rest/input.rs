@@ -17,7 +17,7 @@ pub(super) trait Input {
     /// What a handler receives.
     type Value;
 
-    /// For the description of the API; several if they belong together.
+    /// Its description for the API; several if inputs belong together.
     fn descriptions(&self) -> Vec<Description>;
 
     /// Reads and checks it.
@@ -36,9 +36,9 @@ pub(super) struct RawInput<'a> {
 const ANY_KEY: &str = "{key}";
 
 impl<'a> RawInput<'a> {
-    /// The variables of the path, as the router found them; an ill-formed path names nothing.
+    /// The variables of the path, as the router found them; a malformed path is answered with *not found*.
     pub(super) async fn variables(parts: &mut Parts) -> Result<Vec<(String, String)>, ApiError> {
-        let ill_formed = |_| ApiError::NotFound("the path is not well formed".into());
+        let ill_formed = |_| ApiError::NotFound("the path is malformed".into());
         let found: RawPathParams = parts.extract().await.map_err(ill_formed)?;
         let owned = |(name, value): (&str, &str)| (name.to_owned(), value.to_owned());
         Ok(found.iter().map(owned).collect())
@@ -58,8 +58,8 @@ impl<'a> RawInput<'a> {
         }
     }
 
-    /// Refuses a parameter that is not known, and a second value where there can be one: they would be ignored,
-    /// and the client expects an effect.
+    /// Refuses an unknown parameter, and a second value of a parameter that is not repeatable: they would have no
+    /// effect, and the client expects one.
     pub(super) fn check(&self, described: &[Description]) -> Result<(), ApiError> {
         let known = described.iter().filter(|one| one.place == Place::Query);
         for (n, (name, value)) in self.query.iter().enumerate() {
@@ -77,7 +77,7 @@ impl<'a> RawInput<'a> {
             if again && !parameter.repeatable {
                 return Err(ApiError::BadParameter {
                     name: parameter.name,
-                    got: format!("a second one, {value}"),
+                    got: format!("a second value, {value}"),
                     expected: "one value".into(),
                 });
             }
@@ -85,18 +85,18 @@ impl<'a> RawInput<'a> {
         Ok(())
     }
 
-    /// The value of a query parameter of that name.
+    /// The value of the query parameter of this name.
     pub(super) fn one(&self, name: &str) -> Option<&str> {
         self.all(name).next()
     }
 
-    /// All values of a query parameter of that name.
+    /// All values of the query parameter of this name.
     pub(super) fn all(&self, name: &str) -> impl Iterator<Item = &str> {
         let named = self.query.iter().filter(move |(own, _)| own == name);
         named.map(|(_, value)| value.as_str())
     }
 
-    /// Keys and values of the query parameters with such a name.
+    /// Keys and values of the query parameters whose names match this one with `{key}`.
     pub(super) fn keyed(&self, name: &str) -> impl Iterator<Item = (String, String)> {
         let start = name.trim_end_matches(ANY_KEY);
         self.query.iter().filter_map(move |(own, value)| {
@@ -106,7 +106,7 @@ impl<'a> RawInput<'a> {
     }
 }
 
-/// Whether `name` belongs to this parameter; one with `{key}` has many.
+/// Whether `name` belongs to this parameter; one with `{key}` has a name for each key.
 fn matches(parameter: &str, name: &str) -> bool {
     match parameter.strip_suffix(ANY_KEY) {
         Some(start) => name.starts_with(start),
@@ -123,7 +123,7 @@ impl<V: Values> Input for Variable<V> {
 
     fn extract(&self, raw: &RawInput<'_>) -> Result<V::Value, ApiError> {
         let mut named = raw.variables.iter().filter(|(name, _)| name == self.name);
-        // it is there: a test checks that each path has the variables of its operation
+        // it exists: a test checks that each path has the variables of its operation
         let text = named.next().map_or("", |(_, value)| value.as_str());
         self.read(text)
     }
@@ -200,15 +200,11 @@ mod tests {
         }
         let unknown = refused("status=queued&color=red").unwrap();
         assert!(unknown.contains("color") && unknown.contains("created_after, created_before"));
-        assert!(
-            refused("label=x")
-                .unwrap()
-                .contains("there is no parameter")
-        );
+        assert!(refused("label=x").unwrap().contains("has no parameter"));
         assert!(
             refused("name=a&name=b")
                 .unwrap()
-                .contains("a second one, b")
+                .contains("a second value, b")
         );
     }
 

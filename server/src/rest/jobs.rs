@@ -16,7 +16,7 @@ use crate::{
     parameters::Values,
     store::{Filter, GroupBy, Order},
     verbs::{
-        bulk::{self, Many},
+        bulk::{self, BulkResult},
         jobs::{self as verbs, Cancellation},
         lists::{self, Count},
         page::Paging,
@@ -34,8 +34,8 @@ pub(super) async fn get(
     if let (Some(_), None) = (until, wait_s) {
         return Err(ApiError::BadParameter {
             name: UNTIL.name,
-            got: "no wait beside it".into(),
-            expected: format!("{} beside it: {}", WAIT.name, WAIT.values.expected()),
+            got: format!("`{}` without `{}`", UNTIL.name, WAIT.name),
+            expected: format!("also `{}`, {}", WAIT.name, WAIT.values.expected()),
         });
     }
     let Call {
@@ -54,7 +54,7 @@ pub(super) async fn get(
     if seen.is_some_and(|seen| seen.contain(&tag)) {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
     }
-    Ok(one(&job))
+    Ok(job_response(&job))
 }
 
 /// A page of jobs.
@@ -104,7 +104,7 @@ pub(super) async fn update(
     } = &call;
     let versions = meant_for.as_ref().and_then(Tags::versions);
     let job = verbs::update(service, caller, id, edit, versions).await?;
-    Ok(one(&job))
+    Ok(job_response(&job))
 }
 
 pub(super) async fn cancel(call: Call, id: JobId) -> Result<Response, ApiError> {
@@ -118,18 +118,18 @@ pub(super) async fn delete(call: Call, id: JobId) -> Result<StatusCode, ApiError
     Ok(StatusCode::NO_CONTENT)
 }
 
-pub(super) async fn cancel_many(call: Call, filter: Filter) -> Result<Json<Many>, ApiError> {
+pub(super) async fn cancel_many(call: Call, filter: Filter) -> Result<Json<BulkResult>, ApiError> {
     let many = bulk::cancel_many(&call.service, &call.caller, filter).await?;
     Ok(Json(many))
 }
 
-pub(super) async fn delete_many(call: Call, filter: Filter) -> Result<Json<Many>, ApiError> {
+pub(super) async fn delete_many(call: Call, filter: Filter) -> Result<Json<BulkResult>, ApiError> {
     let many = bulk::delete_many(&call.service, &call.caller, filter).await?;
     Ok(Json(many))
 }
 
 /// One job with its version as entity tag.
-pub(super) fn one(job: &Job) -> Response {
+pub(super) fn job_response(job: &Job) -> Response {
     ([(header::ETAG, tag(job))], Json(job)).into_response()
 }
 
@@ -137,7 +137,7 @@ pub(super) fn tag(job: &Job) -> String {
     format!("\"{}\"", job.version)
 }
 
-/// What asking a job to stop did, and the job.
+/// The effect of asking a job to stop, and the job.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Canceled {
     outcome: Cancellation,

@@ -19,14 +19,14 @@ use crate::{
     verbs::{meshes as verbs, page::Paging},
 };
 
-/// The file is the body, of whatever type: its format is recognized by how it begins.
+/// The file is the body, of any media type: its format is recognized from its first bytes.
 pub(super) async fn upload(call: Call) -> Result<Response, ApiError> {
     let limit_bytes = call.service.max_mesh_bytes;
     let mut pieces = call.body.into_data_stream();
     let found = if declared_length(&call.headers).is_some_and(|length| length > limit_bytes) {
         Err(ApiError::PayloadTooLarge { limit_bytes })
     } else {
-        let broken = |error| ApiError::MalformedJson(format!("the body broke off: {error}"));
+        let broken = |error| ApiError::MalformedJson(format!("the body is incomplete: {error}"));
         let stream = (&mut pieces).map(|piece| piece.map_err(broken));
         verbs::upload(&call.service, &call.caller, Box::pin(stream)).await
     };

@@ -1,6 +1,6 @@
 //! REST. The whole API is one list, `operations`. Handlers only translate; see `verbs`.
 
-// A request on its way in: what it says beside its body, its body, and who asks.
+// Requests: parameters and headers, bodies, the caller.
 mod accept;
 mod authenticate;
 mod bodies;
@@ -11,7 +11,7 @@ mod headers;
 mod input;
 mod object;
 
-// Answers on their way out.
+// Answers.
 mod data;
 mod reply;
 
@@ -25,7 +25,7 @@ mod results;
 mod service;
 mod submit;
 
-// The list of operations, and what is made of it.
+// The list of operations, and what is made from it.
 mod openapi;
 mod operations;
 mod reference;

@@ -21,13 +21,13 @@ pub(super) struct Object<'a> {
 }
 
 impl<'a> Object<'a> {
-    /// The object of a text; `expected` describes it where the text is something else.
+    /// The object in a text; `expected` describes it in the error if the text is something else.
     pub(super) fn open(text: &'a str, expected: &str) -> Result<Self, ApiError> {
         if text.trim().is_empty() {
             let nothing = format!("the body is empty; expected {expected}");
             return Err(ApiError::MalformedJson(nothing));
         }
-        // First only the syntax, so that a well-formed array is reported as the wrong type.
+        // first only the syntax, so that a well-formed array is reported as the wrong type
         let whole: &RawValue = serde_json::from_str(text)
             .map_err(|error| ApiError::MalformedJson(error.to_string()))?;
         let Pairs(pairs) = serde_json::from_str(whole.get())
@@ -37,7 +37,7 @@ impl<'a> Object<'a> {
         for (name, value) in pairs {
             if fields.insert(name.clone(), value).is_some() {
                 violations.add(Violation {
-                    pointer: format!("/{}", escape(&violations::name(&name))),
+                    pointer: format!("/{}", escape(&violations::quoted(&name))),
                     reason: Reason::DuplicateName,
                     got: "the name twice".into(),
                     expected: "each name once".into(),
@@ -85,16 +85,16 @@ impl<'a> Object<'a> {
         value.map_err(|_| self.wrong_type(name, raw, expected)).ok()
     }
 
-    /// Notes that a field has another type.
+    /// Records that a field has the wrong type.
     pub(super) fn wrong_type(&mut self, name: &str, raw: &RawValue, expected: &str) {
         self.violations
             .add(wrong_type(&format!("/{name}"), raw, expected));
     }
 
-    /// What was read, if there are no violations and no unknown fields left.
-    pub(super) fn close<T>(mut self, known: &str, read: Option<T>) -> Read<T> {
+    /// The content, if there are no violations and no unknown fields left.
+    pub(super) fn finish<T>(mut self, known: &str, read: Option<T>) -> Read<T> {
         for name in self.fields.into_keys() {
-            let name = violations::name(&name);
+            let name = violations::quoted(&name);
             self.violations.add(Violation {
                 pointer: format!("/{}", escape(&name)),
                 reason: Reason::UnknownName,
@@ -143,7 +143,7 @@ fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
     Violation {
         pointer: pointer.into(),
         reason: Reason::WrongType,
-        got: violations::name(raw.get()),
+        got: violations::quoted(raw.get()),
         expected: expected.into(),
         hint: "The bodies of all requests are described in /openapi.json.".into(),
     }

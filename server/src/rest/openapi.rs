@@ -1,5 +1,5 @@
-//! `/openapi.json`: the list of operations as an OpenAPI document. The shapes of bodies are those of
-//! the types that are read and written, so that a renamed field changes the document by itself.
+//! `/openapi.json`: the list of operations as an OpenAPI document. The schemas of bodies are derived from the types
+//! that are read and written, so that a renamed field changes the document automatically.
 
 use std::{collections::BTreeMap, sync::LazyLock};
 
@@ -55,13 +55,13 @@ const INTRODUCTION: &str = "The same operations, names and numbers as over gRPC 
 [/v1/schema/problem.json](/v1/schema/problem.json). \
 Units are chosen by the client and must be consistent; stresses are negative in compression; times are RFC 3339 in UTC. \
 Unknown names are refused, in bodies and in queries. Every error is a document of RFC 9457; its `code` \
-is stable, and explained at its `type`.";
+is stable, and its `type` is the address of an explanation.";
 
 /// Collects the schemas that operations refer to.
 struct Schemas {
-    /// How bodies are read: what has a default may be left out.
+    /// For bodies that are read: fields with a default may be left out.
     requests: SchemaGenerator,
-    /// How they are written: what is always written is always there.
+    /// For bodies that are written: fields that are always written are required.
     answers: SchemaGenerator,
 }
 
@@ -122,15 +122,15 @@ impl Schemas {
         described
     }
 
-    /// All errors of one status; their codes say which of them.
+    /// All errors of one status; their codes distinguish them.
     fn failure(&mut self, codes: &[Kind]) -> Value {
-        let said: Vec<String> = codes
+        let kinds: Vec<String> = codes
             .iter()
             .map(|kind| format!("`{}`: {}", kind.code, kind.title))
             .collect();
         let names: Vec<&str> = codes.iter().map(|kind| kind.code).collect();
         json!({
-            "description": said.join("; "),
+            "description": kinds.join("; "),
             "content": { PROBLEM: { "schema": {
                 "allOf": [{ "$ref": "#/components/schemas/Error" }],
                 "properties": { "code": { "enum": names } },
@@ -141,7 +141,7 @@ impl Schemas {
     fn into_components(mut self) -> Map<String, Value> {
         let violation = self.answers.subschema_for::<Violation>();
         let mut all = self.requests.take_definitions(true);
-        // What is both read and written is described as it is read.
+        // A type that is both read and written has the schema of the one that is read.
         for (name, schema) in self.answers.take_definitions(true) {
             all.entry(name).or_insert(schema);
         }
@@ -196,17 +196,17 @@ fn error_schema(violation: &Value) -> Value {
         "description": "What went wrong (RFC 9457).",
         "type": "object",
         "properties": {
-            "type": { "type": "string", "description": "The address of the explanation." },
+            "type": { "type": "string", "description": "Address of the explanation." },
             "title": { "type": "string", "description": "One line, the same for all errors of this kind." },
             "status": { "type": "integer", "minimum": 400, "maximum": 599 },
             "code": { "type": "string", "description": "The kind of error, a stable name for programs." },
-            "detail": { "type": "string", "description": "What happened this time." },
+            "detail": { "type": "string", "description": "What happened in this case." },
             "instance": { "type": "string", "description": "The path of the request." },
             "retryable": { "type": "boolean", "description": "The same request may succeed later." },
             "errors": {
                 "type": "array",
                 "items": violation,
-                "description": "The violations of an invalid request, one by one.",
+                "description": "All violations of an invalid request.",
             },
         },
         "required": ["type", "title", "status", "code", "detail", "instance", "retryable", "errors"],
@@ -224,7 +224,7 @@ mod tests {
         fields.map(|(name, _)| name.clone()).collect()
     }
 
-    /// One list of schemas is made of two, which may use the same name.
+    /// Two lists of schemas are merged into one, and may use the same name.
     #[test]
     fn two_types_do_not_share_a_name() {
         let mut schemas = Schemas::new();

@@ -20,7 +20,7 @@ pub(super) async fn plot(
     theme: Option<Theme>,
     stress: Option<Stress>,
 ) -> Result<impl IntoResponse, ApiError> {
-    // it would have no effect on the others
+    // it has no effect on the other plots
     if stress.is_some() && plot != Plot::Deformed {
         return Err(ApiError::UnknownParameter {
             name: STRESS.name.into(),
@@ -35,7 +35,7 @@ pub(super) async fn plot(
     Ok((HEADERS, svg))
 }
 
-/// A figure is looked at, and does nothing: texts in it are a client's.
+/// A figure may not run scripts or load anything: its texts come from clients.
 const HEADERS: [(HeaderName, &str); 2] = [
     (header::CONTENT_TYPE, "image/svg+xml"),
     (

@@ -1,4 +1,4 @@
-//! How errors leave over REST: always as `application/problem+json`.
+//! Errors over REST: always sent as `application/problem+json`.
 
 use std::any::Any;
 
@@ -13,7 +13,7 @@ use axum::{
 use crate::error::ApiError;
 
 impl IntoResponse for ApiError {
-    /// Only the status and the error itself; `errors_as_documents` writes it out, knowing the path.
+    /// Only the status and the error itself; `errors_as_documents` writes the document, since it knows the path.
     fn into_response(self) -> Response {
         let mut response = self.http_status().into_response();
         if let Some(seconds) = self.retry_after_s() {
@@ -31,7 +31,7 @@ impl IntoResponse for ApiError {
     }
 }
 
-/// Writes errors out as documents whose `instance` is the path that was asked for.
+/// Writes errors as documents whose `instance` is the path of the request.
 pub(super) async fn errors_as_documents(request: Request, next: Next) -> Response {
     let path = request.uri().path().to_string();
     let method = request.method().clone();
@@ -51,7 +51,7 @@ pub(super) async fn errors_as_documents(request: Request, next: Next) -> Respons
     Response::from_parts(parts, Body::from(document))
 }
 
-/// The answer on an unknown path: a gRPC status for a gRPC client, an error document for others.
+/// The answer to an unknown path: a gRPC status for a gRPC client, an error document for others.
 pub(super) async fn not_found(request: Request) -> Response {
     let content_type = request
         .headers()
@@ -61,7 +61,7 @@ pub(super) async fn not_found(request: Request) -> Response {
         let name = request.uri().path();
         return tonic::Status::unimplemented(format!("there is no method {name}")).into_http();
     }
-    ApiError::NotFound(format!("there is nothing at {}", request.uri().path())).into_response()
+    ApiError::NotFound(format!("there is no resource at {}", request.uri().path())).into_response()
 }
 
 /// A handler panicked: an incident like any other unexpected error.

@@ -69,7 +69,7 @@ pub(super) async fn fields(
         let bytes = stored::converted_fields(service, caller, id, format).await?;
         return data::whole(&part, format, name, bytes);
     }
-    // as they are stored, so they are passed on
+    // JSON is the stored form, and is sent unchanged
     let fields = stored::fields(service, caller, id).await?;
     let file = data::File {
         format,

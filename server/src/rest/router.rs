@@ -14,11 +14,11 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         .method_not_allowed_fallback(async || ApiError::MethodNotAllowed)
         .with_state(AppState { service, openapi })
         .merge(grpc)
-        // After the merge: the fallback of the gRPC router would answer every unknown path with a gRPC status.
+        // after the merge: the fallback of the gRPC router would answer every unknown path with a gRPC status.
         .fallback(reply::not_found)
         .layer(middleware::from_fn(authenticate))
         .layer(CatchPanicLayer::custom(reply::panicked))
-        // `body::json_text` has its own limit, which answers with an error document.
+        // `body::json_text` has a limit of its own, and answers with an error document
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn(reply::errors_as_documents))
 }

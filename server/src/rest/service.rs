@@ -47,7 +47,7 @@ pub(super) const CODE: Variable<Words<Code>> = Variable {
     values: Words::all(),
 };
 
-/// What a kind of error means: for programs, or as a page for people.
+/// The explanation of a kind of error: as JSON for programs, or as a page for people.
 pub(super) async fn error(call: Call, code: Code) -> Result<Response, ApiError> {
     let kind = code.kind();
     let vary = [(header::VARY, "Accept")];
@@ -107,7 +107,7 @@ pub(super) async fn livez(_: Call) -> Result<&'static str, ApiError> {
     Ok("ok\n")
 }
 
-/// The service takes jobs.
+/// The service accepts jobs.
 pub(super) async fn readyz(call: Call) -> Result<(StatusCode, &'static str), ApiError> {
     call.service.accepting()?;
     call.service.store.ping().await?;

@@ -12,7 +12,7 @@ use super::{
     bodies::{self, bare_problem, submission},
     call::Call,
     events,
-    jobs::{one, tag},
+    jobs::{job_response, tag},
 };
 use crate::{
     error::ApiError,
@@ -20,7 +20,7 @@ use crate::{
     verbs::{
         key::Key,
         problems::{self, Validation},
-        retry::{self as again, Changes},
+        retry::{self, Changes},
         submit::{self as verbs, Submitted},
         watch::{self, Until},
     },
@@ -69,11 +69,11 @@ pub(super) async fn retry(
         true => bodies::retry(&call.json().await?)?,
         false => Changes::default(),
     };
-    let submitted = again::retry(&call.service, &call.caller, id, changes, key).await?;
+    let submitted = retry::retry(&call.service, &call.caller, id, changes, key).await?;
     answer(call, submitted, wait_s, false).await
 }
 
-/// The job: at once, or when it is done, or as a stream of its events.
+/// The job: at once, or when it has ended, or as a stream of its events.
 async fn answer(
     call: Call,
     submitted: Submitted<Job>,
@@ -107,7 +107,7 @@ async fn answer(
         (false, true) => StatusCode::CREATED,
         (false, false) => StatusCode::ACCEPTED,
     };
-    let mut response = (status, one(&job)).into_response();
+    let mut response = (status, job_response(&job)).into_response();
     set(&mut response, header::LOCATION, location(&job));
     note_replay(&mut response, replayed);
     match wait_s {

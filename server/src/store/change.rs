@@ -1,5 +1,5 @@
-//! One transaction of the single writer, and what follows once it is committed: changes to the jobs that wait, as
-//! they are kept in memory, and jobs whose watchers are to be told.
+//! One transaction of the single writer, and its effects once it is committed: changes to the waiting jobs that are
+//! kept in memory, and jobs whose watchers are to be notified.
 
 use sqlx::{Sqlite, SqliteConnection, Transaction};
 use tokio::sync::MutexGuard;
@@ -11,9 +11,10 @@ pub(super) struct Change<'a> {
     store: &'a Store,
     tx: Transaction<'static, Sqlite>,
     moves: Vec<Move>,
-    /// Jobs that have changed, for those who watch them.
+    /// Jobs that have changed, for their watchers.
     changed: Vec<i64>,
-    /// Nobody else begins before the moves of this one are applied: they are applied in the order of commits.
+    /// Held until the moves are applied: no other change begins before, so that moves are applied in the order of
+    /// commits.
     _lock: MutexGuard<'a, ()>,
 }
 
@@ -44,12 +45,12 @@ impl Change<'_> {
         &mut self.tx
     }
 
-    /// Changes the jobs that wait, as soon as this is committed.
+    /// Changes the waiting jobs in memory, once this is committed.
     pub(super) fn move_job(&mut self, change: Move) {
         self.moves.push(change);
     }
 
-    /// This job has changed.
+    /// Records that this job has changed.
     pub(super) fn changed(&mut self, key: i64) {
         self.changed.push(key);
     }
@@ -62,7 +63,7 @@ impl Change<'_> {
             .to_vec()
     }
 
-    /// How many jobs wait, with what this transaction changes.
+    /// How many jobs wait, with the changes of this transaction.
     pub(super) fn waiting(&self) -> usize {
         let difference = |change: &Move| match change {
             Move::Enter { .. } | Move::Attach => 1,
@@ -76,7 +77,7 @@ impl Change<'_> {
             .unwrap_or(0)
     }
 
-    /// Marks a point to roll back to. There is one at a time: it is released, or rolled back to, before the next.
+    /// Sets a point to roll back to. There is one at a time: it is released or rolled back to before the next is set.
     pub(super) async fn savepoint(&mut self) -> Result<Savepoint> {
         sqlx::query("savepoint submission")
             .execute(self.sql())
@@ -87,7 +88,7 @@ impl Change<'_> {
         })
     }
 
-    /// Keeps what was done since the savepoint.
+    /// Keeps the changes since the savepoint.
     pub(super) async fn release(&mut self) -> Result<()> {
         sqlx::query("release submission")
             .execute(self.sql())
@@ -95,7 +96,7 @@ impl Change<'_> {
         Ok(())
     }
 
-    /// Undoes what was done since this savepoint.
+    /// Undoes the changes since this savepoint.
     pub(super) async fn roll_back_to(&mut self, savepoint: Savepoint) -> Result<()> {
         sqlx::query("rollback to submission")
             .execute(self.sql())
@@ -106,7 +107,8 @@ impl Change<'_> {
         Ok(())
     }
 
-    /// On the disk when this returns, and only then applied to the jobs in memory. Gives the jobs that have changed.
+    /// Commits: the changes are on the disk when this returns, and only then applied to the jobs in memory. Returns the
+    /// jobs that have changed.
     pub(super) async fn commit(self) -> Result<Vec<i64>> {
         self.tx.commit().await?;
         let mut waiting = self.store.waiting_jobs();

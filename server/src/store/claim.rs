@@ -8,7 +8,7 @@ use crate::job::Cache;
 
 impl Store {
     /// Starts an attempt of the next job of the queue: highest priority first, then in order of arrival. Jobs
-    /// before it for which there is a result by now are answered. Gives all jobs that have changed, too.
+    /// before it for which there is a result by now are answered. Also returns all jobs that have changed.
     pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
         let mut change = self.change().await?;
         let claim = claim(&mut change).await?;
@@ -18,13 +18,13 @@ impl Store {
 }
 
 /// The next job of the queue. The index is named because the planner, which does not know how many jobs there are,
-/// would rather sort all that wait.
+/// would sort all waiting ones instead.
 pub(super) const NEXT: &str = "select id from job indexed by job_queue
      where status = 'queued' and coalesced_into is null order by priority desc, id limit 1";
 
 /// Claims within a transaction.
 pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
-    /// More jobs than these would make one transaction too long.
+    /// With more jobs than this, one transaction would take too long.
     const MOST_ANSWERED: usize = 100;
     for _ in 0..MOST_ANSWERED {
         let key: Option<i64> = sqlx::query_scalar(NEXT)

@@ -1,8 +1,8 @@
 //! Coalescing: jobs of the same input are solved once.
 //!
 //! A job is answered by the result of an earlier job, or coalesced into a job that waits or runs, its *primary*.
-//! A coalesced job is not solved itself: it waits until its primary has ended, and ends with the same result. Where
-//! the end of the primary is the primary's alone (it was canceled, say), the first of the jobs coalesced into it
+//! A coalesced job is not solved itself: it waits until its primary has ended, and ends with the same result. If
+//! the end concerns the primary alone (if it was canceled, for example), the first of the jobs coalesced into it
 //! takes its place.
 
 use super::{
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::job::{Job, Reason, Status};
 
-/// Most jobs that are coalesced into one: they end in one transaction with it. Those beyond wait for a worker, and
+/// Most jobs that are coalesced into one: they end in one transaction with it. Further ones wait for a worker, and
 /// are answered when it is their turn.
 const MOST_COALESCED: i64 = 100;
 
@@ -29,7 +29,7 @@ pub(super) const PRIMARY: &str = "select id from job indexed by job_under_way
            and cancel_requested = 0 and (status = 'running' or priority >= ?)
      order by id limit 1";
 
-/// A priority that no job has: as the least priority of a primary that waits, it leaves those that run.
+/// A priority above that of any job: as the lowest priority of a waiting primary it excludes all but running ones.
 const ONLY_RUNNING: i32 = i32::MAX;
 
 /// The newest job of this input whose final result, found by this version of the program, may answer others.
@@ -105,8 +105,7 @@ async fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Vec<Job
     rows.iter().map(from_row).collect()
 }
 
-/// What becomes of the jobs coalesced into one that has ended: they end as it has ended, or the first of them
-/// takes its place.
+/// Ends the jobs coalesced into one that has ended in the same way, or puts the first of them in its place.
 pub(super) async fn end_coalesced(change: &mut Change<'_>, primary: &Job) -> Result<()> {
     let coalesced = coalesced_jobs(change, primary.key).await?;
     let Some(first) = coalesced.first() else {
@@ -122,7 +121,7 @@ pub(super) async fn end_coalesced(change: &mut Change<'_>, primary: &Job) -> Res
     Ok(())
 }
 
-/// A primary waits with this priority now: if a job coalesced into it has a higher one, that takes its place.
+/// A primary now waits with this priority: if a job coalesced into it has a higher one, that job takes its place.
 pub(super) async fn replace_if_outranked(
     change: &mut Change<'_>,
     primary: i64,
@@ -135,7 +134,7 @@ pub(super) async fn replace_if_outranked(
     }
 }
 
-/// A job waits for a worker in place of its primary, and the others coalesced into that are coalesced into it.
+/// Lets a job wait for a worker in place of its primary, and coalesces the other jobs of that primary into it.
 async fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
     detach(change, job, job.priority).await?;
     sqlx::query("update job set coalesced_into = ? where coalesced_into = ?")
@@ -146,7 +145,7 @@ async fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Re
     Ok(())
 }
 
-/// A coalesced job waits for a worker itself, with this priority.
+/// Lets a coalesced job wait for a worker itself, with this priority.
 async fn detach(change: &mut Change<'_>, job: &Job, priority: i32) -> Result<()> {
     let key = job.key;
     sqlx::query("update job set coalesced_into = null where id = ?")
@@ -158,7 +157,7 @@ async fn detach(change: &mut Change<'_>, job: &Job, priority: i32) -> Result<()>
     Ok(())
 }
 
-/// A coalesced job has this priority now: if its primary still waits with a lower one, it no longer waits for that.
+/// A coalesced job now has this priority: if its primary still waits with a lower one, the job is detached from it.
 pub(super) async fn detach_if_ahead(
     change: &mut Change<'_>,
     job: &Job,

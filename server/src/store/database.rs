@@ -1,4 +1,4 @@
-//! The one SQLite file: its connections, and what is kept in memory beside it.
+//! The one SQLite file: its connections, and the data that is also kept in memory.
 
 use std::{
     fs::{File, OpenOptions, TryLockError},
@@ -28,11 +28,11 @@ const LIST_PATIENCE: Duration = Duration::from_secs(5);
 pub struct Store {
     pub(super) writer: SqlitePool,
     pub(super) reader: SqlitePool,
-    /// For lists and counts, which may be slow, so that they keep nobody else from reading.
+    /// For lists and counts, which may be slow, so that they do not delay other reads.
     pub(super) lists: SqlitePool,
     /// The jobs that wait, as they are on the disk after every commit.
     pub(super) waiting: Mutex<WaitingJobs>,
-    /// Whether the queue is paused; likewise.
+    /// Whether the queue is paused, as it is on the disk after every commit.
     pub(super) paused: AtomicBool,
     /// One transaction at a time changes the jobs that wait.
     pub(super) change_lock: tokio::sync::Mutex<()>,
@@ -43,8 +43,8 @@ pub struct Store {
 }
 
 impl Store {
-    /// Connects to the database in `folder`, created if need be, and brings its tables up to date. With the store
-    /// come the submissions made to it. What is kept in memory is not read yet.
+    /// Connects to the database in `folder`, created if necessary, and brings its tables up to date. Also
+    /// returns the receiver of submissions. The data kept in memory is not read yet.
     pub(super) async fn connect(folder: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
         let lock = lock(folder)?;
         let options = SqliteConnectOptions::new()
@@ -57,7 +57,7 @@ impl Store {
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full);
         // A full disk makes SQLite end a transaction by itself, which leaves the driver's count of open ones
-        // wrong for ever: such a connection is replaced by a new one.
+        // wrong permanently: such a connection is replaced by a new one.
         let writer = pool(1)
             .before_acquire(|connection, _| {
                 let whole = !connection.is_in_transaction();
@@ -86,7 +86,7 @@ impl Store {
         Ok((store, submissions))
     }
 
-    /// The jobs that wait.
+    /// The waiting jobs.
     pub(super) fn waiting_jobs(&self) -> MutexGuard<'_, WaitingJobs> {
         // No code panics while it holds this lock; if one did, the list would still be whole.
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
@@ -99,7 +99,7 @@ impl Store {
         self.writer.close().await;
     }
 
-    /// Whether the store still answers.
+    /// Whether the database answers.
     pub async fn ping(&self) -> Result<()> {
         sqlx::query("select 1").execute(&self.reader).await?;
         Ok(())

@@ -8,7 +8,7 @@ use crate::{caller::Owners, job::JobId, time::Time};
 /// How long the id of a deleted job is answered with *deleted*; then it is unknown.
 const REMEMBERED_S: f64 = 7.0 * 86_400.0;
 
-/// What deleting a job did.
+/// The effect of deleting a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deletion {
     /// It was deleted.
@@ -60,14 +60,14 @@ impl Store {
         Ok(Deletion::Deleted)
     }
 
-    /// Whether a job of these owners with this public id was deleted not long ago.
+    /// Whether a job of these owners with this public id was deleted recently.
     pub async fn was_deleted(&self, owners: Owners<'_>, id: JobId) -> Result<bool> {
         let mut connection = self.reader.acquire().await?;
         let owner = owner_of_deleted(&mut connection, id).await?;
         Ok(owner.is_some_and(|owner| owners.include(&owner)))
     }
 
-    /// Forgets the ids of jobs that were deleted long ago.
+    /// Removes the ids of jobs that were deleted long ago.
     pub async fn forget_deleted(&self, now: Time) -> Result<()> {
         let before = now.after_s(-REMEMBERED_S).micros();
         let some: bool =
@@ -87,7 +87,7 @@ impl Store {
     }
 }
 
-/// The owner of a job that was deleted not long ago; none if there was no such job.
+/// The owner of a job that was deleted recently; `None` if there was no such job.
 pub(super) async fn owner_of_deleted(
     connection: &mut SqliteConnection,
     id: JobId,
@@ -112,7 +112,7 @@ pub(super) async fn deleted_id(
     Ok(uuid.and_then(|text| text.parse().ok()).map(JobId))
 }
 
-/// Whether a job has the result under this key: its own, or as an answer.
+/// Whether a job has the result under this key, as its own or from another job.
 async fn is_in_use(tx: &mut SqliteConnection, result: i64) -> Result<bool> {
     Ok(sqlx::query_scalar(
         "select exists (select 1 from job where id = ?1) or exists (select 1 from job where result_job = ?1)",

@@ -15,7 +15,7 @@ use crate::{
     job::{Job, JobId},
 };
 
-/// What is changed of a job; what is absent stays as it is.
+/// Changes to a job; absent fields stay unchanged.
 #[derive(Clone, Debug, Default)]
 pub struct Edit {
     /// A name, or none.
@@ -24,7 +24,7 @@ pub struct Edit {
     pub labels: Option<BTreeMap<String, String>>,
     /// −10 … 10.
     pub priority: Option<i32>,
-    /// Never removed by age.
+    /// Never deleted because of its age.
     pub pinned: Option<bool>,
 }
 

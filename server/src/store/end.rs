@@ -16,10 +16,10 @@ use crate::{
     time::Time,
 };
 
-/// What asking a job to stop did.
+/// The effect of asking a job to stop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CancelOutcome {
-    /// It was not running, and is canceled. With the jobs that have changed.
+    /// It was not running, and is canceled; with the jobs that have changed.
     Canceled(Vec<i64>),
     /// This attempt is running and should stop.
     Requested {
@@ -31,11 +31,11 @@ pub enum CancelOutcome {
 }
 
 impl Store {
-    /// Notes that a client wants the job to stop; a queued one is canceled at once.
+    /// Records that a client has asked the job to stop; a queued one is canceled at once.
     pub async fn request_cancel(&self, key: i64) -> Result<CancelOutcome> {
         let mut change = self.change().await?;
         let Some(job) = find(change.sql(), key).await? else {
-            return Ok(CancelOutcome::AlreadyTerminal); // and deleted since
+            return Ok(CancelOutcome::AlreadyTerminal); // and was deleted since
         };
         let attempt = job.attempt;
         match job.status {
@@ -60,7 +60,7 @@ impl Store {
         Ok(CancelOutcome::Requested { attempt })
     }
 
-    /// Ends a running job, with its last events and the rest of its result. Gives the jobs that have changed;
+    /// Ends a running job, with its last events and the rest of its result. Returns the jobs that have changed;
     /// `None` when this attempt is no longer the current one, because the job was canceled or requeued meanwhile.
     pub async fn finish(
         &self,
@@ -86,11 +86,11 @@ impl Store {
         Ok(Some(change.commit().await?))
     }
 
-    /// Ends jobs that have waited longer than they may, some at a time. A job coalesced into one that runs does
+    /// Ends jobs that have waited longer than allowed, some at a time. A job coalesced into one that runs does
     /// not wait for a worker, and is left alone.
     pub async fn expire_queued(&self, now: Time) -> Result<Vec<i64>> {
         const AT_ONCE: i64 = 100;
-        // nearly always there is none, and a reader finds that out without holding up the writer
+        // nearly always there is none, which a reader finds without occupying the writer
         let some = sqlx::query(EXPIRED)
             .bind(now.micros())
             .bind(1)
@@ -123,14 +123,14 @@ impl Store {
     }
 }
 
-/// Jobs that have waited too long, at most so many.
+/// Jobs that have waited too long, up to a limit.
 pub(super) const EXPIRED: &str = "select id from job indexed by job_expiry
      where status = 'queued' and expires_at <= ?
            and (coalesced_into is null or exists
                 (select 1 from job primary_job where primary_job.id = job.coalesced_into and primary_job.status = 'queued'))
      order by expires_at limit ?";
 
-/// Ends a job, and decides what becomes of those coalesced into it.
+/// Ends a job, and the jobs coalesced into it or replaces it by the first of them.
 pub(super) async fn end(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
     lifecycle::end_job(change, job, ending).await?;
     coalescing::end_coalesced(change, job).await

@@ -1,10 +1,10 @@
-//! What can go wrong with the store.
+//! Errors of the store.
 
 use sqlx::migrate::MigrateError;
 
 use crate::job::JobId;
 
-/// What can go wrong with the store.
+/// An error of the store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The folder cannot be used.
@@ -22,7 +22,7 @@ pub enum StoreError {
     /// The job was deleted.
     #[error("{0} was deleted")]
     Deleted(JobId),
-    /// The job's mesh is not there.
+    /// The job's mesh is not stored.
     #[error("the mesh is not stored")]
     UnknownMesh,
     /// Too many lists are requested at once.
@@ -34,7 +34,7 @@ pub enum StoreError {
     /// A row that this program cannot have written.
     #[error("the database holds something unexpected: {0}")]
     Corrupt(String),
-    /// The database refused.
+    /// An error of the database.
     #[error("database: {0}")]
     Database(sqlx::Error),
     /// The tables cannot be brought up to date.
@@ -72,5 +72,5 @@ impl From<serde_json::Error> for StoreError {
     }
 }
 
-/// The result of a question to the store.
+/// The result of a query to the store.
 pub type Result<T> = std::result::Result<T, StoreError>;

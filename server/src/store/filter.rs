@@ -41,7 +41,7 @@ impl Filter {
         self
     }
 
-    /// The same filter restricted to these owners; none if it asks for the jobs of another.
+    /// The same filter restricted to these owners; `None` if it requests the jobs of another.
     pub(super) fn among(&self, owners: Owners<'_>) -> Option<Self> {
         let mut filter = self.clone();
         if let Owners::Only(owner) = owners {

@@ -1,4 +1,4 @@
-//! Requests that are repeated: under a request key, or with an id that the client made. Both belong to an owner.
+//! Repeated requests: with a request key, or with an id chosen by the client. Both belong to an owner.
 
 use std::ops::Range;
 
@@ -32,7 +32,7 @@ impl Store {
         Ok(Some(jobs))
     }
 
-    /// The job with an id that the client made, if this owner submitted it with that payload.
+    /// The job with an id chosen by the client, if this owner submitted it with this payload.
     pub async fn replay_with_id(
         &self,
         owner: &str,
@@ -82,7 +82,7 @@ pub(super) async fn already_submitted(
             Some(_) => return Err(StoreError::IdConflict(id)),
             None => match owner_of_deleted(change.sql(), id).await? {
                 Some(theirs) if theirs == owner => return Err(StoreError::Deleted(id)),
-                // of another owner: whether that job is still there is not revealed
+                // of another owner: whether that job still exists is not revealed
                 Some(_) => return Err(StoreError::IdConflict(id)),
                 None => {}
             },
@@ -91,7 +91,7 @@ pub(super) async fn already_submitted(
     Ok((!old.is_empty()).then_some(old))
 }
 
-/// Notes that these jobs, numbered without a gap, were accepted under a key.
+/// Records that these jobs, numbered without a gap, were accepted under a key.
 pub(super) async fn remember(
     change: &mut Change<'_>,
     owner: &str,
@@ -132,8 +132,8 @@ async fn jobs_of_key(
     }
 }
 
-/// Those of these jobs that are still there. If all of them were deleted, that is an error as long as it is
-/// remembered; after that the key may be used again.
+/// Those of these jobs that still exist. If all of them were deleted, that is an error as long as their ids are
+/// kept; after that the key may be used again.
 async fn remaining(
     connection: &mut SqliteConnection,
     keys: Range<i64>,

@@ -1,4 +1,4 @@
-//! Labels once more, as rows to search.
+//! Labels in a table of their own, for searches.
 
 use std::collections::BTreeMap;
 

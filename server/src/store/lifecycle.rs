@@ -50,7 +50,7 @@ impl Ending {
     }
 }
 
-/// Starts an attempt of a queued job; gives the job as it is then.
+/// Starts an attempt of a queued job; returns the started job.
 pub(super) async fn start_attempt(change: &mut Change<'_>, job: &Job) -> Result<Job> {
     let now = Time::now();
     set_status(change, job, Status::Running).await?;
@@ -72,14 +72,14 @@ pub(super) async fn start_attempt(change: &mut Change<'_>, job: &Job) -> Result<
 /// Ends a job, with its one `done` event. Jobs coalesced into it are not touched.
 pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
     assert!(ending.status.is_terminal());
-    // Lists rely on it that no job ends before it was accepted, even if the clock was set back.
+    // lists rely on the fact that no job ends before it was accepted, even if the clock was set back
     let now = Time::now().max(job.created_at);
     let failure = ending
         .failure
         .as_ref()
         .map(serde_json::to_string)
         .transpose()?;
-    // the results of finished load steps are kept, however the job ends
+    // the results of finished load steps are kept, whatever the status
     let result = ending.result.max(job.result_available);
     set_status(change, job, ending.status).await?;
     sqlx::query(
@@ -96,7 +96,7 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
     .await?;
     match (ending.result, result) {
         (ResultAvailable::None, ResultAvailable::None) => {
-            // pieces that were written for a result that is not kept
+            // removes pieces that were written for a result that is not kept
             results::remove(change.sql(), job.key).await?;
             results::remove(change.sql(), partial_key(job.key)).await?;
         }
@@ -111,7 +111,7 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
     Ok(())
 }
 
-/// Changes the status of a job, and with it the jobs that wait. Nothing else does.
+/// Changes the status of a job, and with it the waiting jobs. Only this function does.
 pub(super) async fn set_status(change: &mut Change<'_>, job: &Job, next: Status) -> Result<()> {
     if !job.status.may_become(next) {
         return Err(StoreError::Corrupt(format!(

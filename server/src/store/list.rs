@@ -1,8 +1,8 @@
 //! Lists of jobs: pages, counts, keys.
 //!
-//! A page costs as many rows as it shows, not as many as there are. Each filter has an index in the order of
+//! A page costs as many rows as it shows, not as many as the table has. Each filter has an index in the order of
 //! the list. One filter is chosen as the access path, and the others are checked on the rows that it finds: a
-//! filter that matches few jobs, which are then sorted if need be, or else one whose index has the order of the
+//! filter that matches few jobs, which are then sorted if necessary, or else one whose index has the order of the
 //! list, since then a page is soon full.
 
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
@@ -60,7 +60,7 @@ impl Store {
         Ok(jobs)
     }
 
-    /// How many jobs there are, in groups if asked for; the groups are sorted by name.
+    /// How many jobs there are, by group if requested; the groups are sorted by name.
     pub async fn count(
         &self,
         owners: Owners<'_>,
@@ -147,7 +147,7 @@ pub(super) fn keys_of_jobs(
     query
 }
 
-/// The access path by a filter that matches few jobs, if there is one and there is a choice.
+/// The access path by a filter that matches few jobs, if there is such a filter and more than one path.
 async fn selective_path<'a>(
     connection: &mut SqliteConnection,
     filter: &'a Filter,
@@ -206,7 +206,7 @@ async fn selective_path<'a>(
     Ok(None)
 }
 
-/// The access path where every filter matches many jobs: an index in the order of the list. It is one path, or one
+/// The access path if every filter matches many jobs: an index in the order of the list. It is one path, or one
 /// for each status, whose lists are merged.
 pub(super) fn ordered_paths(filter: &Filter, order: Order) -> Vec<AccessPath<'_>> {
     let statuses = &filter.statuses;

@@ -29,7 +29,7 @@ impl Store {
         .await?)
     }
 
-    /// Whether the job is terminal, so that its events contain `done`; `None` when it is no longer there.
+    /// Whether the job is terminal, so that its events contain `done`; `None` if it no longer exists.
     pub async fn has_ended(&self, key: i64) -> Result<Option<bool>> {
         let status: Option<String> = sqlx::query_scalar("select status from job where id = ?")
             .bind(key)

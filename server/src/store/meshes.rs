@@ -6,7 +6,7 @@ use super::{
 };
 use crate::mesh::MeshInfo;
 
-/// What removing a mesh did.
+/// The effect of removing a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Removal {
     /// It was removed.
@@ -22,12 +22,12 @@ pub enum Removal {
 pub struct StoredMesh {
     /// Order of arrival.
     pub key: i64,
-    /// What clients see of it.
+    /// Its description, as clients see it.
     pub info: MeshInfo,
 }
 
 impl Store {
-    /// What clients see of a mesh.
+    /// The description of a mesh, as clients see it.
     pub async fn mesh(&self, hash: &str) -> Result<Option<MeshInfo>> {
         let info: Option<String> = sqlx::query_scalar("select info from mesh where hash = ?")
             .bind(hash)
@@ -51,7 +51,7 @@ impl Store {
         rows.into_iter().map(read).collect()
     }
 
-    /// Writes pieces of a mesh, numbered from `first`. They are used only once `insert_mesh` was called.
+    /// Writes pieces of a mesh, numbered from `first`. They are used only after `insert_mesh`.
     pub async fn write_mesh_pieces(
         &self,
         hash: &str,
@@ -72,8 +72,8 @@ impl Store {
         Ok(())
     }
 
-    /// The mesh is complete with so many pieces; false if it was there already. `None`: some of them were
-    /// removed meanwhile, with an earlier mesh of the same file, and must be written again.
+    /// Completes a mesh with this number of pieces; false if it was stored already. `None`: some pieces were removed
+    /// meanwhile, with an earlier mesh of the same file, and must be written again.
     pub async fn insert_mesh(&self, info: &MeshInfo, pieces: i64) -> Result<Option<bool>> {
         let mut tx = self.begin().await?;
         let there: i64 = sqlx::query_scalar("select count(*) from mesh_piece where hash = ?")
@@ -97,7 +97,7 @@ impl Store {
 
     /// The parsed mesh as it was written.
     pub async fn mesh_body(&self, hash: &str) -> Result<Option<Vec<u8>>> {
-        // one statement sees one state: a mesh is there with all its pieces, or not at all
+        // one statement sees one state: a mesh with all its pieces, or no mesh
         let pieces: Vec<Vec<u8>> = sqlx::query_scalar(
             "select body from mesh_piece join mesh using (hash) where hash = ? order by piece",
         )
@@ -146,7 +146,7 @@ impl Store {
     }
 }
 
-/// A job's mesh must be there when the job is accepted.
+/// A job's mesh must be stored when the job is accepted.
 pub(super) async fn require(tx: &mut sqlx::SqliteConnection, mesh: Option<&str>) -> Result<()> {
     let Some(hash) = mesh else { return Ok(()) };
     let there: bool = sqlx::query_scalar("select exists (select 1 from mesh where hash = ?)")

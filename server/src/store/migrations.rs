@@ -1,4 +1,4 @@
-//! The tables and how they came to be: `migrations/`, compiled in.
+//! The tables and their history: `migrations/`, compiled in.
 
 use std::borrow::Cow;
 
@@ -7,8 +7,8 @@ use sqlx::{
     migrate::{Migration, MigrationType, Migrator},
 };
 
-/// Every step, with the name of its file. Listed here rather than found by `sqlx::migrate!`, for whose sake sqlx
-/// and SQLite would be compiled a second time, for the compiler to run; a test compares the list with the folder.
+/// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
+/// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
 const STEPS: [(i64, &str, &str); 5] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
@@ -33,17 +33,17 @@ const STEPS: [(i64, &str, &str); 5] = [
     ),
 ];
 
-/// What brings the tables of an older version up to date.
+/// The steps that bring the tables of an older version up to date.
 pub(super) fn migrator() -> Migrator {
     let migration = |(version, description, sql): (i64, &'static str, &'static str)| {
         let description = Cow::Borrowed(description);
-        let one_transaction_each = false;
+        let without_transaction = false;
         Migration::new(
             version,
             description,
             MigrationType::Simple,
             sql.into_sql_str(),
-            one_transaction_each,
+            without_transaction,
         )
     };
     Migrator::with_migrations(STEPS.map(migration).to_vec())
@@ -61,7 +61,7 @@ mod tests {
     async fn every_file_of_the_folder_is_a_step_under_its_name() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../migrations");
         let files = Migrator::new(folder).await.unwrap();
-        let said = |migrator: &Migrator| -> Vec<_> {
+        let fields = |migrator: &Migrator| -> Vec<_> {
             let steps = migrator.iter().cloned();
             steps
                 .map(|m| {
@@ -75,6 +75,6 @@ mod tests {
                 })
                 .collect()
         };
-        assert_eq!(said(&migrator()), said(&files));
+        assert_eq!(fields(&migrator()), fields(&files));
     }
 }

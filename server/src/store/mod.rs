@@ -1,24 +1,24 @@
 //! Everything durable, and the only SQL: one SQLite file.
 //!
-//! One connection writes, always in `begin immediate`, so that no transaction ever fails half-way
-//! for want of a lock; others read at the same time (WAL). A commit is on the disk when it returns
-//! (synchronous FULL). Each method answers one question, in one transaction.
+//! One connection writes, always in `begin immediate`, so that no transaction fails half-way
+//! because it cannot get a lock; others read at the same time (WAL). A commit is on the disk when it returns
+//! (synchronous FULL). Each method runs one query or change, in one transaction.
 //!
-//! Questions about a public id, lists and counts name the owners whose jobs are meant ([`Owners`]): a job of
-//! another owner is not found, as if there were none. Keys, the store's own numbers of jobs, come only from such
-//! answers.
+//! Queries by public id, lists and counts have a parameter for the owners whose jobs they may return ([`Owners`]): a
+//! job of another owner is not found, as if it did not exist. Keys, the store's own numbers of jobs, come only from
+//! the results of such queries.
 //!
-//! The files are listed from the ground up: none uses a file that uses it.
+//! The files are listed in order of use: no file uses one that uses it.
 //!
 //! [`Owners`]: crate::caller::Owners
 
-// What goes in and out, and what can go wrong.
+// Input and output types, and errors.
 mod error;
 mod filter;
 mod parts;
 mod submission;
 
-// The database; one transaction of its single writer; the jobs that wait, mirrored in memory.
+// The database; one transaction of its single writer; the waiting jobs, mirrored in memory.
 mod change;
 mod database;
 mod migrations;
@@ -74,7 +74,7 @@ pub use self::{
 };
 
 impl Store {
-    /// Opens the store in `folder`, created if need be, and brings its tables up to date.
+    /// Opens the store in `folder`, which is created if necessary, and brings its tables up to date.
     pub async fn open(folder: &Path) -> Result<Arc<Store>> {
         let (store, submissions) = Store::connect(folder).await?;
         store.read_waiting_jobs().await?;

@@ -1,4 +1,4 @@
-//! A result as it is stored: named parts, each in pieces.
+//! The stored form of a result: named parts, each in pieces.
 
 use std::collections::BTreeMap;
 
@@ -10,11 +10,11 @@ use crate::run::Document;
 
 /// Bytes of one piece of a stored result or mesh: larger rows make SQLite chain pages, and readers need more memory.
 pub const PIECE_BYTES: usize = 256 << 10;
-/// Pieces per transaction: 1 MiB holds the single writer for some ten milliseconds, so that a
-/// cancel or a submit beside a large result still answers at once.
+/// Pieces per transaction: 1 MiB occupies the single writer for some ten milliseconds, so that a
+/// cancel or a submission during the write of a large result is still answered at once.
 pub const PIECES_PER_COMMIT: usize = 4;
 
-/// A document as it is stored: name, JSON and SHA-256 of each part.
+/// The stored form of a document: name, JSON and SHA-256 of each part.
 #[derive(Debug)]
 pub struct Parts(pub(super) Vec<Part>);
 
@@ -108,7 +108,7 @@ pub(super) struct Piece<'a> {
     pub(super) body: &'a [u8],
 }
 
-/// Where a stored profile has its values.
+/// The points at which a stored profile has its values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProfilePoints {
     /// At the nodes of the boundary.

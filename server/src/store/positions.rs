@@ -6,7 +6,7 @@ use super::{database::Store, error::Result, rows::find, waiting::Move};
 use crate::job::{Job, QueuePosition, Status, Waiting};
 
 impl Store {
-    /// Reads which jobs wait, when the store is opened.
+    /// Reads the waiting jobs, when the store is opened.
     pub(super) async fn read_waiting_jobs(&self) -> Result<()> {
         let waiting: Vec<(i32, i64)> = sqlx::query_as(
             "select priority, id from job where status = 'queued' and coalesced_into is null order by priority desc, id",
@@ -30,8 +30,8 @@ impl Store {
         self.waiting_jobs().len()
     }
 
-    /// Fills in the queue positions, if they can be read: the answer to a request that has changed something is
-    /// better without them than not at all.
+    /// Fills in the queue positions, if they can be read: a request that has changed something is answered even without
+    /// them.
     pub async fn try_add_queue_positions(&self, jobs: &mut [Job]) {
         if jobs.iter().all(|job| job.status != Status::Queued) {
             return;
@@ -62,7 +62,7 @@ impl Store {
                     true => Waiting::Paused,
                     false => Waiting::WorkersBusy,
                 };
-                // none: it has been started since it was read
+                // none if it has been started since it was read
                 job.queue =
                     position(job.priority, job.key).map(|(position, ahead)| QueuePosition {
                         position,

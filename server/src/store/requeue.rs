@@ -18,14 +18,14 @@ use crate::{
 
 impl Store {
     /// Requeues a running job because the service stops, which does not count against its attempts; one that was
-    /// asked to stop is canceled instead. Gives its new status; `None` when the attempt is no longer the current one.
+    /// asked to stop is canceled instead. Returns its new status; `None` when the attempt is no longer the current one.
     pub async fn requeue_drained(&self, key: i64, attempt: i32) -> Result<Option<Status>> {
         let mut change = self.change().await?;
         if !is_current(change.sql(), key, attempt).await? {
             return Ok(None);
         }
         let job = read(change.sql(), key).await?;
-        // who asked it to stop does not have to wait for the restart
+        // the client that asked it to stop does not have to wait for the restart
         let status = if job.cancel_requested {
             end(&mut change, &job, &Ending::canceled()).await?;
             Status::Canceled
@@ -38,7 +38,7 @@ impl Store {
     }
 
     /// Requeues the jobs that were running when the process died; ends those that were asked to stop, and those
-    /// whose attempts are used up. To be called before the listener opens. Gives how many there were.
+    /// whose attempts are used up. To be called before the listener opens. Returns their number.
     pub async fn requeue_interrupted(&self) -> Result<usize> {
         let mut change = self.change().await?;
         let rows = sqlx::query("select * from job where status = 'running'")
@@ -71,7 +71,7 @@ impl Store {
 /// Puts a running job back in the queue.
 async fn requeue(change: &mut Change<'_>, job: &Job, reason: Requeue) -> Result<()> {
     lifecycle::set_status(change, job, Status::Queued).await?;
-    // The attempt keeps its number, by which events are told apart; where it does not count, one more is allowed.
+    // The attempt keeps its number, by which events are distinguished; if it does not count, one more is allowed.
     let one_more = i32::from(reason == Requeue::Drain);
     sqlx::query("update job set max_attempts = max_attempts + ? where id = ?")
         .bind(one_more)
@@ -85,7 +85,7 @@ async fn requeue(change: &mut Change<'_>, job: &Job, reason: Requeue) -> Result<
         .bind(job.key)
         .execute(change.sql())
         .await?;
-    // it no longer runs: a coalesced job of a higher priority need not wait for it
+    // it no longer runs: a coalesced job of higher priority does not have to wait for it
     coalescing::replace_if_outranked(change, job.key, job.priority).await?;
     let requeued = [(Time::now(), Payload::requeued(reason))];
     events::append(change.sql(), job.key, job.attempt, &requeued).await?;

@@ -27,7 +27,7 @@ impl Store {
                 return Ok(false);
             }
             if n == 0 {
-                // pieces of an earlier attempt that was interrupted while it wrote them
+                // removes the pieces of an earlier attempt that was interrupted while it wrote them
                 remove(&mut tx, key).await?;
             }
             insert(&mut tx, key, group).await?;
@@ -69,7 +69,7 @@ pub(super) async fn write_at_end(tx: &mut SqliteConnection, key: i64, parts: &Pa
     write_info(tx, key, parts).await
 }
 
-/// The partial result of a running job becomes its result; but its history is that of its events, which went on
+/// The partial result of a running job becomes its result; but its history is that of its events, which continued
 /// after the last finished load step.
 pub(super) async fn keep_partial(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     remove(tx, key).await?;

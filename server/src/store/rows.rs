@@ -12,7 +12,7 @@ use crate::{
     time::Time,
 };
 
-/// The job with this key, which must be there.
+/// The job with this key, which must exist.
 pub(super) async fn read(tx: &mut SqliteConnection, key: i64) -> Result<Job> {
     from_row(
         &sqlx::query("select * from job where id = ?")
@@ -22,7 +22,7 @@ pub(super) async fn read(tx: &mut SqliteConnection, key: i64) -> Result<Job> {
     )
 }
 
-/// The job with this key, if it is still there.
+/// The job with this key, if it still exists.
 pub(super) async fn find(connection: &mut SqliteConnection, key: i64) -> Result<Option<Job>> {
     let row = sqlx::query("select * from job where id = ?")
         .bind(key)
@@ -124,7 +124,7 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
     })
 }
 
-/// The value that a word in this column stands for.
+/// The value of a word in this column.
 fn word<T: FromStr>(column: &str, text: &str) -> Result<T> {
     text.parse().map_err(|_| corrupt(column))
 }

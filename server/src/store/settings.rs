@@ -1,4 +1,4 @@
-//! Settings that are changed while the service runs, and survive a restart.
+//! Settings that can be changed while the service runs, and are kept across restarts.
 
 use std::sync::atomic::Ordering;
 
@@ -20,7 +20,7 @@ impl Store {
         self.paused.load(Ordering::Relaxed)
     }
 
-    /// Pauses or resumes the queue, also across restarts.
+    /// Pauses or resumes the queue; kept across restarts.
     pub async fn set_paused(&self, paused: bool) -> Result<()> {
         let mut tx = self.begin().await?;
         let statement = if paused {

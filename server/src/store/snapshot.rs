@@ -24,7 +24,7 @@ pub struct PartInfo {
 }
 
 impl Store {
-    /// A job and its result, both as of one moment: while it runs the parts may be replaced, and removed when it is
+    /// A job and its result at one moment: the parts may be replaced while the job runs, and are removed when it is
     /// deleted.
     pub async fn snapshot(&self, owners: Owners<'_>, id: JobId) -> Result<Option<Snapshot>> {
         let mut tx = self.reader.begin().await?;
@@ -45,7 +45,7 @@ impl Store {
     }
 }
 
-/// A job and its result as of one moment. It holds a connection, and should be dropped soon.
+/// A job and its result at one moment. It holds a connection, and should be dropped soon.
 pub struct Snapshot {
     /// The job, without its queue position.
     pub job: Job,

@@ -1,4 +1,4 @@
-//! What is submitted, what becomes of it, and where it waits for the next commit.
+//! A submission, its result, and the inbox in which it waits for the next commit.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::job::{Cache, Job, JobId, Limits};
 /// A job that is about to be accepted.
 #[derive(Clone, Debug)]
 pub struct NewJob {
-    /// Its public id, if the client made it.
+    /// Its public id, if the client has chosen it.
     pub id: Option<JobId>,
     /// A name for people.
     pub name: Option<String>,
@@ -32,7 +32,7 @@ pub struct NewJob {
     pub problem: String,
     /// The stored mesh that it names.
     pub mesh: Option<String>,
-    /// Fingerprint of all that the client submitted.
+    /// Fingerprint of everything that the client submitted.
     pub payload: String,
 }
 
@@ -54,18 +54,18 @@ pub struct Submission {
     pub jobs: Vec<NewJob>,
     /// The client's key.
     pub key: Option<RequestKey>,
-    /// Most jobs that may wait.
+    /// Maximum number of waiting jobs.
     pub max_queued: u32,
 }
 
-/// What became of a submission.
+/// The result of a submission.
 #[derive(Debug)]
 pub struct Accepted {
     /// Its jobs, in order.
     pub jobs: Vec<Job>,
-    /// They were there already: the key, or the client's id of the job, was used before.
+    /// They existed already: the key, or the id chosen by the client, was used before.
     pub replayed: bool,
-    /// The next job of the queue, if a claim was asked for and there is one.
+    /// The next job of the queue, if a claim was requested and there is one.
     pub claim: Option<Claim>,
     /// Jobs that have changed: these, and those that were answered while the next job was claimed.
     pub changed: Vec<i64>,
@@ -91,16 +91,16 @@ pub(super) struct Pending {
     pub(super) submission: Submission,
     /// Whether the next job of the queue is to be claimed with it.
     pub(super) claim: bool,
-    /// Where the answer goes.
+    /// The channel for the answer.
     pub(super) reply: oneshot::Sender<Result<Accepted>>,
 }
 
-/// Where submissions wait for the next commit.
+/// The inbox in which submissions wait for the next commit.
 #[derive(Debug)]
 pub(super) struct Inbox(pub(super) mpsc::Sender<Pending>);
 
 impl Inbox {
-    /// An inbox, and where its submissions come out.
+    /// An inbox, and the receiver of its submissions.
     pub(super) fn new() -> (Inbox, mpsc::Receiver<Pending>) {
         let (sender, receiver) = mpsc::channel(4 * MOST_PER_COMMIT);
         (Inbox(sender), receiver)

@@ -1,8 +1,8 @@
 //! Accepting jobs: one commit for many clients.
 //!
-//! A commit costs a flush of the disk, whatever it holds. Submissions that arrive while one is under
-//! way therefore wait together and share the next, each with a savepoint of its own, so that one that is
-//! refused undoes nothing of the others.
+//! A commit costs a flush of the disk, whatever it contains. Submissions that arrive during a commit therefore wait
+//! together and share the next one, each with a savepoint of its own, so that a refused one does not affect the
+//! others.
 
 use std::sync::{Arc, Weak};
 
@@ -25,7 +25,7 @@ use crate::{
 };
 
 impl Store {
-    /// Accepts jobs. They are on the disk when this returns. With `claim` (a worker is free) the next job of the
+    /// Accepts jobs. They are stored on the disk when this returns. With `claim` (a worker is free) the next job of the
     /// queue is claimed in the same commit.
     pub async fn submit(&self, submission: Submission, claim: bool) -> Result<Accepted> {
         let (reply, answer) = oneshot::channel();
@@ -62,7 +62,7 @@ impl Store {
                     }
                     Err(cause) => match change.roll_back_to(savepoint).await {
                         Ok(()) => answers.push(Err(cause)),
-                        // a full disk made the database roll back everything by itself: that is the cause to report
+                        // a full disk has made the database roll back everything: report that as the cause
                         Err(_) => return Err(cause),
                     },
                 }
@@ -73,7 +73,7 @@ impl Store {
         match committed {
             Ok(_) => {
                 for (reply, accepted) in replies.into_iter().zip(answers) {
-                    let _ = reply.send(accepted); // the client may have gone
+                    let _ = reply.send(accepted); // the client may have disconnected
                 }
             }
             Err(cause) => {
@@ -139,7 +139,7 @@ pub(super) async fn commit_submissions(store: Weak<Store>, mut inbox: mpsc::Rece
         {
             pending.push(next);
         }
-        // in a task of its own: a panic there must not close the inbox for all later submissions
+        // in its own task: a panic there must not close the inbox for all later submissions
         let store: Arc<Store> = store;
         let done = tokio::spawn(async move { store.commit_together(pending).await }).await;
         if let Err(panic) = done {
@@ -160,7 +160,7 @@ async fn insert(
         Cache::Refresh | Cache::Off => None,
     };
     let coalesced_into = match (&answer, new.cache) {
-        (Some(source), _) => Some(source.key), // until it is answered, below
+        (Some(source), _) => Some(source.key), // until it is answered below
         (None, Cache::Use) => coalescing::primary_for(change, new).await?,
         (None, _) => None,
     };

@@ -1,4 +1,4 @@
-//! How a job that was read becomes one that is queued: fingerprinted, checked in depth, stored.
+//! Admission of a job that was read: it is fingerprinted, checked in depth, and stored in the queue.
 
 use solver::{
     error::{Findings, Violation},
@@ -26,7 +26,7 @@ pub(super) struct Prepared {
     problem: Result<Problem, Vec<Violation>>,
     violations: Findings,
     pub(super) id: Option<JobId>,
-    /// Fingerprint of all that was submitted.
+    /// Fingerprint of everything that was submitted.
     pub(super) payload: String,
 }
 
@@ -43,7 +43,7 @@ pub(super) async fn prepare(
                 Ok(problem) => {
                     digest::of_json(&(&envelope, problem, id)).map_err(ApiError::internal)?
                 }
-                Err(_) => String::new(), // it is refused before it is compared
+                Err(_) => String::new(), // not used: the job is refused before fingerprints are compared
             };
             Ok(Prepared {
                 envelope,
@@ -142,7 +142,7 @@ pub(super) async fn enqueue(
     let accepted = service.queue.submit(submission).await;
     let accepted = accepted.map_err(|error| match error {
         StoreError::QueueFull => ApiError::QueueFull { limit },
-        // it was there when the problem was checked, and has been removed since
+        // it was stored when the problem was checked, and has been deleted since
         StoreError::UnknownMesh => {
             ApiError::InvalidProblem(vec![meshes::missing(&hash.unwrap_or_default())])
         }

@@ -14,12 +14,13 @@ use crate::{
     store::{CancelOutcome, Deletion, Filter},
 };
 
-/// What was done to many jobs.
+/// How many jobs a bulk operation matched and changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, JsonSchema)]
-pub struct Many {
+#[schemars(rename = "Many")] // its published name
+pub struct BulkResult {
     /// Jobs that match the filters.
     pub matched: u64,
-    /// Those of them that changed.
+    /// How many of them changed.
     pub changed: u64,
 }
 
@@ -28,7 +29,7 @@ pub async fn cancel_many(
     service: &Arc<Service>,
     caller: &Caller,
     filter: Filter,
-) -> Result<Many, ApiError> {
+) -> Result<BulkResult, ApiError> {
     for_each(service, caller, filter, Action::Cancel).await
 }
 
@@ -37,11 +38,11 @@ pub async fn delete_many(
     service: &Arc<Service>,
     caller: &Caller,
     filter: Filter,
-) -> Result<Many, ApiError> {
+) -> Result<BulkResult, ApiError> {
     for_each(service, caller, filter, Action::Delete).await
 }
 
-/// What is done to each of many jobs.
+/// What a bulk operation does to each job.
 #[derive(Clone, Copy, Debug)]
 enum Action {
     Cancel,
@@ -49,22 +50,22 @@ enum Action {
 }
 
 /// Applies the action to every job that matches a filter, each in a transaction of its own, so that other requests
-/// do not wait for all of them. It goes on when the client hangs up.
+/// do not wait for all of them. It continues if the client disconnects.
 async fn for_each(
     service: &Arc<Service>,
     caller: &Caller,
     filter: Filter,
     action: Action,
-) -> Result<Many, ApiError> {
+) -> Result<BulkResult, ApiError> {
     const AT_ONCE: i64 = 1000;
     let filter = filters::required(filter)?;
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
         let store = &service.store;
         let last = store.last_key().await?;
-        let (mut after, mut many) = (0, Many::default());
+        let (mut after, mut many) = (0, BulkResult::default());
         loop {
-            let keys = store.keys(caller.sees(), &filter, after, last, AT_ONCE);
+            let keys = store.keys(caller.visible_owners(), &filter, after, last, AT_ONCE);
             let keys = keys.await?;
             let Some(end) = keys.last() else {
                 return Ok(many);
@@ -92,7 +93,8 @@ async fn act(
             Ok(outcome != CancelOutcome::AlreadyTerminal)
         }
         Action::Delete => {
-            let deleted = service.store.delete(caller.sees(), key).await? == Deletion::Deleted;
+            let deleted =
+                service.store.delete(caller.visible_owners(), key).await? == Deletion::Deleted;
             if deleted {
                 service.queue.announce(&[key]);
             }

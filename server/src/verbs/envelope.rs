@@ -10,7 +10,7 @@ use solver::{
 
 use crate::{
     job::{Cache, Limits, MAX_PRIORITY, MIN_PRIORITY},
-    parameters::{Values, Whole},
+    parameters::{Integers, Values},
 };
 
 /// Characters of the longest name.
@@ -20,7 +20,7 @@ pub const MAX_LABELS: usize = 64;
 /// Characters of the longest key or value of a label.
 pub const MAX_LABEL: usize = 256;
 /// All priorities.
-pub const PRIORITIES: Whole = Whole(MIN_PRIORITY as i64..=MAX_PRIORITY as i64);
+pub const PRIORITIES: Integers = Integers(MIN_PRIORITY as i64..=MAX_PRIORITY as i64);
 /// Longest time that a job may run, in seconds: a week.
 const MAX_TIMEOUT_S: f64 = 7.0 * 86_400.0;
 /// Longest time that it may wait: thirty days.

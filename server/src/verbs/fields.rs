@@ -1,4 +1,4 @@
-//! Mesh, displacements and stresses: as they are stored, or in another format.
+//! Mesh, displacements and stresses: in their stored form, or in another format.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::{
     store::{PIECE_BYTES, PartInfo},
 };
 
-/// The fields of a job as they are stored: JSON, of known length and fingerprint, in pieces.
+/// The stored fields of a job: JSON of known length and fingerprint, in pieces.
 #[derive(Debug)]
 pub struct StoredFields {
     /// Length and fingerprint.
@@ -26,7 +26,7 @@ pub struct StoredFields {
     result_key: i64,
 }
 
-/// The fields at all nodes as they are stored.
+/// The fields at all nodes in their stored form.
 pub async fn fields(
     service: &Service,
     caller: &Caller,
@@ -41,7 +41,7 @@ pub async fn fields(
 }
 
 impl StoredFields {
-    /// The bytes from `start` to before `end`, in pieces: they may be many.
+    /// The bytes from `start` to before `end`, in pieces, since there may be many.
     pub fn bytes(
         &self,
         service: &Arc<Service>,

@@ -12,7 +12,7 @@ use crate::{
 /// By status; several may be given.
 pub const STATUS: Parameter<Words<Status>> = Parameter {
     name: "status",
-    meaning: "Only jobs of this status; several may be given",
+    meaning: "Only jobs with this status; several may be given",
     values: Words::all(),
 };
 
@@ -33,7 +33,7 @@ pub const LABEL: Parameter<Text> = Parameter {
 /// By name.
 pub const NAME: Parameter<Text> = Parameter {
     name: "name",
-    meaning: "Only jobs of this name",
+    meaning: "Only jobs with this name",
     values: Text,
 };
 
@@ -72,7 +72,7 @@ pub const FINISHED_BEFORE: Parameter<Times> = Parameter {
     values: Times,
 };
 
-/// All of them, as they are described.
+/// The descriptions of all filters.
 pub fn describe() -> [Description; 9] {
     [
         STATUS.describe_several(),
@@ -87,7 +87,7 @@ pub fn describe() -> [Description; 9] {
     ]
 }
 
-/// OpenAPI has labels as the members of an object, which are parameters each (style form, exploded: the
+/// In OpenAPI the labels are the members of an object, each of which is a parameter (style form, exploded: the
 /// default). Their values have no type: in a query all are text.
 fn labels() -> Description {
     let keys = json!({ "^label\\.": {} });
@@ -110,7 +110,7 @@ pub fn checked(filter: Filter) -> Result<Filter, ApiError> {
     Ok(filter)
 }
 
-/// A filter that is not empty, for bulk operations: nobody should apply one to all jobs by accident.
+/// A filter that is not empty, for bulk operations, so that none is applied to all jobs by accident.
 pub(super) fn required(filter: Filter) -> Result<Filter, ApiError> {
     match filter.is_empty() {
         true => Err(ApiError::MissingFilter(

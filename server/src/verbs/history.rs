@@ -6,19 +6,19 @@ use crate::{
     error::ApiError,
     event::{Payload, TimedIteration},
     job::{JobId, ResultAvailable},
-    parameters::{Parameter, Whole},
+    parameters::{Integers, Parameter},
     store::Snapshot,
 };
 
-/// How many rows to give; the first and the last one are always among them.
-pub const MAX_POINTS: Parameter<Whole> = Parameter {
+/// The maximum number of rows; the first and the last one are always included.
+pub const MAX_POINTS: Parameter<Integers> = Parameter {
     name: "max_points",
-    meaning: "At most so many rows; the first and the last are kept",
-    values: Whole(2..=i64::MAX),
+    meaning: "Maximum number of rows; the first and the last are included",
+    values: Integers(2..=i64::MAX),
 };
 
-/// The rows of the last start of a job, at most so many of them: those of its result, or as long as
-/// there is none those of its events.
+/// The rows of the last start of a job, reduced to a maximum number: those of its result, or those of its events as
+/// long as there is no result.
 pub async fn history(
     service: &Service,
     caller: &Caller,
@@ -36,7 +36,7 @@ pub async fn history(
     Ok(rows)
 }
 
-/// A history as it is stored.
+/// The stored form of a history.
 pub(super) enum StoredHistory {
     /// With the result.
     Whole(Vec<u8>),
@@ -50,7 +50,7 @@ impl StoredHistory {
         found: &mut Snapshot,
     ) -> Result<StoredHistory, ApiError> {
         let job = &found.job;
-        // of a job that runs there are more events than its finished load steps hold
+        // a running job has more events than its finished load steps contain
         if job.status.is_terminal() && job.result_available != ResultAvailable::None {
             let whole = found.part("history").await?;
             if let Some(whole) = whole {
@@ -75,19 +75,19 @@ fn row(line: &str) -> serde_json::Result<TimedIteration> {
     match serde_json::from_str(line)? {
         Payload::Iteration(row) => Ok(row),
         other => Err(serde::de::Error::custom(format!(
-            "{} where an iteration belongs",
+            "{} in place of an iteration",
             other.kind()
         ))),
     }
 }
 
-/// Leaves at most `most` rows (2 or more), evenly spread, the first and the last among them.
+/// Keeps at most `most` rows (2 or more), evenly spread, with the first and the last.
 fn downsample(rows: &mut Vec<TimedIteration>, most: usize) {
     let count = rows.len();
     if count <= most || most < 2 {
         return;
     }
-    // the n-th row that stays; strictly rising, since most ≤ count
+    // the n-th row that is kept; strictly increasing, since most ≤ count
     let kept = |n: usize| (n * (count - 1) + (most - 1) / 2) / (most - 1);
     let (mut place, mut next) = (0, 0);
     rows.retain(|_| {
@@ -105,7 +105,7 @@ mod tests {
     use crate::fake;
 
     #[test]
-    fn a_thinned_history_has_its_ends_and_never_more_rows_than_asked_for() {
+    fn a_reduced_history_has_its_ends_and_at_most_the_requested_number_of_rows() {
         for count in 0..40 {
             for most in 2..45 {
                 let all: Vec<u32> = (1..=count).collect();
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn the_event_of_an_iteration_holds_the_row_itself() {
+    fn the_event_of_an_iteration_contains_its_row() {
         let event = Payload::Iteration(fake::timed(3));
         let line = serde_json::to_string(&event).unwrap();
         assert_eq!(row(&line).unwrap(), fake::timed(3));

@@ -1,4 +1,4 @@
-//! What this service is, and its limits.
+//! Version and limits of the service.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -11,9 +11,9 @@ use crate::{caller::Caller, formats::Format};
 pub struct Info {
     /// Its name.
     pub name: String,
-    /// Of the program, and so of the solver.
+    /// The version of the program, and so of the solver.
     pub version: String,
-    /// Of the API.
+    /// The version of the API.
     pub api_version: String,
     /// Jobs that can run at the same time.
     pub workers: u32,

@@ -48,29 +48,35 @@ impl Values for JobIds {
 
 /// The job as it is now.
 pub async fn get(service: &Service, caller: &Caller, id: JobId) -> Result<Job, ApiError> {
-    match service.store.job(caller.sees(), id).await? {
+    match service.store.job(caller.visible_owners(), id).await? {
         Some(job) => Ok(job),
         None => Err(not_found(service, caller, id).await?),
     }
 }
 
-/// The job with what there is of its result, as of one moment.
+/// The job with its result so far, at one moment.
 pub(super) async fn snapshot(
     service: &Service,
     caller: &Caller,
     id: JobId,
 ) -> Result<Snapshot, ApiError> {
-    match service.store.snapshot(caller.sees(), id).await? {
+    match service.store.snapshot(caller.visible_owners(), id).await? {
         Some(found) => Ok(found),
         None => Err(not_found(service, caller, id).await?),
     }
 }
 
 async fn not_found(service: &Service, caller: &Caller, id: JobId) -> Result<ApiError, ApiError> {
-    Ok(match service.store.was_deleted(caller.sees(), id).await? {
-        true => ApiError::Deleted(id),
-        false => ApiError::NotFound(format!("there is no job {id}")),
-    })
+    Ok(
+        match service
+            .store
+            .was_deleted(caller.visible_owners(), id)
+            .await?
+        {
+            true => ApiError::Deleted(id),
+            false => ApiError::NotFound(format!("there is no job {id}")),
+        },
+    )
 }
 
 /// The problem that was submitted, with its defaults filled in.
@@ -83,7 +89,7 @@ pub async fn problem(service: &Service, caller: &Caller, id: JobId) -> Result<Pr
     Ok(Problem { title, ..problem })
 }
 
-/// Changes what may be changed of a job, if it has one of these versions; `None`: whatever its version.
+/// Changes the editable fields of a job, if it has one of these versions; `None`: whatever its version.
 pub async fn update(
     service: &Arc<Service>,
     caller: &Caller,
@@ -101,7 +107,7 @@ pub async fn update(
         .map_err(ApiError::InvalidProblem)?;
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
-        let (owners, versions) = (caller.sees(), versions.as_deref());
+        let (owners, versions) = (caller.visible_owners(), versions.as_deref());
         match service.store.edit(owners, id, &edit, versions).await? {
             Some(Ok(job)) => {
                 service.queue.announce(&[job.key]);
@@ -133,15 +139,15 @@ pub async fn cancel(
     .await
 }
 
-/// What asking a job to stop did.
+/// The effect of asking a job to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Cancellation {
-    /// It was waiting, and will not run.
+    /// It was queued, and will not run.
     Canceled,
-    /// It was running; it will have ended in half a second.
+    /// It was running, and ends within half a second.
     CancelRequested,
-    /// It had ended.
+    /// It had ended already.
     AlreadyTerminal,
 }
 
@@ -150,7 +156,11 @@ pub async fn delete(service: &Arc<Service>, caller: &Caller, id: JobId) -> Resul
     let job = get(service, caller, id).await?;
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
-        match service.store.delete(caller.sees(), job.key).await? {
+        match service
+            .store
+            .delete(caller.visible_owners(), job.key)
+            .await?
+        {
             Deletion::Deleted => {
                 service.queue.announce(&[job.key]);
                 Ok(())

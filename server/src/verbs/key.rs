@@ -5,15 +5,15 @@ use crate::parameters::{Parameter, Values};
 /// The key; over gRPC the field `request_id`.
 pub const IDEMPOTENCY_KEY: Parameter<Keys> = Parameter {
     name: "Idempotency-Key",
-    meaning: "The client's key for this request: sent again, it is answered with the job that it created",
+    meaning: "Key chosen by the client for this request: repeated with the same key, it is answered with the job that it created",
     values: Keys,
 };
 
-/// A key that was checked.
+/// A valid key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Key(pub(super) String);
 
-/// The keys that there may be.
+/// The valid keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Keys;
 
@@ -23,7 +23,7 @@ const MAX_LENGTH: usize = 255;
 impl Values for Keys {
     type Value = Key;
 
-    /// As a header of HTTP can have them, without blanks around.
+    /// As HTTP allows them in a header, without spaces at the ends.
     fn schema(&self) -> serde_json::Value {
         let inner = MAX_LENGTH - 2;
         let pattern = format!("^[!-~]([ -~]{{0,{inner}}}[!-~])?$");

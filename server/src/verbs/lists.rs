@@ -25,7 +25,7 @@ pub const ORDER_BY: Parameter<Orders> = Parameter {
     values: Orders,
 };
 
-/// The orders that there are.
+/// The possible orders.
 #[derive(Clone, Copy, Debug)]
 pub struct Orders;
 
@@ -70,7 +70,7 @@ impl Values for Orders {
     }
 }
 
-/// Lists jobs; newest first, unless another order is asked for.
+/// Lists jobs; newest first, unless another order is requested.
 pub async fn list(
     service: &Service,
     caller: &Caller,
@@ -81,23 +81,29 @@ pub async fn list(
     let order = order.unwrap_or(Order::NEWEST_FIRST);
     let list = page::list_of_jobs(filter, order);
     let (store, cursor) = (&service.store, paging.cursor(&list)?);
-    let jobs = store.jobs(caller.sees(), filter, order, cursor, paging.limit());
+    let jobs = store.jobs(
+        caller.visible_owners(),
+        filter,
+        order,
+        cursor,
+        paging.limit(),
+    );
     Ok(paging.page(&list, jobs.await?, |job| page::after(job, order)))
 }
 
-/// What jobs are counted by.
+/// The field by which jobs are counted.
 pub const GROUP_BY: Parameter<Words<GroupBy>> = Parameter {
     name: "group_by",
-    meaning: "Counts each of these on its own, too",
+    meaning: "Also counts the jobs of each value of this field",
     values: Words::all(),
 };
 
-/// How many jobs there are, and in groups how many of each.
+/// The number of jobs, in total and by group.
 #[derive(Clone, Debug, serde::Serialize, JsonSchema)]
 pub struct Count {
     /// All that match the filters.
     pub total: i64,
-    /// By the group's name; empty when no groups were asked for.
+    /// The number in each group, by its name; empty if no groups were requested.
     pub groups: BTreeMap<String, i64>,
 }
 
@@ -109,7 +115,9 @@ pub async fn count(
     group_by: Option<GroupBy>,
 ) -> Result<Count, ApiError> {
     let store = &service.store;
-    let groups = store.count(caller.sees(), filter, group_by).await?;
+    let groups = store
+        .count(caller.visible_owners(), filter, group_by)
+        .await?;
     let total = groups.iter().map(|(_, jobs)| jobs).sum();
     let groups = match group_by {
         Some(_) => groups.into_iter().collect(),

@@ -1,4 +1,4 @@
-//! Meshes that are stored once and named by jobs.
+//! Meshes that are stored once, and referred to by jobs.
 
 use std::{
     fs::File,
@@ -61,8 +61,8 @@ impl Values for Hashes {
     }
 }
 
-/// Stores a mesh file that arrives in pieces; and whether it is new. The file streams to the disk
-/// and from there through the reader: only the parsed mesh is ever in memory.
+/// Stores a mesh file that arrives in pieces; returns whether it is new. The file is streamed to the disk
+/// and from there through the reader: only the parsed mesh is held in memory.
 pub async fn upload(
     service: &Arc<Service>,
     _caller: &Caller,
@@ -70,7 +70,7 @@ pub async fn upload(
 ) -> Result<(MeshInfo, bool), ApiError> {
     service.accepting()?;
     let limit_bytes = service.max_mesh_bytes;
-    // without a name: the system removes it with the process
+    // without a name: the system removes it when the process ends
     let file = tempfile::tempfile_in(&service.data).map_err(unwritten)?;
     let mut out = tokio::io::BufWriter::with_capacity(
         PIECE_BYTES,
@@ -186,10 +186,10 @@ pub async fn get(service: &Service, _caller: &Caller, hash: &str) -> Result<Mesh
 }
 
 fn unknown(hash: &str) -> ApiError {
-    ApiError::NotFound(format!("there is no mesh {:?}", violations::name(hash)))
+    ApiError::NotFound(format!("there is no mesh {:?}", violations::quoted(hash)))
 }
 
-/// The one list of meshes that there is, for its page tokens.
+/// The name of the only list of meshes, for its page tokens.
 const LIST: &str = "meshes";
 
 /// Lists meshes, newest first.
@@ -222,9 +222,9 @@ pub async fn delete(service: &Arc<Service>, _caller: &Caller, hash: &str) -> Res
     .await
 }
 
-/// The mesh that a problem names, or the violation that there is none.
+/// The stored mesh that a problem refers to, or the violation that it is not stored.
 pub(super) async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mesh), ApiError> {
-    // loaded once there is a permit: what waits uses no memory
+    // loaded once there is a permit, so that waiting requests use no memory
     let load = async {
         let found = match service.store.mesh(hash).await? {
             Some(info) => service
@@ -243,12 +243,12 @@ pub(super) async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mes
     service.work_on(load, read).await?
 }
 
-/// The violation that a problem names a mesh that is not stored.
+/// The violation of a problem that refers to a mesh that is not stored.
 pub(super) fn missing(hash: &str) -> Violation {
     Violation {
-        pointer: format!("{}/mesh/stored", violations::AT),
+        pointer: format!("{}/mesh/stored", violations::PROBLEM),
         reason: Reason::UnknownMesh,
-        got: violations::name(hash).to_owned(),
+        got: violations::quoted(hash).to_owned(),
         expected: "the hash of a mesh that this service has stored".to_owned(),
         hint: "Upload it first: POST /v1/meshes, or UploadMesh.".to_owned(),
     }

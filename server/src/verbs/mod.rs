@@ -1,8 +1,8 @@
-//! What the service does, each verb once, whatever the protocol; `rest` and `grpc` only translate. A verb takes the
-//! service, the caller, and then what the caller asks for. The parameters of requests are defined beside the verb that
-//! they belong to.
+//! The operations of the service, called verbs, each defined once for both protocols; `rest` and `grpc` only
+//! translate. A verb takes the service, the caller, and then the arguments of the request. The parameters of requests
+//! are defined beside the verb that they belong to.
 
-// What every verb works with.
+// The service, which every verb receives.
 mod service;
 
 // Parts of requests: a job and what comes beside its problem, a key, filters, pages.

@@ -1,5 +1,5 @@
-//! Lists in pages, and their tokens: where a list goes on. A token is opaque to clients, and of no use for another
-//! list.
+//! Lists in pages, and page tokens: the place where the next page begins. A token is opaque to clients, and valid for
+//! one list only.
 
 use sha2::{Digest, Sha256};
 
@@ -7,31 +7,32 @@ use crate::{
     digest::hex,
     error::ApiError,
     job::Job,
-    parameters::{Parameter, Text, Whole},
+    parameters::{Integers, Parameter, Text},
     store::{Cursor, Filter, Order, OrderBy},
 };
 
-/// How much of a list is asked for.
-pub const PAGE_SIZE: Parameter<Whole> = Parameter {
+/// The size of a page.
+pub const PAGE_SIZE: Parameter<Integers> = Parameter {
     name: "page_size",
-    meaning: "Most on a page; absent: 50",
-    values: Whole(1..=MAX_PAGE_SIZE),
+    meaning: "Maximum number of entries on a page; default 50",
+    values: Integers(1..=MAX_PAGE_SIZE),
 };
-/// Most on a page.
+/// Largest number of entries on a page.
 pub const MAX_PAGE_SIZE: i64 = 1000;
+/// A unit test compares this with the meaning of `PAGE_SIZE`.
 const DEFAULT_PAGE_SIZE: i64 = 50;
 
-/// Which page of a list is asked for.
+/// The page of a list.
 pub const PAGE_TOKEN: Parameter<Text> = Parameter {
     name: "page_token",
-    meaning: "The next_page_token of the page before",
+    meaning: "The next_page_token of the previous page",
     values: Text,
 };
 
-/// What part of a list is asked for.
+/// The requested part of a list.
 #[derive(Clone, Debug, Default)]
 pub struct Paging {
-    /// Most on the page.
+    /// Maximum number of entries on the page.
     pub size: Option<i64>,
     /// Where it begins; absent or empty: at the start of the list.
     pub token: Option<String>,
@@ -40,7 +41,7 @@ pub struct Paging {
 /// A part of a list.
 #[derive(Debug)]
 pub struct Page<T> {
-    /// What is on it.
+    /// Its entries.
     pub items: Vec<T>,
     /// Where the next page begins; none after the last.
     pub next: Option<String>,
@@ -55,12 +56,12 @@ impl Paging {
             .transpose()
     }
 
-    /// How many to ask the store for: one more than the page holds shows whether there is another page.
+    /// How many entries to read from the store: one more than the page holds shows whether there is another page.
     pub(super) fn limit(&self) -> i64 {
         self.size() + 1
     }
 
-    /// The page of this list, of so many found. `at` gives the place of one in the list.
+    /// The page of this list, from the entries that were found. `at` returns the place of an entry in the list.
     pub(super) fn page<T>(
         &self,
         list: &str,
@@ -97,7 +98,7 @@ pub(super) fn after(job: &Job, order: Order) -> Cursor {
     }
 }
 
-/// The token for what comes after the cursor in this list.
+/// The token for the page after the cursor in this list.
 fn token(cursor: Cursor, list: &str) -> String {
     let Cursor { micros, key } = cursor;
     format!("{micros:016x}{key:016x}{}", checksum(cursor, list))
@@ -114,7 +115,7 @@ fn cursor(token: &str, list: &str) -> Option<Cursor> {
     (self::token(cursor, list) == token).then_some(cursor)
 }
 
-/// Ties a token to its list. No secret: a forged token shows only what the list would have shown anyway.
+/// Ties a token to its list. It is not a secret: a forged token shows only what the list would show anyway.
 fn checksum(Cursor { micros, key }: Cursor, list: &str) -> String {
     let hash = Sha256::digest(format!("{micros} {key} {list}"));
     hex(&hash[..4])
@@ -130,6 +131,12 @@ mod tests {
             statuses: statuses.to_vec(),
             ..Filter::default()
         }
+    }
+
+    #[test]
+    fn the_meaning_of_page_size_names_the_default() {
+        let default = format!("default {DEFAULT_PAGE_SIZE}");
+        assert!(PAGE_SIZE.meaning.ends_with(&default));
     }
 
     #[test]

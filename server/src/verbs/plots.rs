@@ -34,17 +34,17 @@ pub const PLOT: Variable<Words<Plot>> = Variable {
     }),
 };
 
-/// The colours of a figure.
+/// The colour theme of a figure.
 pub const THEME: Parameter<Words<Theme>> = Parameter {
     name: "theme",
-    meaning: "Its colours; absent: light",
+    meaning: "Colour theme; default light",
     values: Words(|| vec![("light", Theme::Light), ("dark", Theme::Dark)]),
 };
 
-/// The stress that a deformed body is coloured by.
+/// The stress shown on a deformed body.
 pub const STRESS: Parameter<Words<Stress>> = Parameter {
     name: "stress",
-    meaning: "What colours deformed.svg, and only that; absent: von_mises",
+    meaning: "Stress shown in deformed.svg (no other plot); default von_mises",
     values: Words(|| {
         vec![
             ("von_mises", Stress::VonMises),
@@ -56,7 +56,7 @@ pub const STRESS: Parameter<Words<Stress>> = Parameter {
     }),
 };
 
-/// One figure as SVG, drawn from what the store keeps. Only the parts that it needs are read.
+/// One figure as SVG, drawn from the stored data. Only the parts that it needs are read.
 pub async fn plot(
     service: &Arc<Service>,
     caller: &Caller,
@@ -64,7 +64,7 @@ pub async fn plot(
     plot: Plot,
     style: Style,
 ) -> Result<String, ApiError> {
-    // loaded once there is a permit: what waits uses no memory
+    // loaded once there is a permit, so that waiting requests use no memory
     let load = async {
         let mut found = match plot {
             // these show the problem or the iterations, and so can be drawn while the job waits or runs
@@ -102,7 +102,8 @@ pub async fn plot(
             Some(hash) if plot == Plot::Mesh => {
                 let gone = || {
                     ApiError::NotFound(format!(
-                        "{id} has no plot mesh: {hash} was removed; deformed has the elements too"
+                        "the mesh of {id} cannot be drawn: the stored mesh {hash} was deleted; \
+                         the plot `deformed` also shows the elements"
                     ))
                 };
                 Some(store.mesh_body(hash).await?.ok_or_else(gone)?)
@@ -138,8 +139,8 @@ pub async fn plot(
     service.work_on(load, draw).await?
 }
 
-/// Job, problem, profiles, history, fields and stored mesh, as the store keeps them; what a figure does not need
-/// is absent.
+/// Job, problem, profiles, history, fields and stored mesh, in their stored form; the parts that a figure does not
+/// need are absent.
 type Loaded = (
     Job,
     Problem,

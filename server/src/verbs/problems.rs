@@ -16,25 +16,25 @@ use crate::{
     digest,
     error::{ApiError, count, size},
     mesh::MeshInfo,
-    violations::{AT, prefixed},
+    violations::{PROBLEM, prefixed},
 };
 
 /// The result of checking a problem.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Validation {
-    /// It would be accepted.
+    /// Whether it would be accepted.
     pub valid: bool,
-    /// Everything that is wrong with it.
+    /// All its violations.
     pub violations: Vec<Violation>,
-    /// What to consider before trusting its result.
+    /// What to consider before relying on its result.
     pub warnings: Vec<Warning>,
-    /// What it would cost; absent when it could not be read.
+    /// Its estimated cost, given even if it is invalid; absent if it, or the stored mesh that it names, cannot be read.
     pub estimate: Option<Estimate>,
-    /// Its fingerprint; absent when it could not be read.
+    /// Its fingerprint; absent as `estimate` is.
     pub input_hash: Option<String>,
 }
 
-/// Checks a problem and stores nothing. That it is invalid is an answer, not an error.
+/// Checks a problem and stores nothing. An invalid problem is not an error here: its violations are the answer.
 pub async fn validate(
     service: &Service,
     _caller: &Caller,
@@ -62,7 +62,7 @@ pub async fn validate(
             Err(violations) => (vec![], violations),
         };
         let at = |warning: Warning| Warning {
-            pointer: format!("{AT}{}", warning.pointer),
+            pointer: format!("{PROBLEM}{}", warning.pointer),
             ..warning
         };
         Validation {
@@ -88,11 +88,11 @@ impl Validation {
     }
 }
 
-/// The violation of a problem that is over the memory budget.
+/// The violation of a problem that exceeds the memory budget.
 fn too_large(estimate: &Estimate, budget_bytes: u64) -> Violation {
     let (unknowns, memory) = (count(estimate.dofs), size(estimate.memory_bytes));
     Violation {
-        pointer: format!("{AT}/mesh"),
+        pointer: format!("{PROBLEM}/mesh"),
         reason: Reason::TooLarge,
         got: format!("{unknowns} unknowns, which need about {memory}"),
         expected: format!("at most {} of memory", size(budget_bytes)),
@@ -109,11 +109,11 @@ pub(super) struct Admitted {
     pub input_hash: String,
     /// The rest as JSON.
     pub json: String,
-    /// The stored mesh that it names.
+    /// The stored mesh that it refers to.
     pub mesh: Option<String>,
 }
 
-/// The stored mesh that a problem names, if it names one.
+/// The stored mesh that a problem refers to, if it does.
 async fn stored(
     service: &Service,
     problem: &Problem,
@@ -150,7 +150,7 @@ pub(super) async fn admit(service: &Service, mut problem: Problem) -> Result<Adm
     service.work(admit).await?
 }
 
-/// The estimate is made before anything is meshed: a mesh may be what we cannot afford.
+/// The estimate is made before meshing, since the mesh itself may need too much memory.
 fn estimate(problem: &Problem, stored: Option<&(MeshInfo, Mesh)>) -> Estimate {
     let size = stored.map(|(info, _)| info.size());
     solver::estimate(problem, size.as_ref())
@@ -161,5 +161,5 @@ fn check(
     stored: Option<(MeshInfo, Mesh)>,
 ) -> Result<Vec<Warning>, Vec<Violation>> {
     let external = files::external_mesh(problem, stored.map(|(_, mesh)| mesh));
-    solver::check(problem, external).map_err(|violations| prefixed(AT, violations))
+    solver::check(problem, external).map_err(|violations| prefixed(PROBLEM, violations))
 }

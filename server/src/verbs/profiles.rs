@@ -11,20 +11,20 @@ use crate::{
     caller::Caller,
     error::ApiError,
     job::JobId,
-    parameters::{Parameter, Text, Values, Variable, Whole},
+    parameters::{Integers, Parameter, Text, Values, Variable},
     store::{ProfilePoints, Snapshot},
     violations,
 };
 
-/// Where a profile has its values.
+/// The points at which a profile has its values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Points {
     /// At the nodes of the boundary.
     #[default]
     Nodes,
-    /// Where friction acts, which is what forces and peaks are made of.
+    /// At the points where friction acts, from which forces and peaks are computed.
     Friction,
-    /// At so many places, equally spaced in arc length, the ends among them.
+    /// At this number of points, equally spaced in arc length, with the ends.
     Spaced(usize),
 }
 
@@ -39,24 +39,24 @@ pub const BOUNDARY: Variable<Text> = Variable {
 /// A load step.
 pub const STEP: Parameter<Text> = Parameter {
     name: "step",
-    meaning: "A load step, by its name or its number from 0; absent: the last",
+    meaning: "Load step, by its name or its number from 0; default: the last",
     values: Text,
 };
 
-/// Where the values are wanted.
+/// The points at which values are requested.
 pub const POINTS: Parameter<Places> = Parameter {
     name: "points",
-    meaning: "Where: at the nodes, where friction acts, or at so many evenly spaced places; absent: nodes",
+    meaning: "Points of the profile: the nodes, the points where friction acts, or a number of evenly spaced points; default nodes",
     values: Places {
-        spaced: Whole(2..=100_000),
+        spaced: Integers(2..=100_000),
     },
 };
 
-/// The places that can be asked for.
+/// The points that can be requested.
 #[derive(Clone, Debug)]
 pub struct Places {
-    /// How many evenly spaced ones.
-    pub spaced: Whole,
+    /// The possible numbers of evenly spaced points.
+    pub spaced: Integers,
 }
 
 impl Values for Places {
@@ -121,7 +121,7 @@ pub async fn profile(
         }
         return Err(ApiError::NotFound(format!(
             "{id} has no contact boundary {:?}; it has: {}",
-            violations::name(boundary),
+            violations::quoted(boundary),
             known.join(", ")
         )));
     };
@@ -152,7 +152,7 @@ fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, A
             .collect();
         ApiError::NotFound(format!(
             "{id} has no load step {:?}; it has {} (by name, or by number from 0): {}",
-            violations::name(wanted),
+            violations::quoted(wanted),
             steps.len(),
             names.join(", ")
         ))

@@ -11,7 +11,7 @@ use crate::{caller::Caller, error::ApiError};
 /// The state of the queue.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct QueueState {
-    /// No new job is started.
+    /// Whether the queue is paused: no new job is started.
     pub paused: bool,
     /// Jobs that wait for a worker, or for another job with the same input.
     pub queued: u64,
@@ -21,7 +21,7 @@ pub struct QueueState {
     pub workers: u32,
     /// Workers without a job.
     pub idle: u32,
-    /// Jobs that may wait before more are refused.
+    /// Maximum number of waiting jobs; further ones are refused.
     pub max_queued: u32,
 }
 

@@ -1,4 +1,4 @@
-//! The summary of a result; and whether there is a result.
+//! The summary of a result, and whether there is a result.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ use crate::{
 pub struct StepResult {
     /// Its name in the problem, or its number from 0.
     pub name: String,
-    /// Its end.
+    /// Its summary, at its end.
     pub summary: solver::solution::Summary,
 }
 
@@ -25,16 +25,16 @@ pub struct StepResult {
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(rename = "Result")]
 pub struct JobResult {
-    /// As of the job: `partial` where it has not come to its end, or to none that can be trusted. The summary
-    /// may say that the last finished load step has converged; the others are missing all the same.
+    /// As in the job: `partial` if the job has not ended or has not converged, even if the summary of the last finished
+    /// load step is that of a converged solution.
     pub result_available: ResultAvailable,
-    /// That of the last load step that is done.
+    /// The summary of the last finished load step.
     pub summary: Summary,
-    /// Those that are done.
+    /// The finished load steps.
     pub steps: Vec<StepResult>,
 }
 
-/// The scalars of a job that has some.
+/// The scalars of a job that has a result.
 pub async fn result(service: &Service, caller: &Caller, id: JobId) -> Result<JobResult, ApiError> {
     let load = async {
         let mut found = with_result(service, caller, id).await?;
@@ -54,7 +54,7 @@ pub async fn result(service: &Service, caller: &Caller, id: JobId) -> Result<Job
     service.work_on(load, read).await?
 }
 
-/// The job, if it has something to show: at its end, or of finished load steps while it runs.
+/// The job, if it has a result: at its end, or that of finished load steps while it runs.
 pub(super) async fn with_result(
     service: &Service,
     caller: &Caller,
@@ -67,8 +67,8 @@ pub(super) async fn with_result(
     }
 }
 
-/// There is nothing to show: not yet, or not any more. A job that was canceled, or still runs, has history and
-/// profiles, but no fields.
+/// The error of a job without a result, or without a result yet. A job that was canceled or still runs has history
+/// and profiles, but no fields.
 pub(super) fn no_result(job: &Job) -> ApiError {
     match job.status.is_terminal() {
         true => ApiError::NoResult(job.status),

@@ -21,7 +21,7 @@ use crate::{
     store::{Accepted, NewJob, RequestKey},
 };
 
-/// What the new job has otherwise; what is absent stays.
+/// Changes for the new job; absent fields stay unchanged.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Changes {
     /// Seconds from a start to the end.
@@ -76,7 +76,7 @@ pub async fn retry(
                 timeout_s: changes.timeout_s.unwrap_or(limits.timeout_s),
                 queue_ttl_s: changes.queue_ttl_s.unwrap_or(limits.queue_ttl_s),
             },
-            // a result that was not to be shared is still not to be
+            // a result that may not answer other jobs still may not
             cache: match cache {
                 Cache::Off => Cache::Off,
                 Cache::Use | Cache::Refresh => Cache::Refresh,

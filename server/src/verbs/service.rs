@@ -1,4 +1,4 @@
-//! What every verb works with.
+//! The service, which every verb receives.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -11,16 +11,16 @@ use crate::{
     store::{Store, StoreError},
 };
 
-/// What every verb works with.
+/// The service, which every verb receives.
 #[derive(Debug)]
 pub struct Service {
-    /// All that is durable.
+    /// The durable data.
     pub store: Arc<Store>,
     /// Runs the jobs.
     pub queue: Arc<Queue>,
-    /// Bounds how many problems are checked, and results converted, at the same time: that takes a core each.
+    /// Limits how many problems are checked and results converted at the same time: each takes a core.
     checks: Arc<Semaphore>,
-    /// Jobs that may wait before more are refused.
+    /// Maximum number of waiting jobs; further ones are refused.
     pub(super) max_queued: u32,
     /// Memory that one job may need, by the estimate.
     pub(super) memory_budget_bytes: u64,
@@ -28,7 +28,7 @@ pub struct Service {
     pub max_body_bytes: usize,
     /// Largest mesh file.
     pub max_mesh_bytes: usize,
-    /// Where uploads are kept until they are read.
+    /// The folder for uploads until they are read.
     pub(super) data: PathBuf,
 }
 
@@ -58,7 +58,7 @@ impl Service {
 
     /// Runs work whose duration depends on the client's input (reading, meshing, hashing a problem) on a blocking
     /// thread, a few at a time: the async threads stay free for other requests. The permit belongs to the work, not
-    /// to the request: a client that hangs up does not free it before the work is done.
+    /// to the request: a client that disconnects does not free it before the work is done.
     pub async fn work<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
@@ -66,7 +66,7 @@ impl Service {
         self.work_on(async { Ok(()) }, |()| work()).await
     }
 
-    /// The same on something large that is loaded first, once there is a permit: what waits uses no memory.
+    /// The same with data that is loaded first, once there is a permit, so that waiting requests use no memory.
     pub async fn work_on<L: Send + 'static, T: Send + 'static>(
         &self,
         load: impl Future<Output = Result<L, ApiError>>,
@@ -83,8 +83,8 @@ impl Service {
     }
 }
 
-/// Runs a change detached from the request: a client that hangs up in the middle must not keep
-/// a committed job from being announced.
+/// Runs a change detached from the request: a committed job must be announced even if the client disconnects
+/// before.
 pub(super) async fn detached<T: Send + 'static>(
     work: impl Future<Output = Result<T, ApiError>> + Send + 'static,
 ) -> Result<T, ApiError> {
@@ -113,34 +113,34 @@ mod tests {
 
     use crate::verbs::tests::service;
 
-    /// This test has one thread: work that blocked it would wait for ever.
+    /// This test has one thread: work that blocked it would never end.
     #[tokio::test]
     async fn work_leaves_the_async_threads_free() {
         let folder = tempfile::tempdir().unwrap();
         let service = service(folder.path()).await;
-        let (say, heard) = mpsc::channel();
-        let work = service.work(move || heard.recv_timeout(Duration::from_secs(10)));
-        let (worked, said) = tokio::join!(work, async { say.send(7) });
-        said.unwrap();
+        let (send, received) = mpsc::channel();
+        let work = service.work(move || received.recv_timeout(Duration::from_secs(10)));
+        let (worked, sent) = tokio::join!(work, async { send.send(7) });
+        sent.unwrap();
         assert_eq!(worked.unwrap(), Ok(7));
     }
 
     #[tokio::test]
-    async fn a_client_that_hangs_up_frees_no_permit_before_the_work_is_done() {
+    async fn a_client_that_disconnects_frees_no_permit_before_the_work_is_done() {
         let folder = tempfile::tempdir().unwrap();
         let service = service(folder.path()).await;
-        let (say, heard) = mpsc::channel::<()>();
+        let (send, received) = mpsc::channel::<()>();
         let (start, started) = tokio::sync::oneshot::channel();
         let work = service.work(move || {
             let _ = start.send(());
-            heard.recv()
+            received.recv()
         });
         tokio::select! {
             _ = work => unreachable!("it waits for a message"),
-            _ = started => {} // and the request is dropped
+            _ = started => {} // the request is dropped
         }
         assert_eq!(service.checks.available_permits(), 1);
-        drop(say);
+        drop(send);
         service.checks.acquire_many(2).await.unwrap().forget();
     }
 }

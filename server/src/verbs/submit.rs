@@ -1,4 +1,4 @@
-//! Submitting jobs: one, one with an id that the client made, many at once.
+//! Submitting jobs: one, one with an id chosen by the client, many at once.
 
 use std::sync::Arc;
 
@@ -20,20 +20,20 @@ use crate::{
     violations::prefixed,
 };
 
-/// Most jobs of a batch.
+/// Maximum number of jobs in a batch.
 pub const MAX_BATCH: usize = 1000;
 
-/// What became of a submission.
+/// The result of a submission.
 #[derive(Debug)]
 pub struct Submitted<T> {
     /// The job or jobs.
     pub accepted: T,
-    /// They were there already, by the key or by the id.
+    /// They existed already, under the key or the id.
     pub replayed: bool,
 }
 
-/// Accepts a job. It is durable when this returns. Violations of envelope and problem come together. With
-/// a key, or an id of the client's, the same request gives the same job, however often it is made.
+/// Accepts a job. It is durable when this returns. Violations of envelope and problem are reported together. With
+/// a key, or an id chosen by the client, the same request gives the same job, however often it is repeated.
 pub async fn create(
     service: &Arc<Service>,
     caller: &Caller,
@@ -50,7 +50,7 @@ pub async fn create(
         if let Some(old) = replayed(&service, &caller, key.as_ref()).await? {
             return single(old, true);
         }
-        // before it is looked at in depth: what was accepted once need not be acceptable now
+        // before it is checked in depth: a request that was accepted once need not be acceptable now
         if let Some(id) = prepared.id
             && !prepared.payload.is_empty()
         {
@@ -67,7 +67,7 @@ pub async fn create(
     .await
 }
 
-/// Accepts all of these jobs or none. Violations of all come together, with pointers `/jobs/{n}/…`.
+/// Accepts all of these jobs or none. Violations of all are reported together, with pointers `/jobs/{n}/…`.
 pub async fn create_batch(
     service: &Arc<Service>,
     caller: &Caller,
@@ -112,15 +112,15 @@ pub async fn create_batch(
     .await
 }
 
-/// The one job of a submission of one.
+/// The job of a submission of one job.
 pub(super) fn single(jobs: Vec<Job>, replayed: bool) -> Result<Submitted<Job>, ApiError> {
     let accepted = jobs.into_iter().next();
     let accepted =
-        accepted.ok_or_else(|| ApiError::internal("a job was accepted, but not given"))?;
+        accepted.ok_or_else(|| ApiError::internal("a job was accepted, but not returned"))?;
     Ok(Submitted { accepted, replayed })
 }
 
-/// Does the same with each of many, a few at a time, in order; the violations of all are reported together.
+/// Does the same with each item, a few at a time, in order; the violations of all are reported together.
 async fn each<A, B, F: Future<Output = Result<B, ApiError>>>(
     many: Vec<A>,
     work: impl Fn(A) -> F,

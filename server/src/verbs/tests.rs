@@ -1,4 +1,4 @@
-//! Two callers on one service: each finds only their own jobs, whatever they ask.
+//! Two callers of one service: each finds only their own jobs, by every verb.
 #![allow(clippy::unwrap_used)]
 
 use std::{path::Path, sync::Arc};
@@ -47,7 +47,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
     Arc::new(Service::new(&config, store, queue))
 }
 
-/// Who may do everything with what is their own.
+/// A caller who may do everything with their own jobs.
 fn caller(owner: &str) -> Caller {
     Caller::new(owner, [Scope::Read, Scope::Submit, Scope::Cancel])
 }
@@ -68,7 +68,7 @@ async fn create(service: &Arc<Service>, caller: &Caller, id: Option<JobId>) -> J
     submitted.unwrap().accepted
 }
 
-/// That there is nothing of this kind, for this caller.
+/// Asserts that the answer is *not found*.
 fn unknown<T>(verb: &str, answer: Result<T, ApiError>) {
     assert!(matches!(answer, Err(ApiError::NotFound(_))), "{verb}");
 }
@@ -113,7 +113,7 @@ async fn a_job_of_another_is_not_found_by_any_verb() {
     unknown("retry", again.await);
     unknown("delete", jobs::delete(service, bob, id).await);
 
-    // and is there for its owner all the same
+    // and its owner still finds it unchanged
     let job = jobs::get(service, ada, id).await.unwrap();
     assert_eq!((job.owner.as_str(), job.pinned), ("ada", false));
     let events = watch::watch(service, ada, id, 0).await.unwrap().unwrap();
@@ -126,7 +126,7 @@ async fn a_job_of_another_is_not_found_by_any_verb() {
 }
 
 #[tokio::test]
-async fn what_is_done_to_many_jobs_is_done_to_those_that_the_caller_sees() {
+async fn bulk_operations_apply_to_the_jobs_that_the_caller_sees() {
     let folder = tempfile::tempdir().unwrap();
     let service = &service(folder.path()).await;
     let (ada, bob, admin) = (&caller("ada"), &caller("bob"), &Caller::local());
@@ -165,7 +165,7 @@ async fn what_is_done_to_many_jobs_is_done_to_those_that_the_caller_sees() {
 }
 
 #[tokio::test]
-async fn keys_and_ids_belong_to_who_made_them() {
+async fn keys_and_ids_belong_to_the_owner_who_used_them() {
     let folder = tempfile::tempdir().unwrap();
     let service = &service(folder.path()).await;
     let (ada, bob) = (&caller("ada"), &caller("bob"));

@@ -12,19 +12,19 @@ use crate::{
     error::ApiError,
     event::{Event, Payload},
     job::{Job, JobId},
-    parameters::{Parameter, Seconds, Whole, Words},
+    parameters::{Integers, Parameter, Seconds, Words},
 };
 
 /// How long to wait for a job.
 pub const WAIT: Parameter<Seconds> = Parameter {
     name: "wait",
-    meaning: "Seconds to wait until the version differs from If-None-Match, else from now",
+    meaning: "Seconds to wait until the version differs from If-None-Match or, without it, from the current one",
     values: Seconds(0.0..=MAX_WAIT_S),
 };
 /// Longest time that a request may wait for a job, in seconds.
 pub const MAX_WAIT_S: f64 = 60.0;
 
-/// What to wait for.
+/// The condition to wait for.
 pub const UNTIL: Parameter<Words<Until>> = Parameter {
     name: "until",
     meaning: "Wait until the job has ended",
@@ -32,24 +32,24 @@ pub const UNTIL: Parameter<Words<Until>> = Parameter {
 };
 
 /// Where a stream of events begins.
-pub const AFTER_SEQ: Parameter<Whole> = Parameter {
+pub const AFTER_SEQ: Parameter<Integers> = Parameter {
     name: "after_seq",
-    meaning: "Number of the last event that was seen; absent: 0, which is all events",
-    values: Whole(0..=i64::MAX),
+    meaning: "Number of the last event already received; default 0: all events",
+    values: Integers(0..=i64::MAX),
 };
 
 /// Events read at a time by a watcher.
 const EVENTS_PER_READ: i64 = 256;
 
-/// What a waiting client waits for.
+/// The condition that a client waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Until {
     /// The job has ended.
     Terminal,
-    /// Its version is another than this one.
+    /// Its version differs from this one.
     Changed(i64),
-    /// Its version has changed since the request; or it has ended: a client that knows no version waits for a
-    /// change, and there will be none.
+    /// Its version has changed since the request, or it has ended, since no further change will come: for a client that
+    /// knows no version.
     NextChange,
 }
 
@@ -64,9 +64,9 @@ pub async fn wait(
 ) -> Result<(Job, bool), ApiError> {
     let end = Instant::now() + Duration::from_secs_f64(seconds.clamp(0.0, MAX_WAIT_S));
     let at_arrival = jobs::get(service, caller, id).await?;
-    let mut news = service.queue.subscribe(at_arrival.key);
+    let mut subscription = service.queue.subscribe(at_arrival.key);
     loop {
-        // Read after subscribing: a change in between is not overlooked.
+        // read after subscribing, so that a change in between is not missed
         let job = jobs::get(service, caller, id).await?;
         let has_ended = job.status.is_terminal();
         let met = match until {
@@ -78,7 +78,7 @@ pub async fn wait(
             return Ok((job, true));
         }
         tokio::select! {
-            heard = timeout_at(end, news.news()) => if heard.is_err() { return Ok((job, false)) },
+            change = timeout_at(end, subscription.changed()) => if change.is_err() { return Ok((job, false)) },
             () = service.queue.stopping().cancelled() => return Ok((job, false)),
         }
     }
@@ -86,7 +86,7 @@ pub async fn wait(
 
 /// Stored events after number `after`, then live ones; the stream ends after `done`, or when the job ends if `after`
 /// is beyond that. `None`: the job has ended, and there are no events after that number. When the service stops, or
-/// the job is deleted before, the stream ends with an error, so that this is not mistaken for the end of the job.
+/// the job is deleted before, the stream ends with an error, so that it is not mistaken for the end of the job.
 pub async fn watch(
     service: &Arc<Service>,
     caller: &Caller,
@@ -110,7 +110,7 @@ fn follow(
 ) -> impl Stream<Item = Result<Event, ApiError>> + Send {
     try_stream! {
         let mut cursor = after;
-        let mut news = service.queue.subscribe(key);
+        let mut subscription = service.queue.subscribe(key);
         let mut ended = false;
         loop {
             let events = service.store.events_after(key, cursor, EVENTS_PER_READ).await?;
@@ -128,7 +128,7 @@ fn follow(
             }
             if idle {
                 let has_ended = service.store.has_ended(key).await?;
-                // deleted: `done` cannot be seen any more
+                // deleted: `done` cannot be read any more
                 if has_ended.ok_or(ApiError::Deleted(id))? {
                     ended = true;
                     continue; // read again: `done` may have been written after the last read
@@ -139,7 +139,7 @@ fn follow(
             }
             if idle {
                 tokio::select! {
-                    () = news.news() => {}
+                    () = subscription.changed() => {}
                     () = service.queue.stopping().cancelled() => {}
                 }
             }

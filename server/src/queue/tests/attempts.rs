@@ -86,7 +86,7 @@ fn unbalanced(
 }
 
 #[tokio::test]
-async fn a_job_that_converged_to_no_balance_fails_and_keeps_its_result() {
+async fn a_job_whose_forces_do_not_balance_fails_and_keeps_its_result() {
     let rig = rig(unbalanced).await;
     rig.queue.start();
     let job = rig.submit().await;
@@ -111,7 +111,7 @@ async fn a_job_that_converged_to_no_balance_fails_and_keeps_its_result() {
     );
 }
 
-/// In one long phase, with nothing to report.
+/// Solves in one long phase, with nothing to report.
 fn busy(
     _: &Problem,
     _: Option<External>,
@@ -139,7 +139,7 @@ async fn a_pulse_is_answered_and_not_recorded() {
     assert_eq!(kinds, ["status", "status", "done"]);
 }
 
-/// As one long factorisation: it does not react for a second.
+/// Like a long factorisation: it does not react for a second.
 fn unresponsive(
     problem: &Problem,
     _: Option<External>,
@@ -187,7 +187,7 @@ async fn an_unresponsive_solver_delays_only_its_worker_and_not_the_cancel() {
 
 #[tokio::test]
 async fn a_running_job_without_a_worker_is_canceled_at_once() {
-    let rig = rig(fake::solve).await; // its workers never start: nobody solves what is claimed here
+    let rig = rig(fake::solve).await; // its workers never start: claimed jobs are not solved
     let job = rig.submit().await;
     rig.store.claim_next().await.unwrap().0.unwrap();
     let outcome = rig.queue.cancel(job.key).await.unwrap();
@@ -388,11 +388,11 @@ async fn partial_results_of_many_quick_steps_are_not_stored_after_each() {
     assert!(kept.part("summary").await.unwrap().is_some());
     assert!(
         kept.part("history").await.unwrap().is_none(),
-        "its events went on after it"
+        "its events continued after it"
     );
 }
 
-/// Its events cannot be stored for a while.
+/// The events of the job cannot be stored for a while.
 #[tokio::test]
 async fn a_full_disk_delays_a_job_and_does_not_end_it() {
     let rig = rig(fake::solve_until_stopped).await;

@@ -29,7 +29,7 @@ async fn an_earlier_result_answers_at_once_and_outlives_its_job() {
 }
 
 #[tokio::test]
-async fn a_job_that_wants_no_earlier_result_gets_none_and_may_keep_its_own_private() {
+async fn a_job_without_the_cache_is_solved_anew_and_its_result_may_answer_no_other() {
     let rig = rig(fake::solve).await;
     rig.queue.start();
     let off = rig.submit().await;
@@ -148,9 +148,9 @@ async fn coalesced_jobs_count_as_waiting_and_one_of_higher_priority_is_detached(
     assert_eq!(rig.store.waiting(), 0);
 }
 
-/// A job that waits, and may be watched, is answered in the commit of another one's submit.
+/// A waiting job, which may have watchers, is answered in the commit of another submission.
 #[tokio::test]
-async fn a_job_that_is_answered_beside_a_submit_is_among_those_that_changed() {
+async fn a_job_answered_in_the_commit_of_another_submission_is_reported_as_changed() {
     let rig = rig(fake::solve).await; // its workers never start: jobs are claimed here
     let waiting = rig.submit_as(same()).await;
     let anew = NewJob {

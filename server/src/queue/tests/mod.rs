@@ -1,4 +1,4 @@
-//! The queue with stand-ins for the solver, for what a real one does only on its worst days.
+//! The queue with substitutes for the solver, which fail in ways that the real one rarely does.
 #![allow(clippy::unwrap_used)]
 
 mod attempts;
@@ -32,7 +32,7 @@ use crate::{
     time::Time,
 };
 
-/// Whose jobs they are.
+/// The owner of the jobs.
 const OWNER: &str = "ada";
 
 struct Rig {
@@ -87,7 +87,7 @@ impl Rig {
         accepted.jobs.into_iter().next().unwrap()
     }
 
-    /// Its solver has reported something.
+    /// Waits until its solver has reported something.
     async fn until_at_work(&self, job: &Job) {
         self.until(job, |event| matches!(event.payload, Payload::Iteration(_)))
             .await;
@@ -115,13 +115,13 @@ impl Rig {
     }
 
     async fn until(&self, job: &Job, done: impl Fn(&Event) -> bool) -> Vec<Event> {
-        let mut news = self.queue.subscribe(job.key);
+        let mut subscription = self.queue.subscribe(job.key);
         loop {
             let events = self.store.events_after(job.key, 0, 100_000).await.unwrap();
             if events.iter().any(&done) {
                 return events;
             }
-            news.news().await;
+            subscription.changed().await;
         }
     }
 
@@ -149,7 +149,7 @@ impl Rig {
     }
 }
 
-/// With the input of the others, and ready to be answered with theirs.
+/// A job with the same input as the others, which may be answered with their result.
 fn same() -> NewJob {
     NewJob {
         cache: Cache::Use,

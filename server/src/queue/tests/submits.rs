@@ -1,9 +1,9 @@
-//! Submits: keys, and what is refused beside what is accepted.
+//! Submissions: keys, and refused submissions beside accepted ones.
 
 use super::*;
 
 #[tokio::test]
-async fn one_key_is_one_job_however_many_ask_at_once() {
+async fn many_simultaneous_submissions_with_one_key_make_one_job() {
     let rig = rig(fake::solve).await;
     let asking = (0..50).map(|_| rig.queue.submit(submission(vec![new(0)], Some("k"))));
     let answers = futures_util::future::join_all(asking).await;
@@ -16,7 +16,7 @@ async fn one_key_is_one_job_however_many_ask_at_once() {
     other.key.as_mut().unwrap().payload = "another".into();
     let refused = rig.queue.submit(other).await.unwrap_err();
     assert!(matches!(refused, StoreError::KeyReuse), "{refused}");
-    // the key outlives its job, and says that it was deleted
+    // the key outlives its job, and is answered with *deleted*
     rig.queue
         .cancel(rig.store.last_key().await.unwrap())
         .await
@@ -30,7 +30,7 @@ async fn one_key_is_one_job_however_many_ask_at_once() {
 }
 
 #[tokio::test]
-async fn one_that_is_refused_undoes_nothing_of_those_in_the_same_commit() {
+async fn a_refused_submission_does_not_affect_the_others_in_its_commit() {
     let rig = rig(fake::solve).await;
     let id = JobId::new();
     let named = |payload: &str| NewJob {
@@ -63,7 +63,7 @@ async fn one_that_is_refused_undoes_nothing_of_those_in_the_same_commit() {
 }
 
 #[tokio::test]
-async fn a_key_stands_for_what_is_left_of_its_jobs() {
+async fn a_key_is_answered_with_its_remaining_jobs() {
     let rig = rig(fake::solve).await;
     rig.queue.start();
     let two = submission(vec![new(0), new(0)], Some("k"));
@@ -85,7 +85,7 @@ async fn a_key_stands_for_what_is_left_of_its_jobs() {
         .unwrap();
     let gone = rig.queue.submit(two.clone()).await;
     assert!(matches!(gone, Err(StoreError::Deleted(_))));
-    // forgotten with the ids of its jobs
+    // removed with the ids of its jobs
     let later = crate::time::Time::now().after_s(8.0 * 86_400.0);
     rig.store.forget_deleted(later).await.unwrap();
     assert!(!rig.queue.submit(two).await.unwrap().replayed);

@@ -20,11 +20,11 @@ pub(super) struct File {
     content: &'static str,
 }
 
-/// Such a file in a path. `build.rs` takes the parts of Swagger UI out of its archive.
+/// Such a file in a path. `build/main.rs` extracts the files of Swagger UI from its archive.
 pub(super) const FILE: Variable<Words<File>> = Variable {
     name: "file",
     kind: "file of the page",
-    meaning: "What the page loads",
+    meaning: "File that the page loads",
     values: Words(|| {
         let file = |name, kind, content| (name, File { kind, content });
         vec![
@@ -61,8 +61,8 @@ pub(super) async fn file(_: Call, file: File) -> Result<impl IntoResponse, ApiEr
     Ok((headers(file.kind), file.content))
 }
 
-/// The page may load from here and ask here, and nothing else. Swagger UI sets styles of its elements, and
-/// has its icons in its stylesheet.
+/// The page may load files from this service and send requests to it, and to no other. Swagger UI sets styles on its
+/// elements, and its stylesheet contains its icons.
 fn headers(kind: &'static str) -> [(HeaderName, &'static str); 4] {
     [
         (header::CONTENT_TYPE, kind),

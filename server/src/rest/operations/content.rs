@@ -18,7 +18,7 @@ pub(super) fn bytes(media: &'static str) -> Content {
     vec![(media, anything)]
 }
 
-/// A stream of server-sent events, the data of each a `T` as JSON. The schema is of one event: OpenAPI
+/// A stream of server-sent events, the data of each a `T` as JSON. The schema is that of one event: OpenAPI
 /// 3.1 cannot describe the stream.
 pub(super) fn stream<T: JsonSchema>() -> Content {
     vec![("text/event-stream", |generator| {
@@ -35,12 +35,12 @@ pub(super) fn stream<T: JsonSchema>() -> Content {
     })]
 }
 
-/// The same as JSON Lines.
+/// A stream of events as JSON Lines.
 pub(super) fn lines() -> Content {
     vec![("application/jsonl", anything)]
 }
 
-/// A problem, as it is read: JSON Schema of `files::schema`.
+/// A problem, by the JSON Schema of `files::schema`.
 pub(super) fn the_problem() -> Content {
     vec![(
         "application/json",
@@ -55,7 +55,7 @@ pub(super) fn submission() -> Value {
     json!({ "problem": problem })
 }
 
-/// What JSON Schema cannot describe.
+/// The schema of content that JSON Schema cannot describe.
 pub(super) fn anything(_: &mut SchemaGenerator) -> Schema {
     Schema::default()
 }

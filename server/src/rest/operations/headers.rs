@@ -7,7 +7,7 @@ use crate::{
     rest::headers::{header, text},
 };
 
-/// Where what was created is.
+/// The path of a new resource.
 pub(super) fn location() -> Description {
     header("Location", text(), "The path of the resource")
 }
@@ -17,23 +17,23 @@ pub(super) fn etag() -> Description {
     header("ETag", text(), "The job's version, as a strong entity tag")
 }
 
-/// When to poll.
+/// How long to wait before polling.
 pub(super) fn retry_after() -> Description {
     let seconds = json!({ "type": "integer", "minimum": 0, "maximum": u32::MAX });
     header("Retry-After", seconds, "Seconds after which to poll")
 }
 
-/// Whether the request had been made before.
+/// Marks the answer to a repeated request.
 pub(super) fn replayed() -> Description {
     let yes = json!({ "type": "string", "enum": ["true"] });
     header(
         "Idempotency-Replayed",
         yes,
-        "The key or id was known: nothing new was submitted",
+        "The key or id was used before: nothing new was submitted",
     )
 }
 
-/// That the client's wish to wait was granted.
+/// Confirms that the client's preference to wait was applied.
 pub(super) fn preference_applied() -> Description {
     header(
         "Preference-Applied",

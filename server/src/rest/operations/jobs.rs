@@ -17,7 +17,7 @@ use crate::{
         jobs, submit,
     },
     verbs::{
-        bulk::Many,
+        bulk::BulkResult,
         jobs::ID,
         key::{IDEMPOTENCY_KEY, Keys},
         lists::{Count, GROUP_BY, ORDER_BY},
@@ -40,10 +40,10 @@ pub(super) fn operations() -> Vec<Operation> {
         put("/v1/jobs/{id}", (ID, KEY, PREFER), submit::put)
             .rpcs(&["CreateJob"])
             .named("PutJob")
-            .summary("Submits a job under an id that the client made; the same request again changes nothing")
+            .summary("Submits a job under an id chosen by the client; repeating the request changes nothing")
             .body(json::<Submission>())
             .example(submission())
-            .answers(200, "The job of that id, submitted before with the same content", json::<Job>())
+            .answers(200, "The job with this id, submitted before with the same content", json::<Job>())
             .with([location(), etag()])
             .sometimes_with(replayed())
             .submits()
@@ -70,7 +70,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .summary("Returns a job now, or after it has changed or ended")
             .answers(200, "The job", json::<Job>())
             .with([etag()])
-            .answers(304, "The version is the known one", nothing())
+            .answers(304, "The job has not changed", nothing())
             .with([etag()]),
         get("/v1/jobs/{id}/problem", (ID,), jobs::problem)
             .rpcs(&["GetJobProblem"])
@@ -84,7 +84,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .fails(&[Code::NotAcceptable]),
         patch("/v1/jobs/{id}", (ID, IF_MATCH), jobs::update)
             .rpcs(&["UpdateJob"])
-            .summary("Changes the name, labels or priority of a job, or whether it is kept for ever")
+            .summary("Changes the name, labels or priority of a job, or whether it is kept permanently")
             .body(json::<Edits>())
             .answers(200, "The changed job", json::<Job>())
             .with([etag()])
@@ -92,12 +92,12 @@ pub(super) fn operations() -> Vec<Operation> {
         post("/v1/jobs/{id}/cancel", (ID,), jobs::cancel)
             .rpcs(&["CancelJob"])
             .summary("Asks a job to stop; it is terminal within half a second")
-            .answers(200, "What that did, and the job", json::<jobs::Canceled>())
+            .answers(200, "The effect, and the job", json::<jobs::Canceled>())
             .with([etag()])
             .fails(&[Code::StorageFull]),
         post("/v1/jobs/{id}/retry", (ID, KEY, PREFER), submit::retry)
             .rpcs(&["RetryJob"])
-            .summary("Submits the problem of an ended job again, as a new job with the old one as its parent, which is solved without the cache; a body changes the limits and the priority of the new one")
+            .summary("Submits the problem of an ended job again: a new job, with the old one as its parent, that is solved without the cache; a body changes its limits and priority")
             .optional_body(json::<Retry>())
             .submits()
             .fails(&[Code::JobActive]),
@@ -109,29 +109,29 @@ pub(super) fn operations() -> Vec<Operation> {
         post("/v1/jobs/cancel", (FILTERS,), jobs::cancel_many)
             .rpcs(&["CancelJobs"])
             .summary("Asks all jobs that match the filters to stop")
-            .answers(200, "How many jobs matched, and how many of them changed", json::<Many>())
+            .answers(200, "How many jobs matched, and how many of them changed", json::<BulkResult>())
             .fails(&[Code::MissingFilter, Code::StorageFull]),
         delete("/v1/jobs", (FILTERS,), jobs::delete_many)
             .rpcs(&["DeleteJobs"])
             .summary("Deletes all jobs that match the filters and have ended, pinned ones too")
-            .answers(200, "How many jobs matched, and how many of them were deleted", json::<Many>())
+            .answers(200, "How many jobs matched, and how many of them were deleted", json::<BulkResult>())
             .fails(&[Code::MissingFilter, Code::StorageFull]),
     ]
 }
 
-/// Why a submission may be refused.
+/// The reasons for which a submission may be refused.
 const SUBMITTING: &[Code] = &[
     Code::InvalidProblem,
     Code::ProblemTooLarge,
     Code::IdempotencyKeyReuse,
-    Code::Deleted, // a key or id of a job that was
+    Code::Deleted, // the key or id of a deleted job
     Code::QueueFull,
     Code::Draining,
     Code::StorageFull,
 ];
 
 impl Operation {
-    /// Answers with the job that was submitted: when it is done, at once, or with its events.
+    /// Answers with the submitted job: when it has ended, at once, or with its events.
     fn submits(self) -> Self {
         let accepted = [json::<Job>(), stream::<Event>(), lines()].concat();
         self.answers(201, "The terminal job: it ended within the wait", json::<Job>())

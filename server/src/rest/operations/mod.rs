@@ -1,10 +1,10 @@
-//! The REST API as one list: every operation with its route and handler, the rpc that does the same,
-//! what it takes and what it answers. The router, `/openapi.json`, `docs/api.md` and the test of parity with gRPC
-//! are all made from this list, so none of them can know an operation that another does not.
+//! The REST API as one list: every operation with its route and handler, the corresponding rpc, its input and its
+//! answers. The router, `/openapi.json`, `docs/api.md` and the test of parity with gRPC
+//! are all made from this list, so that all of them have the same operations.
 //!
-//! Why no crate makes the document from the handlers (utoipa, aide): they describe what extractors read, while
-//! bodies are read here by hand, since all errors of a request are reported together. And the table must feed the
-//! parity test and the reference as well.
+//! The document is not generated from the handlers by a crate (utoipa, aide): these describe what extractors read,
+//! while bodies are read here by hand, since all errors of a request are reported together. The parity test and the
+//! reference need the list as well.
 
 // An entry, and the bodies and headers that entries name.
 mod content;
@@ -23,7 +23,7 @@ pub(super) use operation::{Answer, Content, Operation};
 
 use super::call::AppState;
 
-/// Name and subject of the groups, and what belongs to each, in the order in which they are documented.
+/// The groups in the order in which they are documented: name, subject and operations.
 pub(super) const GROUPS: [Group; 4] = [
     ("jobs", "Submit, get, list, watch, cancel", jobs::operations),
     ("results", "What a job has computed", results::operations),
@@ -69,7 +69,7 @@ mod tests {
         pb,
     };
 
-    /// The contract itself, not what was generated from it.
+    /// The rpcs of the contract itself, not of the code generated from it.
     fn rpcs() -> BTreeSet<String> {
         let files = prost_types::FileDescriptorSet::decode(pb::DESCRIPTORS)
             .unwrap()
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn every_operation_is_described_once_and_whole() {
+    fn every_operation_is_described_once_and_completely() {
         let mut ids = BTreeSet::new();
         let mut routes = BTreeSet::new();
         for operation in all() {
@@ -134,7 +134,7 @@ mod tests {
             assert!(!summary.ends_with('.'), "{summary}");
             assert!(
                 !operation.answers.is_empty(),
-                "{method} {path} answers nothing"
+                "{method} {path} has no answer"
             );
             for code in operation.errors() {
                 assert!(
@@ -147,7 +147,7 @@ mod tests {
 
     /// A handler receives a variable by its name.
     #[test]
-    fn every_variable_of_a_path_is_taken_and_every_parameter_once() {
+    fn every_variable_of_a_path_is_read_and_every_parameter_is_read_once() {
         for Operation {
             path, parameters, ..
         } in all()
@@ -164,8 +164,8 @@ mod tests {
         }
     }
 
-    /// The operations that tests cover by their own account: a line `/// Operations: CreateJob, GetJob` above a
-    /// test, or such a line after `#` in a script.
+    /// The operations that tests claim to cover: by a line `/// Operations: CreateJob, GetJob` above a test, or by such
+    /// a line after `#` in a script.
     fn tested() -> BTreeSet<String> {
         let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests");
         let mut found = BTreeSet::new();

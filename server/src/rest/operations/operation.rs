@@ -16,20 +16,20 @@ use crate::{
 
 /// An operation of the API.
 pub(in crate::rest) struct Operation {
-    /// In capitals.
+    /// The HTTP method, in capitals.
     pub(in crate::rest) method: &'static str,
-    /// With its variables in braces.
+    /// The path, with its variables in braces.
     pub(in crate::rest) path: &'static str,
     pub(super) route: MethodRouter<AppState>,
     /// Name of its group.
     pub(in crate::rest) group: &'static str,
-    /// The rpcs that do the same, the closest one first; none: over REST only.
+    /// The corresponding rpcs, the closest one first; empty if it exists over REST only.
     pub(in crate::rest) rpcs: &'static [&'static str],
     /// Name of the operation: that of the first rpc, if there is one.
     pub(in crate::rest) id: &'static str,
     /// One line, without a full stop.
     pub(in crate::rest) summary: &'static str,
-    /// As its input describes them.
+    /// The parameters, as its input describes them.
     pub(in crate::rest) parameters: Vec<Description>,
     /// The body of a request.
     pub(in crate::rest) body: Option<Content>,
@@ -38,7 +38,7 @@ pub(in crate::rest) struct Operation {
     pub(in crate::rest) example: Option<Value>,
     /// The successful answers.
     pub(in crate::rest) answers: Vec<Answer>,
-    /// It refuses parameters that it does not know.
+    /// It refuses unknown parameters.
     strict: bool,
     errors: Vec<Code>,
 }
@@ -48,17 +48,17 @@ pub(in crate::rest) struct Answer {
     pub(in crate::rest) status: u16,
     pub(in crate::rest) meaning: &'static str,
     pub(in crate::rest) content: Content,
-    /// Each with whether it is always there.
+    /// Each header, and whether it is always sent.
     pub(in crate::rest) headers: Vec<(Description, bool)>,
 }
 
 /// A body: its schema by media type.
 pub(in crate::rest) type Content = Vec<(&'static str, SchemaOf)>;
 
-/// The schema of a type, by way of the generator that collects the parts.
+/// Makes the schema of a type with a generator, which collects the schemas that it refers to.
 pub(in crate::rest) type SchemaOf = fn(&mut SchemaGenerator) -> Schema;
 
-/// The handler receives what `input` reads: a parameter that is not listed here cannot be asked for there.
+/// The handler receives the values of `input`, so that it cannot use a parameter that is not listed.
 fn operation<T, H>(
     (method, filter): (&'static str, MethodFilter),
     path: &'static str,
@@ -107,20 +107,20 @@ pub(super) fn probe<H: Handler<()>>(path: &'static str, handler: H) -> Operation
 }
 
 impl Operation {
-    /// The rpcs that do the same.
+    /// The corresponding rpcs.
     pub(super) fn rpcs(mut self, rpcs: &'static [&'static str]) -> Self {
         self.rpcs = rpcs;
         self.id = rpcs.first().copied().unwrap_or_default();
         self
     }
 
-    /// Over REST only, under this name.
+    /// An operation over REST only, with this name.
     pub(super) fn rest_only(mut self, id: &'static str) -> Self {
         self.id = id;
         self
     }
 
-    /// A second operation for the same rpc, under this name.
+    /// The name of a second operation for the same rpc.
     pub(super) fn named(mut self, id: &'static str) -> Self {
         self.id = id;
         self
@@ -138,7 +138,7 @@ impl Operation {
         self
     }
 
-    /// A body that may also be left out.
+    /// A body that may be left out.
     pub(super) fn optional_body(self, body: Content) -> Self {
         Operation {
             needs_body: false,
@@ -173,7 +173,7 @@ impl Operation {
         self
     }
 
-    /// A header that it may have.
+    /// A header that the previous answer may have.
     pub(super) fn sometimes_with(mut self, header: Description) -> Self {
         if let Some(answer) = self.answers.last_mut() {
             answer.headers.push((header, false));
@@ -212,7 +212,7 @@ impl Operation {
             ]);
         }
         codes.extend(&self.errors);
-        // in the order of the catalogue, each once
+        // in the order of the catalog, each once
         Code::VARIANTS
             .iter()
             .copied()

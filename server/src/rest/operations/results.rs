@@ -1,4 +1,4 @@
-//! What a job has computed, as data and as figures.
+//! The results of a job, as data and as figures.
 
 use solver::solution::{ContactProfile, Fields};
 
@@ -68,22 +68,26 @@ pub(super) fn operations() -> Vec<Operation> {
     ]
 }
 
-/// Why there is nothing to return.
+/// The errors if there is nothing to return.
 const NO_RESULT: &[Code] = &[Code::NoResult, Code::ResultNotReady];
 
 impl Operation {
-    /// Answers with a file: whole, a part of it, or that it is known.
+    /// Answers with a file, with a part of it, or with 304 if the client has it.
     fn file(self, meaning: &'static str, content: Content) -> Self {
         let tag = || header("ETag", text(), "The file's SHA-256");
         let name = || header("Content-Disposition", text(), "A name for the file");
         let whole_file = header("Content-Digest", text(), "Its SHA-256 (RFC 9530)");
         let parts = content.iter().flat_map(|(media, _)| bytes(media)).collect();
-        let part = header("Content-Range", text(), "Which part, and of how much");
+        let part = header(
+            "Content-Range",
+            text(),
+            "The part, and the size of the file",
+        );
         self.answers(200, meaning, content)
             .with([tag(), name(), whole_file])
-            .answers(206, "The part that was asked for", parts)
+            .answers(206, "The requested part", parts)
             .with([tag(), name(), part])
-            .answers(304, "The file is the known one", nothing())
+            .answers(304, "The file has not changed", nothing())
             .with([tag()])
             .fails(&[Code::NotAcceptable, Code::RangeNotSatisfiable])
     }

@@ -20,7 +20,7 @@ pub(super) fn operations() -> Vec<Operation> {
     vec![
         post("/v1/problems/validate", (), submit::validate)
             .rpcs(&["ValidateProblem"])
-            .summary("Checks a problem and estimates its cost; stores nothing, and an invalid problem is an answer, too")
+            .summary("Checks a problem and estimates its cost; stores nothing; an invalid problem is also answered with 200")
             .body(json::<BareProblem>())
             .example(submission())
             .answers(200, "Whether it is valid, and its estimated cost", json::<Validation>())
@@ -45,7 +45,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "Version and limits", json::<Info>()),
         get("/v1/me", (), service::me)
             .rpcs(&["GetCaller"])
-            .summary("Returns who is asking, and what they may do")
+            .summary("Returns the caller: their owner name and scopes")
             .answers(200, "The caller", json::<Caller>()),
         get("/v1/errors/{code}", (CODE,), service::error)
             .rest_only("GetError")
@@ -53,7 +53,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "The explanation", [json::<Kind>(), bytes("text/html")].concat()),
         get("/v1/schema/problem.json", (), service::schema)
             .rest_only("GetProblemSchema")
-            .summary("Returns the JSON Schema of a problem: every name, what it means and its default")
+            .summary("Returns the JSON Schema of a problem: every field with its meaning and default")
             .answers(200, "The schema", bytes("application/json")),
         get("/openapi.json", (), service::openapi)
             .rest_only("GetOpenApi")
@@ -77,11 +77,11 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "ok", bytes("text/plain")),
         probe("/readyz", service::readyz)
             .rest_only("Ready")
-            .summary("Answers 200 as long as the service takes jobs")
+            .summary("Answers 200 as long as the service accepts jobs")
             .answers(200, "ok", bytes("text/plain"))
             .fails(&[Code::Draining]),
     ]
 }
 
-/// Types of the files of the page.
+/// Media types of the files of the page.
 const PARTS: [&str; 3] = ["text/css", "text/javascript", "text/plain"];

@@ -1,4 +1,4 @@
-//! The store by itself.
+//! The store alone.
 #![allow(clippy::unwrap_used)]
 
 mod owners;
@@ -12,8 +12,7 @@ use crate::{
 };
 
 impl Store {
-    /// Makes the disk full after so many more pages, until that is found out: the connection that has met it is
-    /// replaced.
+    /// Makes the disk full after this number of further pages, until a write fails: the connection is then replaced.
     pub(crate) async fn bound(&self, more: i64) {
         let pages: i64 = sqlx::query_scalar("pragma page_count")
             .fetch_one(&self.writer)
@@ -23,7 +22,7 @@ impl Store {
         sqlx::query(limit).execute(&self.writer).await.unwrap();
     }
 
-    /// Nobody has found out yet.
+    /// Whether no write has failed yet.
     pub(crate) async fn is_bound(&self) -> bool {
         let pages: i64 = sqlx::query_scalar("pragma max_page_count")
             .fetch_one(&self.writer)
@@ -33,7 +32,7 @@ impl Store {
     }
 }
 
-/// A job with an input of its own, which answers nobody else.
+/// A job with an input of its own, whose result answers no other job.
 fn new(input: &str) -> NewJob {
     NewJob {
         id: None,
@@ -51,7 +50,7 @@ fn new(input: &str) -> NewJob {
     }
 }
 
-/// What this owner hands in.
+/// A submission of this owner.
 fn by(owner: &str, jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
     let key = key.map(|key| RequestKey {
         key: key.into(),
@@ -67,7 +66,7 @@ fn by(owner: &str, jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
 
 /// SQLite ends a transaction by itself when the disk is full, and the driver does not notice.
 #[tokio::test]
-async fn a_full_disk_refuses_and_does_not_end_the_writing_for_ever() {
+async fn a_full_disk_refuses_jobs_and_writing_continues_when_there_is_space() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     store.bound(4).await;
@@ -87,9 +86,13 @@ async fn a_full_disk_refuses_and_does_not_end_the_writing_for_ever() {
         }
     };
     assert!(matches!(refused, StoreError::Full), "{refused}");
-    assert_eq!(store.waiting(), accepted, "the line is what is on the disk");
+    assert_eq!(
+        store.waiting(),
+        accepted,
+        "the waiting jobs are those on the disk"
+    );
     store.bound(4).await;
-    // so large that the database has to write before it is told to commit, and undoes everything by itself
+    // so large that the database has to write before the commit, and undoes everything by itself
     let large = store.submit(submission(&"x".repeat(20 << 20)), false).await;
     assert!(matches!(large, Err(StoreError::Full)), "{large:?}");
     store.bound(1_000_000).await; // there is room again

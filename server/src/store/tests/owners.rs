@@ -1,4 +1,4 @@
-//! Two owners: each sees only what is their own, and whoever sees everybody's sees both.
+//! Two owners: each sees only their own jobs, and a caller who sees every owner's jobs sees both.
 
 use super::*;
 use crate::job::{Job, JobId};
@@ -13,7 +13,7 @@ struct Two {
     bob: Job,
 }
 
-/// A job of each, alike in all but the owner: handed in under the same key, with the same name and label.
+/// A job of each, equal in all but the owner: submitted under the same key, with the same name and label.
 async fn two_owners() -> Two {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
@@ -26,7 +26,10 @@ async fn two_owners() -> Two {
         };
         let submission = by(owner, vec![job], Some("key"));
         let accepted = store.submit(submission, false).await.unwrap();
-        assert!(!accepted.replayed, "the key of another is no key of mine");
+        assert!(
+            !accepted.replayed,
+            "the key of another owner is a different key"
+        );
         accepted.jobs.into_iter().next().unwrap()
     };
     let (ada, bob) = (submit("ada").await, submit("bob").await);
@@ -39,7 +42,7 @@ async fn two_owners() -> Two {
     }
 }
 
-/// Runs all that wait, and has them succeed.
+/// Runs all waiting jobs, which succeed.
 async fn run_all(store: &Store) {
     let ending = Ending {
         status: Status::Succeeded,
@@ -54,7 +57,7 @@ async fn run_all(store: &Store) {
 }
 
 #[tokio::test]
-async fn a_job_is_found_by_its_owner_and_by_who_sees_all() {
+async fn a_job_is_found_by_its_owner_and_by_a_caller_who_sees_all() {
     let Two {
         _folder,
         store,
@@ -80,7 +83,7 @@ async fn a_job_is_found_by_its_owner_and_by_who_sees_all() {
 }
 
 #[tokio::test]
-async fn lists_counts_and_keys_hold_what_the_owner_sees() {
+async fn lists_counts_and_keys_contain_only_the_visible_jobs() {
     let Two {
         _folder,
         store,
@@ -143,7 +146,7 @@ async fn lists_counts_and_keys_hold_what_the_owner_sees() {
     }
     let counted = store.count(ADA, &all, Some(GroupBy::Owner)).await.unwrap();
     assert_eq!(counted, [("ada".to_string(), 1)]);
-    // who asks for another's jobs finds none
+    // a filter for another owner's jobs finds none
     let bobs = Filter {
         owner: Some("bob".into()),
         ..all
@@ -170,7 +173,7 @@ async fn lists_counts_and_keys_hold_what_the_owner_sees() {
 }
 
 #[tokio::test]
-async fn a_request_key_stands_for_the_jobs_of_who_used_it() {
+async fn a_request_key_belongs_to_the_owner_who_used_it() {
     let Two {
         _folder,
         store,
@@ -189,7 +192,7 @@ async fn a_request_key_stands_for_the_jobs_of_who_used_it() {
 }
 
 #[tokio::test]
-async fn an_id_of_another_owner_is_refused_and_shows_nothing() {
+async fn an_id_of_another_owner_is_refused_without_revealing_the_job() {
     let Two {
         _folder,
         store,
@@ -214,7 +217,7 @@ async fn an_id_of_another_owner_is_refused_and_shows_nothing() {
     };
     assert_eq!(replayed("ada").await.unwrap().id, ada.id);
     assert!(replayed("bob").await.is_none());
-    // the same answer whether that job is there, or was deleted
+    // the same answer whether that job exists or was deleted
     let refused = submit("bob").await;
     assert!(
         matches!(refused, Err(StoreError::IdConflict(id)) if id == ada.id),
@@ -235,7 +238,7 @@ async fn an_id_of_another_owner_is_refused_and_shows_nothing() {
 }
 
 #[tokio::test]
-async fn nobody_changes_or_deletes_a_job_of_another() {
+async fn a_job_of_another_owner_cannot_be_changed_or_deleted() {
     let Two {
         _folder,
         store,
@@ -284,7 +287,7 @@ async fn nobody_changes_or_deletes_a_job_of_another() {
 
 /// Results are found by their input alone: whether owners share them is a policy that does not exist yet.
 #[tokio::test]
-async fn a_result_answers_jobs_of_the_same_input_whoever_their_owner() {
+async fn a_result_answers_jobs_of_the_same_input_of_any_owner() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let submit = async |owner| {

@@ -1,8 +1,8 @@
-//! Questions that are asked often, or of very many jobs, are answered by indexes.
+//! Frequent queries, and queries over very many jobs, use indexes.
 
 use super::*;
 
-/// The steps by which the database would answer.
+/// The steps of the database's query plan.
 async fn plan(store: &Store, question: &str) -> Vec<String> {
     let plan = sqlx::AssertSqlSafe(format!("explain query plan {question}"));
     let plan: Vec<(i64, i64, i64, String)> =
@@ -14,10 +14,10 @@ fn sorts(steps: &[String]) -> bool {
     steps.iter().any(|step| step.contains("TEMP B-TREE"))
 }
 
-/// What every submit, start and tick of the clock asks looks at as many rows as it gives, however many jobs
+/// The queries of every submission, start and periodic task read as many rows as they return, however many jobs
 /// there are.
 #[tokio::test]
-async fn the_questions_of_the_queue_are_answered_by_indexes() {
+async fn the_queries_of_the_queue_use_indexes() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     for question in [
@@ -32,10 +32,10 @@ async fn the_questions_of_the_queue_are_answered_by_indexes() {
     }
 }
 
-/// A page of one owner's jobs costs no look at those of others, nor a sort; counts and bulk changes look at that
-/// owner's jobs alone.
+/// A page of one owner's jobs reads no jobs of others and needs no sort; counts and bulk changes read that owner's
+/// jobs alone.
 #[tokio::test]
-async fn lists_of_one_owner_are_answered_by_indexes() {
+async fn lists_of_one_owner_use_indexes() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let mine = Filter {

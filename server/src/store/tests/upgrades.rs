@@ -4,7 +4,7 @@ use sqlx::{AssertSqlSafe, SqlitePool, migrate::Migrator, sqlite::SqliteConnectOp
 
 use super::*;
 
-/// A store with the tables of these migrations and no later ones, and with what these statements insert.
+/// A store with the tables of these migrations and no later ones, and with the rows that these statements insert.
 async fn older_store(folder: &Path, migrations: &[&str], statements: &[&'static str]) {
     let older = folder.join("migrations");
     std::fs::create_dir(&older).unwrap();
@@ -37,7 +37,7 @@ const BEFORE_THE_JOB_API: [&str; 4] = [
     "insert into result_part (job_id, name, piece, body) values (1, 'fields', 0, x'7b'), (1, 'fields', 1, x'7d')",
 ];
 
-/// A job that waits, one that waits for its end, and one that was deleted; all of the one owner that there was.
+/// A job that waits, two that wait for its end, and one that was deleted; all of the only owner of that time.
 const BEFORE_OWNERS: [&str; 5] = [
     "insert into problem (input_hash, body) values ('sha256:1', '{}')",
     "insert into job (uuid, status, input_hash, created_at)
@@ -50,7 +50,7 @@ const BEFORE_OWNERS: [&str; 5] = [
 ];
 
 #[tokio::test]
-async fn a_store_from_before_the_job_api_is_brought_up_to_date_with_all_that_is_in_it() {
+async fn a_store_from_before_the_job_api_is_upgraded_with_its_content() {
     let folder = tempfile::tempdir().unwrap();
     let migrations = ["0001_jobs.sql", "0002_meshes.sql"];
     older_store(folder.path(), &migrations, &BEFORE_THE_JOB_API).await;
@@ -76,7 +76,7 @@ async fn a_store_from_before_the_job_api_is_brought_up_to_date_with_all_that_is_
     let info = found.part_info("fields").await.unwrap().unwrap();
     drop(found);
     assert_eq!((info.bytes, info.digest.len()), (2, 32));
-    // the one that waited is in line, and is not taken for one that has waited too long
+    // the waiting job is in the queue, and does not count as having waited too long
     assert_eq!(store.waiting(), 1);
     assert!(
         store
@@ -86,7 +86,7 @@ async fn a_store_from_before_the_job_api_is_brought_up_to_date_with_all_that_is_
             .is_empty()
     );
     assert!(store.claim_next().await.unwrap().0.is_some());
-    // what an older program has found answers nobody
+    // a result of an older program answers no other job
     assert_eq!(
         store.delete(Owners::All, key).await.unwrap(),
         Deletion::Deleted
