@@ -9,16 +9,24 @@ use crate::error::escape;
 
 /// Whether all numbers of a value are finite.
 pub fn is_finite<T: Serialize + ?Sized>(value: &T) -> bool {
-    let mut walk = Walk::new(1);
+    let mut walk = Walk::new(Limit::StopAtFirst);
     value.serialize(&mut walk).is_ok()
 }
 
-/// JSON Pointers to the numbers of a value that are not finite; the first `most` of them.
-pub fn not_finite<T: Serialize + ?Sized>(value: &T, most: usize) -> Vec<String> {
-    let mut walk = Walk::new(most);
-    // an error only means that `most` are found
+/// JSON Pointers to the numbers of a value that are not finite, the first `most` of them; and how many more there are.
+pub fn not_finite<T: Serialize + ?Sized>(value: &T, most: usize) -> (Vec<String>, usize) {
+    let mut walk = Walk::new(Limit::List(most));
+    // nothing here fails: only the other limit ends a walk with an error
     let _ = value.serialize(&mut walk);
-    walk.found
+    (walk.found, walk.more)
+}
+
+/// How far a walk goes.
+enum Limit {
+    /// To the first number that is not finite; that ends it with an error.
+    StopAtFirst,
+    /// Through the whole value, with a list of the first so many.
+    List(usize),
 }
 
 /// A serializer that writes nothing and checks every number.
@@ -26,7 +34,9 @@ struct Walk {
     /// The way from the whole value to the current one.
     path: Vec<Step>,
     found: Vec<String>,
-    most: usize,
+    /// Numbers beyond those of the list.
+    more: usize,
+    limit: Limit,
     /// The next string is the key of an entry.
     in_key: bool,
 }
@@ -39,11 +49,12 @@ enum Step {
 }
 
 impl Walk {
-    fn new(most: usize) -> Self {
+    fn new(limit: Limit) -> Self {
         Walk {
             path: Vec::new(),
             found: Vec::new(),
-            most,
+            more: 0,
+            limit,
             in_key: false,
         }
     }
@@ -57,12 +68,14 @@ impl Walk {
             Step::Key(name) => format!("/{}", escape(name)),
             Step::Index(place) => format!("/{place}"),
         };
-        self.found.push(self.path.iter().map(step).collect());
-        if self.found.len() < self.most {
-            Ok(())
-        } else {
-            Err(fmt::Error)
+        match self.limit {
+            Limit::StopAtFirst => return Err(fmt::Error),
+            Limit::List(most) if self.found.len() < most => {
+                self.found.push(self.path.iter().map(step).collect());
+            }
+            Limit::List(_) => self.more += 1,
         }
+        Ok(())
     }
 
     /// A part of the value, one step further.
@@ -362,8 +375,9 @@ mod tests {
             "/by_name/d/pair/1",
             "/by_name/e/ring/outer",
         ];
-        assert_eq!(not_finite(&whole(), 100), all);
-        assert_eq!(not_finite(&whole(), 2), all[..2]);
+        let all = all.map(str::to_owned).to_vec();
+        assert_eq!(not_finite(&whole(), 2), (all[..2].to_vec(), 3));
+        assert_eq!(not_finite(&whole(), 100), (all, 0));
         assert!(!is_finite(&whole()));
         assert!(is_finite(&Whole {
             bad: None,

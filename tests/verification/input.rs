@@ -109,6 +109,15 @@ fn nan_and_infinity_are_refused_everywhere() {
             pair("/contacts/0/indentation", "not_finite")
         ]
     );
+    // those that are not listed are counted
+    p.mesh.grid_mut().unwrap().x = vec![f64::NAN; 250];
+    let list = solver::check(&p, None).unwrap_err();
+    assert_eq!(list.len(), 100);
+    assert!(
+        list[99].hint.ends_with("(151 more violations.)"),
+        "{}",
+        list[99].hint
+    );
 }
 
 #[test]

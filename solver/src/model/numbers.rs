@@ -14,7 +14,8 @@ impl Checks {
     /// NaN and infinity cannot come from JSON, but from protobuf.
     pub(super) fn finite(&mut self, problem: &Problem) -> Checked {
         let mut all = AllChecks::default();
-        for pointer in not_finite(problem, MOST_LISTED) {
+        let (listed, more) = not_finite(problem, MOST_LISTED);
+        for pointer in listed {
             all.fail(self.report(
                 pointer,
                 Reason::NotFinite,
@@ -23,6 +24,7 @@ impl Checks {
                 "Check the computation that produced it.",
             ));
         }
+        self.found.count(more);
         all.finish(())
     }
 
