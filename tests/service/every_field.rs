@@ -213,6 +213,7 @@ fn text(message: &str, field: &str, count: usize) -> String {
         ("Job", "reason") => "timed_out".into(),
         ("QueuePosition", "reason") => "paused".into(),
         ("Violation", "reason") => "missing".into(),
+        ("Warning", "code") => "no_contact".into(),
         ("StageEvent", "stage") => "factor".into(),
         ("Iteration" | "Summary", "stage") => "inner".into(),
         _ => format!("text {count}"),

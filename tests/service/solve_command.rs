@@ -1,6 +1,6 @@
 //! `signorini solve FILE`.
 
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use serde_json::{Value, json};
 use suite::{example, example_json};
@@ -187,5 +187,16 @@ fn an_invalid_output_is_rejected_before_solving() {
             error.contains(expected) && error.lines().count() == 1,
             "{error}"
         );
+    }
+}
+
+#[test]
+fn a_reader_that_closes_the_pipe_is_not_an_error() {
+    for arguments in [&["openapi"][..], &["schema"], &["explain"]] {
+        let mut command = Command::new(SIGNORINI);
+        let child = command.args(arguments).stdout(Stdio::piped()).spawn();
+        let mut child = child.unwrap();
+        drop(child.stdout.take());
+        assert_eq!(child.wait().unwrap().code(), Some(0), "{arguments:?}");
     }
 }

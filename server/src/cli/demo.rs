@@ -1,7 +1,7 @@
 //! `signorini demo`: a service on a free port with a temporary store, to which the five examples are
 //! submitted over both protocols, as any client submits them.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 
 use anyhow::{Context, bail, ensure};
 use eventsource_stream::Eventsource;
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use solver::solution::{ContactProfile, Iteration};
 use tonic::transport::Channel;
 
-use super::{examples, exit::Exit, report};
+use super::{examples, exit::Exit, output, report};
 use crate::{
     app::App,
     config::{Config, MemoryBudget},
@@ -39,7 +39,9 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
 }
 
 async fn show(url: &str) -> anyhow::Result<Exit> {
-    println!("Service at {url}, REST and gRPC on one port, its store in a temporary folder.\n");
+    output::print(&format!(
+        "Service at {url}, REST and gRPC on one port, its store in a temporary folder.\n\n"
+    ))?;
     let rest = Rest {
         // A local address, which a proxy from the environment could not reach.
         client: Client::builder().no_proxy().build()?,
@@ -77,7 +79,9 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
             "{name}: REST and gRPC differ: {} and {digest}",
             summary["digest"]
         );
-        println!("  {name:<18} both    same bits: {digest:.23}…\n");
+        output::print(&format!(
+            "  {name:<18} both    same bits: {digest:.23}…\n\n"
+        ))?;
         first.get_or_insert((by_rest.clone(), summary));
     }
 
@@ -92,17 +96,17 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
             .get(&format!("/v1/jobs/{id}/profiles/{boundary}"))
             .await?;
         let profile: ContactProfile = serde_json::from_value(profile)?;
-        println!(
-            "Stresses of {name} along {boundary:?}:\n\n{}",
+        output::print(&format!(
+            "Stresses of {name} along {boundary:?}:\n\n{}\n",
             report::profile(&profile)
-        );
+        ))?;
     }
     let force = |name: &str| summary[name].as_f64().unwrap_or(f64::NAN);
-    println!(
-        "normal force {:.4}, tangential force {:.4}",
+    output::print(&format!(
+        "normal force {:.4}, tangential force {:.4}\n",
         force("normal_force"),
         force("tangential_force")
-    );
+    ))?;
     Ok(Exit::Ok)
 }
 
@@ -257,14 +261,12 @@ impl Line {
         self.iterations = k;
         self.last =
             format!("{k:>4} {stage:<12} residual {residual:8.2e}  friction {friction:8.2e}");
-        let mut out = std::io::stdout().lock();
-        if self.terminal {
+        let Line { head, last, .. } = self;
+        output::print(&match self.terminal {
             // return to the start of the line, write, clear the rest
-            write!(out, "\r{}{}\x1b[K", self.head, self.last)?;
-        } else {
-            writeln!(out, "{}{}", self.head, self.last)?;
-        }
-        out.flush()?;
+            true => format!("\r{head}{last}\x1b[K"),
+            false => format!("{head}{last}\n"),
+        })?;
         Ok(())
     }
 
@@ -281,13 +283,13 @@ impl Line {
             terminal,
         } = self;
         if terminal {
-            println!("\r{head}{last}\x1b[K");
+            output::print(&format!("\r{head}{last}\x1b[K\n"))?;
         }
         ensure!(succeeded, "the job failed: {}", failure.unwrap_or_default());
-        println!(
-            "{head}    converged after {iterations} iterations, {:.3} s",
+        output::print(&format!(
+            "{head}    converged after {iterations} iterations, {:.3} s\n",
             run_s.unwrap_or_default()
-        );
+        ))?;
         Ok(())
     }
 }

@@ -3,7 +3,7 @@
 use clap::Args;
 use strum::VariantArray;
 
-use super::exit::Exit;
+use super::{exit::Exit, output};
 use crate::catalog::{Code, Kind};
 
 #[derive(Debug, Args)]
@@ -14,10 +14,11 @@ pub(super) struct Arguments {
 
 pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
     let Some(code) = code else {
-        for code in Code::VARIANTS {
+        let line = |code: &Code| {
             let Kind { code, title, .. } = code.kind();
-            println!("{code:<24} {title}");
-        }
+            format!("{code:<24} {title}\n")
+        };
+        output::print(&Code::VARIANTS.iter().map(line).collect::<String>())?;
         return Ok(Exit::Ok);
     };
     // a job's reason is the code with underscores; the type of an error is the address of its page
@@ -29,10 +30,17 @@ pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
         return Ok(Exit::Invalid);
     };
     let kind = found.kind();
-    println!("{} ({})", kind.title, kind.code);
-    for fact in kind.facts() {
-        println!("{fact}");
-    }
-    println!("\n{}", kind.explanation);
+    let facts: String = kind
+        .facts()
+        .iter()
+        .map(|fact| format!("{fact}\n"))
+        .collect();
+    let Kind {
+        title,
+        code,
+        explanation,
+        ..
+    } = kind;
+    output::print(&format!("{title} ({code})\n{facts}\n{explanation}\n"))?;
     Ok(Exit::Ok)
 }

@@ -61,12 +61,11 @@ pub fn main() -> ExitCode {
         Command::Schema => solve::schema(),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Openapi { reference } => {
-            if reference {
-                print!("{}", rest::reference());
-            } else {
-                println!("{:#}", rest::openapi());
-            }
-            Ok(Exit::Ok)
+            let text = match reference {
+                true => rest::reference(),
+                false => format!("{:#}\n", rest::openapi()),
+            };
+            output::print(&text).map(|()| Exit::Ok).map_err(Into::into)
         }
         Command::Demo => {
             log(LevelFilter::WARN);

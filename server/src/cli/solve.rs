@@ -1,7 +1,6 @@
 //! `signorini solve FILE`: runs the same code as a worker of the service.
 
 use std::{
-    io::Write,
     ops::ControlFlow,
     path::{Path, PathBuf},
     time::Instant,
@@ -110,7 +109,7 @@ pub(super) fn run(
         output.write(&problem, *theme, &document)?;
     }
     if outputs.is_empty() {
-        print(&report::document(title, &document))?;
+        output::print(&report::document(title, &document))?;
     }
     Ok(if document.summary.solution.converged {
         Exit::Ok
@@ -121,7 +120,7 @@ pub(super) fn run(
 
 /// `signorini schema`.
 pub(super) fn schema() -> anyhow::Result<Exit> {
-    print(&format!("{:#}\n", files::schema()))?;
+    output::print(&format!("{:#}\n", files::schema()))?;
     Ok(Exit::Ok)
 }
 
@@ -136,10 +135,4 @@ fn invalid(file: &Path, violations: &[Violation]) -> Exit {
         eprintln!("  {violation}");
     }
     Exit::Invalid
-}
-
-fn print(text: &str) -> std::io::Result<()> {
-    let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    out.flush()
 }

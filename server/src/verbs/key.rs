@@ -5,7 +5,7 @@ use crate::parameters::{Parameter, Values};
 /// The key; over gRPC the field `request_id`.
 pub const IDEMPOTENCY_KEY: Parameter<Keys> = Parameter {
     name: "Idempotency-Key",
-    meaning: "Key chosen by the client for this request: repeated with the same key, it is answered with the job that it created",
+    meaning: "Key chosen by the client for this request: if it is repeated with the same key, the answer is what the first one created",
     values: Keys,
 };
 
