@@ -402,6 +402,7 @@ fn forces_that_hold_a_bonded_contact_are_compared_too() {
              "tangential_displacement": 0.02,
              "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}}
         ],
+        "steps": [{"tangential_displacement": 1}],
         "solver": {"check_increments": true, "check_uniqueness": true}
     }))
     .unwrap();
