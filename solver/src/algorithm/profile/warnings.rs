@@ -102,7 +102,7 @@ impl PatchView<'_> {
             warn(
                 WarningCode::MeshTooCoarseForContact,
                 format!(
-                    "Only {edges} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a reliable pressure. {} Refine the mesh there.",
+                    "Only {edges} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a pressure to rely on. {} Refine the mesh there.",
                     self.peak_uncertainty(edges)
                 ),
             );
@@ -113,7 +113,7 @@ impl PatchView<'_> {
             warn(
                 WarningCode::ContactReachesObstacleEnd,
                 format!(
-                    "The body presses against the end of the obstacle, s = {s:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the real obstacle does not end there, extend it."
+                    "The body presses against the very end of the obstacle, s = {s:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the obstacle goes on there, extend it."
                 ),
             );
         }
@@ -145,7 +145,7 @@ impl PatchView<'_> {
         let (mirrored, sharp): (Vec<usize>, Vec<usize>) = pressed.partition(|&i| self.symmetric(i));
         let across = edges * (1 + mirrored.len());
         if across == 0 {
-            "Its peak is unknown.".to_owned()
+            "Nothing is known of its peak.".to_owned()
         } else if !sharp.is_empty() {
             "At the obstacle's end its peak has no limit.".to_owned()
         } else {
