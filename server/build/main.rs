@@ -24,10 +24,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     fs::write(out.join("descriptors.bin"), descriptors.encode_to_vec())?;
     let pool = DescriptorPool::from_file_descriptor_set(descriptors.clone())?;
     fs::write(out.join("conversions.rs"), conversions::source(&pool)?)?;
-    // Ordered maps, so that equal responses have equal bytes.
+    let mut types = prost_build::Config::new();
+    // Ordered maps, so that equal responses have equal bytes; names, by which the codec finds a message's descriptor.
+    types.btree_map(["."]).enable_type_names();
     tonic_prost_build::configure()
-        .btree_map(".")
-        .compile_fds(descriptors)?;
+        .codec_path("crate::codec::Codec")
+        .compile_fds_with_config(descriptors, types)?;
     swagger_ui(&out)
 }
 

@@ -4,13 +4,20 @@
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 
 use anyhow::Context;
-use axum::serve::ListenerExt;
-use tokio::{net::TcpListener, task::JoinHandle, time::timeout};
+use tokio::{task::JoinHandle, time::timeout};
 use tokio_util::sync::CancellationToken;
 use tonic_health::server::HealthReporter;
 use tracing::{info, warn};
 
-use crate::{config::Config, grpc, queue::Queue, rest, store::Store, verbs::Service};
+use crate::{
+    config::Config,
+    grpc,
+    listener::{self, Listener},
+    queue::Queue,
+    rest,
+    store::Store,
+    verbs::Service,
+};
 
 /// The service, listening.
 #[derive(Debug)]
@@ -21,7 +28,7 @@ pub struct App {
     health: HealthReporter,
     /// Closes the listener and, one by one, the connections.
     closing: CancellationToken,
-    server: JoinHandle<std::io::Result<()>>,
+    server: JoinHandle<()>,
     grace: Duration,
 }
 
@@ -49,23 +56,12 @@ impl App {
         let (grpc, health) = grpc::router(service.clone()).await?;
         let router = rest::router(service, grpc);
 
-        let listener = TcpListener::bind(config.listen)
-            .await
+        let most = listener::most_connections(config.max_connections);
+        let listener = Listener::bind(config.listen, most)
             .with_context(|| format!("cannot listen on {}", config.listen))?;
-        let address = listener.local_addr()?;
-        // Events are small and should be sent at once.
-        let listener = listener.tap_io(|connection| {
-            if let Err(error) = connection.set_nodelay(true) {
-                tracing::debug!(%error, "TCP_NODELAY: {error}");
-            }
-        });
+        let address = listener.address()?;
         let closing = CancellationToken::new();
-        let closed = closing.clone().cancelled_owned();
-        let server = tokio::spawn(
-            axum::serve(listener, router)
-                .with_graceful_shutdown(closed)
-                .into_future(),
-        );
+        let server = tokio::spawn(listener.serve(router, closing.clone()));
         queue.start();
         info!(%address, workers = config.workers, "listening on {address}");
         if !address.ip().is_loopback() {
@@ -95,8 +91,8 @@ impl App {
         self.queue.drain().await;
         self.closing.cancel();
         match timeout(self.grace, self.server).await {
-            Ok(Ok(Ok(()))) => {}
-            Ok(ended) => warn!(?ended, "the listener ended with an error"),
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => warn!(%error, "the listener ended with an error: {error}"),
             Err(_) => warn!("connections still open after the grace time are cut"),
         }
         // The recorder of an unresponsive solver may hold a statement; what it writes no longer counts.

@@ -51,6 +51,19 @@ pub struct Config {
     #[arg(long, env = "SIGNORINI_MAX_MESH_BYTES", default_value_t = 512 << 20, value_name = "BYTES")]
     pub max_mesh_bytes: usize,
 
+    /// Maximum number of connections; fewer if the limit of open files is lower
+    #[arg(long, env = "SIGNORINI_MAX_CONNECTIONS", default_value_t = 8192, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_connections: u32,
+
+    /// Maximum size of all request bodies in memory at the same time
+    #[arg(long, env = "SIGNORINI_MAX_RECEIVED_BYTES", default_value_t = 64 << 20, value_name = "BYTES")]
+    pub max_received_bytes: usize,
+
+    /// Maximum size of all answers in memory at the same time
+    #[arg(long, env = "SIGNORINI_MAX_SENT_BYTES", default_value_t = 128 << 20, value_name = "BYTES")]
+    pub max_sent_bytes: usize,
+
     /// Time that open requests get to finish after SIGTERM; running jobs are requeued at once
     #[arg(
         long,

@@ -1,6 +1,8 @@
 //! Why a request failed, with the details of the case; `catalog` has, for each kind, what clients may rely on. Here
 //! an error becomes the HTTP document, and the gRPC status with its details.
 
+use std::time::Duration;
+
 use axum::http::StatusCode;
 use serde_json::{Value, json};
 use solver::{
@@ -15,6 +17,9 @@ use crate::{
     catalog::{Code, Kind},
     job::{JobId, Status as JobStatus},
 };
+
+/// How long to wait for the next piece of a request's body.
+pub const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
 /// Why a request failed.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -46,6 +51,21 @@ pub enum ApiError {
     /// A change of many jobs, without a filter.
     #[error("a filter is required: at least one of {0}")]
     MissingFilter(String),
+    /// It is not HTTP, or not a message of the contract.
+    #[error("{0}")]
+    BadRequest(String),
+    /// Nothing more of the body arrived.
+    #[error("nothing more of the body arrived for {} s", LONGEST_PAUSE.as_secs())]
+    RequestTimeout,
+    /// The address is too long.
+    #[error("the path and the query are too long")]
+    UriTooLong,
+    /// The headers are too large.
+    #[error("the headers of the request are too large")]
+    HeaderTooLarge,
+    /// Others occupy the memory for transfers, or the connections.
+    #[error("other requests occupy the memory for transfers, or all connections; try again")]
+    Overloaded,
     /// It does not exist.
     #[error("{0}")]
     NotFound(String),
@@ -95,6 +115,15 @@ pub enum ApiError {
     /// The body is too large.
     #[error("the body is larger than {limit_bytes} bytes")]
     PayloadTooLarge {
+        /// The limit.
+        limit_bytes: usize,
+    },
+    /// The message has too many parts.
+    #[error(
+        "the message has too many parts: it would take more than {} in memory",
+        size(*limit_bytes as u64)
+    )]
+    MessageTooLarge {
         /// The limit.
         limit_bytes: usize,
     },
@@ -159,6 +188,11 @@ impl ApiError {
             ApiError::BadParameter { .. } => Code::BadParameter,
             ApiError::BadPageToken => Code::BadPageToken,
             ApiError::MissingFilter(_) => Code::MissingFilter,
+            ApiError::BadRequest(_) => Code::BadRequest,
+            ApiError::RequestTimeout => Code::RequestTimeout,
+            ApiError::UriTooLong => Code::UriTooLong,
+            ApiError::HeaderTooLarge => Code::HeaderTooLarge,
+            ApiError::Overloaded => Code::Overloaded,
             ApiError::NotFound(_) => Code::NotFound,
             ApiError::Deleted(_) => Code::Deleted,
             ApiError::NoResult(_) => Code::NoResult,
@@ -171,9 +205,9 @@ impl ApiError {
             ApiError::StaleVersion(_) => Code::StaleVersion,
             ApiError::RangeNotSatisfiable(_) => Code::RangeNotSatisfiable,
             ApiError::ResultNotReady(_) => Code::ResultNotReady,
-            ApiError::PayloadTooLarge { .. } | ApiError::AnswerTooLarge { .. } => {
-                Code::PayloadTooLarge
-            }
+            ApiError::PayloadTooLarge { .. }
+            | ApiError::MessageTooLarge { .. }
+            | ApiError::AnswerTooLarge { .. } => Code::PayloadTooLarge,
             ApiError::ProblemTooLarge { .. } => Code::ProblemTooLarge,
             ApiError::InvalidProblem(_) => Code::InvalidProblem,
             ApiError::RateLimited => Code::RateLimited,

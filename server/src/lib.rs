@@ -9,10 +9,14 @@ pub mod job;
 pub mod mesh;
 pub mod time;
 
-// Errors of requests, their parameters, and the configuration.
+// The messages of gRPC, read within a limit.
+pub mod codec;
+
+// Errors of requests, their parameters, the bytes that they may occupy, and the configuration.
 pub mod config;
 pub mod error;
 pub mod parameters;
+pub mod transfer;
 pub mod violations;
 
 // Solves one problem and measures it; fingerprints of problem and result; the formats of a result.
@@ -33,6 +37,9 @@ pub mod verbs;
 pub mod convert;
 pub mod grpc;
 pub mod rest;
+
+// Accepts connections, and ends those that are idle, stalled or abusive.
+pub mod listener;
 
 // Starts and stops the service; and the commands.
 pub mod app;

@@ -30,6 +30,9 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         memory: MemoryBudget::default(),
         max_body_bytes: 16 << 20,
         max_mesh_bytes: 16 << 20,
+        max_connections: 100,
+        max_received_bytes: 64 << 20,
+        max_sent_bytes: 128 << 20,
         grace_s: 5,
     };
     let app = App::start(&config).await?;

@@ -4,16 +4,16 @@ mod demo;
 pub mod examples;
 mod exit;
 mod explain;
+mod log;
 mod output;
 mod report;
 mod serve;
 mod solve;
 
-use std::{io::IsTerminal, process::ExitCode};
+use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use tracing::level_filters::LevelFilter;
-use tracing_subscriber::{filter::Targets, prelude::*};
 
 use self::exit::Exit;
 use crate::{config::Config, rest};
@@ -51,11 +51,11 @@ pub fn main() -> ExitCode {
     let Cli { command } = Cli::parse();
     let exit = match command {
         Command::Serve(config) => {
-            log(LevelFilter::INFO);
-            with_runtime(serve::run(config))
+            let lines = log::start(LevelFilter::INFO);
+            with_runtime(serve::run(config, lines.lost()))
         }
         Command::Solve(arguments) => {
-            log(LevelFilter::WARN);
+            let _lines = log::start(LevelFilter::WARN);
             solve::run(&arguments)
         }
         Command::Schema => solve::schema(),
@@ -68,7 +68,7 @@ pub fn main() -> ExitCode {
             output::print(&text).map(|()| Exit::Ok).map_err(Into::into)
         }
         Command::Demo => {
-            log(LevelFilter::WARN);
+            let _lines = log::start(LevelFilter::WARN);
             with_runtime(demo::run())
         }
     };
@@ -88,51 +88,4 @@ fn with_runtime(command: impl Future<Output = anyhow::Result<Exit>>) -> anyhow::
     // the process may exit while they still run.
     runtime.shutdown_background();
     exit
-}
-
-/// One line per event on standard error, filtered by SIGNORINI_LOG, e.g. `info,service=debug`.
-fn log(default: LevelFilter) {
-    let asked = std::env::var("SIGNORINI_LOG").unwrap_or_default();
-    let lines = tracing_subscriber::fmt::layer()
-        .with_writer(std::io::stderr)
-        // a log that cannot be written must not end the process
-        .log_internal_errors(false)
-        .with_ansi(std::io::stderr().is_terminal());
-    tracing_subscriber::registry()
-        .with(lines)
-        .with(filter(&asked, default))
-        .init();
-}
-
-/// What is logged. An invalid filter is reported and ignored.
-fn filter(asked: &str, default: LevelFilter) -> Targets {
-    let default = Targets::new().with_default(default);
-    if asked.trim().is_empty() {
-        return default;
-    }
-    asked.parse().unwrap_or_else(|error| {
-        eprintln!("signorini: SIGNORINI_LOG={asked} is ignored: {error}");
-        default
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use tracing::Level;
-
-    #[test]
-    fn a_log_filter_is_a_level_and_targets_or_the_default() {
-        let debug = |asked| {
-            let filter = filter(asked, LevelFilter::WARN);
-            ["service::queue", "hyper"].map(|target| filter.would_enable(target, &Level::DEBUG))
-        };
-        assert_eq!(debug("info,service=debug"), [true, false]);
-        assert_eq!(debug("debug"), [true, true]);
-        for asked in ["", " ", "service=loud"] {
-            assert_eq!(debug(asked), [false, false], "{asked}");
-            let warnings = filter(asked, LevelFilter::WARN).would_enable("hyper", &Level::WARN);
-            assert!(warnings, "{asked}");
-        }
-    }
 }

@@ -3,7 +3,7 @@
 //! `workers` slots each hold one job at a time. The dispatcher claims the next job of the store whenever a
 //! slot is free; a submit that finds one free does that in its own transaction, and starts the claimed job in
 //! that slot. Each claim is solved on a blocking thread. Beside each running solver a recorder task commits
-//! its events in batches and then announces that there are some; watchers read them from the store. No event
+//! its events in batches and then announces that there are some; watchers read them from the store, together. No event
 //! travels through a channel to a watcher, so none is repeated, missed, or undone by a crash.
 //!
 //! A job may be ended by its worker, by a cancel, by a time limit, or requeued when the service stops. Several of
@@ -12,6 +12,7 @@
 
 // In order of use: no file uses one below it.
 mod backoff;
+mod feed;
 mod running;
 mod watchers;
 
@@ -29,6 +30,7 @@ mod dispatch;
 mod tests;
 
 pub use self::{
+    feed::News,
     state::{Queue, Solve, State},
     watchers::Subscription,
 };

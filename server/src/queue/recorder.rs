@@ -112,7 +112,7 @@ async fn store_batch(
     if !batch.events.is_empty() {
         let stored = store.append_events(key, attempt, &batch.events, progress);
         match stored.await? {
-            true => queue.announce(&[key]),
+            true => queue.announce_events(key),
             false => return Ok(false),
         }
     }

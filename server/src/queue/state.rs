@@ -11,7 +11,7 @@ use solver::{
     problem::Problem,
     solution::{Observer, Solution},
 };
-use tokio::sync::{Notify, RwLock, Semaphore};
+use tokio::sync::{Notify, RwLock, Semaphore, SemaphorePermit};
 use tokio_util::sync::CancellationToken;
 
 use super::{
@@ -22,6 +22,9 @@ use crate::{
     job::Job,
     store::{self, Ending, FinalBatch, Store},
 };
+
+/// Reads of jobs by those who wait for them, at the same time: a few for each connection to the database.
+const MOST_TURNS: usize = 16;
 
 /// The solver, or its substitute in a test.
 pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Solution, SolveError>;
@@ -37,6 +40,8 @@ pub struct Queue {
     /// Notified when a job may be ready to be claimed.
     pub(super) wake: Notify,
     pub(super) watchers: Watchers,
+    /// How many that wait for jobs may read them at the same time.
+    turns: Semaphore,
     /// Jobs that a worker of this process is solving.
     pub(super) running: Mutex<HashMap<i64, Running>>,
     /// Held for reading while a job is claimed and entered into `running`, for writing while one is asked to stop, so
@@ -71,6 +76,7 @@ impl Queue {
             workers,
             wake: Notify::new(),
             watchers: Watchers::default(),
+            turns: Semaphore::new(MOST_TURNS),
             running: Mutex::default(),
             claiming: RwLock::default(),
             stopping: CancellationToken::new(),
@@ -85,6 +91,16 @@ impl Queue {
     /// Notifies the watchers of these jobs that there is something new to read.
     pub fn announce(&self, jobs: &[i64]) {
         jobs.iter().for_each(|key| self.watchers.announce(*key));
+    }
+
+    /// Notifies the watchers of this job that it has new events, and is otherwise as before.
+    pub(super) fn announce_events(&self, key: i64) {
+        self.watchers.announce_events(key);
+    }
+
+    /// The turn of somebody who waits for a job to look at it: some at a time, since one change may wake thousands.
+    pub async fn turn(&self) -> Option<SemaphorePermit<'_>> {
+        self.turns.acquire().await.ok()
     }
 
     /// Canceled when the service is about to stop; streams end then.

@@ -1,41 +1,78 @@
-//! The watchers of a job are notified of changes, without their content: they read the store.
+//! The watchers of a job are notified of changes, without their content: they read the store, together (see `feed`).
 
 use std::{
     collections::HashMap,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 use tokio::sync::watch;
 
+use super::feed::{Feed, News};
+use crate::store::{self, Store};
+
+/// From so many watchers of one job on, each looks for news less often.
+const CROWD: usize = 16;
+
 /// The jobs that are watched.
 #[derive(Debug, Default)]
 pub(super) struct Watchers {
-    watched: Mutex<HashMap<i64, watch::Sender<()>>>,
+    watched: Mutex<HashMap<i64, Arc<Watched>>>,
+}
+
+/// A job that is watched.
+#[derive(Debug)]
+struct Watched {
+    changes: watch::Sender<Changes>,
+    feed: Feed,
+}
+
+/// How often changes were announced.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Changes {
+    /// Changes of any kind.
+    all: u64,
+    /// Changes of the job itself, and not only further events.
+    of_job: u64,
 }
 
 impl Watchers {
-    /// Notifies the watchers of a job that there is something new in the store.
+    /// Notifies the watchers of a job that it has changed.
     pub(super) fn announce(&self, key: i64) {
-        if let Some(sender) = self.watched().get(&key) {
-            sender.send_replace(());
+        self.change(key, |changes| changes.of_job += 1);
+    }
+
+    /// Notifies the watchers of a job that it has new events, and is otherwise as before.
+    pub(super) fn announce_events(&self, key: i64) {
+        self.change(key, |_| {});
+    }
+
+    fn change(&self, key: i64, change: impl FnOnce(&mut Changes)) {
+        if let Some(watched) = self.watched().get(&key) {
+            watched.changes.send_modify(|changes| {
+                changes.all += 1;
+                change(changes);
+            });
         }
     }
 
     /// Subscribes to the announcements about a job.
     pub(super) fn subscribe(&self, key: i64) -> Subscription<'_> {
-        let receiver = self
-            .watched()
-            .entry(key)
-            .or_insert_with(|| watch::channel(()).0)
-            .subscribe();
+        let mut all = self.watched();
+        let watched = all.entry(key).or_insert_with(|| {
+            Arc::new(Watched {
+                changes: watch::channel(Changes::default()).0,
+                feed: Feed::default(),
+            })
+        });
         Subscription {
             watchers: self,
             key,
-            receiver,
+            receiver: watched.changes.subscribe(),
+            watched: watched.clone(),
         }
     }
 
-    fn watched(&self) -> MutexGuard<'_, HashMap<i64, watch::Sender<()>>> {
+    fn watched(&self) -> MutexGuard<'_, HashMap<i64, Arc<Watched>>> {
         self.watched.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -45,14 +82,41 @@ impl Watchers {
 pub struct Subscription<'a> {
     watchers: &'a Watchers,
     key: i64,
-    receiver: watch::Receiver<()>,
+    watched: Arc<Watched>,
+    receiver: watch::Receiver<Changes>,
 }
 
 impl Subscription<'_> {
-    /// Returns when a change was announced since the subscription or the last call.
+    /// Returns when anything was announced since the subscription or the last call.
     pub async fn changed(&mut self) {
         // an error would mean that the sender is gone, but it lives as long as this subscription
         let _ = self.receiver.changed().await;
+    }
+
+    /// Returns when a change of the job itself was announced since the subscription or the last call.
+    pub async fn job_changed(&mut self) {
+        let seen = self.receiver.borrow_and_update().of_job;
+        let _ = self
+            .receiver
+            .wait_for(|changes| changes.of_job != seen)
+            .await;
+    }
+
+    /// Events after number `after`, and whether the job has ended. All watchers of a job share what one of them reads.
+    pub async fn news(&mut self, store: &Store, after: i64) -> store::Result<News> {
+        let announced = self.receiver.borrow_and_update().all;
+        let others = self.receiver_count() > 1;
+        let feed = &self.watched.feed;
+        feed.news(store, self.key, announced, after, others).await
+    }
+
+    /// Whether so many watch this job that each of them should look for news less often.
+    pub fn is_crowded(&self) -> bool {
+        self.receiver_count() > CROWD
+    }
+
+    fn receiver_count(&self) -> usize {
+        self.watched.changes.receiver_count()
     }
 }
 
@@ -60,10 +124,7 @@ impl Drop for Subscription<'_> {
     fn drop(&mut self) {
         let mut watched = self.watchers.watched();
         // the lock keeps others from subscribing meanwhile: the only receiver left is this one
-        if watched
-            .get(&self.key)
-            .is_some_and(|sender| sender.receiver_count() <= 1)
-        {
+        if self.receiver_count() <= 1 {
             watched.remove(&self.key);
         }
     }
@@ -71,6 +132,10 @@ impl Drop for Subscription<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
+    use tokio::time::timeout;
+
     use super::*;
 
     #[tokio::test]
@@ -79,6 +144,22 @@ mod tests {
         let mut subscription = watchers.subscribe(7);
         watchers.announce(7);
         subscription.changed().await;
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn who_waits_for_a_change_of_the_job_is_not_notified_of_events() {
+        let watchers = Watchers::default();
+        let mut subscription = watchers.subscribe(7);
+        let wait = Duration::from_secs(1);
+        let changed = async {
+            watchers.announce_events(7);
+            timeout(wait, subscription.job_changed()).await
+        };
+        assert!(changed.await.is_err());
+        let (changed, ()) = tokio::join!(subscription.job_changed(), async {
+            watchers.announce(7);
+        });
+        changed
     }
 
     #[test]

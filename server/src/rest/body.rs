@@ -8,13 +8,17 @@ use axum::{
 };
 use futures_util::StreamExt;
 
-use crate::error::ApiError;
+use crate::{
+    error::ApiError,
+    transfer::{self, Received},
+};
 
-/// The body as text, if it is declared as JSON and is not too large.
+/// The body as text, if it is declared as JSON and is not too large, alone and together with those of other requests.
 pub(super) async fn json_text(
     headers: &HeaderMap,
     body: Body,
     limit_bytes: usize,
+    received: &Received,
 ) -> Result<String, ApiError> {
     let content_type = headers
         .get(header::CONTENT_TYPE)
@@ -46,10 +50,18 @@ pub(super) async fn json_text(
     let mut bytes = Vec::new();
     let mut too_large = length.is_some_and(|length| length > limit_bytes);
     while !too_large && let Some(piece) = pieces.next().await {
-        let piece = piece
-            .map_err(|error| ApiError::MalformedJson(format!("the body is incomplete: {error}")))?;
+        let piece = piece.map_err(incomplete)?;
         too_large = bytes.len() + piece.len() > limit_bytes;
         if !too_large {
+            if let Err(error) = received.count(piece.len()) {
+                tokio::spawn(discard(pieces));
+                return Err(error);
+            }
+            // twice as much as before, as usual, but never more than can be needed
+            if bytes.capacity() < bytes.len() + piece.len() {
+                let wanted = (2 * bytes.len()).clamp(bytes.len() + piece.len(), limit_bytes);
+                bytes.reserve_exact(wanted - bytes.len());
+            }
             bytes.extend_from_slice(&piece);
         }
     }
@@ -58,6 +70,12 @@ pub(super) async fn json_text(
         return Err(ApiError::PayloadTooLarge { limit_bytes });
     }
     String::from_utf8(bytes).map_err(|error| ApiError::MalformedJson(error.to_string()))
+}
+
+/// Why a body could not be read to its end.
+pub(super) fn incomplete(error: axum::Error) -> ApiError {
+    transfer::cause(error)
+        .unwrap_or_else(|error| ApiError::MalformedJson(format!("the body is incomplete: {error}")))
 }
 
 /// The length of the body that the headers declare.

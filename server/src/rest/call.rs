@@ -15,7 +15,7 @@ use super::{
     body,
     input::{Input, RawInput},
 };
-use crate::{caller::Caller, error::ApiError, verbs::Service};
+use crate::{caller::Caller, error::ApiError, transfer::Received, verbs::Service};
 
 /// The state that all handlers share.
 #[derive(Clone, Debug)]
@@ -31,6 +31,8 @@ pub(super) struct Call {
     pub(super) caller: Caller,
     pub(super) headers: HeaderMap,
     pub(super) body: Body,
+    /// What of the body is in memory.
+    pub(super) received: Received,
     pub(super) openapi: fn() -> &'static Value,
 }
 
@@ -38,7 +40,13 @@ impl Call {
     /// The body as text, if it is declared as JSON and is not too large.
     pub(super) async fn json(&mut self) -> Result<String, ApiError> {
         let body = std::mem::take(&mut self.body);
-        body::json_text(&self.headers, body, self.service.max_body_bytes).await
+        body::json_text(
+            &self.headers,
+            body,
+            self.service.max_body_bytes,
+            &self.received,
+        )
+        .await
     }
 
     /// Whether the request has a body.
@@ -99,6 +107,8 @@ where
                 let caller = caller.ok_or_else(|| {
                     ApiError::internal("the caller of a request was not identified")
                 })?;
+                let received = parts.extensions.remove::<Received>();
+                let received = received.unwrap_or_else(|| Received::new(&site.service.received));
                 let raw = RawInput::new(variables, parts.uri.query(), &parts.headers);
                 let (input, described) = &*operation;
                 if strict {
@@ -110,6 +120,7 @@ where
                     caller,
                     headers: parts.headers,
                     body,
+                    received,
                     openapi: site.openapi,
                 };
                 handler.handle(call, values).await

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    body::{declared_length, discard},
+    body::{declared_length, discard, incomplete},
     call::Call,
 };
 use crate::{
@@ -26,8 +26,7 @@ pub(super) async fn upload(call: Call) -> Result<Response, ApiError> {
     let found = if declared_length(&call.headers).is_some_and(|length| length > limit_bytes) {
         Err(ApiError::PayloadTooLarge { limit_bytes })
     } else {
-        let broken = |error| ApiError::MalformedJson(format!("the body is incomplete: {error}"));
-        let stream = (&mut pieces).map(|piece| piece.map_err(broken));
+        let stream = (&mut pieces).map(|piece| piece.map_err(incomplete));
         verbs::upload(&call.service, &call.caller, Box::pin(stream)).await
     };
     if found.is_err() {

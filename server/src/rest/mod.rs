@@ -9,6 +9,7 @@ mod call;
 mod filters;
 mod headers;
 mod input;
+mod limits;
 mod object;
 
 // Answers.
@@ -33,4 +34,6 @@ mod router;
 
 pub use openapi::openapi;
 pub use reference::reference;
+pub use reply::refuse;
 pub use router::router;
+pub use service::is_probe;

@@ -38,10 +38,15 @@ pub(super) async fn errors_as_documents(request: Request, next: Next) -> Respons
     let response = next.run(request).await;
     let status = response.status();
     tracing::debug!(http.method = %method, http.path = path, http.status = status.as_u16(), "{method} {path}: {status}");
-    let Some(error) = response.extensions().get::<ApiError>() else {
+    with_document(response, &path)
+}
+
+/// An error with its document; any other answer as it is.
+fn with_document(mut response: Response, path: &str) -> Response {
+    let Some(error) = response.extensions_mut().remove::<ApiError>() else {
         return response;
     };
-    let document = error.document(&path).to_string();
+    let document = error.document(path).to_string();
     let (mut parts, _) = response.into_parts();
     parts.headers.insert(
         header::CONTENT_TYPE,
@@ -51,13 +56,28 @@ pub(super) async fn errors_as_documents(request: Request, next: Next) -> Respons
     Response::from_parts(parts, Body::from(document))
 }
 
+/// Whether the client speaks gRPC.
+pub(super) fn is_grpc(request: &Request) -> bool {
+    let content_type = request.headers().get(header::CONTENT_TYPE);
+    content_type.is_some_and(|value| value.as_bytes().starts_with(b"application/grpc"))
+}
+
+/// Refuses a request before it reaches its handler: with a gRPC status, or with an error document.
+pub(super) fn refusal(grpc: bool, path: &str, error: ApiError) -> Response {
+    match grpc {
+        true => tonic::Status::from(error).into_http(),
+        false => with_document(error.into_response(), path),
+    }
+}
+
+/// The same for a request that is not routed.
+pub fn refuse(request: &Request, error: ApiError) -> Response {
+    refusal(is_grpc(request), request.uri().path(), error)
+}
+
 /// The answer to an unknown path: a gRPC status for a gRPC client, an error document for others.
 pub(super) async fn not_found(request: Request) -> Response {
-    let content_type = request
-        .headers()
-        .get(header::CONTENT_TYPE)
-        .and_then(|value| value.to_str().ok());
-    if content_type.is_some_and(|value| value.starts_with("application/grpc")) {
+    if is_grpc(&request) {
         let name = request.uri().path();
         return tonic::Status::unimplemented(format!("there is no method {name}")).into_http();
     }

@@ -5,14 +5,19 @@ use std::sync::Arc;
 use axum::{Router, extract::DefaultBodyLimit, middleware};
 use tower_http::catch_panic::CatchPanicLayer;
 
-use super::{authenticate::authenticate, call::AppState, openapi::openapi, operations, reply};
+use super::{
+    authenticate::authenticate, call::AppState, limits::limits, openapi::openapi, operations, reply,
+};
 use crate::{error::ApiError, verbs::Service};
 
 /// All routes, REST and gRPC. Unknown paths are answered by `reply::not_found`.
 pub fn router(service: Arc<Service>, grpc: Router) -> Router {
     operations::routes()
         .method_not_allowed_fallback(async || ApiError::MethodNotAllowed)
-        .with_state(AppState { service, openapi })
+        .with_state(AppState {
+            service: service.clone(),
+            openapi,
+        })
         .merge(grpc)
         // after the merge: the fallback of the gRPC router would answer every unknown path with a gRPC status.
         .fallback(reply::not_found)
@@ -20,5 +25,6 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         .layer(CatchPanicLayer::custom(reply::panicked))
         // `body::json_text` has a limit of its own, and answers with an error document
         .layer(DefaultBodyLimit::disable())
+        .layer(middleware::from_fn_with_state(service, limits))
         .layer(middleware::from_fn(reply::errors_as_documents))
 }

@@ -2,6 +2,7 @@
 
 use axum::{
     Json,
+    extract::Request,
     http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
@@ -100,6 +101,11 @@ pub(super) async fn openapi(call: Call) -> Result<Json<&'static Value>, ApiError
 pub(super) async fn proto(_: Call) -> Result<impl IntoResponse, ApiError> {
     const TEXT: &str = include_str!("../../../proto/signorini/v1/signorini.proto");
     Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], TEXT))
+}
+
+/// Whether a request asks for one of the probes, which are answered even if all connections are busy.
+pub fn is_probe(request: &Request) -> bool {
+    matches!(request.uri().path(), "/livez" | "/readyz")
 }
 
 /// The process is alive.

@@ -52,12 +52,14 @@ impl StoredFields {
         const PIECE: u64 = PIECE_BYTES as u64;
         try_stream! {
             for piece in start / PIECE..end.div_ceil(PIECE) {
+                let share = service.sent.wait_for(PIECE_BYTES).await?;
                 let found = service.store.piece(key, "fields", piece as i64).await?;
                 let mut bytes = found.ok_or_else(|| ApiError::internal("a piece of a result is missing"))?;
                 let first = piece * PIECE;
                 bytes.truncate(end.saturating_sub(first) as usize);
                 let skipped = start.saturating_sub(first) as usize;
                 yield bytes.split_off(skipped.min(bytes.len()));
+                drop(share); // the next piece is asked for: this one is on its way
             }
         }
     }

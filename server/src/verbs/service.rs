@@ -9,6 +9,7 @@ use crate::{
     error::ApiError,
     queue::Queue,
     store::{Store, StoreError},
+    transfer::Budget,
 };
 
 /// The service, which every verb receives.
@@ -28,6 +29,10 @@ pub struct Service {
     pub max_body_bytes: usize,
     /// Largest mesh file.
     pub max_mesh_bytes: usize,
+    /// Bytes of bodies in memory, over all requests.
+    pub received: Budget,
+    /// Bytes of answers in memory, over all requests.
+    pub sent: Budget,
     /// The folder for uploads until they are read.
     pub(super) data: PathBuf,
 }
@@ -43,6 +48,8 @@ impl Service {
             memory_budget_bytes: config.memory.bytes(),
             max_body_bytes: config.max_body_bytes,
             max_mesh_bytes: config.max_mesh_bytes,
+            received: Budget::new(config.max_received_bytes),
+            sent: Budget::new(config.max_sent_bytes),
             data: config.data.clone(),
         }
     }

@@ -40,6 +40,9 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
         memory: MemoryBudget::default(),
         max_body_bytes: 1 << 20,
         max_mesh_bytes: 1 << 20,
+        max_connections: 100,
+        max_received_bytes: 64 << 20,
+        max_sent_bytes: 128 << 20,
         grace_s: 1,
     };
     let store = Store::open(folder).await.unwrap();

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use async_stream::try_stream;
 use futures_util::Stream;
-use tokio::time::{Instant, timeout_at};
+use tokio::time::{Instant, sleep_until, timeout_at};
 
 use super::{jobs, service::Service};
 use crate::{
@@ -13,6 +13,7 @@ use crate::{
     event::{Event, Payload},
     job::{Job, JobId},
     parameters::{Integers, Parameter, Seconds, Words},
+    queue::News,
 };
 
 /// How long to wait for a job.
@@ -38,8 +39,9 @@ pub const AFTER_SEQ: Parameter<Integers> = Parameter {
     values: Integers(0..=i64::MAX),
 };
 
-/// Events read at a time by a watcher.
-const EVENTS_PER_READ: i64 = 256;
+/// How long each of many watchers of one job waits between two looks for news. As long as the recorder may wait before
+/// it commits events: news are at most twice as late.
+const CROWDED_PAUSE: Duration = Duration::from_millis(50);
 
 /// The condition that a client waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +68,8 @@ pub async fn wait(
     let at_arrival = jobs::get(service, caller, id).await?;
     let mut subscription = service.queue.subscribe(at_arrival.key);
     loop {
+        // some at a time: thousands may wait for the same job
+        let turn = service.queue.turn().await;
         // read after subscribing, so that a change in between is not missed
         let job = jobs::get(service, caller, id).await?;
         let has_ended = job.status.is_terminal();
@@ -77,8 +81,9 @@ pub async fn wait(
         if met {
             return Ok((job, true));
         }
+        drop(turn);
         tokio::select! {
-            change = timeout_at(end, subscription.changed()) => if change.is_err() { return Ok((job, false)) },
+            change = timeout_at(end, subscription.job_changed()) => if change.is_err() { return Ok((job, false)) },
             () = service.queue.stopping().cancelled() => return Ok((job, false)),
         }
     }
@@ -111,28 +116,21 @@ fn follow(
     try_stream! {
         let mut cursor = after;
         let mut subscription = service.queue.subscribe(key);
-        let mut ended = false;
         loop {
-            let events = service.store.events_after(key, cursor, EVENTS_PER_READ).await?;
-            let idle = events.is_empty();
+            let News { events, ended } = subscription.news(&service.store, cursor).await?;
+            let (read, idle) = (Instant::now(), events.is_empty());
             for event in events {
                 cursor = event.seq;
                 let done = matches!(event.payload, Payload::Done { .. });
-                yield event;
+                yield Arc::unwrap_or_clone(event);
                 if done {
                     return;
                 }
             }
+            // deleted: `done` cannot be read any more
+            let ended = ended.ok_or(ApiError::Deleted(id))?;
             if idle && ended {
                 return;
-            }
-            if idle {
-                let has_ended = service.store.has_ended(key).await?;
-                // deleted: `done` cannot be read any more
-                if has_ended.ok_or(ApiError::Deleted(id))? {
-                    ended = true;
-                    continue; // read again: `done` may have been written after the last read
-                }
             }
             if service.queue.stopping().is_cancelled() {
                 Err(ApiError::Draining)?;
@@ -141,6 +139,9 @@ fn follow(
                 tokio::select! {
                     () = subscription.changed() => {}
                     () = service.queue.stopping().cancelled() => {}
+                }
+                if subscription.is_crowded() {
+                    sleep_until(read + CROWDED_PAUSE).await;
                 }
             }
         }

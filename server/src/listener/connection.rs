@@ -1,0 +1,179 @@
+//! One connection: its requests go to the router, its answers back, until it ends or is ended.
+
+use std::{
+    convert::Infallible,
+    pin::{Pin, pin},
+    sync::Arc,
+    task::{Context, Poll},
+    time::Duration,
+};
+
+use axum::{
+    Router,
+    body::{Body, Bytes, HttpBody},
+    extract::Request,
+    response::Response,
+};
+use http_body::{Frame, SizeHint};
+use hyper::{body::Incoming, service::service_fn};
+use hyper_util::{
+    rt::{TokioExecutor, TokioIo, TokioTimer},
+    server::conn::auto::Builder,
+};
+use tokio::{net::TcpStream, time::sleep};
+use tokio_util::sync::CancellationToken;
+use tower::ServiceExt;
+use tracing::debug;
+
+use super::{
+    activity::{Activity, UnderWay},
+    guarded::Guarded,
+    places::Place,
+};
+use crate::{error::ApiError, rest};
+
+/// Requests at the same time on one connection; a client with more waits or opens another one.
+const MOST_STREAMS: u32 = 100;
+/// Bytes of answers that one stream keeps until the client reads them, and pieces in which answers are sent.
+const PIECE_BYTES: usize = 64 << 10;
+/// Largest head of a request.
+const HEAD_BYTES: usize = 64 << 10;
+/// How long requests get to finish when the client has not asked for more for too long.
+const FAREWELL: Duration = Duration::from_secs(2);
+/// How often a client over HTTP/2 that says nothing is asked whether it is still there.
+const PING: Duration = Duration::from_secs(60);
+
+/// Serves a connection until it ends, is idle or stalled for too long, or its place is given to another one.
+pub(super) async fn serve(
+    stream: TcpStream,
+    router: Router,
+    place: Place,
+    closing: CancellationToken,
+) {
+    let activity = place.activity().clone();
+    let io = TokioIo::new(Guarded::new(stream, activity.clone()));
+    let service = service_fn(|request: Request<Incoming>| {
+        let request = request.map(Body::new);
+        answer(router.clone(), request, place.is_reserved(), &activity)
+    });
+    let mut builder = Builder::new(TokioExecutor::new());
+    builder
+        .http1()
+        .timer(TokioTimer::new())
+        // `Activity` ends slow heads, and those of HTTP/2 as well
+        .header_read_timeout(None)
+        .max_buf_size(HEAD_BYTES);
+    builder
+        .http2()
+        .timer(TokioTimer::new())
+        .max_concurrent_streams(MOST_STREAMS)
+        .max_send_buf_size(PIECE_BYTES)
+        .keep_alive_interval(PING);
+    let mut connection = pin!(builder.serve_connection(io, service));
+    let ended = tokio::select! {
+        ended = connection.as_mut() => ended,
+        () = activity.is_cut() => return,
+        () = activity.stalled_too_long() => {
+            debug!("a connection was closed: its client does not read");
+            return;
+        }
+        () = activity.idle_too_long() => {
+            connection.as_mut().graceful_shutdown();
+            tokio::select! {
+                ended = connection.as_mut() => ended,
+                () = sleep(FAREWELL) => return,
+            }
+        }
+        () = closing.cancelled() => {
+            connection.as_mut().graceful_shutdown();
+            tokio::select! {
+                ended = connection.as_mut() => ended,
+                // an open connection on which nothing is asked
+                () = idle_for(&activity, FAREWELL) => return,
+                () = activity.stalled_too_long() => return,
+            }
+        }
+    };
+    if let Err(error) = ended {
+        debug!(%error, "a connection ended: {error}");
+    }
+}
+
+/// Returns when no request has been under way for this time.
+async fn idle_for(activity: &Activity, time: Duration) {
+    while activity
+        .idle_since()
+        .is_none_or(|since| since.elapsed() < time)
+    {
+        sleep(time / 10).await;
+    }
+}
+
+fn answer(
+    router: Router,
+    request: Request,
+    reserved: bool,
+    activity: &Arc<Activity>,
+) -> impl Future<Output = Result<Response<Sent>, Infallible>> + use<> {
+    let under_way = activity.begin();
+    async move {
+        let response = match reserved && !rest::is_probe(&request) {
+            true => rest::refuse(&request, ApiError::Overloaded),
+            false => match router.oneshot(request).await {
+                Ok(response) => response,
+                Err(never) => match never {},
+            },
+        };
+        Ok(response.map(|body| Sent {
+            body,
+            rest: Bytes::new(),
+            under_way,
+        }))
+    }
+}
+
+/// The body of an answer, in pieces whose progress can be seen; with its end the request is no longer under way.
+struct Sent {
+    body: Body,
+    /// What was taken from `body` and not sent yet.
+    rest: Bytes,
+    under_way: UnderWay,
+}
+
+impl HttpBody for Sent {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        self.under_way.is_asked();
+        if self.rest.is_empty() {
+            match Pin::new(&mut self.body).poll_frame(context) {
+                Poll::Ready(Some(Ok(frame))) => match frame.into_data() {
+                    Ok(data) => self.rest = data,
+                    Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
+                },
+                other => return other,
+            }
+        }
+        let length = self.rest.len().min(PIECE_BYTES);
+        let piece = self.rest.split_to(length);
+        self.under_way.delivers();
+        Poll::Ready(Some(Ok(Frame::data(piece))))
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.rest.is_empty() && self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        let of_body = self.body.size_hint();
+        let rest = self.rest.len() as u64;
+        match of_body.exact() {
+            Some(bytes) => SizeHint::with_exact(bytes + rest),
+            None => SizeHint::new(),
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! How many files the process may open: the store, uploads and every connection need one each.
+
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+use tracing::{debug, warn};
+
+/// Files that are not connections: the database with its log for each connection to it, uploads, standard streams,
+/// the runtime, and files that are written by a command.
+const RESERVED: u64 = 128;
+/// Connections even if hardly any files may be open.
+const FEWEST: u64 = 16;
+
+/// Raises the limit to the highest that the system allows, since the usual one, 1024, is soon reached by connections.
+/// Returns the limit.
+fn raise_file_limit() -> u64 {
+    let before = getrlimit(Resource::Nofile);
+    let highest = Rlimit {
+        current: before.maximum,
+        maximum: before.maximum,
+    };
+    if let Err(error) = setrlimit(Resource::Nofile, highest) {
+        warn!(%error, "the limit of open files cannot be raised: {error}");
+    }
+    // no limit is reported as none
+    let limit = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
+    debug!(limit, "at most {limit} files may be open");
+    limit
+}
+
+/// How many connections there may be: as many as are wanted, if the limit of open files allows it.
+pub fn most_connections(wanted: u32) -> usize {
+    let limit = raise_file_limit();
+    let rest = limit.saturating_sub(RESERVED).max(FEWEST);
+    if rest < u64::from(wanted) {
+        warn!(
+            limit,
+            "at most {rest} connections instead of {wanted}: only {limit} files may be open"
+        );
+    }
+    usize::try_from(rest.min(u64::from(wanted))).unwrap_or(usize::MAX)
+}

@@ -1,0 +1,122 @@
+//! The stream of a connection, watched: when something arrives, floods of HTTP/2 frames, errors without a document.
+
+use std::{
+    io::{self, IoSlice},
+    pin::Pin,
+    sync::Arc,
+    task::{Context, Poll, ready},
+};
+
+use axum::body::Bytes;
+use tokio::{
+    io::{AsyncRead, AsyncWrite, ReadBuf},
+    net::TcpStream,
+};
+
+use super::{activity::Activity, bare, control_frames::ControlFrames};
+
+/// The stream of a connection.
+pub(super) struct Guarded {
+    stream: TcpStream,
+    activity: Arc<Activity>,
+    frames: ControlFrames,
+    /// Written instead of what was given to be written.
+    instead: Bytes,
+}
+
+impl Guarded {
+    pub(super) fn new(stream: TcpStream, activity: Arc<Activity>) -> Guarded {
+        Guarded {
+            stream,
+            activity,
+            frames: ControlFrames::new(),
+            instead: Bytes::new(),
+        }
+    }
+
+    /// Writes what stands instead of something else.
+    fn poll_instead(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        while !self.instead.is_empty() {
+            let stream = Pin::new(&mut self.stream);
+            match ready!(stream.poll_write(context, &self.instead))? {
+                0 => return Poll::Ready(Err(io::ErrorKind::WriteZero.into())),
+                written => drop(self.instead.split_to(written)),
+            }
+        }
+        Poll::Ready(Ok(()))
+    }
+
+    /// The document for an answer that hyper gives by itself; it is the last one on its connection.
+    fn document(&self, head: &[u8]) -> Option<Bytes> {
+        // while a request is under way, this is a piece of its answer, whatever it looks like
+        self.activity.idle_since()?;
+        bare::with_document(head)
+    }
+}
+
+impl AsyncRead for Guarded {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
+        ready!(Pin::new(&mut self.stream).poll_read(context, buffer))?;
+        let received = buffer.filled().get(before..).unwrap_or_default();
+        if !received.is_empty() {
+            self.activity.received();
+        }
+        match self.frames.received(received) {
+            true => Poll::Ready(Ok(())),
+            false => Poll::Ready(Err(io::Error::other("too many control frames"))),
+        }
+    }
+}
+
+impl AsyncWrite for Guarded {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        ready!(self.poll_instead(context))?;
+        if let Some(document) = self.document(bytes) {
+            self.instead = document;
+            return Poll::Ready(Ok(bytes.len()));
+        }
+        let written = ready!(Pin::new(&mut self.stream).poll_write(context, bytes))?;
+        self.frames.sent(written);
+        Poll::Ready(Ok(written))
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        pieces: &[IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        ready!(self.poll_instead(context))?;
+        if let [only] = pieces
+            && let Some(document) = self.document(only)
+        {
+            self.instead = document;
+            return Poll::Ready(Ok(only.len()));
+        }
+        let written = ready!(Pin::new(&mut self.stream).poll_write_vectored(context, pieces))?;
+        self.frames.sent(written);
+        Poll::Ready(Ok(written))
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.stream.is_write_vectored()
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        ready!(self.poll_instead(context))?;
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        ready!(self.poll_instead(context))?;
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}

@@ -1,0 +1,133 @@
+//! Places for connections: when all are taken, the one that has been idle for the longest time is closed.
+
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+use super::activity::Activity;
+
+/// Places beyond the limit, when all others are busy: for the probes, and for telling others to come back.
+const RESERVED: usize = 16;
+
+/// The open connections.
+#[derive(Debug)]
+pub(super) struct Places {
+    most: usize,
+    open: Mutex<Open>,
+}
+
+#[derive(Debug, Default)]
+struct Open {
+    last: u64,
+    connections: HashMap<u64, Arc<Activity>>,
+}
+
+/// The place of one connection, free again when it is dropped.
+#[derive(Debug)]
+pub(super) struct Place {
+    places: Arc<Places>,
+    number: u64,
+    activity: Arc<Activity>,
+    reserved: bool,
+}
+
+impl Places {
+    /// For so many connections.
+    pub(super) fn new(most: usize) -> Arc<Places> {
+        let open = Mutex::default();
+        Arc::new(Places { most, open })
+    }
+
+    /// A place for a new connection; `None`: all are taken, the reserved ones, too.
+    pub(super) fn take(self: &Arc<Self>) -> Option<Place> {
+        let mut open = self.open();
+        let full = open.connections.len() >= self.most;
+        let reserved = full && !open.close_longest_idle();
+        if open.connections.len() >= self.most + RESERVED {
+            return None;
+        }
+        open.last += 1;
+        let (number, activity) = (open.last, Activity::new());
+        open.connections.insert(number, activity.clone());
+        Some(Place {
+            places: self.clone(),
+            number,
+            activity,
+            reserved,
+        })
+    }
+
+    /// Closes the connection that has been without a request for the longest time, if there is one.
+    pub(super) fn close_longest_idle(&self) {
+        self.open().close_longest_idle();
+    }
+
+    fn open(&self) -> MutexGuard<'_, Open> {
+        self.open.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Open {
+    fn close_longest_idle(&mut self) -> bool {
+        let idle = self.connections.iter();
+        let idle = idle.filter_map(|(number, activity)| Some((activity.idle_since()?, *number)));
+        let Some((_, number)) = idle.min() else {
+            return false;
+        };
+        if let Some(activity) = self.connections.remove(&number) {
+            activity.cut();
+        }
+        true
+    }
+}
+
+impl Place {
+    /// What happens on the connection.
+    pub(super) fn activity(&self) -> &Arc<Activity> {
+        &self.activity
+    }
+
+    /// Whether this place is one of the few for the probes.
+    pub(super) fn is_reserved(&self) -> bool {
+        self.reserved
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.places.open().connections.remove(&self.number);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[tokio::test]
+    async fn a_new_connection_takes_the_place_of_the_longest_idle_one() {
+        let places = Places::new(2);
+        let first = places.take().unwrap();
+        let busy = first.activity().begin();
+        let second = places.take().unwrap();
+        assert!(!places.take().unwrap().is_reserved());
+        second.activity().is_cut().await;
+        drop((second, busy));
+    }
+
+    #[test]
+    fn busy_connections_keep_their_places_and_the_reserved_ones_are_few() {
+        let places = Places::new(1);
+        let first = places.take().unwrap();
+        let _busy = first.activity().begin();
+        let mut reserved = vec![];
+        while let Some(place) = places.take() {
+            assert!(place.is_reserved());
+            reserved.push((place.activity().begin(), place));
+        }
+        assert_eq!(reserved.len(), RESERVED);
+        drop((_busy, first));
+        assert!(places.take().is_some());
+    }
+}

@@ -1,0 +1,95 @@
+//! What holds for every request of either protocol: one host, a body that keeps arriving, and bytes of bodies and
+//! answers that are counted over all requests.
+
+use std::sync::Arc;
+
+use axum::{
+    extract::{Request, State},
+    http::{Version, header},
+    middleware::Next,
+    response::Response,
+};
+
+use super::reply::{is_grpc, refusal};
+use crate::{
+    error::ApiError,
+    transfer::{Received, counted, with_longest_pause, with_share},
+    verbs::Service,
+};
+
+/// Uploads are written to a file as they arrive, so that their bytes are not kept in memory.
+const UPLOAD: &str = "/signorini.v1.JobService/UploadMesh";
+
+pub(super) async fn limits(
+    State(service): State<Arc<Service>>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let (grpc, path) = (is_grpc(&request), request.uri().path().to_owned());
+    if let Err(error) = check_host(&request) {
+        return refusal(grpc, &path, error);
+    }
+    let received = Received::new(&service.received);
+    let (mut parts, body) = request.into_parts();
+    let mut body = with_longest_pause(body);
+    // over REST, they are counted where they are collected
+    if grpc && path != UPLOAD {
+        body = counted(body, received.clone());
+    }
+    parts.extensions.insert(received.clone());
+    let response = next.run(Request::from_parts(parts, body)).await;
+    // the bytes, and what was made of them, were needed until here
+    drop(received);
+    let (parts, body) = response.into_parts();
+    match with_share(body, &service.sent) {
+        Ok(body) => Response::from_parts(parts, body),
+        Err(error) => refusal(grpc, &path, error),
+    }
+}
+
+/// RFC 9112, 3.2: a request over HTTP/1.1 has exactly one Host; two could mean different things to a proxy and to us.
+fn check_host(request: &Request) -> Result<(), ApiError> {
+    let hosts: Vec<_> = request.headers().get_all(header::HOST).iter().collect();
+    let authority = request
+        .uri()
+        .authority()
+        .map(|authority| authority.as_str());
+    let wrong = |what: &str| Err(ApiError::BadRequest(what.into()));
+    match hosts[..] {
+        [] if request.version() == Version::HTTP_11 => wrong("the request has no Host header"),
+        [] => Ok(()),
+        [host] => match authority {
+            Some(authority) if authority.as_bytes() != host.as_bytes() => {
+                wrong("the Host header differs from the authority of the address")
+            }
+            _ => Ok(()),
+        },
+        _ => wrong("the request has several Host headers"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use axum::body::Body;
+
+    use super::*;
+
+    #[test]
+    fn a_request_has_one_host() {
+        let check = |version: Version, address: &str, hosts: &[&str]| {
+            let mut request = Request::builder().version(version).uri(address);
+            for host in hosts {
+                request = request.header(header::HOST, *host);
+            }
+            check_host(&request.body(Body::empty()).unwrap()).is_ok()
+        };
+        assert!(check(Version::HTTP_11, "/", &["a"]));
+        assert!(!check(Version::HTTP_11, "/", &[]));
+        assert!(!check(Version::HTTP_11, "/", &["a", "a"]));
+        assert!(check(Version::HTTP_10, "/", &[]));
+        assert!(check(Version::HTTP_2, "http://a/", &[]));
+        assert!(check(Version::HTTP_2, "http://a/", &["a"]));
+        assert!(!check(Version::HTTP_2, "http://a/", &["b"]));
+    }
+}

@@ -1,0 +1,85 @@
+"""Runs the commands of `table.py`, and keeps what they found.
+
+    run.py [--soak] [--record] [ROW ...]
+
+Each command ends with a line `figure: …`. With --record the figures and the date are written to figures.json, and
+docs/reliability.md is written anew; tests/soak does that. Without it the page is only compared with what the table and
+the recorded figures say.
+"""
+
+import datetime
+import json
+import pathlib
+import subprocess
+import sys
+import time
+
+from table import ROWS
+
+HERE = pathlib.Path(__file__).resolve().parent
+TOP = HERE.parent.parent
+FIGURES = HERE / "figures.json"
+PAGE = TOP / "docs/reliability.md"
+
+
+def run(command):
+    """Runs a command of the table; its figure."""
+    words = command.split()
+    if words[0].endswith(".py"):
+        words = [sys.executable, str(HERE / words[0]), *words[1:]]
+    print("\n-- " + command, flush=True)
+    began = time.monotonic()
+    process = subprocess.Popen(words, cwd=TOP, stdout=subprocess.PIPE, text=True)
+    last = ""
+    for line in process.stdout:
+        print(line, end="", flush=True)
+        last = line.strip() or last
+    if process.wait() != 0:
+        sys.exit("%s failed" % command)
+    print("   %.0f s" % (time.monotonic() - began))
+    return last.removeprefix("figure: ")
+
+
+def page(figures):
+    """The page: a row for each promise."""
+    lines = [
+        "# Reliability",
+        "",
+        "What the service promises under faults and attacks, and the command that shows it. `tests/run` runs the small",
+        "form of each; `tests/soak` the large one, by hand. Both are listed in `tests/reliability/table.py`, from which",
+        "`tests/reliability/run.py` writes this page. Scripts lie in `tests/reliability`.",
+        "",
+    ]
+    for row in ROWS:
+        lines += ["## %s. %s" % (row.name, row.promise), ""]
+        for command in dict.fromkeys([row.small, row.soak]):
+            if command:
+                found = figures.get(command)
+                figure = "%s (%s)" % (found["figure"], found["date"]) if found else "not recorded yet"
+                lines += ["- `%s`: %s" % (command, figure)]
+        if row.missing:
+            lines += ["- **Not shown:** " + row.missing]
+        lines += [""]
+    return "\n".join(lines)
+
+
+def main():
+    options = [word for word in sys.argv[1:] if word.startswith("--")]
+    wanted = [word for word in sys.argv[1:] if not word.startswith("--")]
+    rows = [row for row in ROWS if not wanted or row.name in wanted]
+    commands = dict.fromkeys(row.soak if "--soak" in options else row.small for row in rows)
+    figures = json.loads(FIGURES.read_text(encoding="utf-8")) if FIGURES.exists() else {}
+    for command in commands:
+        if command:
+            figure = run(command)
+            if "--record" in options:
+                figures[command] = {"figure": figure, "date": datetime.date.today().isoformat()}
+                FIGURES.write_text(json.dumps(figures, indent=1, ensure_ascii=False, sort_keys=True) + "\n", encoding="utf-8")
+    if "--record" in options:
+        PAGE.write_text(page(figures), encoding="utf-8")
+    elif PAGE.read_text(encoding="utf-8") != page(figures):
+        sys.exit("docs/reliability.md is not what the table and the recorded figures say: run.py --record writes it")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""The promises R1 to R35 of the service under faults and attacks: one row each, with the command that shows it.
+
+`run.py` runs the commands and writes docs/reliability.md. A row without a command is not shown yet, and says why.
+"""
+
+from typing import NamedTuple
+
+
+class Row(NamedTuple):
+    name: str
+    promise: str
+    # Run by tests/run, in at most a minute; a Python script lies in this folder.
+    small: str = ""
+    # Run by tests/soak, for as long as it takes.
+    soak: str = ""
+    # What of the promise no command shows, and why.
+    missing: str = ""
+
+
+SIMULATION = "cargo test --release -p signorini --lib simulation"
+
+ROWS = [
+    Row("R1", "Killed again and again under load: no acknowledged job is lost or doubled, each ends, the database is whole",
+        "kills.py", "kills.py 1000"),
+    Row("R2", "Power loss: a submit is answered only after its job is on the disk", "durable.py", "durable.py"),
+    Row("R3", "The n-th write, sync or allocation fails, for every n: a clean error or success, and the next job runs",
+        missing="not built yet"),
+    Row("R4", "A panic or an error at every boundary of a job's stages costs that job only", missing="not built yet"),
+    Row("R5", "A full disk: 507 within a second, reads and control verbs work, and all is as before when there is space",
+        missing="not built yet"),
+    Row("R6", "A damaged database: nothing wrong is served, and intact jobs are saved", missing="not built yet"),
+    Row("R7", "The clock jumps: no negative time, nothing ends early or late, lists stay in order", missing="not built yet"),
+    Row("R8", "Clients that vanish in the middle of anything leave no files or memory behind, and cancel nothing",
+        "connections.py", "connections.py --soak"),
+    Row("R9", "Two hundred slow watchers: a solve takes no longer", missing="not built yet"),
+    Row("R10", "Streams that are cut and resumed have each event exactly once",
+        "../clients/cut_streams.py", "../clients/cut_streams.py"),
+    Row("R11", "Bodies that are too large, lie about their size or never end are refused at once",
+        "transfers.py", "transfers.py --soak"),
+    Row("R12", "Compressed bodies and files are refused", missing="not built yet"),
+    Row("R13", "Hostile JSON is refused at the cost of reading it", missing="not built yet"),
+    Row("R14", "Requests that stop half-way are closed in time, and disturb nobody",
+        "connections.py", "connections.py --soak"),
+    Row("R15", "More connections than files: bystanders are answered, and it is over when they go",
+        "connections.py", "connections.py --soak"),
+    Row("R16", "Floods of HTTP/2 frames end their connection", "floods.py", "floods.py --soak"),
+    Row("R17", "Jobs that need more memory than there is are refused, or fail alone", missing="not built yet"),
+    Row("R18", "Stopped again and again under load: nothing is lost, streams resume", missing="not built yet"),
+    Row("R19", "Canceled at any time: one end, soon", "cancels.py", "cancels.py"),
+    Row("R20", "One key, one job, whoever asks how often", "keys.py", "keys.py"),
+    Row("R21", "A job that kills its worker costs only itself", missing="not built yet"),
+    Row("R22", "Queue, store and clock simulated with seeded faults keep every promise", missing="not built yet"),
+    Row("R23", "A long sweep of one owner does not hold up another", missing="sweeps and owners come later"),
+    Row("R24", "A day under load: memory, files and times stay flat", missing="retention comes later"),
+    Row("R25", "Lists of a million jobs are as fast as those of ten", missing="not measured at this size yet"),
+    Row("R26", "A thousand submits a second", missing="measured in docs/performance.md; not yet at this rate"),
+    Row("R27", "Random and mutated input of every parser: no panic, no hang", missing="not built yet"),
+    Row("R28", "Thousands of calls made from the description of the API are answered as described",
+        "../contract.py", "../contract.py"),
+    Row("R29", "UM-Bridge conformity", missing="UM-Bridge comes later"),
+    Row("R30", "Upgrades from every released version", missing="there is no release yet; older tables are upgraded in a test"),
+    Row("R31", "Backup under load and restore", missing="backup comes later"),
+    Row("R32", "Every route with every kind of token", missing="tokens come later"),
+    Row("R33", "Two servers on one store, folders and ports that cannot be used: refused at once, with the reason",
+        missing="not built yet"),
+    Row("R34", "The same problem has the same digest, on any thread, after a restart, from the cache",
+        missing="tested for a few problems in the unit and service tests; not a hundred times"),
+    Row("R35", "A page in a browser re-attaches after a restart", missing="there is no page yet"),
+]
