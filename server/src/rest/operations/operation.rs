@@ -189,7 +189,17 @@ impl Operation {
 
     /// The errors that it may answer with, each once.
     pub(in crate::rest) fn errors(&self) -> Vec<Code> {
-        let mut codes = vec![Code::Internal, Code::RateLimited];
+        let mut codes = vec![
+            Code::BadRequest,
+            Code::UriTooLong,
+            Code::HeaderTooLarge,
+            Code::RateLimited,
+            Code::Internal,
+            Code::Overloaded,
+        ];
+        if self.body.is_some() {
+            codes.push(Code::RequestTimeout);
+        }
         if self.strict {
             codes.push(Code::UnknownParameter);
         }
