@@ -1,45 +1,143 @@
 //! Problems from JSON: strict, and with all structural faults reported at once.
 //!
-//! serde decides; but it stops at the first fault, and inside an enum it does not know the place. So a
-//! text that it refuses is checked against our JSON Schema, which gives all faults.
+//! A text is first checked against our JSON Schema, which gives all faults with their places, in memory that does
+//! not depend on what the text says; then serde reads it.
 
-use serde_json::Value;
+use std::fmt;
+
+use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
 use crate::schema::violations;
 use solver::error::{Reason, Violation, escape};
 use solver::problem::Problem;
 
+/// Most brackets that may be open at once. A problem has ten.
+pub const MOST_NESTED: usize = 64;
+
 /// Reads a problem, or returns all faults of its structure. Pointers are relative to
 /// the problem.
 pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
-    serde_json::from_str(text).map_err(|first| explain(text, &first))
-}
-
-fn explain(text: &str, first: &serde_json::Error) -> Vec<Violation> {
     if text.trim().is_empty() {
-        return vec![Violation::new(
+        return Err(vec![Violation::new(
             "",
             Reason::Malformed,
             "an empty text",
             "a problem as JSON",
             "An example is in the README.",
-        )];
+        )]);
     }
-    let value: Value = match serde_json::from_str(text) {
-        Ok(value) => value,
+    if let Some(place) = too_deep(text) {
+        return Err(vec![Violation::new(
+            "",
+            Reason::Malformed,
+            place,
+            format!("at most {MOST_NESTED}"),
+            "Check the brackets there; no problem is nested so deeply.",
+        )]);
+    }
+    match violations(text) {
+        Ok(list) if list.is_empty() => {}
+        Ok(list) => return Err(list),
         Err(error) => {
-            return vec![Violation::new(
+            return Err(vec![Violation::new(
                 "",
                 Reason::Malformed,
-                error,
+                syntax_error(text).unwrap_or(error),
                 "a JSON document (RFC 8259), numbers within double precision",
                 "Check the text at that line and column.",
-            )];
+            )]);
         }
-    };
-    match violations(&value) {
-        list if list.is_empty() => vec![beyond_the_schema(text, first)],
-        list => list,
+    }
+    serde_json::from_str(text).map_err(|first| vec![beyond_the_schema(text, &first)])
+}
+
+/// The place of the first bracket that nests a text too deeply, in words.
+pub fn too_deep(text: &str) -> Option<String> {
+    let bytes = text.as_bytes();
+    let (mut depth, mut at, mut line, mut start) = (0, 0, 1, 0);
+    while let Some(byte) = bytes.get(at) {
+        match byte {
+            b'"' => {
+                at += 1;
+                while let Some(byte) = bytes.get(at).filter(|byte| **byte != b'"') {
+                    at += if *byte == b'\\' { 2 } else { 1 };
+                }
+            }
+            b'[' | b'{' if depth == MOST_NESTED => {
+                let column = at + 1 - start;
+                return Some(format!(
+                    "more than {MOST_NESTED} open brackets at line {line} column {column}"
+                ));
+            }
+            b'[' | b'{' => depth += 1,
+            b']' | b'}' => depth = depth.saturating_sub(1),
+            b'\n' => (line, start) = (line + 1, at + 1),
+            _ => {}
+        }
+        at += 1;
+    }
+    None
+}
+
+/// The first error of the syntax, or of a number or string that has no value, with its line and column.
+fn syntax_error(text: &str) -> Option<serde_json::Error> {
+    let mut reader = serde_json::Deserializer::from_str(text);
+    let read = reader.deserialize_any(Anything);
+    read.and_then(|()| reader.end()).err()
+}
+
+/// Reads any value and keeps nothing; unlike serde's own `IgnoredAny` it also reads numbers and strings.
+struct Anything;
+
+impl<'de> Visitor<'de> for Anything {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_bool<E: Error>(self, _: bool) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_i64<E: Error>(self, _: i64) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_u64<E: Error>(self, _: u64) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_f64<E: Error>(self, _: f64) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_str<E: Error>(self, _: &str) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        while list.next_element_seed(Anything)?.is_some() {}
+        Ok(())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<(), A::Error> {
+        while members.next_key_seed(Anything)?.is_some() {
+            members.next_value_seed(Anything)?;
+        }
+        Ok(())
+    }
+}
+
+impl<'de> serde::de::DeserializeSeed<'de> for Anything {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<(), D::Error> {
+        reader.deserialize_any(self)
     }
 }
 
@@ -68,6 +166,8 @@ fn pointer_of(path: &serde_path_to_error::Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::Value;
+
     use super::*;
     use crate::schema::accepts;
 
