@@ -1,19 +1,23 @@
 //! Resolves the names and numbers of a deck to places in a mesh.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::deck::{Deck, Target};
+use super::deck::{Deck, Incomplete, Name, Set, Surface, Target, on_line};
 use crate::source::Labels;
 use solver::error::{Findings, Reason, Violation};
 use solver::mesh::RawMesh;
+
+/// How often all sets together may name a node or an element on average, beside what the deck writes out: sets that
+/// contain sets are short in the deck, and may be very long when written out.
+const MOST_TIMES: u64 = 16;
 
 impl Deck {
     /// The name of the target of a load or support, as `into_raw` gives it to the mesh.
     pub(super) fn name_of(target: &Target, side: Option<usize>) -> String {
         let name = match target {
             Target::Label(label) => label.to_string(),
-            Target::Set(name) => name.clone(),
-            Target::Range(first, last, step) => format!("{first}-{last}:{step}"),
+            Target::Set(name) => name.to_string(),
+            Target::Range(range) => format!("{}-{}:{}", range[0], range[1], range[2]),
         };
         match side {
             Some(side) => format!("{name} P{side}"),
@@ -24,42 +28,74 @@ impl Deck {
     /// The mesh with all its names, and its violations.
     pub(super) fn into_raw(mut self) -> (RawMesh, Findings) {
         let mut faults = std::mem::take(&mut self.faults);
+        let mut room = self.room();
+        let incomplete = self.incomplete;
+        let elements = Labelled {
+            labels: &self.elements,
+            what: "element",
+            keyword: "ELSET",
+            incomplete: incomplete.elements,
+        };
+        let nodes = Labelled {
+            labels: &self.nodes,
+            what: "node",
+            keyword: "NSET",
+            incomplete: incomplete.nodes,
+        };
         let element_sets = resolve(
             &self.element_sets,
-            &self.elements,
-            "element",
-            "elset",
+            elements,
+            incomplete,
+            &mut room,
             &mut faults,
         );
-        let node_sets = resolve(&self.node_sets, &self.nodes, "node", "nset", &mut faults);
-        let mut surfaces: Vec<(String, Vec<(Target, usize)>)> =
-            std::mem::take(&mut self.surfaces).into_iter().collect();
+        let node_sets = resolve(&self.node_sets, nodes, incomplete, &mut room, &mut faults);
+        let surfaces = std::mem::take(&mut self.surfaces);
+        let mut surfaces: Vec<(String, Surface)> = surfaces
+            .into_iter()
+            .map(|(name, surface)| (name.to_string(), surface))
+            .collect();
+        // a deck may load the same side many times
+        let mut loaded = BTreeSet::new();
         for pressure in &self.pressures {
             if let Some(side) = pressure.side {
-                surfaces.push((
-                    Deck::name_of(&pressure.target, Some(side)),
-                    vec![(pressure.target.clone(), side)],
-                ));
+                let name = Deck::name_of(&pressure.target, Some(side));
+                if loaded.insert(name.clone()) {
+                    let (line, sides) = (pressure.line, vec![(pressure.target.clone(), side)]);
+                    surfaces.push((name, Surface { line, sides }));
+                }
             }
         }
-        for (name, sides) in surfaces {
+        for (name, surface) in surfaces {
             let mut lines = Vec::new();
-            for (target, side) in sides {
-                let elements = match &target {
-                    Target::Label(label) => self.elements.get(*label).map(|e| vec![e]),
-                    Target::Set(set) => element_sets.get(set).cloned(),
+            for (target, side) in surface.sides {
+                let single;
+                let elements: Option<&[u32]> = match &target {
+                    Target::Label(label) => {
+                        single = self.elements.get(*label).map(|e| [e]);
+                        single.as_ref().map(|e| &e[..])
+                    }
+                    Target::Set(set) => element_sets.get(set).map(|set| &set[..]),
                     Target::Range(..) => None,
                 };
                 let Some(elements) = elements else {
-                    unknown(
-                        &mut faults,
-                        &format!("`{}` in the surface `{name}`", Deck::name_of(&target, None)),
-                        "an element or a set of elements",
-                        element_sets.keys(),
-                    );
+                    let label = matches!(target, Target::Label(_));
+                    if !(incomplete.names || label && incomplete.elements) {
+                        let got =
+                            format!("`{}` in the surface `{name}`", Deck::name_of(&target, None));
+                        unknown(
+                            &mut faults,
+                            &got,
+                            "an element or a set of elements",
+                            element_sets.keys(),
+                        );
+                    }
                     continue;
                 };
-                for place in elements {
+                if !room.take(elements.len() as u64, surface.line, &name, &mut faults) {
+                    break;
+                }
+                for &place in elements {
                     let element = &self.raw.elements[place as usize];
                     let corners = element.family().corners();
                     if side > corners {
@@ -78,8 +114,13 @@ impl Deck {
             }
             self.raw.lines.entry(name).or_default().extend(lines);
         }
-        self.raw.groups = element_sets;
-        self.raw.node_sets = node_sets;
+        let named = |sets: BTreeMap<Name, Vec<u32>>| -> BTreeMap<String, Vec<u32>> {
+            sets.into_iter()
+                .map(|(name, set)| (name.to_string(), set))
+                .collect()
+        };
+        self.raw.groups = named(element_sets);
+        self.raw.node_sets = named(node_sets);
         // a node by itself is a set of one
         let single = self.prescribed.iter().map(|row| &row.target);
         for target in single.chain(self.forces.iter().map(|row| &row.target)) {
@@ -88,6 +129,7 @@ impl Deck {
                     Some(node) => {
                         self.raw.node_sets.insert(label.to_string(), vec![node]);
                     }
+                    None if incomplete.nodes => {}
                     None => unknown(
                         &mut faults,
                         &format!("node {label}"),
@@ -95,13 +137,15 @@ impl Deck {
                         self.raw.node_sets.keys(),
                     ),
                 },
-                Target::Set(name) if !self.raw.node_sets.contains_key(name) => {
-                    unknown(
-                        &mut faults,
-                        &format!("the node set `{name:.60}`"),
-                        "a node or a set of nodes",
-                        self.raw.node_sets.keys(),
-                    );
+                Target::Set(name) if !self.raw.node_sets.contains_key(&**name) => {
+                    if !incomplete.names {
+                        unknown(
+                            &mut faults,
+                            &format!("the node set `{name:.60}`"),
+                            "a node or a set of nodes",
+                            self.raw.node_sets.keys(),
+                        );
+                    }
                 }
                 _ => {}
             }
@@ -109,57 +153,131 @@ impl Deck {
         self.raw.sets_span_boundaries = true;
         (self.raw, faults)
     }
+
+    /// The room for the members of all sets and surfaces.
+    fn room(&self) -> Room {
+        let sets = self.node_sets.values().chain(self.element_sets.values());
+        let written: usize = sets.map(|set| set.members.len()).sum();
+        let sides: usize = self
+            .surfaces
+            .values()
+            .map(|surface| surface.sides.len())
+            .sum();
+        let mesh = (self.raw.nodes.len() + self.raw.elements.len()) as u64;
+        let most = (1 << 16) + 2 * (written + sides) as u64 + MOST_TIMES * mesh;
+        Room { most, left: most }
+    }
+}
+
+/// How many members of sets may still be visited.
+struct Room {
+    most: u64,
+    left: u64,
+}
+
+impl Room {
+    /// Takes some of it; reports, once, that there is not enough.
+    fn take(&mut self, count: u64, line: u64, name: &str, faults: &mut Findings) -> bool {
+        if let Some(left) = self.left.checked_sub(count) {
+            self.left = left;
+            return true;
+        }
+        if self.most > 0 {
+            faults.add(on_line(
+                line,
+                Reason::TooMany,
+                format!(
+                    "all sets and surfaces up to `{name:.60}` have more than {} members",
+                    self.most
+                ),
+                "at most 16 times as many as there are nodes and elements",
+                "Write sets that contain sets only where they are used.",
+            ));
+        }
+        (self.most, self.left) = (0, 0);
+        false
+    }
+
+    fn is_used_up(&self) -> bool {
+        self.most == 0
+    }
+}
+
+/// The numbers of nodes or of elements, and the words for them.
+#[derive(Clone, Copy)]
+struct Labelled<'a> {
+    labels: &'a Labels,
+    what: &'static str,
+    keyword: &'static str,
+    /// A missing one may be on a line that could not be read.
+    incomplete: bool,
 }
 
 /// Sets as places in the mesh.
 fn resolve(
-    sets: &BTreeMap<String, Vec<Target>>,
-    labels: &Labels,
-    what: &str,
-    keyword: &str,
+    sets: &BTreeMap<Name, Set>,
+    labelled: Labelled<'_>,
+    incomplete: Incomplete,
+    room: &mut Room,
     faults: &mut Findings,
-) -> BTreeMap<String, Vec<u32>> {
-    let mut resolved: BTreeMap<String, Vec<u32>> = BTreeMap::new();
-    for (name, members) in sets {
+) -> BTreeMap<Name, Vec<u32>> {
+    let Labelled {
+        labels,
+        what,
+        keyword,
+        incomplete: numbers,
+    } = labelled;
+    let mut resolved: BTreeMap<Name, Vec<u32>> = BTreeMap::new();
+    for (name, set) in sets {
         let mut found = Vec::new();
         // sets may contain sets; one that contains itself is visited once
-        let mut open: Vec<&Target> = members.iter().rev().collect();
-        let mut seen = vec![name];
-        while let Some(target) = open.pop() {
+        let mut open = vec![set.members.iter()];
+        let mut seen = BTreeSet::from([name]);
+        while let Some(members) = open.last_mut() {
+            let Some(target) = members.next() else {
+                open.pop();
+                continue;
+            };
+            if !room.take(1, set.line, name, faults) {
+                break;
+            }
             match target {
                 Target::Label(label) => match labels.get(*label) {
                     Some(place) => found.push(place),
+                    None if numbers => {}
                     None => unknown(
                         faults,
                         &format!("{what} {label} in the set `{name:.60}`"),
                         &format!("a number that a {what} has"),
-                        [].iter(),
+                        NONE.iter(),
                     ),
                 },
                 // numbers in between need not exist
-                Target::Range(first, last, step) => {
-                    let inside = labels.range(*first, *last, *step);
-                    if inside.is_empty() {
+                Target::Range(range) => {
+                    let [first, last, step] = **range;
+                    let (inside, visited) = labels.range(first, last, step, room.left);
+                    room.take(visited, set.line, name, faults);
+                    if inside.is_empty() && !numbers && !room.is_used_up() {
                         unknown(
                             faults,
                             &format!("{what}s {first} to {last} in the set `{name:.60}`"),
                             &format!("numbers that {what}s have"),
-                            [].iter(),
+                            NONE.iter(),
                         );
                     }
                     found.extend(inside);
                 }
                 Target::Set(other) => match sets.get_key_value(other) {
                     Some((key, inner)) => {
-                        if !seen.contains(&key) {
-                            seen.push(key);
-                            open.extend(inner.iter().rev());
+                        if seen.insert(key) {
+                            open.push(inner.members.iter());
                         }
                     }
+                    None if incomplete.names => {}
                     None => unknown(
                         faults,
                         &format!("`{other:.60}` in the set `{name:.60}`"),
-                        &format!("a {what} or a set (*{})", keyword.to_uppercase()),
+                        &format!("a {what} or a set (*{keyword})"),
                         sets.keys(),
                     ),
                 },
@@ -167,18 +285,31 @@ fn resolve(
         }
         found.sort_unstable();
         found.dedup();
+        found.shrink_to_fit();
         resolved.insert(name.clone(), found);
+        if room.is_used_up() {
+            break;
+        }
     }
     resolved
 }
 
-fn unknown<'a>(
+/// No names to list.
+const NONE: [&str; 0] = [];
+
+fn unknown<'a, S: AsRef<str> + 'a>(
     faults: &mut Findings,
     got: &str,
     expected: &str,
-    known: impl Iterator<Item = &'a String>,
+    known: impl Iterator<Item = &'a S>,
 ) {
-    let names: Vec<&str> = known.take(20).map(|name| &name[..]).collect();
+    if faults.is_full() {
+        return faults.count(1);
+    }
+    let names: Vec<String> = known
+        .take(20)
+        .map(|name| format!("{:.60}", name.as_ref()))
+        .collect();
     let hint = match names.is_empty() {
         true => "Correct the number.".to_owned(),
         false => format!("Known names: {}.", names.join(", ")),

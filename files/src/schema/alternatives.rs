@@ -3,7 +3,7 @@
 use std::{borrow::Cow, iter};
 
 use serde::Deserialize;
-use serde::de::{Deserializer, Error, IgnoredAny, MapAccess, Visitor};
+use serde::de::{Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
 use super::shape::{Shape, Type};
@@ -41,7 +41,10 @@ impl<'de> Outline<'de> {
             kind: None,
             given: Vec::new(),
         };
-        let kinds = shape.branches().iter().any(|branch| branch.kind().is_some());
+        let kinds = shape
+            .branches()
+            .iter()
+            .any(|branch| branch.kind().is_some());
         if found == Type::Object && (kinds || shape.forms.is_some()) {
             let names = shape.forms.iter().flatten().flatten().map(String::as_str);
             let reader = &mut serde_json::Deserializer::from_str(text);
@@ -55,7 +58,8 @@ impl<'de> Outline<'de> {
 
     /// Whether the value has the type and the `kind` of an alternative; the rest is checked later.
     pub(super) fn resembles(&self, shape: &Shape) -> bool {
-        let same = |only: &str| serde_json::from_str::<Cow<str>>(self.text).is_ok_and(|t| t == only);
+        let same =
+            |only: &str| serde_json::from_str::<Cow<str>>(self.text).is_ok_and(|t| t == only);
         let branches = shape.branches();
         shape.allows(self.found)
             && shape.only.as_deref().is_none_or(same)
@@ -84,10 +88,15 @@ impl<'de> Outline<'de> {
         }
         let names = forms.iter().flatten();
         let got: Vec<(&str, bool)> = names.map(|name| (name.as_str(), given(name))).collect();
-        let (got, offers) = (either(&got), forms.iter().map(|form| words::listed(form, " and ")));
+        let (got, offers) = (
+            either(&got),
+            forms.iter().map(|form| words::listed(form, " and ")),
+        );
         let expected = format!("exactly one of {}", offers.collect::<Vec<_>>().join(", "));
         let (reason, hint) = (Reason::WrongCount, "Choose one of the forms.");
-        Err(Box::new(move |at| Violation::new(at, reason, got, expected, hint)))
+        Err(Box::new(move |at| {
+            Violation::new(at, reason, got, expected, hint)
+        }))
     }
 
     /// The violation of a value that is none of these, and at which of its members it is.

@@ -34,7 +34,8 @@ pub(crate) fn violations(text: &str) -> serde_json::Result<Vec<Violation>> {
     }
     let mut found = found.into_violations();
     if let Some(last) = found.last_mut().filter(|_| stopped) {
-        last.hint.push_str(" (There are more violations: at most 100 are looked for.)");
+        last.hint
+            .push_str(" (There are more violations: at most 100 are looked for.)");
     }
     Ok(found)
 }

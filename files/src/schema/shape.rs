@@ -195,7 +195,9 @@ fn plain(schema: &Value, whole: &Value) -> Value {
         return plain(named, whole);
     }
     let each = |named: &Map<String, Value>| -> Value {
-        let each = named.iter().map(|(name, one)| (name.clone(), plain(one, whole)));
+        let each = named
+            .iter()
+            .map(|(name, one)| (name.clone(), plain(one, whole)));
         Value::Object(each.collect())
     };
     let mut kept = Map::new();

@@ -21,7 +21,7 @@ const MOST_OBJECTS: usize = 1 << 14;
 
 /// Most numbers of a list, and most lists of a list, inside of an object with a `kind`: serde keeps such an object
 /// until it knows its kind, with 32 bytes for a number and 200 for a list.
-const MOST_KEPT_NUMBERS: usize = 1 << 19;
+const MOST_KEPT_NUMBERS: usize = 1 << 17;
 const MOST_KEPT_LISTS: usize = 1 << 16;
 
 /// The violations of a walk, and where it is.
@@ -178,7 +178,8 @@ impl<'a> Walk<'a> {
     fn too_many<E: Error>(&mut self, count: usize, most: usize, what: &str) -> Result<(), E> {
         let got = format!("{count} {what}");
         let expected = format!("at most {most} {what}");
-        let hint = "No problem of this size can be solved; a large mesh is written `inline` or uploaded.";
+        let hint =
+            "No problem of this size can be solved; a large mesh is written `inline` or uploaded.";
         self.report(|at| Violation::new(at, Reason::TooMany, got, expected, hint))
     }
 }
@@ -218,7 +219,11 @@ impl Value<'_, '_> {
     fn number<E: Error>(self, number: f64, got: impl Fn() -> String) -> Result<(), E> {
         let types = self.shape.types();
         let integral = number.fract() == 0.0 && types.contains(&Type::Integer);
-        let found = if integral { Type::Integer } else { Type::Number };
+        let found = if integral {
+            Type::Integer
+        } else {
+            Type::Number
+        };
         match self.shape.minimum.filter(|least| number < *least) {
             Some(least) if types.is_empty() || types.contains(&found) => {
                 let expected = format!("a number of at least {least}");
