@@ -632,4 +632,30 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn groups_of_a_surface_are_bounded_as_are_their_names() {
+        let refused = |file: &str| match read(file.as_bytes()) {
+            Err(ReadError::Invalid(list)) => (list[0].reason, list[0].got.clone()),
+            _ => panic!("it was read"),
+        };
+        let tags = |count: usize| "1 ".repeat(count);
+        let elements = |count: usize| -> String {
+            let lines: String = (1..=count).map(|k| format!("{k} 1 2 3\n")).collect();
+            format!("$Elements\n1 {count} 1 {count}\n2 1 2 {count}\n{lines}$EndElements\n")
+        };
+        let file = triangle(Version::Four, 1);
+        let start = file.find("$Elements").unwrap();
+        let many =
+            file[..start].replace("1 1 0\n$EndEnt", &format!("2000 {}0\n$EndEnt", tags(2000)));
+        assert!(many.contains("2000 1 1"));
+        let (reason, got) = refused(&(many + &elements(1000)));
+        assert_eq!(reason, Reason::TooMany);
+        assert!(got.starts_with("line "), "{got}");
+        let name = "n".repeat(1000);
+        let named =
+            format!("$EndMeshFormat\n$PhysicalNames\n1\n2 1 \"{name}\"\n$EndPhysicalNames\n");
+        let (reason, got) = refused(&file.replace("$EndMeshFormat\n", &named));
+        assert_eq!((reason, got.len() < 200), (Reason::TooLong, true));
+    }
 }

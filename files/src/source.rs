@@ -316,4 +316,24 @@ mod tests {
         );
         assert_eq!(labels.get(77), None);
     }
+
+    #[test]
+    fn a_range_visits_each_wanted_number_at_most_once() {
+        let mut labels = Labels::default();
+        for label in (1..=100).chain([u64::MAX - 4, u64::MAX]) {
+            assert!(labels.add(label));
+        }
+        let all = |first, last, step| labels.range(first, last, step, 1000).0;
+        assert_eq!(all(1, 10, 3), [0, 3, 6, 9]);
+        assert_eq!(all(99, u64::MAX, 1), [98, 99, 100, 101]);
+        assert_eq!(
+            all(0, u64::MAX, 5),
+            (4..100).step_by(5).chain([101]).collect::<Vec<_>>()
+        );
+        assert_eq!(all(u64::MAX, u64::MAX, 1), [101]);
+        assert!(all(10, 1, 1).is_empty());
+        // with what exists, not with how far it reaches
+        assert!(labels.range(0, u64::MAX, 1, 1_000_000).1 < 2000);
+        assert_eq!(labels.range(1, 100, 1, 7).1, 8);
+    }
 }

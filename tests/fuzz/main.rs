@@ -133,12 +133,13 @@ fn kind(violations: &[Violation]) -> String {
     assert!(violations.len() <= 120, "{} violations", violations.len());
     let (first, digit) = (&violations[0], |c: char| c.is_ascii_digit());
     let depth = first.pointer.matches('/').count();
-    let words: String = first
+    // a name from the input itself is not a kind
+    let words = first
         .expected
-        .chars()
-        .filter(|c| !digit(*c))
-        .take(30)
-        .collect();
+        .split(['$', '`', '"'])
+        .next()
+        .unwrap_or_default();
+    let words: String = words.chars().filter(|c| !digit(*c)).take(30).collect();
     format!("{} {depth} {words}", first.reason)
 }
 

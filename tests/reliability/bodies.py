@@ -8,6 +8,7 @@ must be answered in 100 ms, the best of three times, since other programs take p
 and may take one CPU second each.
 """
 
+import concurrent.futures
 import json
 import pathlib
 import sys
@@ -187,6 +188,21 @@ def check_words(server):
     check(len(errors) == 100 and "more" in errors[-1]["hint"], "a thousand violations")
 
 
+def four_at_once(server):
+    """Bytes of growth for four of the same body at the same time."""
+    text = around(problem(mesh='"mesh":{"grid":{"x":[§],"y":[0,1]}}'), "[]").encode()
+    pid = server.process.pid
+    pathlib.Path("/proc/%d/clear_refs" % pid).write_text("5")
+    before = memory(pid, "VmRSS")
+    with concurrent.futures.ThreadPoolExecutor(4) as clients:
+        answers = list(clients.map(lambda _: server.call("POST", "/v1/jobs", text), range(4)))
+    for answer in answers:
+        check(answer.status == 422, "one of four: %r" % answer)
+    grown = memory(pid, "VmHWM") - before
+    check(grown <= 4 * 10 * len(text) + FLOOR, "four at once take %.0f MiB" % (grown / MIB))
+    return grown
+
+
 def main():
     worst, count, largest = [0.0, 0.0, 0.0], 0, 0
     server = Server()
@@ -197,12 +213,13 @@ def main():
             found = attack(server, name, text)
             worst = [max(pair) for pair in zip(worst, found)]
             count, largest = count + 1, max(largest, len(text))
+        grown = four_at_once(server)
         check(server.call("GET", "/readyz").status == 200, "the server is ready")
         peak = memory(server.process.pid, "VmRSS")
     print("%d checks" % outside.checks)
     print("figure: %d hostile bodies of up to %.0f MiB refused in words; the worst took %.1f times its size in memory, "
-          "%.2f CPU s and %.0f ms; %.0f MiB held afterwards" % (
-              count, largest / MIB, worst[0], worst[1], 1e3 * worst[2], peak / MIB))
+          "%.2f CPU s and %.0f ms; four at once of empty arrays took %.0f MiB; %.0f MiB held afterwards" % (
+              count, largest / MIB, worst[0], worst[1], 1e3 * worst[2], grown / MIB, peak / MIB))
 
 
 main()

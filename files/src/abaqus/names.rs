@@ -343,4 +343,76 @@ mod tests {
             assert_eq!((list[0].reason, &list[0].got), (Reason::UnknownEdge, &got));
         }
     }
+
+    fn faults(deck: &str) -> Vec<String> {
+        let Err(ReadError::Invalid(list)) = read(deck.as_bytes()) else {
+            panic!("it was read");
+        };
+        list.into_iter().map(|v| v.got).collect()
+    }
+
+    #[test]
+    fn sets_of_sets_are_read_up_to_a_multiple_of_the_mesh() {
+        let nested = |sets: usize, of: usize| {
+            let labels: String = (0..of).map(|_| "1, 2, 3, 4, 5\n").collect();
+            let sets: String = (0..sets)
+                .map(|k| format!("*NSET, NSET=S{k}\nA\n"))
+                .collect();
+            format!("{MIXED}*NSET, NSET=A\n{labels}{sets}")
+        };
+        let (mesh, _) = read(nested(100, 10).as_bytes()).unwrap();
+        assert_eq!(mesh.node_sets["S99"].len(), 9); // with the midsides between them
+        let found = faults(&nested(2000, 2000));
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(
+            found[0].starts_with("line ") && found[0].contains("members"),
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn chains_and_circles_of_sets_are_resolved() {
+        let chain: String = (0..200)
+            .map(|k| format!("*NSET, NSET=S{k}\nS{}\n", k + 1))
+            .collect();
+        let deck = format!("{MIXED}{chain}*NSET, NSET=S200\n1, 2, S0\n");
+        let (mesh, _) = read(deck.as_bytes()).unwrap();
+        assert_eq!(mesh.node_sets["S0"], mesh.node_sets["S200"]);
+        assert_eq!(mesh.node_sets["S0"].len(), 3);
+    }
+
+    #[test]
+    fn a_bad_line_is_one_violation_whatever_needs_it() {
+        let good = format!(
+            "{MIXED}*NSET, NSET=A\n1, 2\n*SURFACE, NAME=S\nALL, S1\n*DLOAD\n10, P1, 5.\n*BOUNDARY\nA, 1\n2, 2\n"
+        );
+        assert!(read(good.as_bytes()).is_ok());
+        for (sound, bad) in [
+            ("2, 1, 0\n", "2, 1, O\n"),
+            ("2, 1, 0\n", "two, 1, 0\n"),
+            ("10, 1, 2, 3, 4\n", "10, 1, 2, 3, x\n"),
+            ("10, 1, 2, 3, 4\n", "10, 1, 2, 3\n"),
+            ("TYPE=CPE4", "TYPE=C3D8"),
+            ("NSET=A\n", "\n"),
+            ("NAME=S\n", "\n"),
+            ("*NODE\n", "*INCLUDE, INPUT=nodes.inp\n"),
+        ] {
+            assert!(good.contains(sound), "{sound}");
+            let found = faults(&good.replacen(sound, bad, 1));
+            assert_eq!(found.len(), 1, "{bad:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_long_name_is_refused() {
+        let long = "N".repeat(300);
+        for deck in [
+            format!("{MIXED}*NSET, NSET={long}\n1\n"),
+            format!("{MIXED}*NSET, NSET=A\n{long}\n"),
+        ] {
+            let found = faults(&deck);
+            assert_eq!(found.len(), 1);
+            assert!(found[0].contains("of 300 bytes"), "{found:?}");
+        }
+    }
 }

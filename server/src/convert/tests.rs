@@ -150,7 +150,7 @@ fn changed_messages_are_converted_or_refused() {
             problem: Some(problem.into()),
             name: Some("a".to_owned()),
             labels: [("a".to_owned(), "b".to_owned())].into(),
-            priority: Some(3),
+            priority: 3,
             ..Default::default()
         }
     });

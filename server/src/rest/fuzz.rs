@@ -31,7 +31,7 @@ fn kind<T>(answer: Result<T, ApiError>, read: impl FnOnce(T) -> String) -> Strin
             let words: String = words
                 .chars()
                 .filter(|c| !c.is_ascii_digit())
-                .take(30)
+                .take(12)
                 .collect();
             format!("{:?} {words}", error.code())
         }
