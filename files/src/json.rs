@@ -515,7 +515,7 @@ mod tests {
         let nested = |depth: usize| format!("{}{}", "[".repeat(depth), "]".repeat(depth));
         assert_eq!(too_deep(&nested(MOST_NESTED)), None);
         let place = too_deep(&format!("{{\n \"[[\\\"[\": {}", nested(100_000))).unwrap();
-        assert_eq!(place, "more than 64 open brackets at line 2 column 73");
+        assert_eq!(place, "more than 64 open brackets at line 2 column 74");
         for text in [nested(65), "{\"a\":".repeat(1 << 20), "[".repeat(1 << 20)] {
             let list = parse(&text).unwrap_err();
             assert_eq!((list.len(), list[0].reason), (1, Reason::Malformed));

@@ -182,8 +182,13 @@ impl Deck {
 
     /// The name as it was first written.
     pub(super) fn spelled(&mut self, name: &str) -> Name {
-        let known = self.spelling.entry(name.to_uppercase());
-        known.or_insert_with(|| name.into()).clone()
+        let capitals = name.to_uppercase();
+        match self.spelling.get(&capitals) {
+            Some(known) => known.clone(),
+            // more names than a deck may define: this one is unknown anyway
+            None if self.spelling.len() > 2 * MOST_NAMES => name.into(),
+            None => self.spelling.entry(capitals).or_insert(name.into()).clone(),
+        }
     }
 
     /// A set of nodes, which begins on this line if it is new.

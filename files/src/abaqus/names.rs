@@ -241,10 +241,12 @@ fn resolve(
             if !room.take(1, set.line, name, faults) {
                 break;
             }
+            // what is missing in a set is reported there, not in all that contain it
+            let told = open.len() > 1;
             match target {
                 Target::Label(label) => match labels.get(*label) {
                     Some(place) => found.push(place),
-                    None if numbers => {}
+                    None if numbers || told => {}
                     None => unknown(
                         faults,
                         &format!("{what} {label} in the set `{name:.60}`"),
@@ -257,7 +259,7 @@ fn resolve(
                     let [first, last, step] = **range;
                     let (inside, visited) = labels.range(first, last, step, room.left);
                     room.take(visited, set.line, name, faults);
-                    if inside.is_empty() && !numbers && !room.is_used_up() {
+                    if inside.is_empty() && !(numbers || told || room.is_used_up()) {
                         unknown(
                             faults,
                             &format!("{what}s {first} to {last} in the set `{name:.60}`"),
@@ -273,7 +275,7 @@ fn resolve(
                             open.push(inner.members.iter());
                         }
                     }
-                    None if incomplete.names => {}
+                    None if incomplete.names || told => {}
                     None => unknown(
                         faults,
                         &format!("`{other:.60}` in the set `{name:.60}`"),
@@ -361,7 +363,7 @@ mod tests {
             format!("{MIXED}*NSET, NSET=A\n{labels}{sets}")
         };
         let (mesh, _) = read(nested(100, 10).as_bytes()).unwrap();
-        assert_eq!(mesh.node_sets["S99"].len(), 9); // with the midsides between them
+        assert_eq!(mesh.node_sets["S99"].len(), 11); // with the midsides between them
         let found = faults(&nested(2000, 2000));
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(

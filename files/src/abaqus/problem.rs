@@ -1,6 +1,9 @@
 //! A deck as a whole problem: a part that is not supported is a violation with its line.
 
-use std::{collections::HashMap, mem};
+use std::{
+    collections::{BTreeSet, HashMap},
+    mem,
+};
 
 use super::deck::{Deck, Elastic, ElementType, MOST_CONSTANTS, Section, Theory};
 use super::read::read;
@@ -115,9 +118,11 @@ fn materials(deck: &mut Deck) -> Vec<Material> {
         mem::take(&mut deck.sections),
         mem::take(&mut deck.materials),
     );
+    // a material is reported once, however many sections have it
+    let mut told = BTreeSet::new();
     for section in &sections {
         let Some(elastic) = known.get(&section.material) else {
-            if !deck.incomplete.names {
+            if !deck.incomplete.names && told.insert(&section.material) {
                 let got = format!("the material `{:.60}`", section.material);
                 deck.doubt(
                     section.line,
@@ -130,7 +135,7 @@ fn materials(deck: &mut Deck) -> Vec<Material> {
         };
         match material(section, elastic) {
             Some(material) => materials.push(material),
-            None if elastic.unreadable => {}
+            None if elastic.unreadable || !told.insert(&section.material) => {}
             None => {
                 let got = match elastic.values.len() {
                     count @ ..=MOST_CONSTANTS => format!("{count} elastic constants"),
