@@ -554,7 +554,9 @@ mod tests {
         let table = format!(r#"{{"kind": "table", "x": [{points}], "gap": []}}"#);
         let list = parse(&GOOD.replace(r#"{"kind": "flat"}"#, &table)).unwrap_err();
         assert_eq!(list[0].pointer, "/contacts/0/obstacle/x");
-        // numbers take less than their text, however many
+        let lines = many("0", (1 << 20) + 1);
+        let grid = GOOD.replacen("[0, 1], \"y\"", &format!("[{lines}], \"y\""), 1);
+        assert_eq!(parse(&grid).unwrap_err()[0].pointer, "/mesh/grid/x");
         let lines = many("0", 1 << 18);
         assert!(parse(&GOOD.replacen("[0, 1], \"y\"", &format!("[{lines}], \"y\""), 1)).is_ok());
     }

@@ -114,6 +114,7 @@ def bodies():
     for place, text in places.items():
         for empty in empties:
             yield "%s in %s" % (empty, place), around(text, empty)
+    yield "lines of a grid that are all 0", around(problem(mesh='"mesh":{"grid":{"x":[§],"y":[0,1]}}'), "0")
     yield "names of boundaries", around(inline(more=',"boundaries":{§}'), '"%d":[]')
     yield "names of parts", around(problem(mesh='"mesh":{"grid":{"x":[0,1],"y":[0,1]},"boundaries":{§}}'), '"%d":{}')
     yield "loads that are almost all forms", around(

@@ -19,6 +19,10 @@ use solver::error::{Findings, Reason, Violation, escape};
 /// takes a hundred and more in memory. No problem that can be solved comes near.
 const MOST_OBJECTS: usize = 1 << 14;
 
+/// Most numbers of a list: lines of a grid, members of a group. They take less than their text, but a mesh of a
+/// million elements takes more than the largest body.
+const MOST_NUMBERS: usize = 1 << 20;
+
 /// Most numbers of a list, and most lists of a list, inside of an object with a `kind`: serde keeps such an object
 /// until it knows its kind, with 32 bytes for a number and 200 for a list.
 const MOST_KEPT_NUMBERS: usize = 1 << 17;
@@ -168,7 +172,8 @@ impl<'a> Walk<'a> {
         let list = items.items.is_some();
         let number = !list && items.allows(Type::Number) && !items.has_alternatives();
         match (self.kept, list, number) {
-            (0, true, _) | (0, _, true) => usize::MAX,
+            (0, true, _) => usize::MAX,
+            (0, _, true) => MOST_NUMBERS,
             (_, true, _) => MOST_KEPT_LISTS,
             (_, _, true) => MOST_KEPT_NUMBERS,
             _ => MOST_OBJECTS,
