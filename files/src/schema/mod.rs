@@ -10,17 +10,10 @@ mod shape;
 mod walk;
 mod words;
 
-use serde_json::Value;
-
 use solver::error::{Findings, Violation};
-use solver::problem::Problem;
 
+pub use shape::schema;
 pub use words::{meant, quoted};
-
-/// The JSON Schema of a problem (draft 2020-12).
-pub fn schema() -> Value {
-    schemars::schema_for!(Problem).to_value()
-}
 
 /// The violations of a problem's text, at most a hundred; or the error of a text that is not JSON, whose line and
 /// column may be relative to a part of it.
@@ -42,7 +35,7 @@ pub(crate) fn violations(text: &str) -> serde_json::Result<Vec<Violation>> {
 
 /// Whether one of the definitions of the schema accepts a value.
 #[cfg(test)]
-pub(crate) fn accepts(definition: &str, value: &Value) -> bool {
+pub(crate) fn accepts(definition: &str, value: &serde_json::Value) -> bool {
     let schema = schema();
     let named = &schema["$defs"][definition];
     let shape = Box::leak(Box::new(shape::shape(named, &schema).unwrap()));

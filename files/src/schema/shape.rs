@@ -5,9 +5,16 @@ use std::{collections::BTreeMap, sync::LazyLock};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
+use solver::problem::Problem;
+
+/// The JSON Schema of a problem (draft 2020-12).
+pub fn schema() -> Value {
+    schemars::schema_for!(Problem).to_value()
+}
+
 /// The shape of a problem.
 pub(super) static PROBLEM: LazyLock<Shape> = LazyLock::new(|| {
-    let schema = super::schema();
+    let schema = schema();
     // the schema is ours; a test reads it. A shape that allows anything leaves the decision to serde.
     shape(&schema, &schema).unwrap_or_default()
 });
@@ -221,7 +228,7 @@ mod tests {
 
     #[test]
     fn every_keyword_of_the_schema_is_supported() {
-        let schema = super::super::schema();
+        let schema = schema();
         let shape = shape(&schema, &schema).unwrap();
         assert!(shape.properties.contains_key("contacts"));
         for (keyword, value) in [("pattern", json!("a")), ("uniqueItems", json!(true))] {
