@@ -1,6 +1,7 @@
 //! What the tests share.
 #![allow(clippy::unwrap_used, clippy::panic)] // a test that fails should say so at once
 
+pub mod fuzzing;
 pub mod harness;
 
 use serde_json::{Value, json};

@@ -32,10 +32,37 @@ pub fn read_mesh(mut reader: impl BufRead) -> Result<(MeshFormat, Mesh, Vec<Warn
         Some(b'*') => abaqus::read(reader).map(|(mesh, notes)| (MeshFormat::Abaqus, mesh, notes)),
         Some(b'{') => json(reader).map(|mesh| (MeshFormat::Json, mesh, Vec::new())),
         _ => Err(invalid(
-            "a file that begins differently".to_owned(),
+            recognised(start).to_owned(),
             "a Gmsh mesh ($MeshFormat), an Abaqus or CalculiX deck (*HEADING, *NODE), or an inline mesh as JSON",
             "Send the file as it is, without multipart or compression.",
         )),
+    }
+}
+
+/// What a file is that is not a mesh, by its first bytes.
+fn recognised(start: &[u8]) -> &'static str {
+    const KNOWN: [(&[u8], &str); 15] = [
+        (b"\x1f\x8b", "a file compressed with gzip"),
+        (b"\x28\xb5\x2f\xfd", "a file compressed with zstd"),
+        (b"BZh", "a file compressed with bzip2"),
+        (b"\xfd7zXZ", "a file compressed with xz"),
+        (b"PK\x03\x04", "a ZIP archive"),
+        (b"\x89HDF", "an HDF5 file"),
+        (b"CDF", "a NetCDF file (Exodus)"),
+        (b"\xff\xfe", "a text in UTF-16"),
+        (b"\xfe\xff", "a text in UTF-16"),
+        (b"\xef\xbb\xbf", "a text that begins with a byte order mark"),
+        (b"--", "a multipart form (with its boundary lines)"),
+        (b"%PDF", "a PDF document"),
+        (b"# vtk", "a VTK file"),
+        (b"<", "an XML or HTML document"),
+        (b"solid", "an STL surface"),
+    ];
+    let known = KNOWN.iter().find(|(first, _)| start.starts_with(first));
+    match known {
+        Some((_, what)) => what,
+        None if start.iter().all(u8::is_ascii_whitespace) => "an empty file",
+        None => "a file that begins differently",
     }
 }
 
@@ -77,6 +104,19 @@ mod tests {
         };
         assert_eq!(reason("solid cube"), ": malformed");
         assert_eq!(reason(""), ": malformed");
+        for (start, name) in [
+            (&b""[..], "an empty file"),
+            (b" \n", "an empty file"),
+            (b"\x1f\x8b\x08\0", "gzip"),
+            (b"\x28\xb5\x2f\xfd\0", "zstd"),
+            (b"--0123\r\nContent-Disposition: form-data", "multipart"),
+            (b"Point(1) = {0, 0, 0};", "begins differently"),
+        ] {
+            let Err(ReadError::Invalid(list)) = read_mesh(start) else {
+                panic!("{name} was read");
+            };
+            assert!(list[0].got.contains(name), "{}", list[0].got);
+        }
         assert_eq!(reason("$MeshFormat\n4.1 0 8\n"), ": truncated");
         assert_eq!(reason("*NODE\n1, 0, 0\n"), ": too_few");
         assert_eq!(

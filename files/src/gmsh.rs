@@ -27,6 +27,13 @@ const KINDS: [(i64, usize, Kind); 8] = [
     (15, 1, Kind::Point),
 ];
 
+/// Bytes of a physical name; Gmsh itself cuts at 128 characters.
+const LONGEST_NAME: usize = 512;
+
+/// Physical groups that an element may be in on average: the groups of a surface are written once for all of its
+/// elements, and may be many.
+const MOST_GROUPS: usize = 16;
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Point,
@@ -63,6 +70,8 @@ struct File<R> {
     labels: Labels,
     plane: Plane,
     raw: RawMesh,
+    /// Memberships of elements in physical groups.
+    members: usize,
     seen: Seen,
 }
 
@@ -89,6 +98,7 @@ impl<R: BufRead> File<R> {
             labels: Labels::default(),
             plane: Plane::default(),
             raw: RawMesh::default(),
+            members: 0,
             seen: Seen::default(),
         }
     }
@@ -280,6 +290,13 @@ impl<R: BufRead> File<R> {
                     "Correct that line.",
                 ));
             };
+            // it is compared and copied for every element that has it
+            if name.len() > LONGEST_NAME {
+                let got = format!("a name of {} bytes, `{name:.40}…`", name.len());
+                let expected = format!("at most {LONGEST_NAME}");
+                let hint = "Shorten the name of the physical group.";
+                return Err(self.source.fault(Reason::TooLong, &got, &expected, hint));
+            }
             self.names
                 .insert((dimension, tag.unsigned_abs()), name.to_owned());
         }
@@ -464,6 +481,8 @@ impl<R: BufRead> File<R> {
         ] {
             self.size(what)?;
         }
+        // taken out, so that the groups of an entity are not copied for each of its blocks
+        let entities = std::mem::take(&mut self.entities);
         for _ in 0..blocks {
             let dimension = self.int("a dimension")?;
             let entity = self.int("an entity's tag")?;
@@ -471,11 +490,11 @@ impl<R: BufRead> File<R> {
             let (size, kind) = self.kind(kind)?;
             let physical = u8::try_from(dimension)
                 .ok()
-                .and_then(|d| self.entities.get(&(d, entity)));
-            let physical = physical.cloned().unwrap_or_default();
+                .and_then(|d| entities.get(&(d, entity)));
+            let physical = physical.map_or(&[][..], |tags| tags);
             for _ in 0..self.size("the number of elements in the block")? {
                 let label = self.size("an element number")?;
-                self.element(label, kind, size, &physical)?;
+                self.element(label, kind, size, physical)?;
             }
         }
         Ok(())
@@ -547,6 +566,16 @@ impl<R: BufRead> File<R> {
         if dimension == 2 {
             self.raw.element_labels.push(label);
         }
+        self.members += physical.len();
+        let most = (1 << 16) + MOST_GROUPS * (self.raw.elements.len() + self.raw.nodes.len());
+        if self.members > most {
+            return Err(self.source.fault(
+                Reason::TooMany,
+                &format!("elements in {} physical groups in all", self.members),
+                "at most 16 groups for an element on average",
+                "Leave out the groups that are not used.",
+            ));
+        }
         for tag in physical {
             let name = match self.names.get(&(dimension, *tag)) {
                 Some(name) => name.clone(),
@@ -602,5 +631,31 @@ mod tests {
                 assert_eq!(mesh.groups[name], [0]);
             }
         }
+    }
+
+    #[test]
+    fn groups_of_a_surface_are_bounded_as_are_their_names() {
+        let refused = |file: &str| match read(file.as_bytes()) {
+            Err(ReadError::Invalid(list)) => (list[0].reason, list[0].got.clone()),
+            _ => panic!("it was read"),
+        };
+        let tags = |count: usize| "1 ".repeat(count);
+        let elements = |count: usize| -> String {
+            let lines: String = (1..=count).map(|k| format!("{k} 1 2 3\n")).collect();
+            format!("$Elements\n1 {count} 1 {count}\n2 1 2 {count}\n{lines}$EndElements\n")
+        };
+        let file = triangle(Version::Four, 1);
+        let start = file.find("$Elements").unwrap();
+        let many =
+            file[..start].replace("1 1 0\n$EndEnt", &format!("2000 {}0\n$EndEnt", tags(2000)));
+        assert!(many.contains("2000 1 1"));
+        let (reason, got) = refused(&(many + &elements(1000)));
+        assert_eq!(reason, Reason::TooMany);
+        assert!(got.starts_with("line "), "{got}");
+        let name = "n".repeat(1000);
+        let named =
+            format!("$EndMeshFormat\n$PhysicalNames\n1\n2 1 \"{name}\"\n$EndPhysicalNames\n");
+        let (reason, got) = refused(&file.replace("$EndMeshFormat\n", &named));
+        assert_eq!((reason, got.len() < 200), (Reason::TooLong, true));
     }
 }

@@ -1,45 +1,143 @@
 //! Problems from JSON: strict, and with all structural faults reported at once.
 //!
-//! serde decides; but it stops at the first fault, and inside an enum it does not know the place. So a
-//! text that it refuses is checked against our JSON Schema, which gives all faults.
+//! A text is first checked against our JSON Schema, which gives all faults with their places, in memory that does
+//! not depend on what the text says; then serde reads it.
 
-use serde_json::Value;
+use std::fmt;
+
+use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
 use crate::schema::violations;
 use solver::error::{Reason, Violation, escape};
 use solver::problem::Problem;
 
+/// Most brackets that may be open at once. A problem has ten.
+pub const MOST_NESTED: usize = 64;
+
 /// Reads a problem, or returns all faults of its structure. Pointers are relative to
 /// the problem.
 pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
-    serde_json::from_str(text).map_err(|first| explain(text, &first))
-}
-
-fn explain(text: &str, first: &serde_json::Error) -> Vec<Violation> {
     if text.trim().is_empty() {
-        return vec![Violation::new(
+        return Err(vec![Violation::new(
             "",
             Reason::Malformed,
             "an empty text",
             "a problem as JSON",
             "An example is in the README.",
-        )];
+        )]);
     }
-    let value: Value = match serde_json::from_str(text) {
-        Ok(value) => value,
+    if let Some(place) = too_deep(text) {
+        return Err(vec![Violation::new(
+            "",
+            Reason::Malformed,
+            place,
+            format!("at most {MOST_NESTED}"),
+            "Check the brackets there; no problem is nested so deeply.",
+        )]);
+    }
+    match violations(text) {
+        Ok(list) if list.is_empty() => {}
+        Ok(list) => return Err(list),
         Err(error) => {
-            return vec![Violation::new(
+            return Err(vec![Violation::new(
                 "",
                 Reason::Malformed,
-                error,
+                syntax_error(text).unwrap_or(error),
                 "a JSON document (RFC 8259), numbers within double precision",
                 "Check the text at that line and column.",
-            )];
+            )]);
         }
-    };
-    match violations(&value) {
-        list if list.is_empty() => vec![beyond_the_schema(text, first)],
-        list => list,
+    }
+    serde_json::from_str(text).map_err(|first| vec![beyond_the_schema(text, &first)])
+}
+
+/// The place of the first bracket that nests a text too deeply, in words.
+pub fn too_deep(text: &str) -> Option<String> {
+    let bytes = text.as_bytes();
+    let (mut depth, mut at, mut line, mut start) = (0, 0, 1, 0);
+    while let Some(byte) = bytes.get(at) {
+        match byte {
+            b'"' => {
+                at += 1;
+                while let Some(byte) = bytes.get(at).filter(|byte| **byte != b'"') {
+                    at += if *byte == b'\\' { 2 } else { 1 };
+                }
+            }
+            b'[' | b'{' if depth == MOST_NESTED => {
+                let column = at + 1 - start;
+                return Some(format!(
+                    "more than {MOST_NESTED} open brackets at line {line} column {column}"
+                ));
+            }
+            b'[' | b'{' => depth += 1,
+            b']' | b'}' => depth = depth.saturating_sub(1),
+            b'\n' => (line, start) = (line + 1, at + 1),
+            _ => {}
+        }
+        at += 1;
+    }
+    None
+}
+
+/// The first error of the syntax, or of a number or string that has no value, with its line and column.
+fn syntax_error(text: &str) -> Option<serde_json::Error> {
+    let mut reader = serde_json::Deserializer::from_str(text);
+    let read = reader.deserialize_any(Anything);
+    read.and_then(|()| reader.end()).err()
+}
+
+/// Reads any value and keeps nothing; unlike serde's own `IgnoredAny` it also reads numbers and strings.
+struct Anything;
+
+impl<'de> Visitor<'de> for Anything {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_bool<E: Error>(self, _: bool) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_i64<E: Error>(self, _: i64) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_u64<E: Error>(self, _: u64) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_f64<E: Error>(self, _: f64) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_str<E: Error>(self, _: &str) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        while list.next_element_seed(Anything)?.is_some() {}
+        Ok(())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<(), A::Error> {
+        while members.next_key_seed(Anything)?.is_some() {
+            members.next_value_seed(Anything)?;
+        }
+        Ok(())
+    }
+}
+
+impl<'de> serde::de::DeserializeSeed<'de> for Anything {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<(), D::Error> {
+        reader.deserialize_any(self)
     }
 }
 
@@ -68,6 +166,8 @@ fn pointer_of(path: &serde_path_to_error::Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::Value;
+
     use super::*;
     use crate::schema::accepts;
 
@@ -375,5 +475,138 @@ mod tests {
             r#""youngs_modulus": 1000, "youngs_modulus": 2000"#,
         );
         assert_eq!(found.len(), 1);
+    }
+
+    #[test]
+    fn a_misspelt_name_or_kind_is_answered_with_the_one_that_is_meant() {
+        let hint = |from: &str, to: &str| {
+            let list = parse(&GOOD.replacen(from, to, 1)).unwrap_err();
+            list.into_iter().map(|v| v.hint).collect::<String>()
+        };
+        let found = hint("\"youngs_modulus\"", "\"young_modulus\"");
+        assert!(found.contains("Did you mean `youngs_modulus`?"), "{found}");
+        let found = hint("plane_strain", "plain_strain");
+        assert!(found.contains("Did you mean `plane_strain`?"), "{found}");
+        let solver = hint(
+            r#""contacts""#,
+            r#""solver": {"algorithm": "newtn"}, "contacts""#,
+        );
+        assert!(solver.contains("Did you mean `newton`?"), "{solver}");
+    }
+
+    #[test]
+    fn an_element_has_six_or_eight_nodes() {
+        let mesh = |nodes: &str| {
+            let inline = format!(r#""inline": {{"nodes": [], "elements": [[{nodes}]]}}"#);
+            faults(r#""grid": {"x": [0, 1], "y": [0, 1]}"#, &inline).remove(0)
+        };
+        for nodes in ["0,1,2,3", "0,1,2,3,4,5,6", "0,1,2,3,4,5,6,7,8"] {
+            let (pointer, reason, expected) = mesh(nodes);
+            assert_eq!(pointer, "/mesh/inline/elements/0");
+            assert_eq!(
+                (reason, &expected[..]),
+                (Reason::WrongLength, "6 or 8 items")
+            );
+        }
+    }
+
+    #[test]
+    fn a_text_is_refused_where_it_is_nested_too_deeply() {
+        let nested = |depth: usize| format!("{}{}", "[".repeat(depth), "]".repeat(depth));
+        assert_eq!(too_deep(&nested(MOST_NESTED)), None);
+        let place = too_deep(&format!("{{\n \"[[\\\"[\": {}", nested(100_000))).unwrap();
+        assert_eq!(place, "more than 64 open brackets at line 2 column 74");
+        for text in [nested(65), "{\"a\":".repeat(1 << 20), "[".repeat(1 << 20)] {
+            let list = parse(&text).unwrap_err();
+            assert_eq!((list.len(), list[0].reason), (1, Reason::Malformed));
+            assert!(list[0].got.contains("open brackets"), "{}", list[0].got);
+        }
+    }
+
+    #[test]
+    fn a_check_ends_after_a_hundred_violations_and_says_that_there_are_more() {
+        let with = |items: &str| GOOD.replacen("[0, 1], \"y\"", &format!("[{items}], \"y\""), 1);
+        let list = parse(&with(&["[]"; 100].join(","))).unwrap_err();
+        assert_eq!(list.len(), 100);
+        assert!(!list[99].hint.contains("more"), "{}", list[99].hint);
+        let list = parse(&with(&["[]"; 1 << 20].join(","))).unwrap_err();
+        assert_eq!(
+            (list.len(), &list[99].pointer[..]),
+            (100, "/mesh/grid/x/99")
+        );
+        assert!(list[99].hint.contains("There are more violations"));
+    }
+
+    #[test]
+    fn lists_that_take_much_more_memory_than_text_are_bounded() {
+        let first = |more: String| {
+            let list = parse(&GOOD.replacen("\"contacts\"", &(more + ", \"contacts\""), 1));
+            list.unwrap_err().remove(0)
+        };
+        let many = |item: &str, count: usize| vec![item; count].join(",");
+        let steps = first(format!("\"steps\": [{}]", many("{}", (1 << 14) + 1)));
+        assert_eq!(
+            (&steps.pointer[..], steps.reason),
+            ("/steps", Reason::TooMany)
+        );
+        assert!(steps.expected.contains("16384"), "{}", steps.expected);
+        let points = many("0", (1 << 17) + 1);
+        let table = format!(r#"{{"kind": "table", "x": [{points}], "gap": []}}"#);
+        let list = parse(&GOOD.replace(r#"{"kind": "flat"}"#, &table)).unwrap_err();
+        assert_eq!(list[0].pointer, "/contacts/0/obstacle/x");
+        let lines = many("0", (1 << 20) + 1);
+        let grid = GOOD.replacen("[0, 1], \"y\"", &format!("[{lines}], \"y\""), 1);
+        assert_eq!(parse(&grid).unwrap_err()[0].pointer, "/mesh/grid/x");
+        let lines = many("0", 1 << 18);
+        assert!(parse(&GOOD.replacen("[0, 1], \"y\"", &format!("[{lines}], \"y\""), 1)).is_ok());
+    }
+
+    #[test]
+    fn a_name_that_occurs_twice_is_a_violation_at_its_place() {
+        let twice =
+            r#""inline": {"nodes": [], "elements": [], "boundaries": {"a": [], "b": [], "a": []}}"#;
+        let found = faults(r#""grid": {"x": [0, 1], "y": [0, 1]}"#, twice);
+        let place = ("/mesh/inline/boundaries/a", Reason::DuplicateName);
+        assert_eq!((&found[0].0[..], found[0].1), place);
+        let found = faults(
+            "\"youngs_modulus\": 1000",
+            "\"youngs_modulus\": 1000, \"youngs_modulus\": 1000",
+        );
+        assert_eq!(found[0].0, "/materials/0/youngs_modulus");
+    }
+
+    #[test]
+    fn a_huge_name_or_text_is_quoted_by_its_beginning() {
+        let long = "n".repeat(1 << 20);
+        for (from, to) in [
+            ("\"youngs_modulus\"", format!("\"{long}\"")),
+            ("plane_strain", long.clone()),
+            ("1000", format!("\"{long}\"")),
+        ] {
+            let list = parse(&GOOD.replacen(from, &to, 1)).unwrap_err();
+            let size =
+                |v: &Violation| v.pointer.len() + v.got.len() + v.expected.len() + v.hint.len();
+            assert!(list.iter().all(|v| size(v) < 1000));
+            let told = |v: &Violation| v.got.contains("1048576 ") || v.got.contains("1048578 ");
+            assert!(list.iter().any(told), "{list:?}");
+        }
+    }
+
+    #[test]
+    fn a_malformed_text_is_placed_by_its_line_and_column() {
+        for (from, to) in [
+            ("1000", "1e999"),
+            ("\"top\"", "\"\\ud800\""),
+            ("0.3}]", "NaN}]"),
+        ] {
+            let list = parse(&GOOD.replacen(from, to, 1)).unwrap_err();
+            assert_eq!((list.len(), list[0].reason), (1, Reason::Malformed));
+            let line = 1 + GOOD[..GOOD.find(from).unwrap()].matches('\n').count();
+            assert!(
+                list[0].got.contains(&format!("line {line} ")),
+                "{}",
+                list[0].got
+            );
+        }
     }
 }

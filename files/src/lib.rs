@@ -25,7 +25,7 @@ mod number; // what these share
 pub use external::external_mesh;
 pub use file::{MeshFormat, read_mesh};
 pub use json::parse;
-pub use schema::schema;
+pub use schema::{meant, quoted, schema};
 pub use source::ReadError;
 
 #[cfg(test)]

@@ -165,7 +165,7 @@ impl<R: BufRead> Source<R> {
 #[derive(Default)]
 pub(crate) struct Labels {
     dense: Vec<u32>,
-    sparse: std::collections::HashMap<u64, u32>,
+    sparse: std::collections::BTreeMap<u64, u32>,
     count: u32,
 }
 
@@ -191,20 +191,44 @@ impl Labels {
         true
     }
 
-    /// The places of all numbers first, first + step, … up to last. A range may be very wide: only
-    /// existing numbers are visited.
-    pub(crate) fn range(&self, first: u64, last: u64, step: u64) -> Vec<u32> {
-        let inside =
-            |label: u64| label >= first && label <= last && (label - first).is_multiple_of(step);
-        let dense = (0u64..)
-            .zip(&self.dense)
-            .filter(|(_, place)| **place != u32::MAX);
-        let sparse = self.sparse.iter().map(|(label, place)| (*label, place));
-        dense
-            .chain(sparse)
-            .filter(|(label, _)| inside(*label))
-            .map(|(_, place)| *place)
-            .collect()
+    /// The places of all numbers first, first + step, … up to last, and how many numbers were looked at, at most
+    /// one more than `most`. A range may be very wide: only existing numbers are visited, and each wanted number at
+    /// most once.
+    pub(crate) fn range(&self, first: u64, last: u64, step: u64, most: u64) -> (Vec<u32>, u64) {
+        let (mut found, mut visited) = (Vec::new(), 0);
+        if first > last {
+            return (found, visited);
+        }
+        let wanted = |label: u64| (label - first).is_multiple_of(step);
+        let inside = (first..=last.min(self.dense.len() as u64)).step_by(step.max(1) as usize);
+        for label in inside.take_while(|label| *label < self.dense.len() as u64) {
+            visited += 1;
+            if visited > most {
+                return (found, visited);
+            }
+            let place = self.dense[label as usize];
+            if place != u32::MAX {
+                found.push(place);
+            }
+        }
+        if (last - first) / step < self.sparse.len() as u64 {
+            for label in (first..=last).step_by(step as usize) {
+                visited += 1;
+                if visited > most {
+                    break;
+                }
+                found.extend(self.sparse.get(&label));
+            }
+            return (found, visited);
+        }
+        for (label, place) in self.sparse.range(first..=last) {
+            visited += 1;
+            if visited > most {
+                break;
+            }
+            found.extend(wanted(*label).then_some(*place));
+        }
+        (found, visited)
     }
 
     /// The place of a node in the file.
@@ -291,5 +315,25 @@ mod tests {
             [Some(2), Some(3)].map(|x| x)
         );
         assert_eq!(labels.get(77), None);
+    }
+
+    #[test]
+    fn a_range_visits_each_wanted_number_at_most_once() {
+        let mut labels = Labels::default();
+        for label in (1..=100).chain([u64::MAX - 4, u64::MAX]) {
+            assert!(labels.add(label));
+        }
+        let all = |first, last, step| labels.range(first, last, step, 1000).0;
+        assert_eq!(all(1, 10, 3), [0, 3, 6, 9]);
+        assert_eq!(all(99, u64::MAX, 1), [98, 99, 100, 101]);
+        assert_eq!(
+            all(0, u64::MAX, 5),
+            (4..100).step_by(5).chain([101]).collect::<Vec<_>>()
+        );
+        assert_eq!(all(u64::MAX, u64::MAX, 1), [101]);
+        assert!(all(10, 1, 1).is_empty());
+        // with what exists, not with how far it reaches
+        assert!(labels.range(0, u64::MAX, 1, 1_000_000).1 < 2000);
+        assert_eq!(labels.range(1, 100, 1, 7).1, 8);
     }
 }

@@ -1,6 +1,6 @@
 //! Violations of a request: their places in it, and how it is quoted in them.
 
-use solver::error::{Violation, shortened};
+use solver::error::Violation;
 
 /// The place of the problem in a request; pointers start there.
 pub const PROBLEM: &str = "/problem";
@@ -16,9 +16,10 @@ pub fn prefixed(prefix: &str, violations: Vec<Violation>) -> Vec<Violation> {
         .collect()
 }
 
-/// A name from a request as messages quote it: shortened, since it may be as long as the request.
+/// A name from a request as messages quote it: a long one by its beginning and its length, since it may be as long
+/// as the request.
 pub fn quoted(text: &str) -> String {
-    shortened(text, 80)
+    files::quoted(text)
 }
 
 #[cfg(test)]
@@ -28,6 +29,7 @@ mod tests {
     #[test]
     fn a_long_name_is_truncated_between_characters() {
         assert_eq!(quoted("top"), "top");
-        assert_eq!(quoted(&"ä".repeat(81)), format!("{}…", "ä".repeat(80)));
+        let long = format!("{}… (81 characters)", "ä".repeat(80));
+        assert_eq!(quoted(&"ä".repeat(81)), long);
     }
 }

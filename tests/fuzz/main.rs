@@ -1,112 +1,71 @@
-//! Files that no program wrote: real ones with bytes, numbers and lines changed, and noise. Readers and
-//! problem parser may refuse them, in words; they may not panic, and not take memory or time out of all
-//! proportion to the file. A process of its own, so that its memory is its own; the cases are the same in
-//! every run.
+//! Files that no program wrote: real ones changed in every way, and noise. Readers and problem parser may refuse
+//! them, in words; they may not panic, and not take memory or time out of all proportion to the file. A process of
+//! its own, so that its memory is its own; the cases are the same in every run. A longer one: see `suite::fuzzing`.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::path::Path;
 
 use files::{ReadError, abaqus, read_mesh};
-use proptest::prelude::*;
-use proptest::sample::Index;
-use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use solver::error::Violation;
+use suite::fuzzing::{Figures, Target};
 
-/// What a number becomes.
-const EXTREMES: [&str; 13] = [
-    "0",
-    "-1",
-    "1",
-    "2",
-    "65536",
-    "4294967295",
-    "4294967296",
-    "18446744073709551615",
-    "-9223372036854775808",
-    "1e308",
-    "-1e-320",
-    "nan",
-    "inf",
-];
-
-/// Words that mean something to a reader.
-const WORDS: [&str; 16] = [
+/// Words that mean something to a reader of meshes.
+const MESHES: [&str; 24] = [
     "$Nodes\n",
     "$EndNodes\n",
     "$Elements\n",
     "$Entities\n",
     "$PhysicalNames\n1\n1 1 \"top\"\n",
     "$Periodic\n",
+    "$PartitionedEntities\n",
+    "$EndMeshFormat\n",
+    "$Nodes\n4000000000\n",
     "*NODE\n",
+    "*NODE, NSET=a\n",
     "*ELEMENT, TYPE=CPE8\n",
+    "*ELEMENT, TYPE=CPS3, ELSET=e\n",
     "*NSET, NSET=a, GENERATE\n1, 18446744073709551615, 1\n",
     "*NSET, NSET=a\na\n",
+    "*NSET, NSET=b\na, a, b\n",
     "*ELSET, ELSET=e\ne, e\n",
     "*SURFACE, NAME=s\n1, S4\n",
+    "*SURFACE, NAME=s\ne, S1\n",
+    "*BOUNDARY\na, 1, 2\n",
+    "*DLOAD\ne, P1, 1\n",
     "*STEP\n",
-    "{",
-    "]",
-    "\"\\u0000\"",
+    "\x1f\u{8b}",
+    "{\"nodes\": [], \"elements\": []}",
 ];
 
-/// One change of a file.
-#[derive(Clone, Debug)]
-enum Change {
-    Byte(Index, u8),
-    Remove(Index, usize),
-    Repeat(Index, usize),
-    Number(Index, usize),
-    Insert(Index, usize),
-    Cut(Index),
-}
-
-fn change() -> impl Strategy<Value = Change> {
-    let at = any::<Index>;
-    prop_oneof![
-        2 => (at(), any::<u8>()).prop_map(|(i, b)| Change::Byte(i, b)),
-        1 => (at(), 1..200usize).prop_map(|(i, n)| Change::Remove(i, n)),
-        1 => (at(), 1..200usize).prop_map(|(i, n)| Change::Repeat(i, n)),
-        4 => (at(), 0..EXTREMES.len()).prop_map(|(i, k)| Change::Number(i, k)),
-        1 => (at(), 0..WORDS.len()).prop_map(|(i, k)| Change::Insert(i, k)),
-        1 => at().prop_map(Change::Cut),
-    ]
-}
-
-fn apply(file: &mut Vec<u8>, change: &Change) {
-    if file.is_empty() {
-        return;
-    }
-    let size = file.len();
-    match change {
-        Change::Byte(at, byte) => file[at.index(size)] = *byte,
-        Change::Remove(at, count) => {
-            let at = at.index(size);
-            file.drain(at..size.min(at + count));
-        }
-        Change::Repeat(at, count) => {
-            let at = at.index(size);
-            let part = file[at..size.min(at + count)].to_vec();
-            file.splice(at..at, part);
-        }
-        Change::Number(at, which) => {
-            // the next number from there on
-            let at = at.index(size);
-            let digit = |b: &u8| b.is_ascii_digit();
-            let Some(start) = file[at..].iter().position(digit).map(|k| at + k) else {
-                return;
-            };
-            let end = file[start..]
-                .iter()
-                .position(|b| !digit(b))
-                .map_or(size, |k| start + k);
-            file.splice(start..end, EXTREMES[*which].bytes());
-        }
-        Change::Insert(at, which) => {
-            let at = at.index(size);
-            file.splice(at..at, WORDS[*which].bytes());
-        }
-        Change::Cut(at) => file.truncate(at.index(size)),
-    }
-}
+/// Words that mean something to the parser of problems.
+const PROBLEMS: [&str; 26] = [
+    "{",
+    "]",
+    "[[[[[[[[",
+    "\"\\u0000\"",
+    "\"\\ud800\"",
+    "null",
+    "true",
+    "-0",
+    "\"kind\": \"table\", \"x\": [0, 1], \"gap\": [0, 1]",
+    "\"kind\": \"polyline\", \"points\": [[0, 0], [1, 0]]",
+    "\"kind\": \"power\"",
+    "\"inline\": {\"nodes\": [], \"elements\": []}",
+    "\"boundaries\": {\"a\": {\"normal\": [1, 0]}}",
+    "\"refine\": {\"tolerance\": 0.1}",
+    "\"refine\": 2",
+    "\"steps\": [{}]",
+    "\"supports\": [{\"nodes\": \"a\", \"ux\": [0, 1]}]",
+    "\"loads\": [{\"body_force\": [0, -1]}]",
+    "\"loads\": [{\"boundary\": \"top\", \"normal\": 1, \"tangential\": 1}]",
+    "\"orthotropic\": {\"e1\": 1, \"e2\": 1, \"nu12\": 0.3, \"g12\": 1}",
+    "\"friction\": {\"bound\": {\"s\": [0, 1], \"bound\": [1, 1]}, \"elastic_slip\": 1}",
+    "\"condition\": \"bonded\"",
+    "\"along\": \"arc_length\"",
+    "\"algorithm\": \"thesis\"",
+    "\"kind\": \"axisymmetric\"",
+    ",",
+];
 
 /// Real files of a folder.
 fn files(folder: &str, ending: &str) -> Vec<Vec<u8>> {
@@ -137,128 +96,114 @@ fn memory(name: &str) -> u64 {
         << 10
 }
 
-/// Changes files one to five times and gives them to `read`, which says whether they were taken.
-fn attack(files: &[Vec<u8>], cases: u32, read: impl Fn(&[u8]) -> bool) {
-    let config = Config {
-        cases,
-        failure_persistence: None,
-        ..Config::default()
-    };
-    let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
-    let mut runner = TestRunner::new_with_rng(config, rng);
-    let (taken, refused) = (std::cell::Cell::new(0), std::cell::Cell::new(0));
-    let strategy = (any::<Index>(), prop::collection::vec(change(), 1..6));
+/// Attacks a reader; its memory may grow by a multiple of the largest input only.
+fn attack(
+    name: &str,
+    seeds: Vec<Vec<u8>>,
+    words: &[&str],
+    cases: u64,
+    read: impl Fn(&[u8]) -> String,
+) -> Figures {
     let before = memory("VmHWM");
-    let ran = runner.run(&strategy, |(which, changes)| {
-        let mut file = files[which.index(files.len())].clone();
-        changes.iter().for_each(|change| apply(&mut file, change));
-        let count = if read(&file) { &taken } else { &refused };
-        count.set(count.get() + 1);
-        Ok(())
-    });
-    ran.unwrap_or_else(|failure| panic!("{failure}"));
-    // both ends of the readers were reached
-    assert!(
-        taken.get() > 0 && refused.get() > cases / 10,
-        "{taken:?} taken, {refused:?} refused"
-    );
-    // the largest file has 50 kB; the tests run side by side
-    let grown = memory("VmHWM") - before;
-    assert!(grown < 64 << 20, "grown by {} MiB", grown >> 20);
+    let target = Target {
+        name,
+        seeds,
+        words,
+        cases,
+    };
+    let figures = target.attack(read);
+    // many kinds of refusal were reached
+    assert!(figures.answers > 20, "{figures:?}");
+    // inputs have up to 128 KiB, the corpus some thousand of them; the tests run side by side
+    let grown = (memory("VmHWM") - before).saturating_sub(2 * figures.corpus as u64 * (16 << 10));
+    assert!(grown < 128 << 20, "grown by {} MiB", grown >> 20);
+    figures
 }
 
-fn read(file: &[u8]) -> bool {
+/// The kind of a refusal: of the first violation the reason, where it is, and what was expected, without numbers.
+fn kind(violations: &[Violation]) -> String {
+    assert!(!violations.is_empty());
+    for v in violations {
+        let size = v.pointer.len() + v.got.len() + v.expected.len() + v.hint.len();
+        assert!(
+            !v.got.is_empty() && !v.hint.is_empty() && size < 8000,
+            "{v:?}"
+        );
+    }
+    assert!(violations.len() <= 120, "{} violations", violations.len());
+    let (first, digit) = (&violations[0], |c: char| c.is_ascii_digit());
+    let depth = first.pointer.matches('/').count();
+    // a name from the input itself is not a kind
+    let words = first
+        .expected
+        .split(['$', '`', '"'])
+        .next()
+        .unwrap_or_default();
+    let words: String = words.chars().filter(|c| !digit(*c)).take(30).collect();
+    format!("{} {depth} {words}", first.reason)
+}
+
+fn read(file: &[u8]) -> String {
     match read_mesh(file) {
-        Ok((_, mesh, _)) => {
+        Ok((format, mesh, notes)) => {
             assert!(!mesh.elements.is_empty());
             let nodes = mesh.nodes.len() as u32;
             assert!(mesh.elements.iter().all(|e| e.iter().all(|n| *n < nodes)));
-            assert!(
-                mesh.boundaries
-                    .values()
-                    .flatten()
-                    .flatten()
-                    .all(|n| *n < nodes)
-            );
+            let mut edges = mesh.boundaries.values().flatten().flatten();
+            assert!(edges.all(|n| *n < nodes));
             assert!(mesh.node_sets.values().flatten().all(|n| *n < nodes));
             assert!(mesh.nodes.iter().flatten().all(|x| x.is_finite()));
-            true
+            let notes: Vec<_> = notes.iter().map(|note| note.code).collect();
+            format!("{format:?} {} {notes:?}", mesh.boundaries.len().min(9))
         }
-        Err(ReadError::Invalid(violations)) => {
-            assert!(!violations.is_empty());
-            assert!(
-                violations
-                    .iter()
-                    .all(|v| !v.got.is_empty() && v.got.len() < 2000 && !v.hint.is_empty())
-            );
-            false
-        }
+        Err(ReadError::Invalid(violations)) => kind(&violations),
         Err(ReadError::Io(error)) => panic!("a text in memory cannot be read: {error}"),
     }
 }
 
 #[test]
 fn changed_gmsh_files_are_read_or_refused() {
-    attack(&files("data/gmsh", "msh"), 60_000, read);
+    attack("gmsh", files("data/gmsh", "msh"), &MESHES, 30_000, read);
 }
 
 #[test]
 fn changed_decks_are_read_or_refused() {
-    attack(&files("data/abaqus", "inp"), 40_000, read);
+    let decks = files("data/abaqus", "inp");
+    attack("decks", decks.clone(), &MESHES, 20_000, read);
     attack(
-        &files("data/abaqus", "inp"),
+        "decks-as-problems",
+        decks,
+        &MESHES,
         4000,
-        |file| match std::str::from_utf8(file) {
-            Ok(text) => abaqus::problem(text).is_ok(),
-            Err(_) => false,
+        |file| match abaqus::problem(&String::from_utf8_lossy(file)) {
+            Ok(problem) => format!("{:?} {}", problem.analysis, problem.loads.len().min(9)),
+            Err(violations) => kind(&violations),
         },
     );
+}
+
+#[test]
+fn changed_inline_meshes_are_read_or_refused() {
+    let square = r#"{"nodes": [[0,0],[1,0],[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]],
+        "elements": [[0,1,2,3,4,5,6,7]], "boundaries": {"top": [[3,2,6]]}, "groups": {"a": [0]}, "node_sets": {"b": [1]}}"#;
+    attack("inline", vec![square.into()], &MESHES, 20_000, read);
 }
 
 /// The whole way of a submitted problem up to the first assembly: parsed and checked.
 #[test]
 fn changed_problems_are_checked_or_refused() {
     let problems = files("../examples", "json");
-    attack(&problems, 40_000, |file| {
-        let Ok(text) = std::str::from_utf8(file) else {
-            return false;
-        };
-        match files::parse(text) {
+    attack("problems", problems, &PROBLEMS, 20_000, |file| {
+        match files::parse(&String::from_utf8_lossy(file)) {
             // what would be refused for its size is not meshed
-            Ok(problem) => {
-                solver::estimate(&problem, None).memory_bytes > 32 << 20
-                    || solver::check(&problem, files::external_mesh(&problem, None)).is_ok()
+            Ok(problem) if solver::estimate(&problem, None).memory_bytes > 16 << 20 => {
+                "large".to_owned()
             }
-            Err(violations) => {
-                assert!(!violations.is_empty());
-                false
-            }
+            Ok(problem) => match solver::check(&problem, files::external_mesh(&problem, None)) {
+                Ok(_) => format!("sound {}", problem.contacts.len().min(3)),
+                Err(violations) => "unsound ".to_owned() + &kind(&violations),
+            },
+            Err(violations) => kind(&violations),
         }
     });
-}
-
-#[test]
-fn noise_is_refused() {
-    let config = Config {
-        cases: 2000,
-        failure_persistence: None,
-        ..Config::default()
-    };
-    let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
-    let noise = prop::collection::vec(any::<u8>(), 0..2000);
-    let starts = prop::sample::select(vec![
-        "",
-        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n",
-        "$MeshFormat\n4.1 1 8\n\u{1}\0\0\0\n$EndMeshFormat\n$Nodes\n",
-        "*NODE\n",
-        "{",
-    ]);
-    TestRunner::new_with_rng(config, rng)
-        .run(&(starts, noise), |(start, noise)| {
-            let file = [start.as_bytes(), &noise].concat();
-            assert!(!read(&file));
-            let _ = files::parse(&String::from_utf8_lossy(&file));
-            Ok(())
-        })
-        .unwrap_or_else(|failure| panic!("{failure}"));
 }

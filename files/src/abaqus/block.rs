@@ -1,6 +1,8 @@
 //! Blocks of data lines: what each line adds to the deck.
 
-use super::deck::{Deck, Elastic, ElementType, Force, Prescribed, Pressure, Target};
+use super::deck::{
+    Deck, Elastic, ElementType, Force, MOST_CONSTANTS, Name, Prescribed, Pressure, Target,
+};
 use solver::element::{Element, Family};
 use solver::error::Reason;
 use solver::mesh::NO_NODE;
@@ -9,24 +11,24 @@ use solver::mesh::NO_NODE;
 pub(super) enum Block {
     Skip,
     Title,
-    Nodes(Option<String>),
+    Nodes(Option<Name>),
     Elements {
         kind: ElementType,
-        set: Option<String>,
+        set: Option<Name>,
         pending: Vec<u64>,
     },
     NodeSet {
-        name: String,
+        name: Name,
         generate: bool,
     },
     ElementSet {
-        name: String,
+        name: Name,
         generate: bool,
     },
-    Surface(String),
-    NodeSurface(String),
+    Surface(Name),
+    NodeSurface(Name),
     Elastic {
-        material: Option<String>,
+        material: Option<Name>,
         elastic: Elastic,
     },
     Thickness,
@@ -41,6 +43,9 @@ pub(super) enum Block {
 impl Deck {
     /// One line of a block.
     pub(super) fn data(&mut self, block: &mut Block, line: u64, text: &str) {
+        if !matches!(block, Block::Skip | Block::Title) && self.has_long_name(line, text) {
+            return self.forget(block);
+        }
         let words = text
             .split(',')
             .map(str::trim)
@@ -76,6 +81,9 @@ impl Deck {
                                 "a number of a node or element",
                                 "Correct that line.",
                             );
+                            // its next line begins another element, or continues this one: both are unknown
+                            pending.clear();
+                            self.incomplete.elements = true;
                             return;
                         }
                     }
@@ -88,23 +96,17 @@ impl Deck {
             }
             Block::NodeSet { name, generate } => {
                 if let Some(found) = self.members(*generate, line, text) {
-                    self.node_sets
-                        .entry(name.clone())
-                        .or_default()
-                        .extend(found);
+                    self.node_set(name, line).extend(found);
                 }
             }
             Block::ElementSet { name, generate } => {
                 if let Some(found) = self.members(*generate, line, text) {
-                    self.element_sets
-                        .entry(name.clone())
-                        .or_default()
-                        .extend(found);
+                    self.element_set(name, line).extend(found);
                 }
             }
             Block::NodeSurface(name) => {
                 let target = self.target(text.split(',').next().unwrap_or_default());
-                self.node_sets.entry(name.clone()).or_default().push(target);
+                self.node_set(name, line).push(target);
             }
             Block::Surface(name) => {
                 let mut words = words;
@@ -114,11 +116,7 @@ impl Deck {
                 );
                 let target = self.target(target);
                 match side_number(side, 'S') {
-                    Some(side) => self
-                        .surfaces
-                        .entry(name.clone())
-                        .or_default()
-                        .push((target, side)),
+                    Some(side) => self.surface(name, line).push((target, side)),
                     None => self.fault(
                         line,
                         Reason::Malformed,
@@ -129,15 +127,20 @@ impl Deck {
                 }
             }
             Block::Elastic { elastic, .. } => {
-                for word in words {
+                // one more than any form has: the violation reports the excess
+                let room = MOST_CONSTANTS + 1 - elastic.values.len().min(MOST_CONSTANTS);
+                for word in words.take(room) {
                     match number(word) {
                         Some(value) => elastic.values.push(value),
-                        None => self.doubt(
-                            line,
-                            format!("`{word:.40}`"),
-                            "a number",
-                            "Correct that line.",
-                        ),
+                        None => {
+                            elastic.unreadable = true;
+                            self.doubt(
+                                line,
+                                format!("`{word:.40}`"),
+                                "a number",
+                                "Correct that line.",
+                            );
+                        }
                     }
                 }
             }
@@ -164,6 +167,7 @@ impl Deck {
                     (Some(side), Some(value)) => {
                         let target = self.target(words[0]);
                         self.pressures.push(Pressure {
+                            line,
                             target,
                             side,
                             value,
@@ -208,6 +212,7 @@ impl Deck {
     pub(super) fn end(&mut self, block: Block, line: u64) {
         match block {
             Block::Elements { kind, pending, .. } if !pending.is_empty() => {
+                self.incomplete.elements = true;
                 let got = format!("{} numbers for element {}", pending.len() - 1, pending[0]);
                 let expected = format!("{} nodes", kind.nodes);
                 self.fault(
@@ -233,7 +238,16 @@ impl Deck {
         }
     }
 
-    fn node(&mut self, set: &Option<String>, line: u64, text: &str) {
+    /// A line of a block cannot be read: what it would have added is unknown.
+    fn forget(&mut self, block: &Block) {
+        match block {
+            Block::Nodes(_) => self.incomplete.nodes = true,
+            Block::Elements { .. } => self.incomplete.elements = true,
+            _ => self.incomplete.names = true,
+        }
+    }
+
+    fn node(&mut self, set: &Option<Name>, line: u64, text: &str) {
         let mut words = text.split(',').map(str::trim);
         let label = words.next().and_then(|w| w.parse::<u64>().ok());
         let mut place = [0.0; 3];
@@ -245,6 +259,7 @@ impl Deck {
             }
         }
         let Some(label) = label.filter(|_| sound) else {
+            self.incomplete.nodes = true;
             self.fault(
                 line,
                 Reason::Malformed,
@@ -266,20 +281,21 @@ impl Deck {
         }
         self.plane.add(label, place);
         if let Some(name) = set {
-            self.node_sets
-                .entry(name.clone())
-                .or_default()
-                .push(Target::Label(label));
+            self.node_set(name, line).push(Target::Label(label));
         }
         self.raw.nodes.push([place[0], place[1]]);
         self.raw.node_labels.push(label);
     }
 
-    fn element(&mut self, kind: ElementType, set: Option<String>, line: u64, numbers: &[u64]) {
+    fn element(&mut self, kind: ElementType, set: Option<Name>, line: u64, numbers: &[u64]) {
         let label = numbers[0];
         let mut nodes = [NO_NODE; 8];
         for (slot, number) in nodes.iter_mut().zip(&numbers[1..]) {
             let Some(node) = self.nodes.get(*number) else {
+                self.incomplete.elements = true;
+                if self.incomplete.nodes {
+                    return; // it may be the node that could not be read
+                }
                 self.fault(
                     line,
                     Reason::UnknownNode,
@@ -309,10 +325,7 @@ impl Deck {
         });
         self.raw.element_labels.push(label);
         if let Some(name) = set {
-            self.element_sets
-                .entry(name)
-                .or_default()
-                .push(Target::Label(label));
+            self.element_set(&name, line).push(Target::Label(label));
         }
     }
 
@@ -327,8 +340,10 @@ impl Deck {
         }
         let numbers: Vec<u64> = words.iter().filter_map(|word| word.parse().ok()).collect();
         match numbers[..] {
-            [first, last] if words.len() == 2 => Some(vec![Target::Range(first, last, 1)]),
-            [first, last, step] if step > 0 => Some(vec![Target::Range(first, last, step)]),
+            [first, last] if words.len() == 2 => Some(vec![Target::Range([first, last, 1].into())]),
+            [first, last, step] if step > 0 => {
+                Some(vec![Target::Range([first, last, step].into())])
+            }
             _ => {
                 self.fault(
                     line,

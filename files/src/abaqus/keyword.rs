@@ -1,7 +1,7 @@
 //! Keyword lines: `*NAME, PARAMETER=value, …`, and the block of data that each begins.
 
 use super::block::Block;
-use super::deck::{Deck, Elastic, ElementType, Section, Theory};
+use super::deck::{Deck, Elastic, ElementType, Incomplete, MOST_NAMES, Name, Section, Theory};
 use solver::element::Family;
 use solver::error::Reason;
 
@@ -54,12 +54,30 @@ impl Deck {
         &mut self,
         keyword: &Keyword,
         line: u64,
-        material: &mut Option<String>,
+        material: &mut Option<Name>,
     ) -> Block {
+        let names = self.node_sets.len() + self.element_sets.len() + self.surfaces.len();
+        if names > MOST_NAMES {
+            if !std::mem::replace(&mut self.incomplete.names, true) {
+                let (got, expected) = (
+                    format!("more than {MOST_NAMES} names"),
+                    format!("at most {MOST_NAMES} sets and surfaces"),
+                );
+                self.fault(
+                    line,
+                    Reason::TooMany,
+                    got,
+                    &expected,
+                    "Leave out the sets that are not used.",
+                );
+            }
+            return Block::Skip;
+        }
         match &keyword.name[..] {
             "HEADING" => Block::Title,
             "NODE" => {
                 if keyword.has("SYSTEM") || keyword.has("INPUT") {
+                    self.incomplete.nodes = true;
                     self.fault(line, Reason::Unsupported, "*NODE with SYSTEM or INPUT", "coordinates x, y in the deck itself", "Write the nodes out.");
                 }
                 Block::Nodes(keyword.get("NSET").map(|name| self.spelled(name)))
@@ -67,14 +85,14 @@ impl Deck {
             "ELEMENT" => self.element_block(keyword, line),
             "NSET" => match keyword.get("NSET").map(|name| self.spelled(name)) {
                 Some(name) => {
-                    self.node_sets.entry(name.clone()).or_default();
+                    self.node_set(&name, line);
                     Block::NodeSet { name, generate: keyword.has("GENERATE") }
                 }
                 None => self.nameless(line, "*NSET", "NSET"),
             },
             "ELSET" => match keyword.get("ELSET").map(|name| self.spelled(name)) {
                 Some(name) => {
-                    self.element_sets.entry(name.clone()).or_default();
+                    self.element_set(&name, line);
                     Block::ElementSet { name, generate: keyword.has("GENERATE") }
                 }
                 None => self.nameless(line, "*ELSET", "ELSET"),
@@ -82,7 +100,7 @@ impl Deck {
             "SURFACE" => match keyword.get("NAME").map(|name| self.spelled(name)) {
                 Some(name) if keyword.get("TYPE").is_some_and(|t| t.eq_ignore_ascii_case("NODE")) => Block::NodeSurface(name),
                 Some(name) => {
-                    self.surfaces.entry(name.clone()).or_default();
+                    self.surface(&name, line);
                     Block::Surface(name)
                 }
                 None => self.nameless(line, "*SURFACE", "NAME"),
@@ -97,7 +115,7 @@ impl Deck {
                 if !engineering_constants && kind != "ISO" && kind != "ISOTROPIC" {
                     self.doubt(line, format!("*ELASTIC, TYPE={kind:.40}"), "TYPE=ISO or TYPE=ENGINEERING CONSTANTS", "Give the constants in one of these forms.");
                 }
-                let elastic = Elastic { line, engineering_constants, values: Vec::new() };
+                let elastic = Elastic { line, engineering_constants, values: Vec::new(), unreadable: false };
                 Block::Elastic { material: material.clone(), elastic }
             }
             "SOLID SECTION" => {
@@ -137,6 +155,7 @@ impl Deck {
                 _ => Block::Skip,
             },
             "INCLUDE" | "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SYSTEM" | "TRANSFORM" => {
+                self.incomplete = Incomplete { nodes: true, elements: true, names: true };
                 self.fault(line, Reason::Unsupported, format!("*{}", keyword.name), "nodes and elements written out in one file", "Let the preprocessor write the whole mesh.");
                 Block::Skip
             }
@@ -148,6 +167,7 @@ impl Deck {
     }
 
     fn nameless(&mut self, line: u64, keyword: &str, parameter: &str) -> Block {
+        self.incomplete.names = true;
         self.fault(
             line,
             Reason::Malformed,
@@ -179,7 +199,12 @@ impl Deck {
 
     fn element_block(&mut self, keyword: &Keyword, line: u64) -> Block {
         let name = keyword.get("TYPE").unwrap_or_default().to_uppercase();
+        let set = keyword.get("ELSET").map(|name| self.spelled(name));
+        if let Some(name) = &set {
+            self.element_set(name, line);
+        }
         let Some(kind) = element_type(&name) else {
+            self.incomplete.elements = true;
             self.fault(
                 line,
                 Reason::Unsupported,
@@ -191,10 +216,6 @@ impl Deck {
         };
         if !self.types.contains(&kind) {
             self.types.push(kind);
-        }
-        let set = keyword.get("ELSET").map(|name| self.spelled(name));
-        if let Some(name) = &set {
-            self.element_sets.entry(name.clone()).or_default();
         }
         Block::Elements {
             kind,

@@ -1,6 +1,11 @@
 //! A deck as a whole problem: a part that is not supported is a violation with its line.
 
-use super::deck::{Deck, Elastic, ElementType, Section, Theory};
+use std::{
+    collections::{BTreeSet, HashMap},
+    mem,
+};
+
+use super::deck::{Deck, Elastic, ElementType, MOST_CONSTANTS, Section, Theory};
 use super::read::read;
 use crate::source::ReadError;
 use solver::error::Violation;
@@ -109,21 +114,33 @@ fn quadrature(deck: &mut Deck) -> u32 {
 
 fn materials(deck: &mut Deck) -> Vec<Material> {
     let mut materials = Vec::new();
-    for section in deck.sections.clone() {
-        let Some(elastic) = deck.materials.get(&section.material).cloned() else {
-            let got = format!("the material `{:.60}`", section.material);
-            deck.doubt(
-                section.line,
-                got,
-                "a *MATERIAL with *ELASTIC",
-                "Define the material.",
-            );
+    let (sections, known) = (
+        mem::take(&mut deck.sections),
+        mem::take(&mut deck.materials),
+    );
+    // a material is reported once, however many sections have it
+    let mut told = BTreeSet::new();
+    for section in &sections {
+        let Some(elastic) = known.get(&section.material) else {
+            if !deck.incomplete.names && told.insert(&section.material) {
+                let got = format!("the material `{:.60}`", section.material);
+                deck.doubt(
+                    section.line,
+                    got,
+                    "a *MATERIAL with *ELASTIC",
+                    "Define the material.",
+                );
+            }
             continue;
         };
-        match material(&section, &elastic) {
+        match material(section, elastic) {
             Some(material) => materials.push(material),
+            None if elastic.unreadable || !told.insert(&section.material) => {}
             None => {
-                let got = format!("{} elastic constants", elastic.values.len());
+                let got = match elastic.values.len() {
+                    count @ ..=MOST_CONSTANTS => format!("{count} elastic constants"),
+                    _ => format!("more than {MOST_CONSTANTS} elastic constants"),
+                };
                 deck.doubt(
                     elastic.line,
                     got,
@@ -161,22 +178,20 @@ fn material(section: &Section, elastic: &Elastic) -> Option<Material> {
     };
     Some(Material {
         elasticity,
-        group: Some(section.elements.clone()),
-        name: Some(section.material.clone()),
+        group: Some(section.elements.to_string()),
+        name: Some(section.material.to_string()),
     })
 }
 
 /// One support for each row; a later row for the same nodes and component replaces the earlier one.
 fn supports(deck: &Deck) -> Vec<Support> {
     let mut supports: Vec<Support> = Vec::new();
+    let mut places: HashMap<String, usize> = HashMap::new();
     for row in &deck.prescribed {
         let nodes = Deck::name_of(&row.target, None);
-        let known = supports
-            .iter()
-            .position(|s| s.nodes.as_ref() == Some(&nodes));
-        let place = known.unwrap_or_else(|| {
+        let place = *places.entry(nodes).or_insert_with_key(|nodes| {
             supports.push(Support {
-                nodes: Some(nodes),
+                nodes: Some(nodes.clone()),
                 ..Support::default()
             });
             supports.len() - 1

@@ -5,7 +5,7 @@ use std::io::BufRead;
 use solver::error::Reason;
 
 use super::block::Block;
-use super::deck::Deck;
+use super::deck::{Deck, Incomplete, Name};
 use super::keyword::Keyword;
 use crate::source::{ReadError, Source};
 
@@ -14,7 +14,7 @@ pub(super) fn read(reader: impl BufRead) -> Result<Deck, ReadError> {
     let mut source = Source::new(reader);
     let mut deck = Deck::default();
     let mut block = Block::NoData("the first keyword");
-    let mut material: Option<String> = None;
+    let mut material: Option<Name> = None;
     while source.advance()? {
         let line = source.line;
         let mut text = source.text().trim().to_owned();
@@ -30,11 +30,20 @@ pub(super) fn read(reader: impl BufRead) -> Result<Deck, ReadError> {
             text.push_str(source.text().trim());
         }
         deck.end(block, line);
+        if deck.has_long_name(line, &text) {
+            deck.incomplete = Incomplete {
+                nodes: true,
+                elements: true,
+                names: true,
+            };
+            block = Block::Skip;
+            continue;
+        }
         block = deck.begin(&Keyword::new(&text), line, &mut material);
     }
     let line = source.line;
     deck.end(block, line);
-    if deck.raw.nodes.is_empty() {
+    if deck.raw.nodes.is_empty() && !deck.incomplete.nodes {
         deck.fault(
             line,
             Reason::TooFew,

@@ -94,6 +94,10 @@ impl Reader {
 
     /// A violation at or below the current place.
     pub fn violation<T>(&mut self, violation: Violation) -> Option<T> {
+        if self.found.is_full() {
+            self.found.count(1);
+            return None;
+        }
         let token = |token: &Token| match token {
             Token::Name(name) => format!("/{name}"),
             Token::Key(name) => format!("/{}", escape(name)),

@@ -139,3 +139,75 @@ fn statuses_keep_their_numbers_and_zero_is_none() {
     assert!(read::<_, Status>(0).is_err());
     assert!(read::<_, Status>(17).is_err());
 }
+
+/// Messages of any bytes: decoded and converted, or refused. See `suite::fuzzing`, also for longer runs.
+#[test]
+fn changed_messages_are_converted_or_refused() {
+    use prost::Message;
+    let jobs = examples::ALL.map(|(_, text)| {
+        let problem: Problem = files::parse(text).unwrap();
+        pb::CreateJobRequest {
+            problem: Some(problem.into()),
+            name: Some("a".to_owned()),
+            labels: [("a".to_owned(), "b".to_owned())].into(),
+            priority: 3,
+            ..Default::default()
+        }
+    });
+    let batch = pb::BatchCreateJobsRequest {
+        jobs: jobs.to_vec(),
+        ..Default::default()
+    };
+    let mut seeds: Vec<Vec<u8>> = jobs.iter().map(Message::encode_to_vec).collect();
+    seeds.push(batch.encode_to_vec());
+    let filter = pb::JobFilter {
+        status: vec![1, 2],
+        created_after: Some(prost_types::Timestamp {
+            seconds: 1,
+            nanos: 1,
+        }),
+        ..Default::default()
+    };
+    seeds.push(filter.encode_to_vec());
+    let target = suite::fuzzing::Target {
+        name: "messages",
+        seeds,
+        words: &[
+            "\n",
+            "\u{a}\u{0}",
+            "\u{12}\u{2}",
+            "\u{7f}\u{7f}",
+            "top",
+            "\0\0\0\0\0\0\u{0}\u{7f}",
+        ],
+        cases: 10_000,
+    };
+    let figures = target.attack(|input| {
+        let kind = |found: Vec<Violation>| {
+            assert!(!found.is_empty() && found.len() <= 100);
+            let depth = found[0].pointer.matches('/').count();
+            format!("{} {depth} {}", found[0].reason, found.len().min(5))
+        };
+        let one = match pb::CreateJobRequest::decode(input) {
+            Ok(message) => match super::job_request(message).problem {
+                Ok(_) => "read".to_owned(),
+                Err(found) => kind(found),
+            },
+            Err(_) => "undecodable".to_owned(),
+        };
+        let many = match pb::BatchCreateJobsRequest::decode(input) {
+            Ok(message) => {
+                let jobs = message.jobs.into_iter().map(super::job_request);
+                let sound = jobs.filter(|job| job.problem.is_ok()).count();
+                format!("{} jobs", sound.min(5))
+            }
+            Err(_) => "undecodable".to_owned(),
+        };
+        let filter = match pb::JobFilter::decode(input) {
+            Ok(message) => super::filter(Some(message)).is_ok().to_string(),
+            Err(_) => "undecodable".to_owned(),
+        };
+        format!("{one}; {many}; {filter}")
+    });
+    assert!(figures.answers > 20, "{figures:?}");
+}

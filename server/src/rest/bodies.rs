@@ -5,13 +5,12 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde_json::value::RawValue;
 use solver::{
     error::{Reason, Violation},
     problem::Problem,
 };
 
-use super::object::{Object, Read};
+use super::object::{First, Object, Read, Texts};
 use crate::{
     error::ApiError,
     job::{Cache, Limits, MAX_PRIORITY, MIN_PRIORITY},
@@ -130,7 +129,7 @@ pub(super) fn submission(text: &str) -> Result<JobRequest, ApiError> {
     let problem = problem(&mut body);
     let envelope = Envelope {
         name: body.take("name", "a string"),
-        labels: body.take("labels", LABELS).unwrap_or_default(),
+        labels: labels(&mut body, LABELS).unwrap_or_default(),
         priority: body
             .take("priority", &PRIORITIES.expected())
             .unwrap_or_default(),
@@ -152,28 +151,42 @@ pub(super) fn batch(text: &str) -> Result<Read<Vec<JobRequest>>, ApiError> {
     let some = format!("1 … {MAX_BATCH} submissions");
     let hint = "Send {\"jobs\": [{\"problem\": {…}}, …]}.";
     let texts = body.require("jobs", &some, hint).and_then(|raw| {
-        let texts = serde_json::from_str::<Vec<&RawValue>>(raw.get()).ok();
+        // one more than allowed: the verb reports the excess
+        let texts = serde_json::from_str::<First<{ MAX_BATCH + 1 }>>(raw.get()).ok();
         if texts.is_none() {
             body.wrong_type("jobs", raw, "an array of submissions");
         }
         texts
     });
+    let texts = texts.map_or(vec![], |First(texts)| texts);
     let mut requests = vec![];
-    // one more than allowed: the verb reports the excess
-    for (n, text) in texts.iter().flatten().take(MAX_BATCH + 1).enumerate() {
+    let mut unchecked = None;
+    for (n, text) in texts.iter().enumerate() {
+        if body.violations.is_full() {
+            unchecked = Some(n);
+            break;
+        }
         let at = format!("/jobs/{n}");
         match submission(text.get()) {
-            Ok(request) => {
-                if let Err(found) = &request.problem {
-                    body.violations.extend(prefixed(&at, found.clone()));
+            Ok(request) => match &request.problem {
+                Ok(_) => requests.push(request),
+                Err(_) => {
+                    let found = request.problem.err().unwrap_or_default();
+                    body.violations.extend(prefixed(&at, found));
                 }
-                requests.push(request);
-            }
+            },
             Err(ApiError::InvalidProblem(found)) => body.violations.extend(prefixed(&at, found)),
             Err(other) => return Err(other),
         }
     }
-    Ok(body.finish("jobs", Some(requests)))
+    let mut read = body.finish("jobs", Some(requests));
+    if let (Some(n), Err(found)) = (unchecked, &mut read)
+        && let Some(last) = found.last_mut()
+    {
+        last.hint
+            .push_str(&format!(" (The jobs from /jobs/{n} on were not checked.)"));
+    }
+    Ok(read)
 }
 
 /// A body `{name, labels, priority, pinned}`: absent fields stay unchanged; null removes a name or labels.
@@ -181,7 +194,7 @@ pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
     let mut body = Object::open(text, "an object with what to change")?;
     let (unnamed, unlabeled) = (body.is_null("name"), body.is_null("labels"));
     let name: Option<String> = body.take("name", "a string or null");
-    let labels = body.take("labels", "an object of strings, or null");
+    let labels = labels(&mut body, "an object of strings, or null");
     let edit = Edit {
         name: (unnamed || name.is_some()).then_some(name),
         labels: labels.or(unlabeled.then(BTreeMap::new)),
@@ -240,6 +253,12 @@ fn problem(body: &mut Object<'_>) -> Option<Problem> {
     problem
         .map_err(|found| body.violations.extend(prefixed(PROBLEM, found)))
         .ok()
+}
+
+/// The field `labels`, with one more than allowed: the verb reports the excess.
+fn labels(body: &mut Object<'_>, expected: &str) -> Option<BTreeMap<String, String>> {
+    let labels = body.take::<Texts<{ MAX_LABELS + 1 }>>("labels", expected)?;
+    Some(labels.0)
 }
 
 const LABELS: &str = "an object of strings";
@@ -336,7 +355,9 @@ mod tests {
         let text = format!("{{\"problem\": {{}}, \"{}\": 1}}", "x".repeat(1 << 20));
         let violations = submission(&text).unwrap().problem.unwrap_err();
         let longest = violations.iter().map(|v| v.pointer.len().max(v.got.len()));
-        assert!(longest.max() < Some(100));
+        assert!(longest.max() < Some(120));
+        let long = violations.iter().find(|v| v.pointer.starts_with("/xxx"));
+        assert!(long.unwrap().got.ends_with("… (1048576 characters)\""));
     }
 
     #[test]

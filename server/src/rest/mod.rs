@@ -32,6 +32,9 @@ mod operations;
 mod reference;
 mod router;
 
+#[cfg(test)]
+mod fuzz;
+
 pub use openapi::openapi;
 pub use reference::reference;
 pub use reply::refuse;

@@ -1,22 +1,25 @@
 //! Reading a JSON object field by field, with all errors reported together.
 
-use std::{collections::BTreeMap, fmt};
+use std::{borrow::Cow, collections::BTreeMap, fmt};
 
 use serde::{
     Deserialize, Deserializer,
-    de::{DeserializeOwned, MapAccess, Visitor},
+    de::{DeserializeOwned, IgnoredAny, MapAccess, SeqAccess, Visitor},
 };
 use serde_json::value::RawValue;
-use solver::error::{Findings, Reason, Violation, escape};
+use solver::error::{Findings, Reason, Violation, escape, shortened};
 
 use crate::{error::ApiError, violations};
 
 /// The content of a body whose JSON is well formed, or its violations.
 pub(super) type Read<T> = Result<T, Vec<Violation>>;
 
+/// Most fields of an object: more than any has, and enough to report a hundred unknown ones.
+const MOST_FIELDS: usize = 1024;
+
 /// An object whose fields are taken out one by one; all violations are reported at the end.
 pub(super) struct Object<'a> {
-    fields: BTreeMap<String, &'a RawValue>,
+    fields: BTreeMap<Cow<'a, str>, &'a RawValue>,
     pub(super) violations: Findings,
 }
 
@@ -27,23 +30,38 @@ impl<'a> Object<'a> {
             let nothing = format!("the body is empty; expected {expected}");
             return Err(ApiError::MalformedJson(nothing));
         }
+        if let Some(place) = files::json::too_deep(text) {
+            let most = files::json::MOST_NESTED;
+            let too_deep = format!("{place}; expected at most {most}");
+            return Err(ApiError::MalformedJson(too_deep));
+        }
         // first only the syntax, so that a well-formed array is reported as the wrong type
         let whole: &RawValue = serde_json::from_str(text)
             .map_err(|error| ApiError::MalformedJson(error.to_string()))?;
-        let Pairs(pairs) = serde_json::from_str(whole.get())
+        let Members {
+            fields,
+            repeated,
+            count,
+        } = serde_json::from_str(whole.get())
             .map_err(|_| ApiError::InvalidProblem(vec![wrong_type("", whole, expected)]))?;
+        if count > MOST_FIELDS {
+            return Err(ApiError::InvalidProblem(vec![Violation {
+                pointer: String::new(),
+                reason: Reason::TooMany,
+                got: format!("an object of {count} fields"),
+                expected: expected.into(),
+                hint: "The bodies of all requests are described in /openapi.json.".into(),
+            }]));
+        }
         let mut violations = Findings::default();
-        let mut fields = BTreeMap::new();
-        for (name, value) in pairs {
-            if fields.insert(name.clone(), value).is_some() {
-                violations.add(Violation {
-                    pointer: format!("/{}", escape(&violations::quoted(&name))),
-                    reason: Reason::DuplicateName,
-                    got: "the name twice".into(),
-                    expected: "each name once".into(),
-                    hint: "Leave one of them out; one would be ignored.".into(),
-                });
-            }
+        for name in repeated {
+            violations.add(Violation {
+                pointer: pointer(&name),
+                reason: Reason::DuplicateName,
+                got: "the name twice".into(),
+                expected: "each name once".into(),
+                hint: "Leave one of them out; one would be ignored.".into(),
+            });
         }
         Ok(Object { fields, violations })
     }
@@ -94,13 +112,13 @@ impl<'a> Object<'a> {
     /// The content, if there are no violations and no unknown fields left.
     pub(super) fn finish<T>(mut self, known: &str, read: Option<T>) -> Read<T> {
         for name in self.fields.into_keys() {
-            let name = violations::quoted(&name);
+            let hint = files::meant(&name, known.split(", "));
             self.violations.add(Violation {
-                pointer: format!("/{}", escape(&name)),
+                pointer: pointer(&name),
                 reason: Reason::UnknownName,
-                got: format!("{name:?}"),
+                got: format!("{:?}", violations::quoted(&name)),
                 expected: format!("one of {known}"),
-                hint: "Check the spelling, or leave it out.".into(),
+                hint: hint.unwrap_or_else(|| "Check the spelling, or leave it out.".into()),
             });
         }
         match read {
@@ -110,29 +128,106 @@ impl<'a> Object<'a> {
     }
 }
 
-/// The members of an object in their order. A map would silently keep only the last one of a name.
-struct Pairs<'a>(Vec<(String, &'a RawValue)>);
+/// The members of an object, the names that occur twice, and the number of all. A map by itself would silently keep
+/// only the last one of a name. Beyond [`MOST_FIELDS`] they are only counted.
+#[derive(Default)]
+struct Members<'a> {
+    fields: BTreeMap<Cow<'a, str>, &'a RawValue>,
+    repeated: Vec<Cow<'a, str>>,
+    count: usize,
+}
 
-impl<'de> Deserialize<'de> for Pairs<'de> {
+#[derive(Deserialize)]
+struct Name<'a>(#[serde(borrow)] Cow<'a, str>);
+
+impl<'de> Deserialize<'de> for Members<'de> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Members;
-        impl<'de> Visitor<'de> for Members {
-            type Value = Pairs<'de>;
+        struct Read;
+        impl<'de> Visitor<'de> for Read {
+            type Value = Members<'de>;
 
             fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
                 formatter.write_str("an object")
             }
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
-                let mut pairs = vec![];
-                while let Some(pair) = map.next_entry()? {
-                    pairs.push(pair);
+                let mut members = Members::default();
+                while let Some(Name(name)) = map.next_key()? {
+                    members.count += 1;
+                    if members.count > MOST_FIELDS {
+                        map.next_value::<IgnoredAny>()?;
+                    } else if members.fields.contains_key(&name) {
+                        members.fields.insert(name.clone(), map.next_value()?);
+                        members.repeated.push(name);
+                    } else {
+                        members.fields.insert(name, map.next_value()?);
+                    }
                 }
-                Ok(Pairs(pairs))
+                Ok(members)
             }
         }
-        deserializer.deserialize_map(Members)
+        deserializer.deserialize_map(Read)
     }
+}
+
+/// The texts of the first `MOST` items of a list; the others are left out.
+pub(super) struct First<'a, const MOST: usize>(pub(super) Vec<&'a RawValue>);
+
+impl<'de, const MOST: usize> Deserialize<'de> for First<'de, MOST> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Read<const MOST: usize>;
+        impl<'de, const MOST: usize> Visitor<'de> for Read<MOST> {
+            type Value = First<'de, MOST>;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str("a list")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+                let mut first = vec![];
+                while first.len() < MOST
+                    && let Some(item) = list.next_element()?
+                {
+                    first.push(item);
+                }
+                while list.next_element::<IgnoredAny>()?.is_some() {}
+                Ok(First(first))
+            }
+        }
+        deserializer.deserialize_seq(Read)
+    }
+}
+
+/// An object of at most `MOST` texts; the others are left out.
+pub(super) struct Texts<const MOST: usize>(pub(super) BTreeMap<String, String>);
+
+impl<'de, const MOST: usize> Deserialize<'de> for Texts<MOST> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Read<const MOST: usize>;
+        impl<'de, const MOST: usize> Visitor<'de> for Read<MOST> {
+            type Value = Texts<MOST>;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str("an object of strings")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+                let mut texts = BTreeMap::new();
+                while let Some((Name(name), Name(text))) = map.next_entry()? {
+                    if texts.len() < MOST {
+                        texts.insert(name.into_owned(), text.into_owned());
+                    }
+                }
+                Ok(Texts(texts))
+            }
+        }
+        deserializer.deserialize_map(Read)
+    }
+}
+
+/// The place of a field, with the beginning of its name.
+fn pointer(name: &str) -> String {
+    format!("/{}", escape(&shortened(name, 80)))
 }
 
 fn is_null(raw: &RawValue) -> bool {

@@ -140,6 +140,42 @@ mod tests {
     }
 
     #[test]
+    fn changed_tokens_are_read_or_refused() {
+        let order = Order::NEWEST_FIRST;
+        let list = list_of_jobs(&filter(&[Status::Queued]), order);
+        let places = [(7, 42), (-1, i64::MAX), (i64::MIN, 0)];
+        let seeds = places.map(|(micros, key)| token(Cursor { micros, key }, &list).into_bytes());
+        let target = suite::fuzzing::Target {
+            name: "tokens",
+            seeds: seeds.into(),
+            words: &[
+                "ffffffffffffffff",
+                "-8000000000000000",
+                "+",
+                "é",
+                "0000000000000007",
+            ],
+            cases: 50_000,
+        };
+        target.attack(|input| {
+            let text = String::from_utf8_lossy(input).into_owned();
+            let paging = Paging {
+                size: None,
+                token: Some(text.clone()),
+            };
+            match paging.cursor(&list) {
+                // what is read is written the same way
+                Ok(Some(place)) => {
+                    assert_eq!(token(place, &list), text);
+                    "read".to_owned()
+                }
+                Ok(None) => "empty".to_owned(),
+                Err(_) => format!("refused {}", text.len().min(60)),
+            }
+        });
+    }
+
+    #[test]
     fn a_token_is_read_back_for_its_own_list_only() {
         let order = Order::NEWEST_FIRST;
         let list = |statuses: &[Status]| list_of_jobs(&filter(statuses), order);

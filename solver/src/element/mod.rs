@@ -127,6 +127,7 @@ impl JsonSchema for Element {
             "items": generator.subschema_for::<u32>(),
             "minItems": 6,
             "maxItems": 8,
+            "not": {"minItems": 7, "maxItems": 7},
         })
     }
 }

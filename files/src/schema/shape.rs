@@ -1,0 +1,248 @@
+//! The JSON Schema of a problem in the form that values are checked with: references resolved, once per process.
+
+use std::{collections::BTreeMap, sync::LazyLock};
+
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+
+use solver::problem::Problem;
+
+/// The JSON Schema of a problem (draft 2020-12).
+pub fn schema() -> Value {
+    schemars::schema_for!(Problem).to_value()
+}
+
+/// The shape of a problem.
+pub(super) static PROBLEM: LazyLock<Shape> = LazyLock::new(|| {
+    let schema = schema();
+    // the schema is ours; a test reads it. A shape that allows anything leaves the decision to serde.
+    shape(&schema, &schema).unwrap_or_default()
+});
+
+/// The shape that a schema describes; `whole` has the definitions.
+pub(super) fn shape(schema: &Value, whole: &Value) -> serde_json::Result<Shape> {
+    let mut shape: Shape = serde_json::from_value(plain(schema, whole))?;
+    shape.find_forms();
+    Ok(shape)
+}
+
+/// A type of JSON values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, strum::IntoStaticStr)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
+pub(super) enum Type {
+    Null,
+    Boolean,
+    Integer,
+    Number,
+    String,
+    Array,
+    Object,
+}
+
+/// What a value may be. The fields are the keywords of draft 2020-12 that the schema of our types has; any other
+/// keyword is an error of [`shape`].
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Shape {
+    /// `false` instead of a schema: the value must be absent.
+    pub(super) never: bool,
+    #[serde(rename = "type")]
+    types: Types,
+    #[serde(rename = "const")]
+    pub(super) only: Option<String>,
+    pub(super) properties: BTreeMap<String, Shape>,
+    pub(super) additional_properties: Option<Box<Shape>>,
+    pub(super) required: Vec<String>,
+    pub(super) items: Option<Box<Shape>>,
+    min_items: usize,
+    max_items: Option<usize>,
+    /// A length between the least and the most that a list must not have.
+    not: Option<Box<Shape>>,
+    pub(super) minimum: Option<f64>,
+    any_of: Vec<Shape>,
+    one_of: Vec<Shape>,
+    #[serde(rename = "if")]
+    pub(super) condition: Option<Box<Shape>>,
+    pub(super) then: Option<Box<Shape>>,
+    #[serde(rename = "else")]
+    pub(super) otherwise: Option<Box<Shape>>,
+    /// The names that only one of the alternatives requires, for each of them, if they distinguish all of them.
+    #[serde(skip)]
+    pub(super) forms: Option<Vec<Vec<String>>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum Types {
+    One(Type),
+    Several(Vec<Type>),
+}
+
+impl Default for Types {
+    fn default() -> Self {
+        Types::Several(Vec::new())
+    }
+}
+
+impl Shape {
+    /// The types by name; empty if all are allowed.
+    pub(super) fn types(&self) -> &[Type] {
+        match &self.types {
+            Types::One(only) => std::slice::from_ref(only),
+            Types::Several(types) => types,
+        }
+    }
+
+    /// Whether a value of this type is allowed. A number may turn out to be an integer.
+    pub(super) fn allows(&self, found: Type) -> bool {
+        let types = self.types();
+        let same = |own: &Type| *own == found || (*own == Type::Integer && found == Type::Number);
+        types.is_empty() || types.iter().any(same)
+    }
+
+    pub(super) fn branches(&self) -> &[Shape] {
+        match self.any_of.is_empty() {
+            true => &self.one_of,
+            false => &self.any_of,
+        }
+    }
+
+    /// Whether it can only be decided from the whole value which parts of the shape apply.
+    pub(super) fn has_alternatives(&self) -> bool {
+        !self.branches().is_empty() || self.condition.is_some()
+    }
+
+    /// Whether it consists of alternatives and nothing else.
+    pub(super) fn only_alternatives(&self) -> bool {
+        self.types().is_empty() && self.properties.is_empty() && self.required.is_empty()
+    }
+
+    /// Whether serde keeps the whole value, until it knows which alternative it is. For a value or null it does not.
+    pub(super) fn is_kept(&self) -> bool {
+        let null = |branch: &Shape| branch.types() == [Type::Null];
+        let by_kind = self.one_of.iter().any(|branch| branch.kind().is_some());
+        by_kind || !self.any_of.is_empty() && !self.any_of.iter().any(null)
+    }
+
+    /// The value of `kind` that an object of this shape has.
+    pub(super) fn kind(&self) -> Option<&str> {
+        self.properties.get("kind")?.only.as_deref()
+    }
+
+    /// Whether a list may have this length.
+    pub(super) fn has_length(&self, count: usize) -> bool {
+        let excluded = |shape: &Shape| shape.min_items <= count && Some(count) <= shape.max_items;
+        count >= self.min_items
+            && self.max_items.is_none_or(|most| count <= most)
+            && !self.not.as_deref().is_some_and(excluded)
+    }
+
+    /// The most items of a list.
+    pub(super) fn most_items(&self) -> Option<usize> {
+        self.max_items
+    }
+
+    /// The allowed lengths in words.
+    pub(super) fn lengths(&self) -> String {
+        let Some(most) = self.max_items else {
+            return format!("at least {}", self.min_items);
+        };
+        let allowed = (self.min_items..=most).filter(|count| self.has_length(*count));
+        let allowed: Vec<String> = allowed.map(|count| count.to_string()).collect();
+        allowed.join(" or ")
+    }
+
+    fn find_forms(&mut self) {
+        let inside = self.properties.values_mut().chain(&mut self.any_of);
+        let boxed = [
+            &mut self.additional_properties,
+            &mut self.items,
+            &mut self.then,
+            &mut self.otherwise,
+        ];
+        inside
+            .chain(&mut self.one_of)
+            .chain(boxed.into_iter().flatten().map(|shape| &mut **shape))
+            .for_each(Shape::find_forms);
+        self.forms = forms(&self.one_of);
+    }
+}
+
+/// The names that only one form of an object requires, for each form, if they distinguish the forms.
+fn forms(branches: &[Shape]) -> Option<Vec<Vec<String>>> {
+    if branches.is_empty() || branches.iter().any(|branch| !branch.types().is_empty()) {
+        return None;
+    }
+    let asked: Vec<Vec<&str>> = branches.iter().map(all_required).collect();
+    let alone = |name: &&str| asked.iter().filter(|form| form.contains(name)).count() == 1;
+    let own = |form: &Vec<&str>| -> Vec<String> {
+        let names = form.iter().filter(|name| alone(name));
+        names.map(|name| (*name).to_owned()).collect()
+    };
+    let forms: Vec<Vec<String>> = asked.iter().map(own).collect();
+    forms.iter().all(|form| !form.is_empty()).then_some(forms)
+}
+
+/// The names that a form requires: all of them, or one of several.
+fn all_required(form: &Shape) -> Vec<&str> {
+    let further = form.branches().iter().flat_map(all_required);
+    let own = form.required.iter().map(String::as_str);
+    own.chain(further).collect()
+}
+
+/// The schema with its references replaced by what they name, and without what is only for readers. Our types do
+/// not contain themselves.
+fn plain(schema: &Value, whole: &Value) -> Value {
+    let Value::Object(words) = schema else {
+        return json!({ "never": *schema == Value::Bool(false) });
+    };
+    let place = words.get("$ref").and_then(Value::as_str);
+    if let Some(named) = place.and_then(|place| whole.pointer(place.strip_prefix('#')?)) {
+        return plain(named, whole);
+    }
+    let each = |named: &Map<String, Value>| -> Value {
+        let each = named
+            .iter()
+            .map(|(name, one)| (name.clone(), plain(one, whole)));
+        Value::Object(each.collect())
+    };
+    let mut kept = Map::new();
+    for (word, value) in words {
+        let value = match (word.as_str(), value) {
+            ("description" | "default" | "format" | "title" | "$schema" | "$defs", _) => continue,
+            ("const" | "required" | "type", _) => value.clone(),
+            ("properties", Value::Object(named)) => each(named),
+            (_, Value::Array(list)) => list.iter().map(|one| plain(one, whole)).collect(),
+            (_, Value::Object(_) | Value::Bool(_)) => plain(value, whole),
+            _ => value.clone(),
+        };
+        kept.insert(word.clone(), value);
+    }
+    Value::Object(kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_keyword_of_the_schema_is_supported() {
+        let schema = schema();
+        let shape = shape(&schema, &schema).unwrap();
+        assert!(shape.properties.contains_key("contacts"));
+        for (keyword, value) in [("pattern", json!("a")), ("uniqueItems", json!(true))] {
+            let mut other = schema.clone();
+            other["properties"]["quadrature"][keyword] = value;
+            assert!(super::shape(&other, &other).is_err(), "{keyword}");
+        }
+    }
+
+    #[test]
+    fn the_forms_of_a_load_are_told_by_the_names_that_only_they_require() {
+        let loads = PROBLEM.properties["loads"].items.as_ref().unwrap();
+        let forms = loads.forms.as_ref().unwrap();
+        assert_eq!(forms[0], ["pressure"]);
+        assert_eq!(forms[2], ["normal", "tangential"]);
+    }
+}

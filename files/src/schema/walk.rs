@@ -1,0 +1,410 @@
+//! A walk through a JSON text and the shape of a problem at once.
+//!
+//! The text is checked while it is read, without a tree of its values: a tree takes 32 bytes and more for a value
+//! of two. Only where alternatives have to be told apart is the text of one value read again. The walk ends at the
+//! hundredth violation, so that it costs no more the more there are.
+
+use std::{borrow::Cow, collections::BTreeSet, fmt};
+
+use serde::Deserialize;
+use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde_json::value::RawValue;
+
+use super::alternatives::Outline;
+use super::shape::{Shape, Type};
+use super::words;
+use solver::error::{Findings, Reason, Violation, escape};
+
+/// Most entries of a list of objects, and most names of an object whose names are free: an entry of three bytes
+/// takes a hundred and more in memory. No problem that can be solved comes near.
+const MOST_OBJECTS: usize = 1 << 14;
+
+/// Most numbers of a list: lines of a grid, members of a group. They take less than their text, but a mesh of a
+/// million elements takes more than the largest body.
+const MOST_NUMBERS: usize = 1 << 20;
+
+/// Most numbers of a list, and most lists of a list, inside of an object with a `kind`: serde keeps such an object
+/// until it knows its kind, with 32 bytes for a number and 200 for a list.
+const MOST_KEPT_NUMBERS: usize = 1 << 17;
+const MOST_KEPT_LISTS: usize = 1 << 16;
+
+/// The violations of a walk, and where it is.
+pub(super) struct Walk<'a> {
+    /// The list of violations; `None` if the question is only whether there is one.
+    found: Option<&'a mut Findings>,
+    /// Names and numbers from the problem to the current value.
+    place: Vec<Token>,
+    /// Values around the current one that serde keeps.
+    kept: usize,
+    /// It ended before the end of the text: there are as many violations as wanted.
+    pub(super) stopped: bool,
+    faults: usize,
+}
+
+enum Token {
+    Name(Cow<'static, str>),
+    Index(usize),
+}
+
+impl<'a> Walk<'a> {
+    pub(super) fn new(found: Option<&'a mut Findings>) -> Self {
+        Walk {
+            found,
+            place: Vec::new(),
+            kept: 0,
+            stopped: false,
+            faults: 0,
+        }
+    }
+
+    /// Checks a text. An error is one of its syntax, unless the walk has stopped.
+    pub(super) fn check(&mut self, shape: &'static Shape, text: &str) -> serde_json::Result<()> {
+        let mut reader = serde_json::Deserializer::from_str(text);
+        self.at(shape).deserialize(&mut reader)?;
+        reader.end()
+    }
+
+    /// Checks a value as if its shape had no alternatives.
+    fn check_base(&mut self, shape: &'static Shape, value: &RawValue) -> serde_json::Result<()> {
+        let mut reader = serde_json::Deserializer::from_str(value.get());
+        reader.deserialize_any(self.at(shape))
+    }
+
+    /// Whether a value has no violation.
+    fn fits(shape: &'static Shape, value: &RawValue) -> serde_json::Result<bool> {
+        let mut walk = Walk::new(None);
+        match walk.check(shape, value.get()) {
+            Err(error) if !walk.stopped => Err(error),
+            _ => Ok(walk.faults == 0),
+        }
+    }
+
+    fn at(&mut self, shape: &'static Shape) -> Value<'_, 'a> {
+        Value { shape, walk: self }
+    }
+
+    /// Adds a violation at the current value. The error stops the reader.
+    pub(super) fn report<E: Error>(
+        &mut self,
+        violation: impl FnOnce(String) -> Violation,
+    ) -> Result<(), E> {
+        self.faults += 1;
+        let full = match &mut self.found {
+            None => true,
+            Some(found) if found.is_full() => true,
+            Some(found) => {
+                let token = |token: &Token| match token {
+                    Token::Name(name) => format!("/{}", escape(&words::beginning(name))),
+                    Token::Index(index) => format!("/{index}"),
+                };
+                found.add(violation(self.place.iter().map(token).collect()));
+                false
+            }
+        };
+        self.stopped |= full;
+        match full {
+            true => Err(E::custom("enough violations")),
+            false => Ok(()),
+        }
+    }
+
+    /// The same, at a member or an item.
+    pub(super) fn report_inside<E: Error>(
+        &mut self,
+        name: impl Into<Cow<'static, str>>,
+        violation: impl FnOnce(String) -> Violation,
+    ) -> Result<(), E> {
+        self.place.push(Token::Name(name.into()));
+        let reported = self.report(violation);
+        self.place.pop();
+        reported
+    }
+
+    /// The value has several alternatives: which of them is meant, and does it fit.
+    fn check_alternatives(
+        &mut self,
+        shape: &'static Shape,
+        value: &RawValue,
+    ) -> serde_json::Result<()> {
+        let outline = Outline::of(shape, value)?;
+        if !shape.only_alternatives() {
+            self.check_base(shape, value)?;
+        }
+        if !shape.allows(outline.found) {
+            return Ok(());
+        }
+        if let Some(condition) = &shape.condition {
+            let chosen = match Walk::fits(condition, value)? {
+                true => &shape.then,
+                false => &shape.otherwise,
+            };
+            if let Some(chosen) = chosen {
+                self.check(chosen, value.get())?;
+            }
+        }
+        if let Some(forms) = &shape.forms {
+            return match outline.form(forms) {
+                Ok(meant) => self.check(&shape.branches()[meant], value.get()),
+                Err(violation) => self.report(violation),
+            };
+        }
+        let branches = shape.branches();
+        let mut alike = branches.iter().filter(|branch| outline.resembles(branch));
+        match (alike.next(), alike.next()) {
+            (Some(only), None) => self.check(only, value.get()),
+            (None, _) if branches.is_empty() => Ok(()),
+            (several, _) => {
+                for branch in branches.iter().filter(|_| several.is_some()) {
+                    if outline.resembles(branch) && Walk::fits(branch, value)? {
+                        return Ok(());
+                    }
+                }
+                match outline.no_alternative(branches) {
+                    (Some(member), violation) => self.report_inside(member, violation),
+                    (None, violation) => self.report(violation),
+                }
+            }
+        }
+    }
+
+    /// The most items of a list that are read.
+    fn most_items(&self, items: &Shape) -> usize {
+        let list = items.items.is_some();
+        let number = !list && items.allows(Type::Number) && !items.has_alternatives();
+        match (self.kept, list, number) {
+            (0, true, _) => usize::MAX,
+            (0, _, true) => MOST_NUMBERS,
+            (_, true, _) => MOST_KEPT_LISTS,
+            (_, _, true) => MOST_KEPT_NUMBERS,
+            _ => MOST_OBJECTS,
+        }
+    }
+
+    fn too_many<E: Error>(&mut self, count: usize, most: usize, what: &str) -> Result<(), E> {
+        let got = format!("{count} {what}");
+        let expected = format!("at most {most} {what}");
+        let hint =
+            "No problem of this size can be solved; a large mesh is written `inline` or uploaded.";
+        self.report(|at| Violation::new(at, Reason::TooMany, got, expected, hint))
+    }
+}
+
+/// One value of the text, which is checked as it is read.
+struct Value<'w, 'a> {
+    shape: &'static Shape,
+    walk: &'w mut Walk<'a>,
+}
+
+impl Value<'_, '_> {
+    fn wrong_type<E: Error>(self, got: impl FnOnce() -> String) -> Result<(), E> {
+        let names = self.shape.types().iter().filter(|own| **own != Type::Null);
+        let names: Vec<&str> = names.map(|own| own.into()).collect();
+        let (expected, hint) = (names.join(" or "), "Write the value in that form.");
+        self.walk
+            .report(|at| Violation::new(at, Reason::WrongType, got(), expected, hint))
+    }
+
+    fn scalar<E: Error>(self, found: Type, got: impl Fn() -> String) -> Result<(), E> {
+        if !self.shape.types().is_empty() && !self.shape.types().contains(&found) {
+            return self.wrong_type(got);
+        }
+        if let Some(only) = &self.shape.only
+            && found != Type::String
+        {
+            let hint = "Correct the value.";
+            let violation = |at| {
+                let expected = format!("{only:?}");
+                Violation::new(at, Reason::UnknownAlternative, got(), expected, hint)
+            };
+            return self.walk.report(violation);
+        }
+        Ok(())
+    }
+
+    fn number<E: Error>(self, number: f64, got: impl Fn() -> String) -> Result<(), E> {
+        let types = self.shape.types();
+        let integral = number.fract() == 0.0 && types.contains(&Type::Integer);
+        let found = if integral {
+            Type::Integer
+        } else {
+            Type::Number
+        };
+        match self.shape.minimum.filter(|least| number < *least) {
+            Some(least) if types.is_empty() || types.contains(&found) => {
+                let expected = format!("a number of at least {least}");
+                let (reason, hint) = (Reason::OutOfRange, "Correct the number.");
+                self.walk
+                    .report(|at| Violation::new(at, reason, got(), expected, hint))
+            }
+            _ => self.scalar(found, got),
+        }
+    }
+}
+
+impl<'de> DeserializeSeed<'de> for Value<'_, '_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<(), D::Error> {
+        if self.shape.never {
+            let value = <&RawValue>::deserialize(reader)?;
+            let expected = "no such field: it cannot be combined with the others";
+            let hint = "Leave it out, or choose another form.";
+            let got = || words::value(value.get());
+            let not_used = |at| Violation::new(at, Reason::NotUsed, got(), expected, hint);
+            return self.walk.report(not_used);
+        }
+        if !self.shape.has_alternatives() {
+            return reader.deserialize_any(self);
+        }
+        let value = <&RawValue>::deserialize(reader)?;
+        self.walk.kept += usize::from(self.shape.is_kept());
+        let checked = self.walk.check_alternatives(self.shape, value);
+        self.walk.kept -= usize::from(self.shape.is_kept());
+        checked.map_err(D::Error::custom)
+    }
+}
+
+impl<'de> Visitor<'de> for Value<'_, '_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<(), E> {
+        self.scalar(Type::Null, || "null".to_owned())
+    }
+
+    fn visit_bool<E: Error>(self, value: bool) -> Result<(), E> {
+        self.scalar(Type::Boolean, || value.to_string())
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<(), E> {
+        self.number(value as f64, || value.to_string())
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<(), E> {
+        self.number(value as f64, || value.to_string())
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<(), E> {
+        self.number(value, || value.to_string())
+    }
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<(), E> {
+        match &self.shape.only {
+            Some(only) if only != text => {
+                let (reason, hint) = (Reason::UnknownAlternative, words::meant(text, [only]));
+                let hint = hint.unwrap_or_else(|| "Correct the value.".to_owned());
+                let got = words::text(text);
+                self.walk
+                    .report(|at| Violation::new(at, reason, got, format!("{only:?}"), hint))
+            }
+            _ => self.scalar(Type::String, || words::text(text)),
+        }
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        let Value { shape, walk } = self;
+        let items = shape.items.as_deref().filter(|_| shape.allows(Type::Array));
+        let most = items.map_or(0, |items| walk.most_items(items));
+        let mut count = 0;
+        while let Some(items) = items
+            && count < most.min(shape.most_items().unwrap_or(most))
+        {
+            walk.place.push(Token::Index(count));
+            let next = list.next_element_seed(walk.at(items));
+            walk.place.pop();
+            match next? {
+                Some(()) => count += 1,
+                None => break,
+            }
+        }
+        while list.next_element::<IgnoredAny>()?.is_some() {
+            count += 1;
+        }
+        if !shape.allows(Type::Array) {
+            return Value { shape, walk }.wrong_type(|| words::counted(count, "list of", "item"));
+        }
+        if !shape.has_length(count) {
+            let (got, expected) = (format!("{count} item(s)"), shape.lengths() + " items");
+            let (reason, hint) = (Reason::WrongLength, "Correct the list.");
+            return walk.report(|at| Violation::new(at, reason, got, expected, hint));
+        }
+        match items.is_some() && count > most {
+            true => walk.too_many(count, most, "entries"),
+            false => Ok(()),
+        }
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<(), A::Error> {
+        let Value { shape, walk } = self;
+        if !shape.allows(Type::Object) {
+            let mut count = 0;
+            while members.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {
+                count += 1;
+            }
+            let got = || words::counted(count, "object of", "name");
+            return Value { shape, walk }.wrong_type(got);
+        }
+        // whether other names are refused; if not, this shape is one alternative and another reports these
+        let free = shape.additional_properties.as_deref();
+        let mut seen: BTreeSet<Cow<'de, str>> = BTreeSet::new();
+        let mut count = 0;
+        while let Some(Name(name)) = members.next_key()? {
+            let own = shape.properties.get_key_value(&*name);
+            let asked = shape.required.iter().any(|asked| *asked == name);
+            let (known, value) = match (own, free) {
+                (Some((known, own)), _) => (Cow::Borrowed(known.as_str()), own),
+                (None, Some(free)) if free.never => {
+                    members.next_value::<IgnoredAny>()?;
+                    let known = || shape.properties.keys();
+                    let place = words::beginning(&name).into_owned();
+                    walk.report_inside(place, |at| words::unknown_name(at, &name, known()))?;
+                    continue;
+                }
+                (None, Some(free)) if count < MOST_OBJECTS => {
+                    (Cow::Owned(name.clone().into_owned()), free)
+                }
+                (None, free) => {
+                    count += usize::from(free.is_some());
+                    members.next_value::<IgnoredAny>()?;
+                    if asked {
+                        seen.insert(name);
+                    }
+                    continue;
+                }
+            };
+            count += 1;
+            if seen.insert(name) || free.is_none() {
+                walk.place.push(Token::Name(known));
+                let checked = members.next_value_seed(walk.at(value));
+                walk.place.pop();
+                checked?;
+            } else {
+                members.next_value::<IgnoredAny>()?;
+                let hint = "Leave one of them out; one would be ignored.";
+                let (reason, got, expected) =
+                    (Reason::DuplicateName, "the name twice", "each name once");
+                walk.report_inside(known, |at| Violation::new(at, reason, got, expected, hint))?;
+            }
+        }
+        for name in &shape.required {
+            if !seen.contains(name.as_str()) {
+                let expected = format!("a value for `{name}`");
+                let (reason, hint) = (Reason::Missing, "It has no default.");
+                walk.report_inside(name.as_str(), |at| {
+                    Violation::new(at, reason, "nothing", expected, hint)
+                })?;
+            }
+        }
+        match count > MOST_OBJECTS {
+            true => walk.too_many(count, MOST_OBJECTS, "names"),
+            false => Ok(()),
+        }
+    }
+}
+
+/// The name of a member, without a copy where it has no escapes.
+#[derive(Deserialize)]
+struct Name<'a>(#[serde(borrow)] Cow<'a, str>);
