@@ -25,6 +25,11 @@ pub struct App {
     grace: Duration,
 }
 
+/// The service cannot listen at this address.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[error("cannot listen on {0}")]
+pub struct CannotListen(SocketAddr);
+
 impl App {
     /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
@@ -51,7 +56,7 @@ impl App {
 
         let listener = TcpListener::bind(config.listen)
             .await
-            .with_context(|| format!("cannot listen on {}", config.listen))?;
+            .with_context(|| CannotListen(config.listen))?;
         let address = listener.local_addr()?;
         // Events are small and should be sent at once.
         let listener = listener.tap_io(|connection| {

@@ -28,7 +28,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Start the service: REST and gRPC on one port
+    /// Start the service: REST and gRPC on one port. Exit code: 0 stopped, 3 cannot listen, 4 the folder cannot be used,
+    /// 5 another process uses it, 6 its tables are of another program or version, 7 stored data is missing or damaged
     Serve(Config),
     /// Solve one problem without a service. Exit code: 0 converged, 9 not converged, 2 invalid input
     Solve(solve::Arguments),
@@ -74,7 +75,7 @@ pub fn main() -> ExitCode {
     };
     let exit = exit.unwrap_or_else(|error| {
         eprintln!("signorini: {error:#}");
-        Exit::Failed
+        Exit::of(&error)
     });
     ExitCode::from(exit as u8)
 }

@@ -1,7 +1,14 @@
 //! The next job of the queue, claimed for a worker.
 
 use super::{
-    change::Change, coalescing, database::Store, error::Result, lifecycle, rows::read,
+    change::Change,
+    coalescing,
+    database::Store,
+    end,
+    error::{Result, StoreError},
+    lifecycle::{self, Ending},
+    problems,
+    rows::read,
     submission::Claim,
 };
 use crate::job::Cache;
@@ -11,7 +18,7 @@ impl Store {
     /// before it for which there is a result by now are answered. Also returns all jobs that have changed.
     pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
         let mut change = self.change().await?;
-        let claim = claim(&mut change).await?;
+        let claim = self.damages.noting(claim(&mut change)).await?;
         let changed = change.commit().await?;
         Ok((claim, changed))
     }
@@ -45,11 +52,17 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         {
             continue;
         }
+        let stored = problems::read(change.sql(), &waiting).await;
         let job = lifecycle::start_attempt(change, &waiting).await?;
-        let (problem, mesh) = sqlx::query_as("select body, mesh from problem where input_hash = ?")
-            .bind(&job.input_hash)
-            .fetch_one(change.sql())
-            .await?;
+        let (problem, mesh) = match stored {
+            Ok(stored) => stored,
+            // it fails alone, and does not stop the queue
+            Err(StoreError::Damaged(damage)) => {
+                end::end(change, &job, &Ending::damaged(&damage)).await?;
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
         return Ok(Some(Claim { job, problem, mesh }));
     }
     Ok(None)

@@ -190,6 +190,9 @@ impl Operation {
     /// The errors that it may answer with, each once.
     pub(in crate::rest) fn errors(&self) -> Vec<Code> {
         let mut codes = vec![Code::Internal, Code::RateLimited];
+        if self.path.starts_with("/v1/jobs") || self.path.starts_with("/v1/meshes") {
+            codes.push(Code::CorruptData);
+        }
         if self.strict {
             codes.push(Code::UnknownParameter);
         }
