@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 mod demo;
+mod doctor;
 pub mod examples;
 mod exit;
 mod explain;
@@ -29,8 +30,10 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Start the service: REST and gRPC on one port. Exit code: 0 stopped, 3 cannot listen, 4 the folder cannot be used,
-    /// 5 another process uses it, 6 its tables are of another program or version, 7 stored data is missing or damaged
+    /// 5 another server uses it, 6 its tables are of another program or version, 7 stored data is missing or damaged
     Serve(Config),
+    /// Check a store that no server is using, and save what is intact. Exit code: 0 all is intact, 7 something is damaged
+    Doctor(doctor::Arguments),
     /// Solve one problem without a service. Exit code: 0 converged, 9 not converged, 2 invalid input
     Solve(solve::Arguments),
     /// Print the JSON Schema of a problem: every field with its meaning and default
@@ -54,6 +57,10 @@ pub fn main() -> ExitCode {
         Command::Serve(config) => {
             log(LevelFilter::INFO);
             with_runtime(serve::run(config))
+        }
+        Command::Doctor(arguments) => {
+            log(LevelFilter::WARN);
+            with_runtime(doctor::run(arguments))
         }
         Command::Solve(arguments) => {
             log(LevelFilter::WARN);

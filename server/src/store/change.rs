@@ -87,6 +87,11 @@ impl Change<'_> {
         }
     }
 
+    /// How many parts were found damaged so far.
+    pub(super) fn damaged_parts(&self) -> usize {
+        self.store.damages.summary().0
+    }
+
     /// Whether the result of a job is as it was written; checked once.
     pub(super) async fn has_intact_result(&mut self, job: &Job) -> Result<bool> {
         let (store, key) = (self.store, job.result_key);

@@ -115,7 +115,9 @@ pub(super) fn row_is_intact(row: &SqliteRow) -> Result<bool> {
     })
 }
 
-fn decode<'r, T: Decode<'r, Sqlite>>(value: <Sqlite as sqlx::Database>::ValueRef<'r>) -> Result<T> {
+pub(super) fn decode<'r, T: Decode<'r, Sqlite>>(
+    value: <Sqlite as sqlx::Database>::ValueRef<'r>,
+) -> Result<T> {
     let decoded = <T as Decode<'r, Sqlite>>::decode(value);
     decoded.map_err(|error| StoreError::from(sqlx::Error::Decode(error)))
 }

@@ -11,7 +11,7 @@ use super::{
     rows::read,
     submission::Claim,
 };
-use crate::job::Cache;
+use crate::job::{Cache, Job};
 
 impl Store {
     /// Starts an attempt of the next job of the queue: highest priority first, then in order of arrival. Jobs
@@ -27,18 +27,37 @@ impl Store {
 /// The next job of the queue. The index is named because the planner, which does not know how many jobs there are,
 /// would sort all waiting ones instead.
 pub(super) const NEXT: &str = "select id from job indexed by job_queue
-     where status = 'queued' and coalesced_into is null order by priority desc, id limit 1";
+     where status = 'queued' and coalesced_into is null order by priority desc, id limit ?";
+
+/// The next job of the queue, but for damaged ones, of which nothing can be trusted: they wait until the operator
+/// removes them, and the others go on.
+async fn next(change: &mut Change<'_>) -> Result<Option<Job>> {
+    loop {
+        let damaged = change.damaged_parts();
+        let keys: Vec<i64> = sqlx::query_scalar(NEXT)
+            .bind(damaged as i64 + 1)
+            .fetch_all(change.sql())
+            .await?;
+        for key in keys {
+            let found = read(change.sql(), key).await;
+            if let Some(job) = change.unless_damaged(found).await? {
+                return Ok(Some(job));
+            }
+        }
+        if change.damaged_parts() == damaged {
+            return Ok(None); // none waits but those
+        }
+    }
+}
 
 /// Claims within a transaction.
 pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
     /// With more jobs than this, one transaction would take too long.
     const MOST_ANSWERED: usize = 100;
     for _ in 0..MOST_ANSWERED {
-        let key: Option<i64> = sqlx::query_scalar(NEXT)
-            .fetch_optional(change.sql())
-            .await?;
-        let Some(key) = key else { return Ok(None) };
-        let waiting = read(change.sql(), key).await?;
+        let Some(waiting) = next(change).await? else {
+            return Ok(None);
+        };
         // there may be a result by now
         if waiting.cache == Cache::Use
             && let Some(source) = coalescing::earlier_result(change, &waiting.input_hash).await?

@@ -210,7 +210,7 @@ impl Store {
 }
 
 /// Compares the database with what is known of it before anything is written to it.
-async fn compare_with_the_past(
+pub(super) async fn compare_with_the_past(
     path: &Path,
     known: Option<&Record>,
     options: SqliteConnectOptions,

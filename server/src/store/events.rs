@@ -48,50 +48,11 @@ impl Store {
 
     /// At most `limit` events after number `after`, in order.
     pub async fn events_after(&self, key: i64, after: i64, limit: i64) -> Result<Vec<Event>> {
-        self.damages
-            .noting(self.read_events(key, after, limit))
-            .await
-    }
-
-    async fn read_events(&self, key: i64, after: i64, limit: i64) -> Result<Vec<Event>> {
-        // one statement sees one state: the events, and after them the number of the last one
-        let rows = sqlx::query(
-            "select * from (select seq, attempt, t, type, body, checksum from event
-                            where job_id = ?1 and seq > ?2 order by seq limit ?3)
-             union all select last_seq, 0, 0, '', '', null from job where id = ?1",
-        )
-        .bind(key)
-        .bind(after)
-        .bind(limit)
-        .fetch_all(&self.reader)
-        .await
-        .map_err(|error| StoreError::from(error).reading(|| Part::of_job(key, "events")))?;
-        let Some((end, rows)) = rows.split_last() else {
-            return Ok(vec![]); // the job was deleted
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            read(&mut connection, key, after, limit).await
         };
-        let last: i64 = end.try_get("seq")?;
-        let events: Vec<Event> = rows
-            .iter()
-            .map(|row| {
-                let (seq, body) = checked(key, row)?;
-                Ok(Event {
-                    seq,
-                    attempt: row.try_get("attempt")?,
-                    t: Time::from_micros(row.try_get("t")?),
-                    payload: serde_json::from_str(body)
-                        .map_err(|error| part(key, seq).damaged(error))?,
-                })
-            })
-            .collect::<Result<_>>()?;
-        // they are numbered without a gap
-        let expected = (last - after).clamp(0, limit);
-        let dense = (after + 1..)
-            .zip(&events)
-            .all(|(seq, event)| event.seq == seq);
-        match dense && events.len() as i64 == expected {
-            true => Ok(events),
-            false => Err(Part::of_job(key, "events").damaged("some are missing")),
-        }
+        self.damages.noting(read).await
     }
 
     /// The iterations of one attempt of a job, each as the JSON of its event, in order.
@@ -109,6 +70,53 @@ impl Store {
             rows.iter().map(body).collect()
         };
         self.damages.noting(read).await
+    }
+}
+
+/// At most `limit` events after number `after`, in order; an error if one is damaged or missing.
+pub(super) async fn read(
+    connection: &mut SqliteConnection,
+    key: i64,
+    after: i64,
+    limit: i64,
+) -> Result<Vec<Event>> {
+    // one statement sees one state: the events, and after them the number of the last one
+    let rows = sqlx::query(
+        "select * from (select seq, attempt, t, type, body, checksum from event
+                        where job_id = ?1 and seq > ?2 order by seq limit ?3)
+         union all select last_seq, 0, 0, '', '', null from job where id = ?1",
+    )
+    .bind(key)
+    .bind(after)
+    .bind(limit)
+    .fetch_all(connection)
+    .await
+    .map_err(|error| StoreError::from(error).reading(|| Part::of_job(key, "events")))?;
+    let Some((end, rows)) = rows.split_last() else {
+        return Ok(vec![]); // the job was deleted
+    };
+    let last: i64 = end.try_get("seq")?;
+    let events: Vec<Event> = rows
+        .iter()
+        .map(|row| {
+            let (seq, body) = checked(key, row)?;
+            Ok(Event {
+                seq,
+                attempt: row.try_get("attempt")?,
+                t: Time::from_micros(row.try_get("t")?),
+                payload: serde_json::from_str(body)
+                    .map_err(|error| part(key, seq).damaged(error))?,
+            })
+        })
+        .collect::<Result<_>>()?;
+    // they are numbered without a gap
+    let expected = (last - after).clamp(0, limit);
+    let dense = (after + 1..)
+        .zip(&events)
+        .all(|(seq, event)| event.seq == seq);
+    match dense && events.len() as i64 == expected {
+        true => Ok(events),
+        false => Err(Part::of_job(key, "events").damaged("some are missing")),
     }
 }
 

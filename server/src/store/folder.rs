@@ -56,7 +56,7 @@ impl Folder {
         for file in &locks {
             file.try_lock().map_err(|error| match error {
                 TryLockError::WouldBlock => StoreError::Locked(format!(
-                    "another process is using the folder {}",
+                    "another server is using the folder {}",
                     path.display()
                 )),
                 TryLockError::Error(error) => named(error),

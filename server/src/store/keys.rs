@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use sqlx::SqliteConnection;
+use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
     change::Change,
@@ -144,6 +144,23 @@ async fn jobs_of_key(
         true => Ok(Some(first..first.saturating_add(jobs))),
         false => Err(StoreError::KeyReuse),
     }
+}
+
+/// An error if a row of the table is not as it was written.
+pub(super) fn check(row: &SqliteRow) -> Result<()> {
+    let key = RequestKey {
+        key: row.try_get("key")?,
+        payload: row.try_get("payload")?,
+    };
+    checksum(
+        row.try_get("owner")?,
+        &key,
+        row.try_get("first_job")?,
+        row.try_get("jobs")?,
+    )
+    .verify(row.try_get("checksum")?, || {
+        Part::named("record of a request key")
+    })
 }
 
 fn checksum(owner: &str, key: &RequestKey, first: i64, jobs: i64) -> Checksum {

@@ -159,13 +159,16 @@ impl Store {
     }
 }
 
+/// How many pieces the mesh has; one of them: its number, its bytes, its checksum.
+type Piece = (Option<i64>, i64, Vec<u8>, Option<i64>);
+
 /// The pieces of a mesh in one, if all are there as they were written.
 pub(super) async fn read_body(
     connection: &mut SqliteConnection,
     hash: &str,
 ) -> Result<Option<Vec<u8>>> {
     // one statement sees one state: a mesh with all its pieces, or no mesh
-    let pieces: Vec<(Option<i64>, i64, Vec<u8>, Option<i64>)> = sqlx::query_as(
+    let pieces: Vec<Piece> = sqlx::query_as(
         "select pieces, piece, body, mesh_piece.checksum from mesh_piece join mesh using (hash)
          where hash = ? order by piece",
     )
@@ -193,7 +196,7 @@ pub(super) async fn read_body(
 }
 
 /// A row of the table as the description of a mesh.
-fn described(row: &SqliteRow) -> Result<StoredMesh> {
+pub(super) fn described(row: &SqliteRow) -> Result<StoredMesh> {
     let hash: String = row.try_get("hash")?;
     let part = || Part::named(format!("description of mesh {hash}"));
     if !checksum::row_is_intact(row)? {

@@ -64,6 +64,9 @@ mod snapshot;
 mod meshes;
 mod settings;
 
+// A store that no server has open.
+mod inspect;
+
 #[cfg(test)]
 mod tests;
 
@@ -78,10 +81,12 @@ pub use self::{
     events::FinalBatch,
     filter::{Cursor, Filter, GroupBy, Order, OrderBy},
     health::Health,
+    inspect::{Report, inspect},
     intact::PartInfo,
     lifecycle::Ending,
     meshes::{Removal, StoredMesh},
     parts::{PIECE_BYTES, PIECES_PER_COMMIT, Parts, ProfilePoints},
+    progress::accept,
     snapshot::Snapshot,
     submission::{Accepted, Claim, NewJob, RequestKey, Submission},
 };
