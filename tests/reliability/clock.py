@@ -22,8 +22,9 @@ LIBRARY = glob.glob("/usr/lib/*/faketime/libfaketime.so.1")
 HOUR, DAY = 3600, 86400
 TO_1970 = -int(time.time()) + 1000
 JUMPS = [HOUR, -HOUR, DAY, -DAY, TO_1970] if "--soak" in sys.argv else [HOUR, -HOUR, TO_1970]
-LONG = talkative(1000, refine=2)  # some seconds, and its solver asks often whether to stop
-TOLERANCE_S = 1.0
+LONG = talkative(2000, refine=2)  # some seconds, and its solver asks often whether to stop
+# the queue looks once a second for jobs that have waited too long, and this machine may be busy
+TOLERANCE_S = 1.3
 worst = 0.0
 
 
@@ -45,7 +46,7 @@ def jump(server, clock, seconds):
     running, began = submit(LONG)
     while server.json("/v1/jobs/" + running)["status"] != "running":
         time.sleep(0.01)
-    limited, limited_at = submit(LONG, limits={"timeout_s": 2})
+    limited, limited_at = submit(LONG, limits={"timeout_s": 4})
     waiting, waiting_at = submit(example(), limits={"queue_ttl_s": 2}, priority=-5)
     patient, patient_at = submit(example(), limits={"queue_ttl_s": 600}, priority=-9)
     time.sleep(0.5)
@@ -57,7 +58,7 @@ def jump(server, clock, seconds):
     equal(expired["reason"], "queue_expired", "the job that waited too long")
     timed_out = server.finished(limited)
     equal(timed_out["reason"], "timed_out", "the job that ran too long")
-    near(timed_out["run_s"], 2, "run_s of a job that timed out after 2 s")
+    near(timed_out["run_s"], 4, "run_s of a job that timed out after 4 s")
     canceled_at = time.monotonic()
     equal(server.call("POST", "/v1/jobs/%s/cancel" % running).status, 200, "cancel")
     near(server.finished(running)["run_s"], canceled_at - began, "run_s of a job that was canceled")

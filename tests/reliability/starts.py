@@ -108,7 +108,7 @@ def wrong_tables(server, folder):
     refused(data, DAMAGED, "a file of something else")
 
 
-def folders(folder):
+def folders(folder, server):
     file = folder / "file"
     file.write_text("")
     refused(file, FOLDER, "a file in place of the folder")
@@ -128,6 +128,13 @@ def folders(folder):
     refused(closed, FOLDER, "a folder that cannot be written", **nobody)
     foreign = folder / "foreign"
     foreign.mkdir(mode=0o700)
+    sealed = crash(server, folder)
+    sealed.parent.chmod(0o755)
+    for path in [*sealed.iterdir(), sealed]:
+        path.chmod(0o500 if path == sealed else 0o400)
+        if nobody:
+            os.chown(path, 65534, 65534)
+    refused(sealed, FOLDER, "a store that cannot be written", **nobody)
     if nobody:
         refused(foreign, FOLDER, "a folder of somebody else", **nobody)
     globals()["BINARY"] = before
@@ -183,7 +190,8 @@ def main():
                 locks(server)
                 server.stop()
                 modes(server.data)
-        folders(folder)
+                if not folder.joinpath("closed").exists():
+                    folders(folder, server)
     told = taken_away()
     check(slowest <= MOST_S, "a refusal took %.2f s" % slowest)
     print("figure: %d starts refused within %.2f s, each with one line and its exit code; a store taken away under a "

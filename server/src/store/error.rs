@@ -134,8 +134,10 @@ impl Damage {
 
 /// SQLite's numbers of errors.
 mod code {
+    pub(super) const READ_ONLY: u32 = 8;
     pub(super) const CORRUPT: u32 = 11;
     pub(super) const FULL: u32 = 13;
+    pub(super) const CANNOT_OPEN: u32 = 14;
     pub(super) const NOT_A_DATABASE: u32 = 26;
     // of these, the details: reading failed, or ended early
     pub(super) const IOERR_READ: u32 = 266;
@@ -156,6 +158,9 @@ impl From<sqlx::Error> for StoreError {
                 Part::named("database").damaged(error)
             }
             _ if number == code::FULL => StoreError::Full,
+            _ if matches!(number & 0xff, code::READ_ONLY | code::CANNOT_OPEN) => {
+                StoreError::Folder(format!("the database cannot be written: {error}"))
+            }
             sqlx::Error::PoolTimedOut => StoreError::Busy,
             sqlx::Error::Decode(_) | sqlx::Error::ColumnDecode { .. } => {
                 Part::named("record").damaged(error)

@@ -94,22 +94,31 @@ pub async fn watch(
     after: i64,
 ) -> Result<Option<impl Stream<Item = Result<Event, ApiError>> + Send + use<>>, ApiError> {
     let job = jobs::get(service, caller, id).await?;
-    if job.status.is_terminal() {
-        let next = service.store.events_after(job.key, after, 1).await?;
-        if next.is_empty() {
-            return Ok(None);
-        }
+    // read before the answer begins, which then is an error if they are damaged
+    let first = service.store.events_after(job.key, after, EVENTS_PER_READ);
+    let first = first.await?;
+    if job.status.is_terminal() && first.is_empty() {
+        return Ok(None);
     }
-    Ok(Some(follow(service.clone(), (id, job.key), after)))
+    Ok(Some(follow(service.clone(), (id, job.key), after, first)))
 }
 
 fn follow(
     service: Arc<Service>,
     (id, key): (JobId, i64),
     after: i64,
+    first: Vec<Event>,
 ) -> impl Stream<Item = Result<Event, ApiError>> + Send {
     try_stream! {
         let mut cursor = after;
+        for event in first {
+            cursor = event.seq;
+            let done = matches!(event.payload, Payload::Done { .. });
+            yield event;
+            if done {
+                return;
+            }
+        }
         let mut subscription = service.queue.subscribe(key);
         let mut ended = false;
         loop {

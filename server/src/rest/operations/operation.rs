@@ -190,8 +190,15 @@ impl Operation {
     /// The errors that it may answer with, each once.
     pub(in crate::rest) fn errors(&self) -> Vec<Code> {
         let mut codes = vec![Code::Internal, Code::RateLimited];
-        if self.path.starts_with("/v1/jobs") || self.path.starts_with("/v1/meshes") {
+        // all that reads jobs, problems or meshes, and all that writes
+        if ["/v1/jobs", "/v1/problems", "/v1/meshes"]
+            .iter()
+            .any(|path| self.path.starts_with(path))
+        {
             codes.push(Code::CorruptData);
+        }
+        if self.errors.contains(&Code::StorageFull) {
+            codes.push(Code::StorageLost);
         }
         if self.strict {
             codes.push(Code::UnknownParameter);
