@@ -32,6 +32,11 @@ pub struct App {
     grace: Duration,
 }
 
+/// The service cannot listen at this address.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[error("cannot listen on {0}")]
+pub struct CannotListen(SocketAddr);
+
 impl App {
     /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
@@ -57,8 +62,8 @@ impl App {
         let router = rest::router(service, grpc);
 
         let most = listener::most_connections(config.max_connections);
-        let listener = Listener::bind(config.listen, most)
-            .with_context(|| format!("cannot listen on {}", config.listen))?;
+        let listener =
+            Listener::bind(config.listen, most).with_context(|| CannotListen(config.listen))?;
         let address = listener.address()?;
         let closing = CancellationToken::new();
         let server = tokio::spawn(listener.serve(router, closing.clone()));

@@ -158,6 +158,14 @@ pub enum ApiError {
         /// Where to find it in the log.
         incident: Uuid,
     },
+    /// A stored record is damaged.
+    #[error("{what}; logged as incident {incident}")]
+    CorruptData {
+        /// Which one.
+        what: String,
+        /// Where to find it in the log.
+        incident: Uuid,
+    },
     /// Too many jobs wait.
     #[error("the queue holds {limit} jobs already")]
     QueueFull {
@@ -167,6 +175,9 @@ pub enum ApiError {
     /// The service is about to stop.
     #[error("the service is stopping; try again when it has been restarted")]
     Draining,
+    /// The database was removed or replaced while the service runs.
+    #[error("the store was removed or replaced while the service was running; nothing is stored")]
+    StorageLost,
     /// The disk is full.
     #[error("the disk is full")]
     StorageFull,
@@ -214,6 +225,8 @@ impl ApiError {
             ApiError::Internal { .. } => Code::Internal,
             ApiError::QueueFull { .. } => Code::QueueFull,
             ApiError::Draining => Code::Draining,
+            ApiError::CorruptData { .. } => Code::CorruptData,
+            ApiError::StorageLost => Code::StorageLost,
             ApiError::StorageFull => Code::StorageFull,
         }
     }
@@ -251,7 +264,9 @@ impl ApiError {
             "errors": self.violations(),
         });
         match self {
-            ApiError::Internal { incident } => document["incident"] = json!(incident.to_string()),
+            ApiError::Internal { incident } | ApiError::CorruptData { incident, .. } => {
+                document["incident"] = json!(incident.to_string());
+            }
             ApiError::ProblemTooLarge {
                 estimate,
                 budget_bytes,
@@ -279,7 +294,7 @@ impl From<ApiError> for Status {
         let mut details = ErrorDetails::new();
         let mut metadata = std::collections::HashMap::new();
         match &error {
-            ApiError::Internal { incident } => {
+            ApiError::Internal { incident } | ApiError::CorruptData { incident, .. } => {
                 metadata.insert("incident".to_string(), incident.to_string());
             }
             ApiError::ProblemTooLarge {

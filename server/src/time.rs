@@ -1,19 +1,31 @@
 //! Points in time: microseconds since 1970 in the store, RFC 3339 in UTC outside.
 
-use std::{borrow::Cow, fmt};
+use std::{borrow::Cow, fmt, sync::LazyLock, time::Duration};
 
 use jiff::Timestamp;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// When this process first looked at the clock: the time, in microseconds since 1970, and the time since the machine was
+/// started.
+static START: LazyLock<(i64, Duration)> = LazyLock::new(|| (wall_clock(), since_boot()));
 
 /// A point in time, to the microsecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Time(i64);
 
 impl Time {
-    /// This moment.
+    /// This moment. The clock of the machine is read once; from then on time goes by what nobody can set, and which also
+    /// counts while the machine sleeps: durations and time limits are right, and times in order, whatever happens to
+    /// the clock. It is believed again at the next start.
     pub fn now() -> Self {
-        Time(Timestamp::now().as_microsecond())
+        let (wall, boot) = *START;
+        Time(wall.saturating_add(micros(since_boot().saturating_sub(boot))))
+    }
+
+    /// How far the clock of the machine is ahead of [`Time::now`], in seconds, because it was set since.
+    pub fn clock_was_set_by_s() -> f64 {
+        wall_clock().saturating_sub(Time::now().0) as f64 / 1e6
     }
 
     /// From microseconds since 1970.
@@ -41,6 +53,23 @@ impl Time {
     pub fn seconds_until(self, later: Time) -> f64 {
         later.0.saturating_sub(self.0).max(0) as f64 / 1e6
     }
+}
+
+fn wall_clock() -> i64 {
+    Timestamp::now().as_microsecond()
+}
+
+/// `std::time::Instant` stands still while the machine sleeps.
+fn since_boot() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::Boottime);
+    Duration::new(
+        time.tv_sec.unsigned_abs(),
+        time.tv_nsec.unsigned_abs() as u32,
+    )
+}
+
+fn micros(duration: Duration) -> i64 {
+    i64::try_from(duration.as_micros()).unwrap_or(i64::MAX)
 }
 
 impl fmt::Display for Time {
@@ -93,6 +122,13 @@ mod tests {
             serde_json::from_str::<Time>(&serde_json::to_string(&time).unwrap()).unwrap(),
             time
         );
+    }
+
+    #[test]
+    fn times_of_one_process_are_in_order_and_near_the_clock() {
+        let times: Vec<Time> = (0..1000).map(|_| Time::now()).collect();
+        assert!(times.is_sorted());
+        assert!(Time::clock_was_set_by_s().abs() < 1.0);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 mod demo;
+mod doctor;
 pub mod examples;
 mod exit;
 mod explain;
@@ -28,8 +29,11 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Start the service: REST and gRPC on one port
+    /// Start the service: REST and gRPC on one port. Exit code: 0 stopped, 3 cannot listen, 4 the folder cannot be used,
+    /// 5 another server uses it, 6 its tables are of another program or version, 7 stored data is missing or damaged
     Serve(Config),
+    /// Check a store that no server is using, and save what is intact. Exit code: 0 all is intact, 7 something is damaged
+    Doctor(doctor::Arguments),
     /// Solve one problem without a service. Exit code: 0 converged, 9 not converged, 2 invalid input
     Solve(solve::Arguments),
     /// Print the JSON Schema of a problem: every field with its meaning and default
@@ -54,6 +58,10 @@ pub fn main() -> ExitCode {
             let lines = log::start(LevelFilter::INFO);
             with_runtime(serve::run(config, lines.lost()))
         }
+        Command::Doctor(arguments) => {
+            let _lines = log::start(LevelFilter::WARN);
+            with_runtime(doctor::run(arguments))
+        }
         Command::Solve(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
             solve::run(&arguments)
@@ -74,7 +82,7 @@ pub fn main() -> ExitCode {
     };
     let exit = exit.unwrap_or_else(|error| {
         eprintln!("signorini: {error:#}");
-        Exit::Failed
+        Exit::of(&error)
     });
     ExitCode::from(exit as u8)
 }

@@ -1,9 +1,9 @@
 //! The routes of gRPC: the service, its health, its reflection.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use axum::{Router, middleware::map_response};
-use tonic::{Code, Status, service::Routes};
+use tonic::{Code, Status, server::NamedService, service::Routes};
 use tonic_health::server::HealthReporter;
 
 use super::{messages::MAX_MESSAGE_BYTES, service::Grpc};
@@ -24,6 +24,7 @@ pub async fn router(
     };
     let (reporter, health) = tonic_health::server::health_reporter();
     reporter.set_serving::<JobServiceServer<Grpc>>().await;
+    tokio::spawn(report_health(reporter.clone(), service.clone()));
     let jobs =
         JobServiceServer::new(Grpc::new(service)).max_decoding_message_size(MAX_MESSAGE_BYTES);
     let routes = Routes::new(jobs)
@@ -45,6 +46,30 @@ async fn too_large(response: axum::response::Response) -> axum::response::Respon
         })
         .into_http(),
         false => response,
+    }
+}
+
+/// Reports the health of the store, until the service stops.
+async fn report_health(reporter: HealthReporter, service: Arc<Service>) {
+    const INTERVAL: Duration = Duration::from_secs(1);
+    let mut serving = true;
+    loop {
+        tokio::select! {
+            () = tokio::time::sleep(INTERVAL) => {}
+            () = service.queue.stopping().cancelled() => return,
+        }
+        let works = service.health().await.is_ok();
+        if works == serving || service.queue.stopping().is_cancelled() {
+            continue;
+        }
+        serving = works;
+        let status = match works {
+            true => tonic_health::ServingStatus::Serving,
+            false => tonic_health::ServingStatus::NotServing,
+        };
+        for name in ["", JobServiceServer::<Grpc>::NAME] {
+            reporter.set_service_status(name, status).await;
+        }
     }
 }
 

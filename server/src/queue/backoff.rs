@@ -17,7 +17,7 @@ impl Default for Backoff {
 impl Backoff {
     /// Waits; false if the service stops meanwhile.
     pub(super) async fn wait(&mut self, stopping: &CancellationToken) -> bool {
-        const LONGEST: Duration = Duration::from_secs(10);
+        const LONGEST: Duration = Duration::from_secs(5);
         let pause = self.0;
         self.0 = (pause * 3).min(LONGEST);
         tokio::select! {

@@ -5,12 +5,13 @@ use std::{sync::Arc, time::Duration};
 use tracing::{error, info};
 
 use super::{
+    backoff::Backoff,
     running::{Running, StopReason},
     state::Queue,
 };
 use crate::{
     job::Status,
-    store::{CancelOutcome, Ending, Result},
+    store::{CancelOutcome, Ending, Result, StoreError},
 };
 
 /// How long a solver may take to stop; then its job is canceled without waiting for it, and only the worker stays
@@ -22,7 +23,14 @@ impl Queue {
     /// second.
     pub async fn cancel(self: &Arc<Self>, key: i64) -> Result<CancelOutcome> {
         let _guard = self.claiming.write().await;
-        let mut outcome = self.store.request_cancel(key).await?;
+        let requested = self.store.request_cancel(key).await;
+        let mut outcome = match (requested, self.running().get(&key)) {
+            // it is remembered by the store, and stored with the end of the job
+            (Err(StoreError::Full), Some(running)) => CancelOutcome::Requested {
+                attempt: running.attempt,
+            },
+            (requested, _) => requested?,
+        };
         if let CancelOutcome::Requested { attempt } = outcome {
             let running = self.running().get(&key).cloned();
             match running {
@@ -48,11 +56,16 @@ impl Queue {
         Ok(outcome)
     }
 
-    /// Cancels a job whose solver does not stop in time; does nothing if it has stopped.
+    /// Cancels a job whose solver does not stop in time; does nothing if it has stopped. This is retried for as long as
+    /// it takes, since the client was told that the job ends.
     async fn force_cancel(self: Arc<Self>, key: i64, attempt: i32) {
         tokio::time::sleep(CANCEL_GRACE).await;
-        if let Err(cause) = self.end_attempt(key, attempt, &Ending::canceled()).await {
-            error!(job.key = key, %cause, "job could not be canceled: {cause}");
+        let mut backoff = Backoff::default();
+        while let Err(cause) = self.end_attempt(key, attempt, &Ending::canceled()).await {
+            error!(job.key = key, %cause, "job could not be canceled yet: {cause}");
+            if !backoff.wait(&self.stopping).await {
+                return;
+            }
         }
     }
 

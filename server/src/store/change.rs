@@ -1,18 +1,29 @@
 //! One transaction of the single writer, and its effects once it is committed: changes to the waiting jobs that are
 //! kept in memory, and jobs whose watchers are to be notified.
 
-use sqlx::{Sqlite, SqliteConnection, Transaction};
+use std::collections::BTreeSet;
+
+use sqlx::SqliteConnection;
 use tokio::sync::MutexGuard;
 
-use super::{database::Store, error::Result, waiting::Move};
+use super::{
+    database::{Store, Writing},
+    error::{Result, StoreError},
+    intact::{self, WHOLE},
+    rows,
+    waiting::Move,
+};
+use crate::{job::Job, time::Time};
 
 /// An open transaction.
 pub(super) struct Change<'a> {
     store: &'a Store,
-    tx: Transaction<'static, Sqlite>,
+    tx: Writing,
     moves: Vec<Move>,
     /// Jobs that have changed, for their watchers.
     changed: Vec<i64>,
+    /// Rows of jobs that need a new checksum.
+    touched: BTreeSet<i64>,
     /// Held until the moves are applied: no other change begins before, so that moves are applied in the order of
     /// commits.
     _lock: MutexGuard<'a, ()>,
@@ -28,13 +39,20 @@ pub(super) struct Savepoint {
 impl Store {
     /// Begins a transaction that may change jobs that wait.
     pub(super) async fn change(&self) -> Result<Change<'_>> {
+        self.reserve.has_room()?;
+        self.control_change().await
+    }
+
+    /// The same for what must work even if the disk is full.
+    pub(super) async fn control_change(&self) -> Result<Change<'_>> {
         let lock = self.change_lock.lock().await;
         Ok(Change {
             _lock: lock,
             store: self,
-            tx: self.begin().await?,
+            tx: self.begin_control().await?,
             moves: vec![],
             changed: vec![],
+            touched: BTreeSet::new(),
         })
     }
 }
@@ -53,6 +71,44 @@ impl Change<'_> {
     /// Records that this job has changed.
     pub(super) fn changed(&mut self, key: i64) {
         self.changed.push(key);
+    }
+
+    /// The row of this job has changed.
+    pub(super) fn touched(&mut self, key: i64) {
+        self.touched.insert(key);
+    }
+
+    /// What was read, unless it is damaged, which is noted.
+    pub(super) async fn unless_damaged<T>(&self, read: Result<T>) -> Result<Option<T>> {
+        match self.store.damages.noting(async { read }).await {
+            Ok(read) => Ok(Some(read)),
+            Err(StoreError::Damaged(_)) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// How many parts were found damaged so far.
+    pub(super) fn damaged_parts(&self) -> usize {
+        self.store.damages.summary().0
+    }
+
+    /// Whether the result of a job is as it was written; checked once.
+    pub(super) async fn has_intact_result(&mut self, job: &Job) -> Result<bool> {
+        let (store, key) = (self.store, job.result_key);
+        if store.intact.contains(key, WHOLE) {
+            return Ok(true);
+        }
+        let checked = intact::check_result(&mut self.tx, key).await;
+        let intact = self.unless_damaged(checked).await?.is_some();
+        if intact {
+            store.intact.insert(key, WHOLE);
+        }
+        Ok(intact)
+    }
+
+    /// This moment, by the clock of the store.
+    pub(super) fn now(&self) -> Time {
+        self.store.now()
     }
 
     /// Jobs that have changed since a savepoint.
@@ -109,7 +165,10 @@ impl Change<'_> {
 
     /// Commits: the changes are on the disk when this returns, and only then applied to the jobs in memory. Returns the
     /// jobs that have changed.
-    pub(super) async fn commit(self) -> Result<Vec<i64>> {
+    pub(super) async fn commit(mut self) -> Result<Vec<i64>> {
+        for key in &self.touched {
+            rows::seal(&mut self.tx, *key).await?;
+        }
         self.tx.commit().await?;
         let mut waiting = self.store.waiting_jobs();
         self.moves

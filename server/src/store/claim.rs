@@ -1,17 +1,24 @@
 //! The next job of the queue, claimed for a worker.
 
 use super::{
-    change::Change, coalescing, database::Store, error::Result, lifecycle, rows::read,
+    change::Change,
+    coalescing,
+    database::Store,
+    end,
+    error::{Result, StoreError},
+    lifecycle::{self, Ending},
+    problems,
+    rows::read,
     submission::Claim,
 };
-use crate::job::Cache;
+use crate::job::{Cache, Job};
 
 impl Store {
     /// Starts an attempt of the next job of the queue: highest priority first, then in order of arrival. Jobs
     /// before it for which there is a result by now are answered. Also returns all jobs that have changed.
     pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
         let mut change = self.change().await?;
-        let claim = claim(&mut change).await?;
+        let claim = self.damages.noting(claim(&mut change)).await?;
         let changed = change.commit().await?;
         Ok((claim, changed))
     }
@@ -20,18 +27,37 @@ impl Store {
 /// The next job of the queue. The index is named because the planner, which does not know how many jobs there are,
 /// would sort all waiting ones instead.
 pub(super) const NEXT: &str = "select id from job indexed by job_queue
-     where status = 'queued' and coalesced_into is null order by priority desc, id limit 1";
+     where status = 'queued' and coalesced_into is null order by priority desc, id limit ?";
+
+/// The next job of the queue, but for damaged ones, of which nothing can be trusted: they wait until the operator
+/// removes them, and the others go on.
+async fn next(change: &mut Change<'_>) -> Result<Option<Job>> {
+    loop {
+        let damaged = change.damaged_parts();
+        let keys: Vec<i64> = sqlx::query_scalar(NEXT)
+            .bind(damaged as i64 + 1)
+            .fetch_all(change.sql())
+            .await?;
+        for key in keys {
+            let found = read(change.sql(), key).await;
+            if let Some(job) = change.unless_damaged(found).await? {
+                return Ok(Some(job));
+            }
+        }
+        if change.damaged_parts() == damaged {
+            return Ok(None); // none waits but those
+        }
+    }
+}
 
 /// Claims within a transaction.
 pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
     /// With more jobs than this, one transaction would take too long.
     const MOST_ANSWERED: usize = 100;
     for _ in 0..MOST_ANSWERED {
-        let key: Option<i64> = sqlx::query_scalar(NEXT)
-            .fetch_optional(change.sql())
-            .await?;
-        let Some(key) = key else { return Ok(None) };
-        let waiting = read(change.sql(), key).await?;
+        let Some(waiting) = next(change).await? else {
+            return Ok(None);
+        };
         // there may be a result by now
         if waiting.cache == Cache::Use
             && let Some(source) = coalescing::earlier_result(change, &waiting.input_hash).await?
@@ -45,11 +71,17 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         {
             continue;
         }
+        let stored = problems::read(change.sql(), &waiting).await;
         let job = lifecycle::start_attempt(change, &waiting).await?;
-        let (problem, mesh) = sqlx::query_as("select body, mesh from problem where input_hash = ?")
-            .bind(&job.input_hash)
-            .fetch_one(change.sql())
-            .await?;
+        let (problem, mesh) = match stored {
+            Ok(stored) => stored,
+            // it fails alone, and does not stop the queue
+            Err(StoreError::Damaged(damage)) => {
+                end::end(change, &job, &Ending::damaged(&damage)).await?;
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
         return Ok(Some(Claim { job, problem, mesh }));
     }
     Ok(None)

@@ -7,7 +7,9 @@
 
 use super::{
     change::Change,
+    database::Store,
     error::Result,
+    intact::{self, WHOLE},
     lifecycle::{self, Ending},
     rows::{from_row, read},
     submission::NewJob,
@@ -22,7 +24,7 @@ const MOST_COALESCED: i64 = 100;
 pub(super) const EARLIER_RESULT: &str = "select * from job indexed by job_answer
      where input_hash = ? and status = 'succeeded' and result_available = 'final' and cache <> 'off'
            and solver_version = ?
-     order by id desc limit 1";
+     order by id desc limit 4";
 
 pub(super) const PRIMARY: &str = "select id from job indexed by job_under_way
      where input_hash = ? and status in ('queued', 'running') and coalesced_into is null and cache <> 'off'
@@ -37,12 +39,41 @@ pub(super) async fn earlier_result(
     change: &mut Change<'_>,
     input_hash: &str,
 ) -> Result<Option<Job>> {
-    let row = sqlx::query(EARLIER_RESULT)
+    let rows = sqlx::query(EARLIER_RESULT)
         .bind(input_hash)
         .bind(env!("CARGO_PKG_VERSION"))
-        .fetch_optional(change.sql())
+        .fetch_all(change.sql())
         .await?;
-    row.as_ref().map(from_row).transpose()
+    for row in &rows {
+        // a damaged one answers nobody
+        if let Some(job) = change.unless_damaged(from_row(row)).await?
+            && change.has_intact_result(&job).await?
+        {
+            return Ok(Some(job));
+        }
+    }
+    Ok(None)
+}
+
+impl Store {
+    /// Checks the result that may answer a job of this input, before the transaction that needs it: a large one would
+    /// occupy the single writer for tenths of a second.
+    pub(super) async fn check_earlier_result(&self, input_hash: &str) -> Result<()> {
+        let row = sqlx::query(EARLIER_RESULT)
+            .bind(input_hash)
+            .bind(env!("CARGO_PKG_VERSION"))
+            .fetch_optional(&self.reader)
+            .await?;
+        let Some(Ok(job)) = row.as_ref().map(from_row) else {
+            return Ok(());
+        };
+        if !self.intact.contains(job.result_key, WHOLE) {
+            let mut connection = self.reader.acquire().await?;
+            intact::check_result(&mut connection, job.result_key).await?;
+            self.intact.insert(job.result_key, WHOLE);
+        }
+        Ok(())
+    }
 }
 
 /// The job that a new one may be coalesced into. One that waits with a lower priority, or that is about to be
@@ -84,25 +115,31 @@ pub(super) async fn coalesce_into_running(change: &mut Change<'_>, job: &Job) ->
     if there + more >= MOST_COALESCED {
         return Ok(false);
     }
-    sqlx::query("update job set coalesced_into = ? where id = ? or coalesced_into = ?")
-        .bind(primary)
-        .bind(job.key)
-        .bind(job.key)
-        .execute(change.sql())
-        .await?;
+    let moved: Vec<i64> = sqlx::query_scalar(
+        "update job set coalesced_into = ?1, checksum = null where id = ?2 or coalesced_into = ?2 returning id",
+    )
+    .bind(primary)
+    .bind(job.key)
+    .fetch_all(change.sql())
+    .await?;
+    moved.into_iter().for_each(|key| change.touched(key));
     let (priority, key) = (job.priority, job.key);
     change.move_job(Move::Leave { priority, key });
     change.move_job(Move::Attach);
     Ok(true)
 }
 
-/// The jobs coalesced into this one, in the order in which they would be started.
+/// The jobs coalesced into this one, in the order in which they would be started, but for damaged ones.
 async fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Vec<Job>> {
     let rows = sqlx::query("select * from job where coalesced_into = ? order by priority desc, id")
         .bind(primary)
         .fetch_all(change.sql())
         .await?;
-    rows.iter().map(from_row).collect()
+    let mut jobs = vec![];
+    for row in &rows {
+        jobs.extend(change.unless_damaged(from_row(row)).await?);
+    }
+    Ok(jobs)
 }
 
 /// Ends the jobs coalesced into one that has ended in the same way, or puts the first of them in its place.
@@ -137,21 +174,25 @@ pub(super) async fn replace_if_outranked(
 /// Lets a job wait for a worker in place of its primary, and coalesces the other jobs of that primary into it.
 async fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
     detach(change, job, job.priority).await?;
-    sqlx::query("update job set coalesced_into = ? where coalesced_into = ?")
-        .bind(job.key)
-        .bind(primary)
-        .execute(change.sql())
-        .await?;
+    let moved: Vec<i64> = sqlx::query_scalar(
+        "update job set coalesced_into = ?, checksum = null where coalesced_into = ? returning id",
+    )
+    .bind(job.key)
+    .bind(primary)
+    .fetch_all(change.sql())
+    .await?;
+    moved.into_iter().for_each(|key| change.touched(key));
     Ok(())
 }
 
 /// Lets a coalesced job wait for a worker itself, with this priority.
 async fn detach(change: &mut Change<'_>, job: &Job, priority: i32) -> Result<()> {
     let key = job.key;
-    sqlx::query("update job set coalesced_into = null where id = ?")
+    sqlx::query("update job set coalesced_into = null, checksum = null where id = ?")
         .bind(key)
         .execute(change.sql())
         .await?;
+    change.touched(key);
     change.move_job(Move::Detach);
     change.move_job(Move::Enter { priority, key });
     Ok(())
@@ -186,7 +227,7 @@ fn is_shared(status: Status, reason: Option<Reason>) -> bool {
 pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> Result<()> {
     let job = lifecycle::start_attempt(change, job).await?;
     sqlx::query(
-        "update job set cached_from = ?, coalesced_into = null,
+        "update job set cached_from = ?, coalesced_into = null, checksum = null,
                         result_job = (select coalesce(result_job, id) from job where id = ?) where id = ?",
     )
     .bind(source.id.0.to_string())

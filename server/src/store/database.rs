@@ -1,21 +1,30 @@
 //! The one SQLite file: its connections, and the data that is also kept in memory.
 
 use std::{
-    fs::{File, OpenOptions, TryLockError},
+    collections::HashSet,
+    ops::{Deref, DerefMut},
     path::Path,
-    sync::{Mutex, MutexGuard, PoisonError, atomic::AtomicBool},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, AtomicI64},
+    },
     time::Duration,
 };
 
 use sqlx::{
-    Connection, Sqlite, SqlitePool, Transaction,
+    ConnectOptions, Connection, Sqlite, SqliteConnection, SqlitePool, Transaction,
     sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
 };
 use tokio::sync::mpsc;
 
 use super::{
+    damage::Damages,
     error::{Result, StoreError},
+    folder::{Folder, Identity, LOG},
+    intact::Intact,
     migrations,
+    progress::{self, Progress, Record},
+    reserve::Reserve,
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
@@ -38,22 +47,75 @@ pub struct Store {
     pub(super) change_lock: tokio::sync::Mutex<()>,
     /// Where submissions wait for the next commit.
     pub(super) inbox: Inbox,
-    /// Held as long as the store is open: a second server on the same folder would run the same jobs.
-    _lock: File,
+    /// Running jobs that a client has canceled, even if that could not be stored yet.
+    pub(super) cancels: Mutex<HashSet<i64>>,
+    /// What was found damaged.
+    pub(super) damages: Arc<Damages>,
+    /// Results that were found intact.
+    pub(super) intact: Arc<Intact>,
+    /// How far its clock is ahead of that of the machine, in microseconds: see `clock`.
+    pub(super) ahead: AtomicI64,
+    /// How far the store has come.
+    pub(super) progress: Progress,
+    /// Space for control when the disk is full.
+    pub(super) reserve: Reserve,
+    // last: SQLite's files are closed before
+    pub(super) identity: Identity,
+    _folder: Folder,
+}
+
+/// A transaction of the single writer; unless it is committed it is rolled back.
+pub(super) struct Writing {
+    tx: Transaction<'static, Sqlite>,
+    progress: Progress,
+    number: i64,
+}
+
+impl Deref for Writing {
+    type Target = SqliteConnection;
+
+    fn deref(&self) -> &SqliteConnection {
+        &self.tx
+    }
+}
+
+impl DerefMut for Writing {
+    fn deref_mut(&mut self) -> &mut SqliteConnection {
+        &mut self.tx
+    }
+}
+
+impl Writing {
+    /// Commits: the changes are on the disk when this returns.
+    pub(super) async fn commit(self) -> Result<()> {
+        self.tx.commit().await?;
+        self.progress.reached(self.number);
+        Ok(())
+    }
 }
 
 impl Store {
     /// Connects to the database in `folder`, created if necessary, and brings its tables up to date. Also
     /// returns the receiver of submissions. The data kept in memory is not read yet.
-    pub(super) async fn connect(folder: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
-        let lock = lock(folder)?;
+    pub(super) async fn connect(path: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
+        let folder = Folder::lock(path)?;
+        let known = progress::read(path).map_err(|error| {
+            StoreError::Folder(format!("cannot read {}: {error}", progress::FILE))
+        })?;
+        let database = folder.database();
         let options = SqliteConnectOptions::new()
-            .filename(folder.join("signorini.db"))
+            .filename(&database)
             .foreign_keys(true)
             .busy_timeout(Duration::from_secs(5));
+        compare_with_the_past(path, known.as_ref(), options.clone())
+            .await
+            .map_err(|error| with_advice(error, path))?;
+        folder.prepare()?;
+        folder.tighten();
+        let reserve = Reserve::new(path);
+        let identity = Identity::of(&folder)?;
         let writing = options
             .clone()
-            .create_if_missing(true)
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full);
         // A full disk makes SQLite end a transaction by itself, which leaves the driver's count of open ones
@@ -65,7 +127,12 @@ impl Store {
             })
             .connect_with(writing)
             .await?;
-        migrations::migrator().run(&writer).await?;
+        migrations::run(&writer).await?;
+        let record = progress::in_database(&mut *writer.acquire().await?).await?;
+        let record = record.ok_or_else(|| StoreError::Unexpected("no progress".into()))?;
+        let progress = Progress::start(path, record).map_err(|error| {
+            StoreError::Folder(format!("cannot write {}: {error}", progress::FILE))
+        })?;
         let reading = options.read_only(true);
         let reader = pool(4).connect_with(reading.clone()).await?;
         let lists = pool(2)
@@ -74,6 +141,7 @@ impl Store {
             .await?;
         let (inbox, submissions) = Inbox::new();
         let store = Store {
+            damages: Arc::new(Damages::new(reader.clone())),
             writer,
             reader,
             lists,
@@ -81,7 +149,13 @@ impl Store {
             paused: AtomicBool::default(),
             change_lock: tokio::sync::Mutex::default(),
             inbox,
-            _lock: lock,
+            cancels: Mutex::default(),
+            intact: Arc::default(),
+            ahead: AtomicI64::default(),
+            progress,
+            reserve,
+            identity,
+            _folder: folder,
         };
         Ok((store, submissions))
     }
@@ -97,17 +171,94 @@ impl Store {
         self.lists.close().await;
         self.reader.close().await;
         self.writer.close().await;
-    }
-
-    /// Whether the database answers.
-    pub async fn ping(&self) -> Result<()> {
-        sqlx::query("select 1").execute(&self.reader).await?;
-        Ok(())
+        if let Err(error) = self.progress.sync() {
+            tracing::warn!(%error, "{}: {error}", progress::FILE);
+        }
     }
 
     /// Begins a transaction of the single writer.
-    pub(super) async fn begin(&self) -> Result<Transaction<'static, Sqlite>> {
-        Ok(self.writer.begin_with("begin immediate").await?)
+    pub(super) async fn begin(&self) -> Result<Writing> {
+        self.reserve.has_room()?;
+        self.begin_control().await
+    }
+
+    /// The same for what must work even if the disk is full.
+    pub(super) async fn begin_control(&self) -> Result<Writing> {
+        self.identity.check()?;
+        let mut tx = self.writer.begin_with("begin immediate").await?;
+        let count = "update progress set commits = commits + 1 returning commits";
+        let number = sqlx::query_scalar(count).fetch_one(&mut *tx).await?;
+        let progress = self.progress.clone();
+        Ok(Writing {
+            tx,
+            progress,
+            number,
+        })
+    }
+
+    /// Does something that must work even if the disk is full: then once more, with the space that is reserved for it.
+    pub(super) async fn control<T, F: Future<Output = Result<T>>>(
+        &self,
+        work: impl Fn() -> F,
+    ) -> Result<T> {
+        let done = match work().await {
+            Err(StoreError::Full) if self.reserve.release() => work().await,
+            other => other,
+        };
+        self.damages.noting(async { done }).await
+    }
+}
+
+/// Compares the database with what is known of it before anything is written to it.
+pub(super) async fn compare_with_the_past(
+    path: &Path,
+    known: Option<&Record>,
+    options: SqliteConnectOptions,
+) -> Result<()> {
+    if !progress::has_content(&path.join(super::folder::DATABASE)) {
+        return match known {
+            Some(_) => Err(StoreError::Lost("it is missing or empty".into())),
+            None if progress::has_content(&path.join(LOG)) => Err(StoreError::Lost(
+                "it is missing or empty, and only its write-ahead log is there".into(),
+            )),
+            None => Ok(()),
+        };
+    }
+    let mut connection = options.read_only(true).connect().await?;
+    let compared = async {
+        migrations::check(&mut connection).await?;
+        match known {
+            Some(known) => {
+                let found = progress::in_database(&mut connection).await?;
+                progress::compare(known, found.as_ref())
+            }
+            None => Ok(()),
+        }
+    };
+    let compared = compared.await;
+    connection.close().await?;
+    compared
+}
+
+/// What the operator can do.
+fn with_advice(error: StoreError, path: &Path) -> StoreError {
+    let database = path.join(super::folder::DATABASE);
+    match error {
+        StoreError::Lost(what) => StoreError::Lost(format!(
+            "the database {} is not as it was left: {what}; put back {} and {LOG} as they were, or, if you mean to go \
+             on with what is there, run `signorini doctor --accept --data {}`",
+            database.display(),
+            super::folder::DATABASE,
+            path.display()
+        )),
+        StoreError::Damaged(damage) => StoreError::Lost(format!(
+            "the database {} cannot be read: {}; restore it from a backup, or save what is intact with \
+             `signorini doctor --data {} --salvage NEW_FOLDER`",
+            database.display(),
+            damage.cause,
+            path.display()
+        )),
+        other => other,
     }
 }
 
@@ -119,25 +270,4 @@ fn pool(connections: u32) -> SqlitePoolOptions {
         .idle_timeout(None)
         .max_lifetime(None)
         .test_before_acquire(false)
-}
-
-fn lock(folder: &Path) -> Result<File> {
-    let named = |error: std::io::Error| {
-        StoreError::Folder(format!("cannot use {}: {error}", folder.display()))
-    };
-    std::fs::create_dir_all(folder).map_err(named)?;
-    let file = OpenOptions::new()
-        .create(true)
-        .truncate(false)
-        .write(true)
-        .open(folder.join("lock"))
-        .map_err(named)?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(StoreError::Folder(format!(
-            "another server is using {}",
-            folder.display()
-        ))),
-        Err(TryLockError::Error(error)) => Err(named(error)),
-    }
 }

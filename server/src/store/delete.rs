@@ -22,7 +22,11 @@ pub enum Deletion {
 impl Store {
     /// Deletes a job that has ended, with its events, and with its result unless other jobs were answered with it.
     pub async fn delete(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
-        let mut change = self.change().await?;
+        self.control(|| self.try_to_delete(owners, key)).await
+    }
+
+    async fn try_to_delete(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
+        let mut change = self.control_change().await?;
         let job = find(change.sql(), key).await?;
         let Some(job) = job.filter(|job| owners.include(&job.owner)) else {
             return Ok(Deletion::Unknown);
@@ -30,12 +34,13 @@ impl Store {
         if !job.status.is_terminal() {
             return Ok(Deletion::Active);
         }
+        let now = change.now();
         let tx = change.sql();
         sqlx::query("insert into deleted_job (uuid, id, owner, deleted_at) values (?, ?, ?, ?)")
             .bind(job.id.0.to_string())
             .bind(key)
             .bind(&job.owner)
-            .bind(Time::now().micros())
+            .bind(now.micros())
             .execute(&mut *tx)
             .await?;
         for statement in [

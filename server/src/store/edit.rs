@@ -38,7 +38,18 @@ impl Store {
         edit: &Edit,
         versions: Option<&[i64]>,
     ) -> Result<Option<std::result::Result<Job, i64>>> {
-        let mut change = self.change().await?;
+        self.control(|| self.try_to_edit(owners, id, edit, versions))
+            .await
+    }
+
+    async fn try_to_edit(
+        &self,
+        owners: Owners<'_>,
+        id: JobId,
+        edit: &Edit,
+        versions: Option<&[i64]>,
+    ) -> Result<Option<std::result::Result<Job, i64>>> {
+        let mut change = self.control_change().await?;
         let Some(job) = with_id(change.sql(), owners, id).await? else {
             return Ok(None);
         };
@@ -56,7 +67,8 @@ impl Store {
             && pinned == job.pinned;
         if !same {
             sqlx::query(
-                "update job set name = ?, labels = ?, priority = ?, pinned = ?, version = version + 1 where id = ?",
+                "update job set name = ?, labels = ?, priority = ?, pinned = ?, version = version + 1,
+                                checksum = null where id = ?",
             )
             .bind(name)
             .bind(serde_json::to_string(labels)?)
@@ -65,6 +77,7 @@ impl Store {
             .bind(key)
             .execute(change.sql())
             .await?;
+            change.touched(key);
             if *labels != job.labels {
                 sqlx::query("delete from job_label where job_id = ?")
                     .bind(key)

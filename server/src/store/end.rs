@@ -1,5 +1,10 @@
 //! The end of a job: by its worker, by a cancel, or because it has waited too long.
 
+use std::{
+    collections::HashSet,
+    sync::{MutexGuard, PoisonError},
+};
+
 use super::{
     change::Change,
     coalescing,
@@ -12,7 +17,7 @@ use super::{
     rows::{find, is_current, read},
 };
 use crate::{
-    job::{Job, Reason, Status},
+    job::{Job, Reason, ResultAvailable, Status},
     time::Time,
 };
 
@@ -33,7 +38,11 @@ pub enum CancelOutcome {
 impl Store {
     /// Records that a client has asked the job to stop; a queued one is canceled at once.
     pub async fn request_cancel(&self, key: i64) -> Result<CancelOutcome> {
-        let mut change = self.change().await?;
+        self.control(|| self.try_to_request_cancel(key)).await
+    }
+
+    async fn try_to_request_cancel(&self, key: i64) -> Result<CancelOutcome> {
+        let mut change = self.control_change().await?;
         let Some(job) = find(change.sql(), key).await? else {
             return Ok(CancelOutcome::AlreadyTerminal); // and was deleted since
         };
@@ -45,12 +54,15 @@ impl Store {
             }
             Status::Running if job.cancel_requested => {}
             Status::Running => {
+                // kept even if it cannot be stored: no later result makes the job succeed
+                self.cancels().insert(key);
                 sqlx::query(
-                    "update job set cancel_requested = 1, version = version + 1 where id = ?",
+                    "update job set cancel_requested = 1, version = version + 1, checksum = null where id = ?",
                 )
                 .bind(key)
                 .execute(change.sql())
                 .await?;
+                change.touched(key);
                 change.commit().await?;
             }
             Status::Succeeded | Status::Failed | Status::Canceled => {
@@ -70,25 +82,68 @@ impl Store {
         last: FinalBatch,
         result: Option<&Parts>,
     ) -> Result<Option<Vec<i64>>> {
-        let mut change = self.change().await?;
+        // the end of a canceled job needs little space
+        match result {
+            Some(_) => {
+                let finishing = self.try_to_finish(key, attempt, ending, &last, result);
+                self.damages.noting(finishing).await
+            }
+            None => {
+                self.control(|| self.try_to_finish(key, attempt, ending, &last, None))
+                    .await
+            }
+        }
+    }
+
+    async fn try_to_finish(
+        &self,
+        key: i64,
+        attempt: i32,
+        ending: &Ending,
+        last: &FinalBatch,
+        result: Option<&Parts>,
+    ) -> Result<Option<Vec<i64>>> {
+        let mut change = match result {
+            Some(_) => self.change().await?,
+            None => self.control_change().await?,
+        };
         if !is_current(change.sql(), key, attempt).await? {
             return Ok(None);
         }
         if !last.events.is_empty() {
-            events::append_with_progress(change.sql(), key, attempt, &last.events, &last.progress)
+            let events = self.events_by_our_clock(&last.events);
+            events::append_with_progress(change.sql(), key, attempt, &events, &last.progress)
                 .await?;
         }
         if let Some(parts) = result {
             results::write_at_end(change.sql(), key, parts).await?;
         }
         let job = read(change.sql(), key).await?;
+        // a client was told that it ends: what was found before the solver noticed that is a partial result
+        let canceled = Ending {
+            result: ending.result.min(ResultAvailable::Partial),
+            ..Ending::canceled()
+        };
+        let ending = match job.cancel_requested || self.cancels().contains(&key) {
+            true if ending.status == Status::Succeeded => &canceled,
+            _ => ending,
+        };
         end(&mut change, &job, ending).await?;
-        Ok(Some(change.commit().await?))
+        let changed = change.commit().await?;
+        self.cancels().remove(&key);
+        Ok(Some(changed))
+    }
+
+    /// Running jobs that a client has canceled.
+    fn cancels(&self) -> MutexGuard<'_, HashSet<i64>> {
+        // No code panics while it holds this lock; if one did, the set would still be whole.
+        self.cancels.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Ends jobs that have waited longer than allowed, some at a time. A job coalesced into one that runs does
     /// not wait for a worker, and is left alone.
     pub async fn expire_queued(&self, now: Time) -> Result<Vec<i64>> {
+        let now = self.by_our_clock(now);
         const AT_ONCE: i64 = 100;
         // nearly always there is none, which a reader finds without occupying the writer
         let some = sqlx::query(EXPIRED)
@@ -107,7 +162,9 @@ impl Store {
             .await?;
         for key in expired {
             // as it is now: it may have been coalesced into one that has just ended
-            let job = read(change.sql(), key).await?;
+            let Ok(job) = self.damages.noting(read(change.sql(), key)).await else {
+                continue; // damaged: others still end
+            };
             let detail = format!(
                 "it was not started within {} s; see limits.queue_ttl_s",
                 job.limits.queue_ttl_s

@@ -1,6 +1,9 @@
 //! Errors of the store.
 
+use std::fmt;
+
 use sqlx::migrate::MigrateError;
+use uuid::Uuid;
 
 use crate::job::JobId;
 
@@ -10,6 +13,15 @@ pub enum StoreError {
     /// The folder cannot be used.
     #[error("{0}")]
     Folder(String),
+    /// Another process uses the folder.
+    #[error("{0}")]
+    Locked(String),
+    /// The tables are not those of this version.
+    #[error("{0}")]
+    Schema(String),
+    /// Something that was stored is missing.
+    #[error("{0}")]
+    Lost(String),
     /// The queue holds as many jobs as it may.
     #[error("the queue is full")]
     QueueFull,
@@ -31,9 +43,15 @@ pub enum StoreError {
     /// The disk is full.
     #[error("the disk is full")]
     Full,
-    /// A row that this program cannot have written.
-    #[error("the database holds something unexpected: {0}")]
-    Corrupt(String),
+    /// The database was removed or replaced while the store is open.
+    #[error("{0}")]
+    Replaced(String),
+    /// A record that is not as it was written.
+    #[error("{0}: {cause}", cause = .0.cause)]
+    Damaged(Box<Damage>),
+    /// What this program should not have asked for.
+    #[error("unexpected: {0}")]
+    Unexpected(String),
     /// An error of the database.
     #[error("database: {0}")]
     Database(sqlx::Error),
@@ -42,14 +60,111 @@ pub enum StoreError {
     Migrate(#[from] MigrateError),
 }
 
+/// A stored record, as errors name it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Part {
+    /// The job that it belongs to, by its key.
+    pub job: Option<i64>,
+    /// Its name, like "event 12".
+    pub name: String,
+}
+
+/// A record that is not as it was written.
+#[derive(Clone, Debug)]
+pub struct Damage {
+    /// Which one.
+    pub part: Part,
+    /// The job that it belongs to.
+    pub job: Option<JobId>,
+    /// How that was found.
+    pub cause: String,
+    /// Where to find it in the log, once it is there.
+    pub incident: Option<Uuid>,
+}
+
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.job {
+            Some(id) => write!(f, "the stored {} of {id} is damaged", self.part.name),
+            None => write!(f, "the stored {} is damaged", self.part.name),
+        }
+    }
+}
+
+impl Part {
+    /// A part of a job.
+    pub(super) fn of_job(key: i64, name: impl Into<String>) -> Part {
+        Part {
+            // a partial result is stored under the negative
+            job: Some(key.abs()),
+            name: name.into(),
+        }
+    }
+
+    /// Something that belongs to no job.
+    pub(super) fn named(name: impl Into<String>) -> Part {
+        Part {
+            job: None,
+            name: name.into(),
+        }
+    }
+
+    /// The error that it is damaged.
+    pub(super) fn damaged(self, cause: impl ToString) -> StoreError {
+        StoreError::Damaged(Box::new(Damage {
+            part: self,
+            job: None,
+            cause: cause.to_string(),
+            incident: None,
+        }))
+    }
+}
+
+impl Damage {
+    /// Indexes of the table of jobs that differ from it.
+    pub(super) fn of_indexes(cause: &str) -> Damage {
+        Damage {
+            part: Part::named("index of the jobs"),
+            job: None,
+            cause: cause.to_owned(),
+            incident: None,
+        }
+    }
+}
+
+/// SQLite's numbers of errors.
+mod code {
+    pub(super) const READ_ONLY: u32 = 8;
+    pub(super) const CORRUPT: u32 = 11;
+    pub(super) const FULL: u32 = 13;
+    pub(super) const CANNOT_OPEN: u32 = 14;
+    pub(super) const NOT_A_DATABASE: u32 = 26;
+    // of these, the details: reading failed, or ended early
+    pub(super) const IOERR_READ: u32 = 266;
+    pub(super) const IOERR_SHORT_READ: u32 = 522;
+}
+
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
-        const SQLITE_FULL: &str = "13";
+        let number = match &error {
+            sqlx::Error::Database(cause) => cause.code().and_then(|code| code.parse().ok()),
+            _ => None,
+        };
+        let number: u32 = number.unwrap_or_default();
         match &error {
-            sqlx::Error::Database(cause) if cause.code().as_deref() == Some(SQLITE_FULL) => {
-                StoreError::Full
+            _ if matches!(number & 0xff, code::CORRUPT | code::NOT_A_DATABASE)
+                || matches!(number, code::IOERR_READ | code::IOERR_SHORT_READ) =>
+            {
+                Part::named("database").damaged(error)
+            }
+            _ if number == code::FULL => StoreError::Full,
+            _ if matches!(number & 0xff, code::READ_ONLY | code::CANNOT_OPEN) => {
+                StoreError::Folder(format!("the database cannot be written: {error}"))
             }
             sqlx::Error::PoolTimedOut => StoreError::Busy,
+            sqlx::Error::Decode(_) | sqlx::Error::ColumnDecode { .. } => {
+                Part::named("record").damaged(error)
+            }
             _ => StoreError::Database(error),
         }
     }
@@ -61,14 +176,26 @@ impl StoreError {
         match self {
             StoreError::Full => StoreError::Full,
             StoreError::Busy => StoreError::Busy,
-            other => StoreError::Corrupt(other.to_string()),
+            StoreError::Replaced(how) => StoreError::Replaced(how.clone()),
+            StoreError::Damaged(damage) => StoreError::Damaged(damage.clone()),
+            other => StoreError::Unexpected(other.to_string()),
+        }
+    }
+
+    /// The same, with the record that was being read if nothing more is known of it.
+    pub(super) fn reading(self, part: impl FnOnce() -> Part) -> StoreError {
+        match self {
+            StoreError::Damaged(damage) if damage.part.job.is_none() => {
+                part().damaged(damage.cause)
+            }
+            other => other,
         }
     }
 }
 
 impl From<serde_json::Error> for StoreError {
     fn from(error: serde_json::Error) -> Self {
-        StoreError::Corrupt(error.to_string())
+        Part::named("record").damaged(error)
     }
 }
 

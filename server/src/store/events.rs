@@ -1,15 +1,16 @@
 //! The events of each job: appended, and read from any point on.
 
-use sqlx::{Row, SqliteConnection};
+use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
+    checksum::Checksum,
     database::Store,
-    error::{Result, StoreError},
-    rows::is_current,
+    error::{Part, Result, StoreError},
+    rows::{find, seal},
 };
 use crate::{
     event::{Event, Payload},
-    job::Progress,
+    job::{Progress, Status},
     time::Time,
 };
 
@@ -33,49 +34,115 @@ impl Store {
         progress: &Progress,
     ) -> Result<bool> {
         let mut tx = self.begin().await?;
-        if !is_current(&mut tx, key, attempt).await? {
+        // the row is read whole, so that a damaged one is not given a new checksum below
+        let job = find(&mut tx, key).await?;
+        if !job.is_some_and(|job| job.status == Status::Running && job.attempt == attempt) {
             return Ok(false);
         }
-        append_with_progress(&mut tx, key, attempt, payloads, progress).await?;
+        let payloads = self.events_by_our_clock(payloads);
+        append_with_progress(&mut tx, key, attempt, &payloads, progress).await?;
+        seal(&mut tx, key).await?;
         tx.commit().await?;
         Ok(true)
     }
 
     /// At most `limit` events after number `after`, in order.
     pub async fn events_after(&self, key: i64, after: i64, limit: i64) -> Result<Vec<Event>> {
-        let rows = sqlx::query(
-            "select seq, attempt, t, body from event where job_id = ? and seq > ? order by seq limit ?",
-        )
-        .bind(key)
-        .bind(after)
-        .bind(limit)
-        .fetch_all(&self.reader)
-        .await?;
-        rows.iter()
-            .map(|row| {
-                let seq = row.try_get("seq")?;
-                let payload = serde_json::from_str(row.try_get("body")?)
-                    .map_err(|error| StoreError::Corrupt(format!("event {seq}: {error}")))?;
-                Ok(Event {
-                    seq,
-                    attempt: row.try_get("attempt")?,
-                    t: Time::from_micros(row.try_get("t")?),
-                    payload,
-                })
-            })
-            .collect()
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            read(&mut connection, key, after, limit).await
+        };
+        self.damages.noting(read).await
     }
 
     /// The iterations of one attempt of a job, each as the JSON of its event, in order.
     pub async fn iterations(&self, key: i64, attempt: i32) -> Result<Vec<String>> {
-        Ok(sqlx::query_scalar(
-            "select body from event where job_id = ? and attempt = ? and type = 'iteration' order by seq",
-        )
-        .bind(key)
-        .bind(attempt)
-        .fetch_all(&self.reader)
-        .await?)
+        let read = async {
+            let rows = sqlx::query(
+                "select seq, attempt, t, type, body, checksum from event
+                 where job_id = ? and attempt = ? and type = 'iteration' order by seq",
+            )
+            .bind(key)
+            .bind(attempt)
+            .fetch_all(&self.reader)
+            .await?;
+            let body = |row| Ok(checked(key, row)?.1.to_owned());
+            rows.iter().map(body).collect()
+        };
+        self.damages.noting(read).await
     }
+}
+
+/// At most `limit` events after number `after`, in order; an error if one is damaged or missing.
+pub(super) async fn read(
+    connection: &mut SqliteConnection,
+    key: i64,
+    after: i64,
+    limit: i64,
+) -> Result<Vec<Event>> {
+    // one statement sees one state: the events, and after them the number of the last one
+    let rows = sqlx::query(
+        "select * from (select seq, attempt, t, type, body, checksum from event
+                        where job_id = ?1 and seq > ?2 order by seq limit ?3)
+         union all select last_seq, 0, 0, '', '', null from job where id = ?1",
+    )
+    .bind(key)
+    .bind(after)
+    .bind(limit)
+    .fetch_all(connection)
+    .await
+    .map_err(|error| StoreError::from(error).reading(|| Part::of_job(key, "events")))?;
+    let Some((end, rows)) = rows.split_last() else {
+        return Ok(vec![]); // the job was deleted
+    };
+    let last: i64 = end.try_get("seq")?;
+    let events: Vec<Event> = rows
+        .iter()
+        .map(|row| {
+            let (seq, body) = checked(key, row)?;
+            Ok(Event {
+                seq,
+                attempt: row.try_get("attempt")?,
+                t: Time::from_micros(row.try_get("t")?),
+                payload: serde_json::from_str(body)
+                    .map_err(|error| part(key, seq).damaged(error))?,
+            })
+        })
+        .collect::<Result<_>>()?;
+    // they are numbered without a gap
+    let expected = (last - after).clamp(0, limit);
+    let dense = (after + 1..)
+        .zip(&events)
+        .all(|(seq, event)| event.seq == seq);
+    match dense && events.len() as i64 == expected {
+        true => Ok(events),
+        false => Err(Part::of_job(key, "events").damaged("some are missing")),
+    }
+}
+
+/// The number of an event and its body, if the row is as it was written.
+fn checked(key: i64, row: &SqliteRow) -> Result<(i64, &str)> {
+    let read = || {
+        let (seq, body) = (row.try_get("seq")?, row.try_get("body")?);
+        let (attempt, t, kind) = (
+            row.try_get("attempt")?,
+            row.try_get("t")?,
+            row.try_get("type")?,
+        );
+        checksum(key, seq, attempt, t, kind, body)
+            .verify(row.try_get("checksum")?, || part(key, seq))?;
+        Ok((seq, body))
+    };
+    read().map_err(|error: StoreError| error.reading(|| Part::of_job(key, "events")))
+}
+
+fn checksum(key: i64, seq: i64, attempt: i32, t: i64, kind: &str, body: &str) -> Checksum {
+    let row = Checksum::new().int(key).int(seq).int(attempt.into());
+    row.int(t).text(kind).text(body)
+}
+
+fn part(key: i64, seq: i64) -> Part {
+    Part::of_job(key, format!("event {seq}"))
 }
 
 /// Appends events, with the progress after them.
@@ -87,7 +154,7 @@ pub(super) async fn append_with_progress(
     progress: &Progress,
 ) -> Result<()> {
     append(tx, key, attempt, payloads).await?;
-    sqlx::query("update job set progress = ? where id = ?")
+    sqlx::query("update job set progress = ?, checksum = null where id = ?")
         .bind(serde_json::to_string(progress)?)
         .bind(key)
         .execute(tx)
@@ -103,7 +170,7 @@ pub(super) async fn append(
     payloads: &[(Time, Payload)],
 ) -> Result<()> {
     let last: i64 = sqlx::query_scalar(
-        "update job set last_seq = last_seq + ? where id = ? returning last_seq",
+        "update job set last_seq = last_seq + ?, checksum = null where id = ? returning last_seq",
     )
     .bind(payloads.len() as i64)
     .bind(key)
@@ -111,15 +178,18 @@ pub(super) async fn append(
     .await?;
     let first = last - payloads.len() as i64 + 1;
     for (seq, (t, payload)) in (first..).zip(payloads) {
+        let (t, kind, body) = (t.micros(), payload.kind(), serde_json::to_string(payload)?);
+        let checksum = checksum(key, seq, attempt, t, kind, &body).stored();
         sqlx::query(
-            "insert into event (job_id, seq, attempt, t, type, body) values (?, ?, ?, ?, ?, ?)",
+            "insert into event (job_id, seq, attempt, t, type, body, checksum) values (?, ?, ?, ?, ?, ?, ?)",
         )
         .bind(key)
         .bind(seq)
         .bind(attempt)
-        .bind(t.micros())
-        .bind(payload.kind())
-        .bind(serde_json::to_string(payload)?)
+        .bind(t)
+        .bind(kind)
+        .bind(body)
+        .bind(checksum)
         .execute(&mut *tx)
         .await?;
     }

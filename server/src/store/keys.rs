@@ -2,34 +2,37 @@
 
 use std::ops::Range;
 
-use sqlx::SqliteConnection;
+use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
     change::Change,
+    checksum::Checksum,
     database::Store,
     delete::{deleted_id, owner_of_deleted},
-    error::{Result, StoreError},
+    error::{Part, Result, StoreError},
     rows::{find, read},
     submission::{NewJob, RequestKey},
 };
 use crate::{
     caller::Owners,
     job::{Job, JobId},
-    time::Time,
 };
 
 impl Store {
     /// The jobs that this owner has submitted under a key.
     pub async fn replay(&self, owner: &str, key: &RequestKey) -> Result<Option<Vec<Job>>> {
-        let mut connection = self.reader.acquire().await?;
-        let Some(keys) = jobs_of_key(&mut connection, owner, key).await? else {
-            return Ok(None);
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            let Some(keys) = jobs_of_key(&mut connection, owner, key).await? else {
+                return Ok(None);
+            };
+            let Some(mut jobs) = remaining(&mut connection, keys).await? else {
+                return Ok(None);
+            };
+            self.add_queue_positions(&mut connection, &mut jobs).await?;
+            Ok(Some(jobs))
         };
-        let Some(mut jobs) = remaining(&mut connection, keys).await? else {
-            return Ok(None);
-        };
-        self.add_queue_positions(&mut connection, &mut jobs).await?;
-        Ok(Some(jobs))
+        self.damages.noting(read).await
     }
 
     /// The job with an id chosen by the client, if this owner submitted it with this payload.
@@ -98,15 +101,18 @@ pub(super) async fn remember(
     key: &RequestKey,
     jobs: &[i64],
 ) -> Result<()> {
+    let (first, count) = (jobs.first().copied().unwrap_or_default(), jobs.len() as i64);
     sqlx::query(
-        "insert or replace into request_key (owner, key, payload, first_job, jobs, created_at) values (?, ?, ?, ?, ?, ?)",
+        "insert or replace into request_key (owner, key, payload, first_job, jobs, created_at, checksum)
+         values (?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(owner)
     .bind(&key.key)
     .bind(&key.payload)
-    .bind(jobs.first())
-    .bind(jobs.len() as i64)
-    .bind(Time::now().micros())
+    .bind(first)
+    .bind(count)
+    .bind(change.now().micros())
+    .bind(checksum(owner, key, first, count).stored())
     .execute(change.sql())
     .await?;
     Ok(())
@@ -118,18 +124,48 @@ async fn jobs_of_key(
     owner: &str,
     key: &RequestKey,
 ) -> Result<Option<Range<i64>>> {
-    let found: Option<(String, i64, i64)> = sqlx::query_as(
-        "select payload, first_job, jobs from request_key where owner = ? and key = ?",
+    let found: Option<(String, i64, i64, Option<i64>)> = sqlx::query_as(
+        "select payload, first_job, jobs, checksum from request_key where owner = ? and key = ?",
     )
     .bind(owner)
     .bind(&key.key)
     .fetch_optional(connection)
     .await?;
-    match found {
-        None => Ok(None),
-        Some((payload, first, jobs)) if payload == key.payload => Ok(Some(first..first + jobs)),
-        Some(_) => Err(StoreError::KeyReuse),
+    let Some((payload, first, jobs, stored)) = found else {
+        return Ok(None);
+    };
+    let written = RequestKey {
+        key: key.key.clone(),
+        payload,
+    };
+    checksum(owner, &written, first, jobs)
+        .verify(stored, || Part::named("record of a request key"))?;
+    match written.payload == key.payload {
+        true => Ok(Some(first..first.saturating_add(jobs))),
+        false => Err(StoreError::KeyReuse),
     }
+}
+
+/// An error if a row of the table is not as it was written.
+pub(super) fn check(row: &SqliteRow) -> Result<()> {
+    let key = RequestKey {
+        key: row.try_get("key")?,
+        payload: row.try_get("payload")?,
+    };
+    checksum(
+        row.try_get("owner")?,
+        &key,
+        row.try_get("first_job")?,
+        row.try_get("jobs")?,
+    )
+    .verify(row.try_get("checksum")?, || {
+        Part::named("record of a request key")
+    })
+}
+
+fn checksum(owner: &str, key: &RequestKey, first: i64, jobs: i64) -> Checksum {
+    let row = Checksum::new().text(owner).text(&key.key);
+    row.text(&key.payload).int(first).int(jobs)
 }
 
 /// Those of these jobs that still exist. If all of them were deleted, that is an error as long as their ids are

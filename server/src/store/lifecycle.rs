@@ -2,7 +2,7 @@
 
 use super::{
     change::Change,
-    error::{Result, StoreError},
+    error::{Damage, Result, StoreError},
     events, results,
     rows::{partial_key, read},
     waiting::Move,
@@ -10,7 +10,6 @@ use super::{
 use crate::{
     event::Payload,
     job::{Failure, Job, Reason, ResultAvailable, Status},
-    time::Time,
 };
 
 /// How a job ends.
@@ -38,6 +37,11 @@ impl Ending {
         }
     }
 
+    /// Failed, since what it needs is damaged.
+    pub(super) fn damaged(damage: &Damage) -> Self {
+        Ending::failed(Reason::Internal, damage.to_string())
+    }
+
     /// Failed, without a result.
     pub fn failed(reason: Reason, detail: impl Into<String>) -> Self {
         let failure = Some(Failure::new(reason, detail));
@@ -52,11 +56,11 @@ impl Ending {
 
 /// Starts an attempt of a queued job; returns the started job.
 pub(super) async fn start_attempt(change: &mut Change<'_>, job: &Job) -> Result<Job> {
-    let now = Time::now();
+    let now = change.now().max(job.created_at);
     set_status(change, job, Status::Running).await?;
     sqlx::query(
-        "update job set attempt = attempt + 1, started_at = ?, progress = null, result_available = 'none'
-         where id = ?",
+        "update job set attempt = attempt + 1, started_at = ?, progress = null, result_available = 'none',
+                        checksum = null where id = ?",
     )
     .bind(now.micros())
     .bind(job.key)
@@ -73,7 +77,7 @@ pub(super) async fn start_attempt(change: &mut Change<'_>, job: &Job) -> Result<
 pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
     assert!(ending.status.is_terminal());
     // lists rely on the fact that no job ends before it was accepted, even if the clock was set back
-    let now = Time::now().max(job.created_at);
+    let now = change.now().max(job.started_at.unwrap_or(job.created_at));
     let failure = ending
         .failure
         .as_ref()
@@ -84,7 +88,7 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
     set_status(change, job, ending.status).await?;
     sqlx::query(
         "update job set reason = ?, failure = ?, result_available = ?, finished_at = ?, coalesced_into = null,
-                        solver_version = ? where id = ?",
+                        solver_version = ?, checksum = null where id = ?",
     )
     .bind(ending.reason.map(<&str>::from))
     .bind(failure)
@@ -114,17 +118,18 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
 /// Changes the status of a job, and with it the waiting jobs. Only this function does.
 pub(super) async fn set_status(change: &mut Change<'_>, job: &Job, next: Status) -> Result<()> {
     if !job.status.may_become(next) {
-        return Err(StoreError::Corrupt(format!(
+        return Err(StoreError::Unexpected(format!(
             "{} cannot go from {:?} to {next:?}",
             job.id, job.status
         )));
     }
-    sqlx::query("update job set status = ?, version = version + 1 where id = ?")
+    sqlx::query("update job set status = ?, version = version + 1, checksum = null where id = ?")
         .bind(<&str>::from(next))
         .bind(job.key)
         .execute(change.sql())
         .await?;
     let (priority, key) = (job.priority, job.key);
+    change.touched(key);
     if job.waits_for_a_worker() {
         change.move_job(Move::Leave { priority, key });
     } else if job.status == Status::Queued {

@@ -48,16 +48,20 @@ impl Store {
         let Some(filter) = &filter.among(owners) else {
             return Ok(vec![]);
         };
-        let mut connection = self.lists.acquire().await?;
-        let paths = match selective_path(&mut connection, filter, order).await? {
-            Some(path) => vec![path],
-            None => ordered_paths(filter, order),
+        let read = async {
+            let mut connection = self.lists.acquire().await?;
+            let paths = match selective_path(&mut connection, filter, order).await? {
+                Some(path) => vec![path],
+                None => ordered_paths(filter, order),
+            };
+            let mut query = page_of_jobs(filter, &paths, order, cursor, limit);
+            let rows = query.build().fetch_all(&mut *connection).await?;
+            let mut jobs = rows.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
+            self.add_queue_positions(&mut connection, &mut jobs).await?;
+            self.damages.indexes_are_intact()?;
+            Ok(jobs)
         };
-        let mut query = page_of_jobs(filter, &paths, order, cursor, limit);
-        let rows = query.build().fetch_all(&mut *connection).await?;
-        let mut jobs = rows.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
-        self.add_queue_positions(&mut connection, &mut jobs).await?;
-        Ok(jobs)
+        self.damages.noting(read).await
     }
 
     /// How many jobs there are, by group if requested; the groups are sorted by name.
@@ -70,11 +74,15 @@ impl Store {
         let Some(filter) = &filter.among(owners) else {
             return Ok(vec![]);
         };
-        let mut query = counted(filter, group_by);
-        let rows = query.build().fetch_all(&self.lists).await?;
-        rows.iter()
-            .map(|row| Ok((row.try_get("kind")?, row.try_get("jobs")?)))
-            .collect()
+        let read = async {
+            let mut query = counted(filter, group_by);
+            let rows = query.build().fetch_all(&self.lists).await?;
+            self.damages.indexes_are_intact()?;
+            rows.iter()
+                .map(|row| Ok((row.try_get("kind")?, row.try_get("jobs")?)))
+                .collect()
+        };
+        self.damages.noting(read).await
     }
 
     /// The keys of at most `limit` jobs, in order of arrival, after one key and up to another.

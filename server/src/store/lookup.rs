@@ -1,6 +1,11 @@
 //! One job: found by its public id; details of it by its key.
 
-use super::{database::Store, error::Result, rows::with_id};
+use super::{
+    database::Store,
+    error::Result,
+    problems,
+    rows::{find, with_id},
+};
 use crate::{
     caller::Owners,
     job::{Job, JobId, Status},
@@ -9,24 +14,32 @@ use crate::{
 impl Store {
     /// The job with this public id, with its queue position.
     pub async fn job(&self, owners: Owners<'_>, id: JobId) -> Result<Option<Job>> {
-        let mut connection = self.reader.acquire().await?;
-        let Some(mut job) = with_id(&mut connection, owners, id).await? else {
-            return Ok(None);
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            let Some(mut job) = with_id(&mut connection, owners, id).await? else {
+                self.damages.indexes_are_intact()?;
+                return Ok(None);
+            };
+            self.add_queue_positions(&mut connection, std::slice::from_mut(&mut job))
+                .await?;
+            Ok(Some(job))
         };
-        self.add_queue_positions(&mut connection, std::slice::from_mut(&mut job))
-            .await?;
-        Ok(Some(job))
+        self.damages.noting(read).await
     }
 
     /// The title of a job, and its problem as JSON without the title.
     pub async fn problem(&self, key: i64) -> Result<Option<(Option<String>, String)>> {
-        Ok(sqlx::query_as(
-            "select job.title, problem.body from job join problem on problem.input_hash = job.input_hash
-             where job.id = ?",
-        )
-        .bind(key)
-        .fetch_optional(&self.reader)
-        .await?)
+        let read = async {
+            let mut tx = self.reader.begin().await?;
+            let Some(job) = find(&mut tx, key).await? else {
+                return Ok(None);
+            };
+            let title = sqlx::query_scalar("select title from job where id = ?");
+            let title = title.bind(key).fetch_one(&mut *tx).await?;
+            let (body, _) = problems::read(&mut tx, &job).await?;
+            Ok(Some((title, body)))
+        };
+        self.damages.noting(read).await
     }
 
     /// Whether the job is terminal, so that its events contain `done`; `None` if it no longer exists.

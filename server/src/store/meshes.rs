@@ -1,8 +1,11 @@
 //! Stored meshes.
 
+use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
+
 use super::{
+    checksum::{self, Checksum},
     database::Store,
-    error::{Result, StoreError},
+    error::{Part, Result, StoreError},
 };
 use crate::mesh::MeshInfo;
 
@@ -29,26 +32,27 @@ pub struct StoredMesh {
 impl Store {
     /// The description of a mesh, as clients see it.
     pub async fn mesh(&self, hash: &str) -> Result<Option<MeshInfo>> {
-        let info: Option<String> = sqlx::query_scalar("select info from mesh where hash = ?")
-            .bind(hash)
-            .fetch_optional(&self.reader)
-            .await?;
-        Ok(info.map(|info| serde_json::from_str(&info)).transpose()?)
+        let read = async {
+            let row = sqlx::query("select * from mesh where hash = ?")
+                .bind(hash)
+                .fetch_optional(&self.reader)
+                .await?;
+            row.as_ref().map(|row| Ok(described(row)?.info)).transpose()
+        };
+        self.damages.noting(read).await
     }
 
     /// Meshes that were stored before the one with key `before`, newest first.
     pub async fn meshes(&self, before: Option<i64>, limit: i64) -> Result<Vec<StoredMesh>> {
-        let rows: Vec<(i64, String)> =
-            sqlx::query_as("select id, info from mesh where id < ? order by id desc limit ?")
+        let read = async {
+            let rows = sqlx::query("select * from mesh where id < ? order by id desc limit ?")
                 .bind(before.unwrap_or(i64::MAX))
                 .bind(limit)
                 .fetch_all(&self.reader)
                 .await?;
-        let read = |(key, info): (i64, String)| {
-            let info = serde_json::from_str(&info)?;
-            Ok(StoredMesh { key, info })
+            rows.iter().map(described).collect()
         };
-        rows.into_iter().map(read).collect()
+        self.damages.noting(read).await
     }
 
     /// Writes pieces of a mesh, numbered from `first`. They are used only after `insert_mesh`.
@@ -61,12 +65,15 @@ impl Store {
         let mut tx = self.begin().await?;
         for (piece, body) in (first..).zip(pieces) {
             // the same file may be uploaded twice at once, or again after an interruption: its pieces are the same
-            sqlx::query("insert or replace into mesh_piece (hash, piece, body) values (?, ?, ?)")
-                .bind(hash)
-                .bind(piece)
-                .bind(body)
-                .execute(&mut *tx)
-                .await?;
+            sqlx::query(
+                "insert or replace into mesh_piece (hash, piece, body, checksum) values (?, ?, ?, ?)",
+            )
+            .bind(hash)
+            .bind(piece)
+            .bind(body)
+            .bind(piece_checksum(hash, piece, body).stored())
+            .execute(&mut *tx)
+            .await?;
         }
         tx.commit().await?;
         Ok(())
@@ -83,28 +90,34 @@ impl Store {
         if there != pieces {
             return Ok(None);
         }
-        let done = sqlx::query(
-            "insert into mesh (hash, info, created_at) values (?, ?, ?) on conflict do nothing",
+        let key: Option<i64> = sqlx::query_scalar(
+            "insert into mesh (hash, info, created_at, pieces) values (?, ?, ?, ?) on conflict do nothing returning id",
         )
         .bind(&info.hash)
         .bind(serde_json::to_string(info)?)
         .bind(info.created_at.micros())
-        .execute(&mut *tx)
+        .bind(pieces)
+        .fetch_optional(&mut *tx)
         .await?;
+        if let Some(key) = key {
+            let row = sqlx::query("select * from mesh where id = ?")
+                .bind(key)
+                .fetch_one(&mut *tx)
+                .await?;
+            sqlx::query("update mesh set checksum = ? where id = ?")
+                .bind(checksum::of_row(&row)?)
+                .bind(key)
+                .execute(&mut *tx)
+                .await?;
+        }
         tx.commit().await?;
-        Ok(Some(done.rows_affected() > 0))
+        Ok(Some(key.is_some()))
     }
 
     /// The parsed mesh as it was written.
     pub async fn mesh_body(&self, hash: &str) -> Result<Option<Vec<u8>>> {
-        // one statement sees one state: a mesh with all its pieces, or no mesh
-        let pieces: Vec<Vec<u8>> = sqlx::query_scalar(
-            "select body from mesh_piece join mesh using (hash) where hash = ? order by piece",
-        )
-        .bind(hash)
-        .fetch_all(&self.reader)
-        .await?;
-        Ok((!pieces.is_empty()).then(|| pieces.concat()))
+        let mut connection = self.reader.acquire().await?;
+        self.damages.noting(read_body(&mut connection, hash)).await
     }
 
     /// Removes a mesh, unless a job that waits or runs needs it.
@@ -146,8 +159,64 @@ impl Store {
     }
 }
 
+/// How many pieces the mesh has; one of them: its number, its bytes, its checksum.
+type Piece = (Option<i64>, i64, Vec<u8>, Option<i64>);
+
+/// The pieces of a mesh in one, if all are there as they were written.
+pub(super) async fn read_body(
+    connection: &mut SqliteConnection,
+    hash: &str,
+) -> Result<Option<Vec<u8>>> {
+    // one statement sees one state: a mesh with all its pieces, or no mesh
+    let pieces: Vec<Piece> = sqlx::query_as(
+        "select pieces, piece, body, mesh_piece.checksum from mesh_piece join mesh using (hash)
+         where hash = ? order by piece",
+    )
+    .bind(hash)
+    .fetch_all(&mut *connection)
+    .await
+    .map_err(|error| StoreError::from(error).reading(|| part(hash)))?;
+    if pieces.is_empty() {
+        let row = sqlx::query("select 1 from mesh where hash = ?").bind(hash);
+        return match row.fetch_optional(connection).await? {
+            Some(_) => Err(part(hash).damaged("it has no pieces")),
+            None => Ok(None),
+        };
+    }
+    let count = pieces.len() as i64;
+    let mut whole = vec![];
+    for (number, (all, piece, body, checksum)) in (0..).zip(pieces) {
+        if piece != number || all.is_some_and(|all| all != count) {
+            return Err(part(hash).damaged("a piece is missing"));
+        }
+        piece_checksum(hash, piece, &body).verify(checksum, || part(hash))?;
+        whole.extend(body);
+    }
+    Ok(Some(whole))
+}
+
+/// A row of the table as the description of a mesh.
+pub(super) fn described(row: &SqliteRow) -> Result<StoredMesh> {
+    let hash: String = row.try_get("hash")?;
+    let part = || Part::named(format!("description of mesh {hash}"));
+    if !checksum::row_is_intact(row)? {
+        return Err(part().damaged("its checksum is not that of its content"));
+    }
+    let info = serde_json::from_str(row.try_get("info")?).map_err(|error| part().damaged(error))?;
+    let key = row.try_get("id")?;
+    Ok(StoredMesh { key, info })
+}
+
+fn piece_checksum(hash: &str, piece: i64, body: &[u8]) -> Checksum {
+    Checksum::new().text(hash).int(piece).bytes(body)
+}
+
+fn part(hash: &str) -> Part {
+    Part::named(format!("mesh {hash}"))
+}
+
 /// A job's mesh must be stored when the job is accepted.
-pub(super) async fn require(tx: &mut sqlx::SqliteConnection, mesh: Option<&str>) -> Result<()> {
+pub(super) async fn require(tx: &mut SqliteConnection, mesh: Option<&str>) -> Result<()> {
     let Some(hash) = mesh else { return Ok(()) };
     let there: bool = sqlx::query_scalar("select exists (select 1 from mesh where hash = ?)")
         .bind(hash)

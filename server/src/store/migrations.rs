@@ -1,15 +1,17 @@
 //! The tables and their history: `migrations/`, compiled in.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, collections::BTreeMap};
 
 use sqlx::{
-    SqlSafeStr,
+    Connection, SqlSafeStr, SqliteConnection, SqlitePool,
     migrate::{Migration, MigrationType, Migrator},
 };
 
+use super::error::{Result, StoreError};
+
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 5] = [
+const STEPS: [(i64, &str, &str); 6] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -31,7 +33,86 @@ const STEPS: [(i64, &str, &str); 5] = [
         "coalesced jobs",
         include_str!("../../../migrations/0005_coalesced_jobs.sql"),
     ),
+    (
+        6,
+        "digests",
+        include_str!("../../../migrations/0006_digests.sql"),
+    ),
 ];
+
+/// Brings the tables up to date, and checks that they are those of this version.
+pub(super) async fn run(database: &SqlitePool) -> Result<()> {
+    migrator().run(database).await?;
+    let mut connection = database.acquire().await?;
+    let found = schema(&mut connection).await?;
+    let mut empty = SqliteConnection::connect("sqlite::memory:")
+        .await
+        .map_err(StoreError::from)?;
+    migrator().run_direct(None, &mut empty, false).await?;
+    let expected = schema(&mut empty).await?;
+    for (name, sql) in &expected {
+        if found.get(name) != Some(sql) {
+            return Err(StoreError::Schema(format!(
+                "the store is not one of this program, or is damaged: {name} is missing or another"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// An error if the tables are of a later version, or not of this program. Nothing is written.
+pub(super) async fn check(connection: &mut SqliteConnection) -> Result<()> {
+    let ours: bool = sqlx::query_scalar(
+        "select exists (select 1 from sqlite_schema where name = '_sqlx_migrations')
+                or not exists (select 1 from sqlite_schema)",
+    )
+    .fetch_one(&mut *connection)
+    .await?;
+    if !ours {
+        return Err(StoreError::Schema(
+            "the database is not one of this program".into(),
+        ));
+    }
+    let applied = "select exists (select 1 from sqlite_schema where name = '_sqlx_migrations')";
+    if !sqlx::query_scalar::<_, bool>(applied)
+        .fetch_one(&mut *connection)
+        .await?
+    {
+        return Ok(());
+    }
+    let applied: Vec<(i64, Vec<u8>)> =
+        sqlx::query_as("select version, checksum from _sqlx_migrations order by version")
+            .fetch_all(connection)
+            .await?;
+    let known = migrator();
+    for (version, checksum) in applied {
+        match known.iter().find(|step| step.version == version) {
+            None => {
+                return Err(StoreError::Schema(format!(
+                    "the store was written by a later version of this program (its tables have step {version}, the last one known \
+                     here is {}); use that version",
+                    STEPS.len()
+                )));
+            }
+            Some(step) if step.checksum[..] != checksum[..] => {
+                return Err(StoreError::Schema(format!(
+                    "the store is not one of this program, or is damaged: step {version} of its tables is another"
+                )));
+            }
+            Some(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// The statements that made the tables and indexes, by name.
+async fn schema(connection: &mut SqliteConnection) -> Result<BTreeMap<String, Option<String>>> {
+    let all: Vec<(String, Option<String>)> =
+        sqlx::query_as("select name, sql from sqlite_schema where name not like 'sqlite_stat%'")
+            .fetch_all(connection)
+            .await?;
+    Ok(all.into_iter().collect())
+}
 
 /// The steps that bring the tables of an older version up to date.
 pub(super) fn migrator() -> Migrator {

@@ -13,13 +13,22 @@
 //! [`Owners`]: crate::caller::Owners
 
 // Input and output types, and errors.
+mod checksum;
 mod error;
 mod filter;
 mod parts;
 mod submission;
 
+// The folder and its files; what was found damaged, or intact.
+mod damage;
+mod folder;
+mod intact;
+mod progress;
+mod reserve;
+
 // The database; one transaction of its single writer; the waiting jobs, mirrored in memory.
 mod change;
+mod clock;
 mod database;
 mod migrations;
 mod waiting;
@@ -27,6 +36,7 @@ mod waiting;
 // A job: its row, its labels, its events, its result.
 mod events;
 mod labels;
+mod problems;
 mod results;
 mod rows;
 
@@ -44,6 +54,7 @@ mod keys;
 mod submit;
 
 // Read: one job, its queue position, its result; many jobs.
+mod health;
 mod list;
 mod lookup;
 mod positions;
@@ -52,6 +63,9 @@ mod snapshot;
 // What is not a job.
 mod meshes;
 mod settings;
+
+// A store that no server has open.
+mod inspect;
 
 #[cfg(test)]
 mod tests;
@@ -63,13 +77,17 @@ pub use self::{
     delete::Deletion,
     edit::Edit,
     end::CancelOutcome,
-    error::{Result, StoreError},
+    error::{Damage, Part, Result, StoreError},
     events::FinalBatch,
     filter::{Cursor, Filter, GroupBy, Order, OrderBy},
+    health::Health,
+    inspect::{Report, inspect},
+    intact::PartInfo,
     lifecycle::Ending,
     meshes::{Removal, StoredMesh},
     parts::{PIECE_BYTES, PIECES_PER_COMMIT, Parts, ProfilePoints},
-    snapshot::{PartInfo, Snapshot},
+    progress::accept,
+    snapshot::Snapshot,
     submission::{Accepted, Claim, NewJob, RequestKey, Submission},
 };
 
@@ -79,9 +97,12 @@ impl Store {
         let (store, submissions) = Store::connect(folder).await?;
         store.read_waiting_jobs().await?;
         store.read_settings().await?;
+        store.read_clock().await?;
         let store = Arc::new(store);
         let committing = submit::commit_submissions(Arc::downgrade(&store), submissions);
         tokio::spawn(committing);
+        tokio::spawn(health::watch(Arc::downgrade(&store)));
+        tokio::spawn(health::check_indexes(Arc::downgrade(&store)));
         Ok(store)
     }
 }

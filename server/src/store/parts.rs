@@ -25,6 +25,13 @@ pub(super) struct Part {
     pub(super) digest: Vec<u8>,
 }
 
+impl Part {
+    pub(super) fn new(name: String, body: Vec<u8>) -> Part {
+        let digest = Sha256::digest(&body).to_vec();
+        Part { name, body, digest }
+    }
+}
+
 impl Parts {
     /// Divides a document into the parts that can be requested.
     pub fn of(document: &Document) -> serde_json::Result<Parts> {
@@ -65,11 +72,7 @@ impl Parts {
         if !document.fields.x.is_empty() {
             parts.push(("fields".to_string(), serde_json::to_vec(&document.fields)?));
         }
-        let hashed = |(name, body): (String, Vec<u8>)| Part {
-            digest: Sha256::digest(&body).to_vec(),
-            name,
-            body,
-        };
+        let hashed = |(name, body)| Part::new(name, body);
         Ok(Parts(parts.into_iter().map(hashed).collect()))
     }
 

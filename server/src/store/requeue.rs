@@ -13,14 +13,18 @@ use super::{
 use crate::{
     event::{Payload, Requeue},
     job::{Job, Reason, Status},
-    time::Time,
 };
 
 impl Store {
     /// Requeues a running job because the service stops, which does not count against its attempts; one that was
     /// asked to stop is canceled instead. Returns its new status; `None` when the attempt is no longer the current one.
     pub async fn requeue_drained(&self, key: i64, attempt: i32) -> Result<Option<Status>> {
-        let mut change = self.change().await?;
+        self.control(|| self.try_to_requeue_drained(key, attempt))
+            .await
+    }
+
+    async fn try_to_requeue_drained(&self, key: i64, attempt: i32) -> Result<Option<Status>> {
+        let mut change = self.control_change().await?;
         if !is_current(change.sql(), key, attempt).await? {
             return Ok(None);
         }
@@ -40,12 +44,18 @@ impl Store {
     /// Requeues the jobs that were running when the process died; ends those that were asked to stop, and those
     /// whose attempts are used up. To be called before the listener opens. Returns their number.
     pub async fn requeue_interrupted(&self) -> Result<usize> {
-        let mut change = self.change().await?;
+        self.control(|| self.try_to_requeue_interrupted()).await
+    }
+
+    async fn try_to_requeue_interrupted(&self) -> Result<usize> {
+        let mut change = self.control_change().await?;
         let rows = sqlx::query("select * from job where status = 'running'")
             .fetch_all(change.sql())
             .await?;
         for row in &rows {
-            let job = from_row(row)?;
+            let Ok(job) = self.damages.noting(async { from_row(row) }).await else {
+                continue; // damaged: the service starts with the others
+            };
             if job.cancel_requested {
                 end(&mut change, &job, &Ending::canceled()).await?;
             } else if job.attempt >= job.max_attempts {
@@ -73,21 +83,26 @@ async fn requeue(change: &mut Change<'_>, job: &Job, reason: Requeue) -> Result<
     lifecycle::set_status(change, job, Status::Queued).await?;
     // The attempt keeps its number, by which events are distinguished; if it does not count, one more is allowed.
     let one_more = i32::from(reason == Requeue::Drain);
-    sqlx::query("update job set max_attempts = max_attempts + ? where id = ?")
+    sqlx::query("update job set max_attempts = max_attempts + ?, checksum = null where id = ?")
         .bind(one_more)
         .bind(job.key)
         .execute(change.sql())
         .await?;
     // its time in the queue begins again, and that of the jobs coalesced into it
-    sqlx::query("update job set expires_at = ? + cast(queue_ttl_s * 1e6 as integer) where id = ? or coalesced_into = ?")
-        .bind(Time::now().micros())
-        .bind(job.key)
-        .bind(job.key)
-        .execute(change.sql())
-        .await?;
+    let waiting_again: Vec<i64> = sqlx::query_scalar(
+        "update job set expires_at = ?1 + cast(queue_ttl_s * 1e6 as integer), checksum = null
+         where id = ?2 or coalesced_into = ?2 returning id",
+    )
+    .bind(change.now().micros())
+    .bind(job.key)
+    .fetch_all(change.sql())
+    .await?;
+    waiting_again
+        .into_iter()
+        .for_each(|key| change.touched(key));
     // it no longer runs: a coalesced job of higher priority does not have to wait for it
     coalescing::replace_if_outranked(change, job.key, job.priority).await?;
-    let requeued = [(Time::now(), Payload::requeued(reason))];
+    let requeued = [(change.now(), Payload::requeued(reason))];
     events::append(change.sql(), job.key, job.attempt, &requeued).await?;
     change.changed(job.key);
     Ok(())

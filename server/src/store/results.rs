@@ -9,8 +9,9 @@ use sqlx::SqliteConnection;
 use super::{
     database::Store,
     error::Result,
-    parts::{Parts, Piece},
-    rows::{is_current, partial_key},
+    intact,
+    parts::{Part, Parts, Piece},
+    rows::{is_current, partial_key, seal},
 };
 
 impl Store {
@@ -48,10 +49,11 @@ impl Store {
             insert(&mut tx, partial_key(key), &group).await?;
         }
         write_info(&mut tx, partial_key(key), parts).await?;
-        sqlx::query("update job set result_available = 'partial' where id = ?")
+        sqlx::query("update job set result_available = 'partial', checksum = null where id = ?")
             .bind(key)
             .execute(&mut *tx)
             .await?;
+        seal(&mut tx, key).await?;
         tx.commit().await?;
         Ok(true)
     }
@@ -73,19 +75,26 @@ pub(super) async fn write_at_end(tx: &mut SqliteConnection, key: i64, parts: &Pa
 /// after the last finished load step.
 pub(super) async fn keep_partial(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     remove(tx, key).await?;
-    sqlx::query("delete from result_part where job_id = ? and name = 'history'")
-        .bind(partial_key(key))
-        .execute(&mut *tx)
-        .await?;
-    for table in ["result_part", "result_info"] {
-        let statement = format!("update {table} set job_id = ? where job_id = ?");
-        sqlx::query(sqlx::AssertSqlSafe(statement))
-            .bind(key)
+    let names: Vec<String> =
+        sqlx::query_scalar("select distinct name from result_part where job_id = ?")
             .bind(partial_key(key))
-            .execute(&mut *tx)
+            .fetch_all(&mut *tx)
             .await?;
+    // a checksum includes the key, so the rows are written anew; partial results are small
+    for name in names.into_iter().filter(|name| name != "history") {
+        let mut body = vec![];
+        let read = intact::read_part(tx, partial_key(key), &name, |piece| {
+            body.extend_from_slice(&piece);
+        });
+        if read.await?.is_some() {
+            let parts = Parts(vec![Part::new(name, body)]);
+            for group in parts.groups() {
+                insert(tx, key, &group).await?;
+            }
+            write_info(tx, key, &parts).await?;
+        }
     }
-    Ok(())
+    remove(tx, partial_key(key)).await
 }
 
 /// Removes the result under this key.
@@ -102,13 +111,17 @@ pub(super) async fn remove(tx: &mut SqliteConnection, key: i64) -> Result<()> {
 /// Writes pieces.
 async fn insert(tx: &mut SqliteConnection, key: i64, group: &[Piece<'_>]) -> Result<()> {
     for Piece { name, number, body } in group {
-        sqlx::query("insert into result_part (job_id, name, piece, body) values (?, ?, ?, ?)")
-            .bind(key)
-            .bind(*name)
-            .bind(number)
-            .bind(*body)
-            .execute(&mut *tx)
-            .await?;
+        let checksum = intact::piece_checksum(key, name, *number, body).stored();
+        sqlx::query(
+            "insert into result_part (job_id, name, piece, body, checksum) values (?, ?, ?, ?, ?)",
+        )
+        .bind(key)
+        .bind(*name)
+        .bind(number)
+        .bind(*body)
+        .bind(checksum)
+        .execute(&mut *tx)
+        .await?;
     }
     Ok(())
 }
@@ -116,13 +129,16 @@ async fn insert(tx: &mut SqliteConnection, key: i64, group: &[Piece<'_>]) -> Res
 /// Writes the size and hash of each part.
 async fn write_info(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
     for part in &parts.0 {
+        let bytes = part.body.len() as i64;
+        let checksum = intact::info_checksum(key, &part.name, bytes, &part.digest).stored();
         sqlx::query(
-            "insert or replace into result_info (job_id, name, bytes, digest) values (?, ?, ?, ?)",
+            "insert or replace into result_info (job_id, name, bytes, digest, checksum) values (?, ?, ?, ?, ?)",
         )
         .bind(key)
         .bind(&part.name)
-        .bind(part.body.len() as i64)
+        .bind(bytes)
         .bind(&part.digest)
+        .bind(checksum)
         .execute(&mut *tx)
         .await?;
     }

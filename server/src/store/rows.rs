@@ -5,7 +5,10 @@ use std::{collections::BTreeMap, str::FromStr};
 use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use uuid::Uuid;
 
-use super::error::{Result, StoreError};
+use super::{
+    checksum,
+    error::{Part, Result, StoreError},
+};
 use crate::{
     caller::Owners,
     job::{Job, JobId, Limits, Status},
@@ -14,12 +17,25 @@ use crate::{
 
 /// The job with this key, which must exist.
 pub(super) async fn read(tx: &mut SqliteConnection, key: i64) -> Result<Job> {
-    from_row(
-        &sqlx::query("select * from job where id = ?")
+    let found = find(tx, key).await?;
+    found.ok_or_else(|| Part::of_job(key, "record").damaged("it is missing"))
+}
+
+/// Gives the row of a job that this transaction has changed its checksum. Every statement that changes a job sets it
+/// to null, so that one which is not renewed does not deny what is right.
+pub(super) async fn seal(tx: &mut SqliteConnection, key: i64) -> Result<()> {
+    let row = sqlx::query("select * from job where id = ? and checksum is null")
+        .bind(key)
+        .fetch_optional(&mut *tx)
+        .await?;
+    if let Some(row) = row {
+        sqlx::query("update job set checksum = ? where id = ?")
+            .bind(checksum::of_row(&row)?)
             .bind(key)
-            .fetch_one(tx)
-            .await?,
-    )
+            .execute(tx)
+            .await?;
+    }
+    Ok(())
 }
 
 /// The job with this key, if it still exists.
@@ -61,8 +77,20 @@ pub(super) async fn is_current(tx: &mut SqliteConnection, key: i64, attempt: i32
     .await?)
 }
 
-/// A row of the table as a job.
+/// A row of the table as a job, if it is as it was written.
 pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
+    let read = || match checksum::row_is_intact(row)? {
+        true => parse(row),
+        false => Err(corrupt("checksum")),
+    };
+    let part = || Part {
+        job: row.try_get("id").ok(),
+        name: "record".into(),
+    };
+    read().map_err(|error| error.reading(part))
+}
+
+fn parse(row: &SqliteRow) -> Result<Job> {
     let uuid: &str = row.try_get("uuid")?;
     let id = JobId(Uuid::try_parse(uuid).map_err(|_| corrupt("uuid"))?);
     let status: Status = word("status", row.try_get("status")?)?;
@@ -130,7 +158,7 @@ fn word<T: FromStr>(column: &str, text: &str) -> Result<T> {
 }
 
 fn corrupt(column: &str) -> StoreError {
-    StoreError::Corrupt(format!("job.{column}"))
+    Part::named("record").damaged(format!("job.{column}"))
 }
 
 fn links(id: JobId) -> BTreeMap<String, String> {

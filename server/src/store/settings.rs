@@ -22,15 +22,19 @@ impl Store {
 
     /// Pauses or resumes the queue; kept across restarts.
     pub async fn set_paused(&self, paused: bool) -> Result<()> {
-        let mut tx = self.begin().await?;
+        self.control(|| self.write_paused(paused)).await?;
+        self.paused.store(paused, Ordering::Relaxed);
+        Ok(())
+    }
+
+    async fn write_paused(&self, paused: bool) -> Result<()> {
+        let mut tx = self.begin_control().await?;
         let statement = if paused {
             "insert into setting (name, value) values ('queue_paused', 'true') on conflict do nothing"
         } else {
             "delete from setting where name = 'queue_paused'"
         };
         sqlx::query(statement).execute(&mut *tx).await?;
-        tx.commit().await?;
-        self.paused.store(paused, Ordering::Relaxed);
-        Ok(())
+        tx.commit().await
     }
 }

@@ -1,11 +1,14 @@
 //! Reading the result of a job.
 
-use sha2::{Digest, Sha256};
+use std::sync::Arc;
+
 use sqlx::{Sqlite, Transaction};
 
 use super::{
+    damage::Damages,
     database::Store,
     error::Result,
+    intact::{self, Intact, PartInfo},
     parts::{ProfilePoints, profile_part},
     rows::with_id,
 };
@@ -14,34 +17,33 @@ use crate::{
     job::{Job, JobId},
 };
 
-/// Size and hash of a part.
-#[derive(Clone, Debug)]
-pub struct PartInfo {
-    /// Its size.
-    pub bytes: u64,
-    /// Its SHA-256.
-    pub digest: Vec<u8>,
-}
-
 impl Store {
     /// A job and its result at one moment: the parts may be replaced while the job runs, and are removed when it is
     /// deleted.
     pub async fn snapshot(&self, owners: Owners<'_>, id: JobId) -> Result<Option<Snapshot>> {
-        let mut tx = self.reader.begin().await?;
-        let job = with_id(&mut tx, owners, id).await?;
-        Ok(job.map(|job| Snapshot { job, tx }))
+        let read = async {
+            let mut tx = self.reader.begin().await?;
+            let job = with_id(&mut tx, owners, id).await?;
+            if job.is_none() {
+                self.damages.indexes_are_intact()?;
+            }
+            Ok(job.map(|job| Snapshot {
+                job,
+                tx,
+                damages: self.damages.clone(),
+                intact: self.intact.clone(),
+            }))
+        };
+        self.damages.noting(read).await
     }
 
     /// One piece of a part, from 0; `None` after the last.
     pub async fn piece(&self, key: i64, part: &str, piece: i64) -> Result<Option<Vec<u8>>> {
-        Ok(sqlx::query_scalar(
-            "select body from result_part where job_id = ? and name = ? and piece = ?",
-        )
-        .bind(key)
-        .bind(part)
-        .bind(piece)
-        .fetch_optional(&self.reader)
-        .await?)
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            intact::piece(&mut connection, key, part, piece).await
+        };
+        self.damages.noting(read).await
     }
 }
 
@@ -50,39 +52,38 @@ pub struct Snapshot {
     /// The job, without its queue position.
     pub job: Job,
     tx: Transaction<'static, Sqlite>,
+    damages: Arc<Damages>,
+    intact: Arc<Intact>,
 }
 
 impl Snapshot {
-    /// Size and hash of a part.
-    pub async fn part_info(&mut self, part: &str) -> Result<Option<PartInfo>> {
-        let found: Option<(i64, Vec<u8>)> =
-            sqlx::query_as("select bytes, digest from result_info where job_id = ? and name = ?")
-                .bind(self.job.result_key)
-                .bind(part)
-                .fetch_optional(&mut *self.tx)
-                .await?;
-        if let Some((bytes, digest)) = found {
-            let bytes = bytes as u64;
-            return Ok(Some(PartInfo { bytes, digest }));
+    /// Size and hash of a part that is served in pieces. The whole is read before, so that damage is found before the
+    /// first byte is sent; of the result of a job that has ended, once.
+    pub async fn checked_part_info(&mut self, part: &'static str) -> Result<Option<PartInfo>> {
+        let (key, tx) = (self.job.result_key, &mut self.tx);
+        let intact = self.intact.contains(key, part);
+        let read = async {
+            if intact && let Some((info, _)) = intact::part_info(tx, key, part).await? {
+                return Ok(Some(info));
+            }
+            intact::read_part(tx, key, part, |_| ()).await
+        };
+        let info = self.damages.noting(read).await?;
+        // that of a running job is replaced
+        if info.is_some() && self.job.status.is_terminal() {
+            self.intact.insert(key, part);
         }
-        // written by a version that did not store size and hash
-        let body = self.part(part).await?;
-        Ok(body.map(|body| PartInfo {
-            bytes: body.len() as u64,
-            digest: Sha256::digest(&body).to_vec(),
-        }))
+        Ok(info)
     }
 
     /// A whole part.
     pub async fn part(&mut self, part: &str) -> Result<Option<Vec<u8>>> {
-        let pieces: Vec<Vec<u8>> = sqlx::query_scalar(
-            "select body from result_part where job_id = ? and name = ? order by piece",
-        )
-        .bind(self.job.result_key)
-        .bind(part)
-        .fetch_all(&mut *self.tx)
-        .await?;
-        Ok((!pieces.is_empty()).then(|| pieces.concat()))
+        let mut whole = vec![];
+        let read = intact::read_part(&mut self.tx, self.job.result_key, part, |piece| {
+            whole.extend_from_slice(&piece);
+        });
+        let found = self.damages.noting(read).await?;
+        Ok(found.map(|_| whole))
     }
 
     /// The profile of a boundary, at the end or at the end of a load step (from 0).

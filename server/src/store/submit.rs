@@ -13,7 +13,7 @@ use super::{
     claim, coalescing,
     database::Store,
     error::{Result, StoreError},
-    events, keys, labels, meshes,
+    events, keys, labels, meshes, problems,
     rows::read,
     submission::{Accepted, MOST_PER_COMMIT, NewJob, Pending, Submission},
     waiting::Move,
@@ -21,13 +21,16 @@ use super::{
 use crate::{
     event::Payload,
     job::{Cache, Status},
-    time::Time,
 };
 
 impl Store {
     /// Accepts jobs. They are stored on the disk when this returns. With `claim` (a worker is free) the next job of the
     /// queue is claimed in the same commit.
     pub async fn submit(&self, submission: Submission, claim: bool) -> Result<Accepted> {
+        for job in submission.jobs.iter().filter(|job| job.cache == Cache::Use) {
+            let checked = self.check_earlier_result(&job.input_hash);
+            let _ = self.damages.noting(checked).await; // what is not found intact does not answer it
+        }
         let (reply, answer) = oneshot::channel();
         let closed = || StoreError::Folder("the store is closed".into());
         let sent = self
@@ -51,7 +54,7 @@ impl Store {
             replies.push(one.reply);
         }
         let mut answers = vec![];
-        let committed = async {
+        let committed = self.damages.noting(async {
             let mut change = self.change().await?;
             for (submission, claim) in submissions {
                 let savepoint = change.savepoint().await?;
@@ -68,8 +71,8 @@ impl Store {
                 }
             }
             change.commit().await
-        }
-        .await;
+        });
+        let committed = committed.await;
         match committed {
             Ok(_) => {
                 for (reply, accepted) in replies.into_iter().zip(answers) {
@@ -170,15 +173,8 @@ async fn insert(
     if answer.is_none() {
         meshes::require(change.sql(), new.mesh.as_deref()).await?;
     }
-    sqlx::query(
-        "insert into problem (input_hash, body, mesh) values (?, ?, ?) on conflict do nothing",
-    )
-    .bind(&new.input_hash)
-    .bind(&new.problem)
-    .bind(&new.mesh)
-    .execute(change.sql())
-    .await?;
-    let now = Time::now();
+    problems::write(change.sql(), new).await?;
+    let now = change.now();
     let expires_at = now.after_s(new.limits.queue_ttl_s);
     let key: i64 = sqlx::query_scalar(
         "insert into job (uuid, status, name, title, labels, priority, input_hash, created_at, payload, parent,
@@ -202,6 +198,7 @@ async fn insert(
     .bind(owner)
     .fetch_one(change.sql())
     .await?;
+    change.touched(key);
     labels::write(change, key, now, &new.labels).await?;
     let queued = [(now, Payload::status(Status::Queued))];
     events::append(change.sql(), key, 0, &queued).await?;

@@ -23,6 +23,7 @@ use crate::{
 pub struct StoredFields {
     /// Length and fingerprint.
     pub info: PartInfo,
+    id: JobId,
     result_key: i64,
 }
 
@@ -34,8 +35,12 @@ pub async fn fields(
 ) -> Result<StoredFields, ApiError> {
     let mut found = with_result(service, caller, id).await?;
     let result_key = found.job.result_key;
-    match found.part_info("fields").await? {
-        Some(info) => Ok(StoredFields { info, result_key }),
+    match found.checked_part_info("fields").await? {
+        Some(info) => Ok(StoredFields {
+            info,
+            id,
+            result_key,
+        }),
         None => Err(no_result(&found.job)),
     }
 }
@@ -48,13 +53,13 @@ impl StoredFields {
         start: u64,
         end: u64,
     ) -> impl Stream<Item = Result<Vec<u8>, ApiError>> + Send + use<> {
-        let (service, key) = (service.clone(), self.result_key);
+        let (service, id, key) = (service.clone(), self.id, self.result_key);
         const PIECE: u64 = PIECE_BYTES as u64;
         try_stream! {
             for piece in start / PIECE..end.div_ceil(PIECE) {
                 let share = service.sent.wait_for(PIECE_BYTES).await?;
                 let found = service.store.piece(key, "fields", piece as i64).await?;
-                let mut bytes = found.ok_or_else(|| ApiError::internal("a piece of a result is missing"))?;
+                let mut bytes = found.ok_or(ApiError::Deleted(id))?;
                 let first = piece * PIECE;
                 bytes.truncate(end.saturating_sub(first) as usize);
                 let skipped = start.saturating_sub(first) as usize;

@@ -1,16 +1,19 @@
 //! The service, which every verb receives.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 
-use tokio::sync::Semaphore;
+use tokio::{sync::Semaphore, time::timeout};
 
 use crate::{
     config::Config,
     error::ApiError,
     queue::Queue,
-    store::{Store, StoreError},
+    store::{Health, Store, StoreError},
     transfer::Budget,
 };
+
+/// How long a probe waits for the store.
+const HEALTH_PATIENCE: Duration = Duration::from_secs(2);
 
 /// The service, which every verb receives.
 #[derive(Debug)]
@@ -63,6 +66,13 @@ impl Service {
         }
     }
 
+    /// How well the service works; an error if it accepts no jobs, or cannot read those that it has.
+    pub async fn health(&self) -> Result<Health, ApiError> {
+        self.accepting()?;
+        let health = timeout(HEALTH_PATIENCE, self.store.health()).await;
+        Ok(health.map_err(|_| ApiError::internal("the store does not answer"))??)
+    }
+
     /// Runs work whose duration depends on the client's input (reading, meshing, hashing a problem) on a blocking
     /// thread, a few at a time: the async threads stay free for other requests. The permit belongs to the work, not
     /// to the request: a client that disconnects does not free it before the work is done.
@@ -108,6 +118,15 @@ impl From<StoreError> for ApiError {
             StoreError::KeyReuse => ApiError::KeyReuse,
             StoreError::IdConflict(id) => ApiError::IdConflict(id),
             StoreError::Deleted(id) => ApiError::Deleted(id),
+            StoreError::Replaced(_) => ApiError::StorageLost,
+            // it is logged already, once
+            StoreError::Damaged(damage) => match damage.incident {
+                Some(incident) => ApiError::CorruptData {
+                    what: damage.to_string(),
+                    incident,
+                },
+                None => ApiError::internal(StoreError::Damaged(damage)),
+            },
             other => ApiError::internal(other),
         }
     }

@@ -39,6 +39,9 @@ pub const AFTER_SEQ: Parameter<Integers> = Parameter {
     values: Integers(0..=i64::MAX),
 };
 
+/// Events that are read before the stream of a watcher begins.
+const FIRST_EVENTS: i64 = 64;
+
 /// How long each of many watchers of one job waits between two looks for news. As long as the recorder may wait before
 /// it commits events: news are at most twice as late.
 const CROWDED_PAUSE: Duration = Duration::from_millis(50);
@@ -99,22 +102,31 @@ pub async fn watch(
     after: i64,
 ) -> Result<Option<impl Stream<Item = Result<Event, ApiError>> + Send + use<>>, ApiError> {
     let job = jobs::get(service, caller, id).await?;
-    if job.status.is_terminal() {
-        let next = service.store.events_after(job.key, after, 1).await?;
-        if next.is_empty() {
-            return Ok(None);
-        }
+    // read before the answer begins, which then is an error if they are damaged
+    let first = service.store.events_after(job.key, after, FIRST_EVENTS);
+    let first = first.await?;
+    if job.status.is_terminal() && first.is_empty() {
+        return Ok(None);
     }
-    Ok(Some(follow(service.clone(), (id, job.key), after)))
+    Ok(Some(follow(service.clone(), (id, job.key), after, first)))
 }
 
 fn follow(
     service: Arc<Service>,
     (id, key): (JobId, i64),
     after: i64,
+    first: Vec<Event>,
 ) -> impl Stream<Item = Result<Event, ApiError>> + Send {
     try_stream! {
         let mut cursor = after;
+        for event in first {
+            cursor = event.seq;
+            let done = matches!(event.payload, Payload::Done { .. });
+            yield event;
+            if done {
+                return;
+            }
+        }
         let mut subscription = service.queue.subscribe(key);
         loop {
             let News { events, ended } = subscription.news(&service.store, cursor).await?;

@@ -166,9 +166,10 @@ async fn a_job_answered_in_the_commit_of_another_submission_is_reported_as_chang
         failure: None,
         result: ResultAvailable::Final,
     };
+    let parts = Parts::of_a_summary();
     let finished = rig
         .store
-        .finish(primary.key, 1, &solved, FinalBatch::default(), None);
+        .finish(primary.key, 1, &solved, FinalBatch::default(), Some(&parts));
     finished.await.unwrap().unwrap();
     let submission = submission(vec![new(0)], None);
     let accepted = rig.store.submit(submission, true).await.unwrap();

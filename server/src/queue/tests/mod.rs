@@ -26,7 +26,7 @@ use crate::{
     fake,
     job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status, Waiting},
     store::{
-        Accepted, CancelOutcome, Edit, Ending, Filter, FinalBatch, GroupBy, NewJob, Order,
+        Accepted, CancelOutcome, Edit, Ending, Filter, FinalBatch, GroupBy, NewJob, Order, Parts,
         RequestKey, Store, StoreError, Submission,
     },
     time::Time,

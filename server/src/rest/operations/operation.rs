@@ -200,6 +200,16 @@ impl Operation {
         if self.body.is_some() {
             codes.push(Code::RequestTimeout);
         }
+        // all that reads jobs, problems or meshes, and all that writes
+        if ["/v1/jobs", "/v1/problems", "/v1/meshes"]
+            .iter()
+            .any(|path| self.path.starts_with(path))
+        {
+            codes.push(Code::CorruptData);
+        }
+        if self.errors.contains(&Code::StorageFull) {
+            codes.push(Code::StorageLost);
+        }
         if self.strict {
             codes.push(Code::UnknownParameter);
         }

@@ -77,9 +77,9 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "ok", bytes("text/plain")),
         probe("/readyz", service::readyz)
             .rest_only("Ready")
-            .summary("Answers 200 as long as the service accepts jobs")
-            .answers(200, "ok", bytes("text/plain"))
-            .fails(&[Code::Draining]),
+            .summary("Answers 200 as long as the service accepts jobs and can read them; the first line is ok or degraded")
+            .answers(200, "ok; or degraded, and what does not work: a full disk, damaged records", bytes("text/plain"))
+            .fails(&[Code::CorruptData, Code::Draining, Code::StorageLost]),
     ]
 }
 

@@ -1,8 +1,10 @@
 //! The store alone.
 #![allow(clippy::unwrap_used)]
 
+mod damage;
 mod owners;
 mod plans;
+mod starts;
 mod upgrades;
 
 use super::*;
@@ -29,6 +31,13 @@ impl Store {
             .await
             .unwrap();
         pages < 1_000_000
+    }
+}
+
+impl Parts {
+    /// Those of a result that is nothing but a summary.
+    pub(crate) fn of_a_summary() -> Parts {
+        Parts(vec![parts::Part::new("summary".into(), b"{}".to_vec())])
     }
 }
 

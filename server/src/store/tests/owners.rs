@@ -51,7 +51,8 @@ async fn run_all(store: &Store) {
         result: crate::job::ResultAvailable::Final,
     };
     while let Some(Claim { job, .. }) = store.claim_next().await.unwrap().0 {
-        let finished = store.finish(job.key, job.attempt, &ending, FinalBatch::default(), None);
+        let (last, parts) = (FinalBatch::default(), Parts::of_a_summary());
+        let finished = store.finish(job.key, job.attempt, &ending, last, Some(&parts));
         finished.await.unwrap().unwrap();
     }
 }

@@ -1,0 +1,65 @@
+//! `signorini doctor`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{exit::Exit, output};
+use crate::store::{self, StoreError};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Folder of the store; no server may be using it
+    #[arg(
+        long,
+        env = "SIGNORINI_DATA",
+        default_value = "./signorini-data",
+        value_name = "FOLDER"
+    )]
+    data: PathBuf,
+
+    /// Copy every intact job, with its problem, events and result, and every intact mesh to a store in this new folder
+    #[arg(long, value_name = "NEW_FOLDER")]
+    salvage: Option<PathBuf>,
+
+    /// Accept the store as it is, although something that was in it is missing: after a restore from a backup, or to
+    /// start anew in this folder
+    #[arg(long, conflicts_with = "salvage")]
+    accept: bool,
+}
+
+/// Prints a line for each finding, and a summary as the last one.
+pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
+    let Arguments {
+        data,
+        salvage,
+        accept,
+    } = arguments;
+    if accept {
+        let known = store::accept(&data).map_err(|error| {
+            StoreError::Folder(format!("cannot change {}: {error}", data.display()))
+        })?;
+        let text = match known {
+            true => "what is in the folder is accepted at the next start\n",
+            false => "nothing was recorded of this folder: the next start accepts what is in it\n",
+        };
+        output::print(text)?;
+        return Ok(Exit::Ok);
+    }
+    let report = store::inspect(&data, salvage.as_deref()).await?;
+    let mut text = String::new();
+    for finding in &report.findings {
+        text += finding;
+        text.push('\n');
+    }
+    text += &format!("{} of {} jobs are intact", report.intact, report.jobs);
+    if let Some(new) = &salvage {
+        text += &format!("; they were copied to {}", new.display());
+    }
+    text.push('\n');
+    output::print(&text)?;
+    Ok(match report.findings.is_empty() {
+        true => Exit::Ok,
+        false => Exit::Damaged,
+    })
+}

@@ -1,0 +1,110 @@
+//! What has been found damaged: told to the client that asked, once in the log, and by `/readyz`.
+
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use sqlx::SqlitePool;
+use uuid::Uuid;
+
+use super::error::{Damage, Part, Result, StoreError};
+use crate::job::JobId;
+
+/// Most parts that are remembered; the log has all of them.
+const MOST: usize = 1000;
+
+/// The parts that were found damaged since the store was opened.
+#[derive(Debug)]
+pub(super) struct Damages {
+    found: Mutex<BTreeMap<Part, (Uuid, Option<JobId>)>>,
+    /// The indexes of the jobs cannot be trusted: a job that is not found may exist.
+    indexes: AtomicBool,
+    /// Finds the public id of a job.
+    reader: SqlitePool,
+}
+
+impl Damages {
+    pub(super) fn new(reader: SqlitePool) -> Self {
+        Damages {
+            found: Mutex::default(),
+            indexes: AtomicBool::default(),
+            reader,
+        }
+    }
+
+    /// Runs a query, and takes note of damage that it finds.
+    pub(super) async fn noting<T>(&self, query: impl Future<Output = Result<T>>) -> Result<T> {
+        match query.await {
+            Err(StoreError::Damaged(damage)) => {
+                Err(StoreError::Damaged(Box::new(self.note(*damage).await)))
+            }
+            other => other,
+        }
+    }
+
+    /// Takes note of damage: the first time it is logged, under an incident number that stays the same.
+    pub(super) async fn note(&self, mut damage: Damage) -> Damage {
+        if damage.incident.is_some() {
+            return damage;
+        }
+        if let Some((incident, job)) = self.found().get(&damage.part) {
+            damage.incident = Some(*incident);
+            damage.job = damage.job.or(*job);
+            return damage;
+        }
+        if damage.job.is_none() {
+            damage.job = self.public_id(damage.part.job).await;
+        }
+        let incident = Uuid::now_v7();
+        damage.incident = Some(incident);
+        let job = damage.job.map(|id| id.to_string()).unwrap_or_default();
+        tracing::error!(
+            job.id = job, part = damage.part.name, %incident, cause = damage.cause,
+            "incident {incident}: {damage}: {}; stop the service and run `signorini doctor`", damage.cause
+        );
+        let mut found = self.found();
+        if found.len() < MOST {
+            found.insert(damage.part.clone(), (incident, damage.job));
+        }
+        damage
+    }
+
+    async fn public_id(&self, key: Option<i64>) -> Option<JobId> {
+        // whoever asks may hold the last connection
+        let mut connection = self.reader.try_acquire()?;
+        let query = sqlx::query_scalar("select uuid from job where id = ?").bind(key?);
+        let uuid: Option<String> = query.fetch_optional(&mut *connection).await.ok()?;
+        Some(JobId(Uuid::try_parse(&uuid?).ok()?))
+    }
+
+    /// How many parts, and the incidents of the first few.
+    pub(super) fn summary(&self) -> (usize, Vec<Uuid>) {
+        const SHOWN: usize = 10;
+        let found = self.found();
+        let incidents = found.values().map(|(incident, _)| *incident);
+        (found.len(), incidents.take(SHOWN).collect())
+    }
+
+    /// The indexes of the jobs were found damaged.
+    pub(super) async fn note_indexes(&self, cause: &str) {
+        self.indexes.store(true, Ordering::Relaxed);
+        self.note(Damage::of_indexes(cause)).await;
+    }
+
+    /// An error if something that was not found may exist nevertheless.
+    pub(super) fn indexes_are_intact(&self) -> Result<()> {
+        match self.indexes.load(Ordering::Relaxed) {
+            true => Err(StoreError::Damaged(Box::new(Damage::of_indexes("")))),
+            false => Ok(()),
+        }
+    }
+
+    fn found(&self) -> std::sync::MutexGuard<'_, BTreeMap<Part, (Uuid, Option<JobId>)>> {
+        // No code panics while it holds this lock; if one did, the map would still be whole.
+        self.found.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

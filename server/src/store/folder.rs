@@ -1,0 +1,217 @@
+//! The folder of a store: its files, who may read them, and the lock that keeps a second server out.
+
+use std::{
+    fs::{self, DirBuilder, File, OpenOptions, Permissions, TryLockError},
+    io::{self, ErrorKind},
+    os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt, PermissionsExt},
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+};
+
+use super::{
+    error::{Result, StoreError},
+    progress, reserve,
+};
+
+/// The database, and the write-ahead log beside it.
+pub(super) const DATABASE: &str = "signorini.db";
+pub(super) const LOG: &str = "signorini.db-wal";
+/// Every file of a store.
+const FILES: [&str; 7] = [
+    DATABASE,
+    LOG,
+    "signorini.db-shm",
+    "signorini.db-journal",
+    progress::FILE,
+    reserve::FILE,
+    OLD_LOCK,
+];
+/// What earlier versions locked. It could be removed apart from the data.
+const OLD_LOCK: &str = "lock";
+
+/// The folder, locked as long as this exists.
+#[derive(Debug)]
+pub(super) struct Folder {
+    path: PathBuf,
+    _locks: Vec<File>,
+}
+
+impl Folder {
+    /// Creates the folder if necessary, and locks it: the folder itself, since a lock file could be removed. A second
+    /// server in it would run the same jobs.
+    pub(super) fn lock(path: &Path) -> Result<Folder> {
+        let named = |error: io::Error| {
+            StoreError::Folder(format!("cannot use the folder {}: {error}", path.display()))
+        };
+        DirBuilder::new()
+            .recursive(true)
+            .mode(0o700)
+            .create(path)
+            .map_err(named)?;
+        let mut locks = vec![File::open(path).map_err(named)?];
+        // a server of an earlier version may be running
+        if let Ok(old) = OpenOptions::new().write(true).open(path.join(OLD_LOCK)) {
+            locks.push(old);
+        }
+        for file in &locks {
+            file.try_lock().map_err(|error| match error {
+                TryLockError::WouldBlock => StoreError::Locked(format!(
+                    "another server is using the folder {}",
+                    path.display()
+                )),
+                TryLockError::Error(error) => named(error),
+            })?;
+        }
+        Ok(Folder {
+            path: path.to_owned(),
+            _locks: locks,
+        })
+    }
+
+    /// Where the database is.
+    pub(super) fn database(&self) -> PathBuf {
+        self.path.join(DATABASE)
+    }
+
+    /// Creates the database as an empty file for its owner alone, unless it is there. SQLite gives its other files the
+    /// same mode.
+    pub(super) fn prepare(&self) -> Result<()> {
+        let created = OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(self.database());
+        match created {
+            Ok(_) => Ok(()),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(()),
+            Err(error) => Err(StoreError::Folder(format!(
+                "cannot write to the folder {}: {error}",
+                self.path.display()
+            ))),
+        }
+    }
+
+    /// Takes from others the access to the files, and to the folder if nothing else is in it.
+    pub(super) fn tighten(&self) {
+        let all = FILES.map(|name| self.path.join(name));
+        let foreign = fs::read_dir(&self.path)
+            .is_ok_and(|entries| entries.flatten().any(|entry| !all.contains(&entry.path())));
+        let folder = (!foreign).then(|| self.path.clone());
+        for path in all.iter().chain(&folder) {
+            let Ok(found) = fs::metadata(path) else {
+                continue;
+            };
+            let (mode, own) = (found.mode() & 0o7777, found.mode() & 0o700);
+            if mode & 0o077 == 0 {
+                continue;
+            }
+            match fs::set_permissions(path, Permissions::from_mode(own)) {
+                Ok(()) => tracing::info!(
+                    "{} was open to others (mode {mode:04o}), now it is not ({own:04o})",
+                    path.display()
+                ),
+                Err(error) => tracing::warn!(
+                    %error, "{} is open to others (mode {mode:04o}): {error}", path.display()
+                ),
+            }
+        }
+    }
+}
+
+/// The files that the store has open, which must stay those in its folder.
+#[derive(Debug)]
+pub(super) struct Identity {
+    database: PathBuf,
+    log: PathBuf,
+    /// Opened before SQLite and closed after it: to close any descriptor of the file releases the locks that SQLite
+    /// holds on it.
+    file: File,
+    seen: Mutex<Seen>,
+}
+
+#[derive(Debug, Default)]
+struct Seen {
+    database: Option<(u64, u64)>,
+    log: Option<(u64, u64)>,
+    /// It never shrinks.
+    bytes: u64,
+    /// What is wrong, as it was logged.
+    wrong: Option<String>,
+}
+
+impl Identity {
+    /// Of the database as it is now.
+    pub(super) fn of(folder: &Folder) -> Result<Identity> {
+        let file = File::open(folder.database());
+        let file = file.map_err(|error| {
+            StoreError::Folder(format!(
+                "cannot read {}: {error}",
+                folder.database().display()
+            ))
+        })?;
+        Ok(Identity {
+            database: folder.database(),
+            log: folder.path.join(LOG),
+            file,
+            seen: Mutex::default(),
+        })
+    }
+
+    /// An error if the database or its log was removed or replaced, or cut short: what is written then is lost at the
+    /// next start. Two calls of `stat`, of some microseconds.
+    pub(super) fn check(&self) -> Result<()> {
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        let wrong = self.difference(&mut seen);
+        if wrong != seen.wrong {
+            match &wrong {
+                Some(what) => tracing::error!(
+                    "{what}; nothing is stored until the service is started on a whole store"
+                ),
+                None => tracing::info!("the files of the store are back"),
+            }
+            seen.wrong.clone_from(&wrong);
+        }
+        wrong.map_or(Ok(()), |what| Err(StoreError::Replaced(what)))
+    }
+
+    fn difference(&self, seen: &mut Seen) -> Option<String> {
+        let Ok(found) = fs::metadata(&self.database) else {
+            return Some(format!("{} was removed", self.database.display()));
+        };
+        let id = (found.dev(), found.ino());
+        if *seen.database.get_or_insert(id) != id {
+            return Some(format!("{} was replaced", self.database.display()));
+        }
+        if found.len() < seen.bytes {
+            return Some(format!("{} was cut short", self.database.display()));
+        }
+        seen.bytes = found.len();
+        let id = fs::metadata(&self.log).map(|found| (found.dev(), found.ino()));
+        match (seen.log, id) {
+            (None, Ok(id)) => seen.log = Some(id),
+            (Some(_), Err(_)) => return Some(format!("{} was removed", self.log.display())),
+            (Some(old), Ok(id)) if old != id => {
+                return Some(format!("{} was replaced", self.log.display()));
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// An error if the file does not begin as a database does: what was read before may hide that. Blocks.
+    pub(super) fn check_header(&self) -> Result<()> {
+        const MAGIC: &[u8; 16] = b"SQLite format 3\0";
+        let mut found = [0; 16];
+        match self.file.read_exact_at(&mut found, 0) {
+            Ok(()) if found == *MAGIC => Ok(()),
+            Ok(()) => Err(StoreError::Replaced(format!(
+                "{} is no longer a database",
+                self.database.display()
+            ))),
+            Err(error) => Err(StoreError::Replaced(format!(
+                "{} cannot be read: {error}",
+                self.database.display()
+            ))),
+        }
+    }
+}

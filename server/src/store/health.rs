@@ -1,0 +1,141 @@
+//! Whether the store works: what `/readyz` tells, and what is watched meanwhile.
+
+use std::{sync::Weak, time::Duration};
+
+use sqlx::{ConnectOptions, Connection};
+use uuid::Uuid;
+
+use crate::time::Time;
+
+use super::{
+    database::Store,
+    error::{Part, Result, StoreError},
+    rows::from_row,
+};
+
+/// How often the files are looked at.
+const INTERVAL: Duration = Duration::from_secs(1);
+
+/// How well the store works.
+#[derive(Clone, Debug, Default)]
+pub struct Health {
+    /// The disk is full: only canceling, deleting, pausing and reading work.
+    pub full: bool,
+    /// How many records were found damaged.
+    pub damaged: usize,
+    /// The incidents of the first of them, for the log.
+    pub incidents: Vec<Uuid>,
+}
+
+impl Health {
+    /// Everything works.
+    pub fn is_whole(&self) -> bool {
+        !self.full && self.damaged == 0
+    }
+
+    /// What does not work, for operators.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = vec![];
+        if self.full {
+            lines.push(
+                "the disk is full: only canceling, deleting, pausing and reading work".into(),
+            );
+        }
+        if self.damaged > 0 {
+            let incidents: Vec<String> = self.incidents.iter().map(Uuid::to_string).collect();
+            lines.push(format!(
+                "{} damaged records were found, see the log for incidents {}; the others can be read; \
+                 stop the service and run `signorini doctor`",
+                self.damaged,
+                incidents.join(", ")
+            ));
+        }
+        lines
+    }
+}
+
+impl Store {
+    /// Reads the newest and the oldest job as clients do, and looks at the files; an error if that does not work. A
+    /// damaged record is none: the others can be read.
+    pub async fn health(&self) -> Result<Health> {
+        self.identity.check()?;
+        self.identity.check_header()?;
+        for (pool, job) in [
+            (&self.reader, "select * from job order by id desc limit 1"),
+            (&self.lists, "select * from job order by id limit 1"),
+        ] {
+            let read = async {
+                let row = sqlx::query(job).fetch_optional(pool).await?;
+                row.as_ref().map(from_row).transpose()
+            };
+            match self.damages.noting(read).await {
+                // of a job: the others can be read
+                Err(StoreError::Damaged(damage)) if damage.part.job.is_some() => {}
+                // lists use all connections, which shows that they are answered
+                Ok(_) | Err(StoreError::Busy) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        let (damaged, incidents) = self.damages.summary();
+        Ok(Health {
+            full: self.reserve.has_room().is_err(),
+            damaged,
+            incidents,
+        })
+    }
+}
+
+/// Looks at the files of the store, flushes the record of its progress, and takes its reserve again, until the store is
+/// dropped or closed.
+pub(super) async fn watch(store: Weak<Store>) {
+    let mut set_by_s = 0.0;
+    loop {
+        tokio::time::sleep(INTERVAL).await;
+        let now_s = Time::clock_was_set_by_s();
+        if (now_s - set_by_s).abs() > 1.0 {
+            tracing::warn!(
+                "the clock of the machine was set by {:+.0} s; times go on without that until the next start",
+                now_s - set_by_s
+            );
+            set_by_s = now_s;
+        }
+        let Some(store) = store.upgrade() else { return };
+        if store.writer.is_closed() {
+            return;
+        }
+        let watched = tokio::task::spawn_blocking(move || {
+            let _ = store.identity.check(); // logs what is wrong
+            if store.reserve.has_room().is_err() && store.reserve.retake() {
+                tracing::info!("there is space on the disk again: jobs are accepted");
+            }
+            store.progress.sync()
+        });
+        if let Ok(Err(error)) = watched.await {
+            tracing::debug!(%error, "the progress could not be flushed: {error}");
+        }
+    }
+}
+
+/// Compares the table of jobs with its indexes, once, beside the work: a job that an index lacks would not be found.
+pub(super) async fn check_indexes(store: Weak<Store>) {
+    let Some(options) = store.upgrade().map(|store| store.reader.connect_options()) else {
+        return;
+    };
+    let checked = async {
+        let mut connection = options.connect().await?;
+        // one finding is enough
+        let found: String = sqlx::query_scalar("pragma integrity_check(job)")
+            .fetch_one(&mut connection)
+            .await?;
+        connection.close().await?;
+        match found.as_str() {
+            "ok" => Ok(()),
+            _ => Err(Part::named("index").damaged(found)),
+        }
+    };
+    if let Err(StoreError::Damaged(damage)) = checked.await
+        && let Some(store) = store.upgrade()
+    {
+        store.damages.note_indexes(&damage.cause).await;
+    }
+}

@@ -1,0 +1,418 @@
+//! Checking a store that no server has open, and copying what is intact to a new one.
+//!
+//! It reads as the service does, one job after the other by its number, so that damage in one place does not hide what
+//! lies elsewhere. Nothing is written to the store that is inspected.
+
+use std::path::Path;
+
+use sqlx::{
+    AssertSqlSafe, Column, ConnectOptions, Connection, Row, SqliteConnection, TypeInfo, ValueRef,
+    sqlite::{SqliteConnectOptions, SqliteRow},
+};
+
+use super::{
+    checksum,
+    database::{Store, Writing, compare_with_the_past},
+    error::{Part, Result, StoreError},
+    events,
+    folder::{DATABASE, Folder},
+    intact, keys, meshes, problems, progress,
+    rows::{find, seal},
+};
+use crate::{
+    event::Payload,
+    job::{Job, ResultAvailable},
+};
+
+/// What an inspection has found.
+#[derive(Debug, Default)]
+pub struct Report {
+    /// Each damage, or what is missing: where, and how that was seen.
+    pub findings: Vec<String>,
+    /// Jobs of which at least a trace was found.
+    pub jobs: u64,
+    /// Those that are intact, with their problem, events and result.
+    pub intact: u64,
+}
+
+/// Jobs that are written to the new store in one transaction.
+const JOBS_PER_COMMIT: u64 = 100;
+/// A number of jobs that no store has: a larger one was read from a damaged record.
+const MOST_JOBS: i64 = 10_000_000;
+/// Events that are read at once.
+const EVENTS_PER_READ: i64 = 1000;
+
+/// Checks everything in the store of this folder; with `new`, which must be empty or missing, copies what is intact.
+pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
+    if !folder.join(DATABASE).exists() {
+        let missing = format!("there is no {DATABASE} in {}", folder.display());
+        return Err(StoreError::Folder(missing));
+    }
+    let _locked = Folder::lock(folder)?;
+    let mut report = Report::default();
+    let target = match new {
+        Some(new) => Some(new_store(new).await?),
+        None => None,
+    };
+    let options = SqliteConnectOptions::new().filename(folder.join(DATABASE));
+    let known = progress::read(folder).unwrap_or_default();
+    if let Err(error) = compare_with_the_past(folder, known.as_ref(), options.clone()).await {
+        report.finding("database", &error);
+    }
+    match options.read_only(true).connect().await {
+        Ok(mut source) => {
+            let inspected = report.inspect(&mut source, target.as_ref()).await;
+            source.close().await?;
+            inspected?;
+        }
+        Err(error) => report.finding("database", &StoreError::from(error)),
+    }
+    if let Some(target) = target {
+        target.close().await;
+    }
+    Ok(report)
+}
+
+async fn new_store(folder: &Path) -> Result<Store> {
+    let empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
+    if !empty {
+        let text = format!("{} is not empty; name a new folder", folder.display());
+        return Err(StoreError::Folder(text));
+    }
+    let (store, _) = Store::connect(folder).await?;
+    // jobs refer to each other, and are copied in the order of their numbers
+    let mut writer = store.writer.acquire().await?;
+    sqlx::query("pragma foreign_keys = off")
+        .execute(&mut *writer)
+        .await?;
+    drop(writer);
+    Ok(store)
+}
+
+impl Report {
+    fn finding(&mut self, what: &str, error: &StoreError) {
+        let text = match error {
+            StoreError::Damaged(damage) if damage.part.name == what => damage.cause.clone(),
+            StoreError::Damaged(damage) => format!("{}: {}", damage.part.name, damage.cause),
+            other => other.to_string(),
+        };
+        self.findings.push(format!("{what}: {text}"));
+    }
+
+    /// Checks one table after the other; an error only if the new store cannot be written.
+    async fn inspect(
+        &mut self,
+        source: &mut SqliteConnection,
+        target: Option<&Store>,
+    ) -> Result<()> {
+        let complaints = sqlx::query_scalar("pragma integrity_check(20)");
+        let complaints: sqlx::Result<Vec<String>> = complaints.fetch_all(&mut *source).await;
+        match complaints {
+            Ok(lines) => {
+                let lines = lines.iter().filter(|line| *line != "ok");
+                self.findings
+                    .extend(lines.map(|line| format!("database: {line}")));
+            }
+            Err(error) => self.finding("database", &error.into()),
+        }
+        let last = last_key(source).await;
+        let mut writing: Option<Writing> = None;
+        for key in 1..=last {
+            let Some(job) = self.check_job(source, key).await else {
+                continue;
+            };
+            let Some(target) = target else { continue };
+            let mut tx = match writing.take() {
+                Some(tx) => tx,
+                None => target.begin().await?,
+            };
+            copy_job(source, &mut tx, &job).await?;
+            match self.intact % JOBS_PER_COMMIT {
+                0 => tx.commit().await?,
+                _ => writing = Some(tx),
+            }
+        }
+        if let Some(tx) = writing {
+            tx.commit().await?;
+        }
+        self.check_meshes(source, target).await?;
+        self.check_request_keys(source, target).await?;
+        match target {
+            Some(target) => copy_the_rest(source, target, last).await,
+            None => Ok(()),
+        }
+    }
+
+    /// Reads everything of a job; returns it if it is intact.
+    async fn check_job(&mut self, source: &mut SqliteConnection, key: i64) -> Option<Job> {
+        let job = match find(source, key).await {
+            Ok(Some(job)) => job,
+            Ok(None) => {
+                if has_events(source, key).await && !was_deleted(source, key).await {
+                    self.jobs += 1;
+                    self.findings
+                        .push(format!("job number {key}: record: it is missing"));
+                }
+                return None;
+            }
+            Err(error) => {
+                self.jobs += 1;
+                self.finding(
+                    &format!("{} (number {key})", name(source, key).await),
+                    &error,
+                );
+                return None;
+            }
+        };
+        self.jobs += 1;
+        match check_parts(source, &job).await {
+            Ok(()) => {
+                self.intact += 1;
+                Some(job)
+            }
+            Err(error) => {
+                self.finding(&job.id.to_string(), &error);
+                None
+            }
+        }
+    }
+
+    async fn check_meshes(
+        &mut self,
+        source: &mut SqliteConnection,
+        target: Option<&Store>,
+    ) -> Result<()> {
+        let rows = sqlx::query("select * from mesh order by id").fetch_all(&mut *source);
+        let rows = match rows.await {
+            Ok(rows) => rows,
+            Err(error) => {
+                self.finding("meshes", &error.into());
+                return Ok(());
+            }
+        };
+        for row in &rows {
+            let hash: String = row.try_get("hash").unwrap_or_default();
+            let read = async {
+                meshes::described(row)?;
+                meshes::read_body(source, &hash).await
+            };
+            match read.await {
+                Err(error) => self.finding(&format!("mesh {hash}"), &error),
+                Ok(_) => {
+                    let Some(target) = target else { continue };
+                    let mut tx = target.begin().await?;
+                    insert(&mut tx, "mesh", row).await?;
+                    let pieces = "select * from mesh_piece where hash = ?";
+                    let pieces = sqlx::query(pieces).bind(&hash).fetch_all(&mut *source);
+                    for piece in pieces.await? {
+                        insert(&mut tx, "mesh_piece", &piece).await?;
+                    }
+                    tx.commit().await?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    async fn check_request_keys(
+        &mut self,
+        source: &mut SqliteConnection,
+        target: Option<&Store>,
+    ) -> Result<()> {
+        let rows = sqlx::query("select * from request_key").fetch_all(source);
+        let rows = match rows.await {
+            Ok(rows) => rows,
+            Err(error) => {
+                self.finding("request keys", &error.into());
+                return Ok(());
+            }
+        };
+        let mut tx = match target {
+            Some(target) => Some(target.begin().await?),
+            None => None,
+        };
+        for row in &rows {
+            match (keys::check(row), &mut tx) {
+                (Err(error), _) => self.finding("request key", &error),
+                (Ok(()), Some(tx)) => insert(tx, "request_key", row).await?,
+                (Ok(()), None) => {}
+            }
+        }
+        match tx {
+            Some(tx) => tx.commit().await,
+            None => Ok(()),
+        }
+    }
+}
+
+/// The highest number of a job that is found anywhere.
+async fn last_key(source: &mut SqliteConnection) -> i64 {
+    let mut last = 0;
+    for statement in [
+        "select seq from sqlite_sequence where name = 'job'",
+        "select max(id) from job",
+        "select max(job_id) from event",
+    ] {
+        let found: Option<Option<i64>> = sqlx::query_scalar(statement)
+            .fetch_optional(&mut *source)
+            .await
+            .ok()
+            .flatten();
+        last = last.max(found.flatten().filter(|key| *key <= MOST_JOBS).unwrap_or(0));
+    }
+    last
+}
+
+async fn exists(source: &mut SqliteConnection, statement: &'static str, key: i64) -> bool {
+    let found = sqlx::query(statement).bind(key).fetch_optional(source);
+    found.await.is_ok_and(|row| row.is_some())
+}
+
+async fn has_events(source: &mut SqliteConnection, key: i64) -> bool {
+    exists(source, "select 1 from event where job_id = ? limit 1", key).await
+}
+
+async fn was_deleted(source: &mut SqliteConnection, key: i64) -> bool {
+    exists(source, "select 1 from deleted_job where id = ?", key).await
+}
+
+/// The public id of a job with a damaged row, as far as it can be read.
+async fn name(source: &mut SqliteConnection, key: i64) -> String {
+    let uuid = sqlx::query_scalar("select uuid from job where id = ?").bind(key);
+    let uuid: sqlx::Result<Option<String>> = uuid.fetch_optional(source).await;
+    match uuid {
+        Ok(Some(uuid)) => format!("job_{uuid}"),
+        _ => "job".into(),
+    }
+}
+
+/// An error if the problem, an event or a part of the result of a job is missing or damaged.
+async fn check_parts(source: &mut SqliteConnection, job: &Job) -> Result<()> {
+    problems::read(source, job).await?;
+    let (mut after, mut ended) = (0, false);
+    loop {
+        let events = events::read(source, job.key, after, EVENTS_PER_READ).await?;
+        let Some(last) = events.last() else { break };
+        ended = matches!(last.payload, Payload::Done { .. });
+        after = last.seq;
+    }
+    if ended != job.status.is_terminal() {
+        return Err(Part::of_job(job.key, "events").damaged("the last one is not that of its end"));
+    }
+    match job.result_available {
+        ResultAvailable::None => Ok(()),
+        ResultAvailable::Partial | ResultAvailable::Final => {
+            intact::check_result(source, job.result_key).await
+        }
+    }
+}
+
+async fn copy_job(source: &mut SqliteConnection, tx: &mut Writing, job: &Job) -> Result<()> {
+    let by_key = |statement| sqlx::query(statement).bind(job.key);
+    let problem = "select * from problem where input_hash = ?";
+    let problem = sqlx::query(problem).bind(&job.input_hash);
+    let rows = [
+        ("problem", problem.fetch_all(&mut *source).await?),
+        (
+            "job",
+            by_key("select * from job where id = ?")
+                .fetch_all(&mut *source)
+                .await?,
+        ),
+        (
+            "event",
+            by_key("select * from event where job_id = ?")
+                .fetch_all(&mut *source)
+                .await?,
+        ),
+    ];
+    for (table, rows) in &rows {
+        for row in rows {
+            insert(tx, table, row).await?;
+        }
+    }
+    for (name, value) in &job.labels {
+        sqlx::query(
+            "insert or ignore into job_label (key, value, created_at, job_id) values (?, ?, ?, ?)",
+        )
+        .bind(name)
+        .bind(value)
+        .bind(job.created_at.micros())
+        .bind(job.key)
+        .execute(&mut **tx)
+        .await?;
+    }
+    if job.result_available == ResultAvailable::None {
+        return Ok(());
+    }
+    for (table, statement) in [
+        ("result_info", "select * from result_info where job_id = ?"),
+        ("result_part", "select * from result_part where job_id = ?"),
+    ] {
+        let rows = sqlx::query(statement).bind(job.result_key);
+        for row in rows.fetch_all(&mut *source).await? {
+            insert(tx, table, &row).await?;
+        }
+    }
+    Ok(())
+}
+
+/// Copies what can be read of the rest, and sets right what refers to jobs that were not copied.
+async fn copy_the_rest(source: &mut SqliteConnection, target: &Store, last: i64) -> Result<()> {
+    let mut tx = target.begin().await?;
+    for (table, statement) in [
+        ("deleted_job", "select * from deleted_job"),
+        ("setting", "select * from setting"),
+    ] {
+        let rows = sqlx::query(statement).fetch_all(&mut *source).await;
+        for row in rows.unwrap_or_default() {
+            insert(&mut tx, table, &row).await?;
+        }
+    }
+    // a job waits by itself if the one that it waited for was not copied; the next one like it coalesces them again
+    let detached = "update job set coalesced_into = null, checksum = null
+         where coalesced_into not in (select id from job) returning id";
+    let mut changed: Vec<i64> = sqlx::query_scalar(detached).fetch_all(&mut *tx).await?;
+    let unsealed = "select id from job where checksum is null";
+    changed.extend(
+        sqlx::query_scalar::<_, i64>(unsealed)
+            .fetch_all(&mut *tx)
+            .await?,
+    );
+    for key in changed {
+        seal(&mut tx, key).await?;
+    }
+    // no number is given twice
+    sqlx::query("update sqlite_sequence set seq = max(seq, ?) where name = 'job'")
+        .bind(last)
+        .execute(&mut *tx)
+        .await?;
+    tx.commit().await
+}
+
+/// Inserts a row as it was read from the same table of another store.
+async fn insert(tx: &mut Writing, table: &str, row: &SqliteRow) -> Result<()> {
+    let names: Vec<&str> = row.columns().iter().map(|column| column.name()).collect();
+    let places = vec!["?"; names.len()].join(", ");
+    let statement = format!(
+        "insert or ignore into {table} ({}) values ({places})",
+        names.join(", ")
+    );
+    let mut query = sqlx::query(AssertSqlSafe(statement));
+    for column in row.columns() {
+        let value = row.try_get_raw(column.ordinal())?;
+        let kind = match value.is_null() {
+            true => "NULL".to_owned(),
+            false => value.type_info().name().to_owned(),
+        };
+        query = match kind.as_str() {
+            "NULL" => query.bind(None::<i64>),
+            "INTEGER" => query.bind(checksum::decode::<i64>(value)?),
+            "REAL" => query.bind(checksum::decode::<f64>(value)?),
+            "TEXT" => query.bind(checksum::decode::<String>(value)?),
+            _ => query.bind(checksum::decode::<Vec<u8>>(value)?),
+        };
+    }
+    query.execute(&mut **tx).await?;
+    Ok(())
+}

@@ -1,0 +1,203 @@
+//! How far the store has come, in a file beside the database: so that it is noticed when the database, or the
+//! write-ahead log with its last transactions, is missing or has been replaced by an older one.
+//!
+//! Every transaction counts itself in the database, and after its commit the file gets the number too: 72 bytes in
+//! place, without a flush, which would cost as much as the commit. So the file is never ahead of what is durable. After
+//! a power cut it may be behind, and then less is noticed, but nothing is refused that is whole.
+
+use std::{
+    fs::{File, OpenOptions},
+    io::{self, ErrorKind},
+    os::unix::fs::{FileExt, OpenOptionsExt},
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use sqlx::SqliteConnection;
+
+use super::error::{Result, StoreError};
+
+/// The name of the file.
+pub(super) const FILE: &str = "signorini.progress";
+
+/// What the file says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Record {
+    /// The name of the store.
+    pub(super) store: String,
+    /// The number of its last transaction.
+    pub(super) commits: i64,
+}
+
+/// The file, open.
+#[derive(Clone, Debug)]
+pub(super) struct Progress(Arc<Mutex<Open>>);
+
+#[derive(Debug)]
+struct Open {
+    file: File,
+    record: Record,
+    /// A failure was logged.
+    failed: bool,
+}
+
+/// Reads the file; `None` if there is none, or none that can be read.
+pub(super) fn read(folder: &Path) -> io::Result<Option<Record>> {
+    let path = folder.join(FILE);
+    match std::fs::read(&path) {
+        Ok(bytes) => {
+            let record = Record::parse(&bytes);
+            if record.is_none() {
+                tracing::warn!(
+                    "{} cannot be read: whether the store is whole is not known; it is written anew",
+                    path.display()
+                );
+            }
+            Ok(record)
+        }
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// What the database says; `None` if it is of a version that did not count.
+pub(super) async fn in_database(connection: &mut SqliteConnection) -> Result<Option<Record>> {
+    let counted = "select exists (select 1 from sqlite_schema where name = 'progress')";
+    if !sqlx::query_scalar::<_, bool>(counted)
+        .fetch_one(&mut *connection)
+        .await?
+    {
+        return Ok(None);
+    }
+    let row = sqlx::query_as("select store, commits from progress").fetch_one(connection);
+    let (store, commits) = row.await?;
+    Ok(Some(Record { store, commits }))
+}
+
+/// An error if the database is not the one that the file tells of, or has not come as far.
+pub(super) fn compare(file: &Record, database: Option<&Record>) -> Result<()> {
+    let lost = |what: String| Err(StoreError::Lost(what));
+    match database {
+        None => lost("it is of an older version than the store that was here last".into()),
+        Some(found) if found.store != file.store => lost("it belongs to another store".into()),
+        Some(found) if found.commits < file.commits => lost(format!(
+            "its last {} transactions are missing",
+            file.commits - found.commits
+        )),
+        Some(_) => Ok(()),
+    }
+}
+
+impl Progress {
+    /// Writes the file, on the disk when this returns, and keeps it open.
+    pub(super) fn start(folder: &Path, record: Record) -> io::Result<Progress> {
+        let file = OpenOptions::new()
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .mode(0o600)
+            .open(folder.join(FILE))?;
+        let text = record.text();
+        file.set_len(text.len() as u64)?;
+        file.write_all_at(text.as_bytes(), 0)?;
+        file.sync_all()?;
+        File::open(folder)?.sync_all()?;
+        let failed = false;
+        let open = Open {
+            file,
+            record,
+            failed,
+        };
+        Ok(Progress(Arc::new(Mutex::new(open))))
+    }
+
+    /// The transaction with this number is on the disk.
+    pub(super) fn reached(&self, number: i64) {
+        let mut open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if number <= open.record.commits {
+            return; // a later one was faster
+        }
+        open.record.commits = number;
+        let written = open.file.write_all_at(open.record.text().as_bytes(), 0);
+        if let (Err(error), false) = (&written, open.failed) {
+            tracing::warn!(%error, "{FILE} cannot be written: {error}");
+        }
+        open.failed = written.is_err();
+    }
+
+    /// Flushes the file.
+    pub(super) fn sync(&self) -> io::Result<()> {
+        let file = {
+            let open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            open.file.try_clone()?
+        };
+        file.sync_data()
+    }
+}
+
+impl Record {
+    /// Always of the same length, so that it is replaced in place, and within one sector.
+    fn text(&self) -> String {
+        let Record { store, commits } = self;
+        let line = format!("signorini {store} {commits:020}");
+        format!("{line} {:08x}\n", crc32fast::hash(line.as_bytes()))
+    }
+
+    fn parse(bytes: &[u8]) -> Option<Record> {
+        let text = std::str::from_utf8(bytes).ok()?;
+        let mut words = text.split_whitespace();
+        let (_, store, commits) = (words.next()?, words.next()?, words.next()?);
+        let record = Record {
+            store: store.to_owned(),
+            commits: commits.parse().ok()?,
+        };
+        (record.text() == text).then_some(record)
+    }
+}
+
+/// Forgets how far the store had come: what is there now is accepted at the next start. Returns whether it was known.
+pub fn accept(folder: &Path) -> io::Result<bool> {
+    let moved = |path: PathBuf| {
+        let mut name = path.clone().into_os_string();
+        name.push(".unused");
+        std::fs::rename(path, name)
+    };
+    // a log without its database holds nothing that can be used, and SQLite would remove it
+    let log = folder.join("signorini.db-wal");
+    if log.exists() && !has_content(&folder.join("signorini.db")) {
+        moved(log)?;
+    }
+    match std::fs::remove_file(folder.join(FILE)) {
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether a file exists and is not empty.
+pub(super) fn has_content(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|found| found.len() > 0)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_record_is_read_back_and_a_changed_one_is_not() {
+        let record = Record {
+            store: "0123456789abcdef0123456789abcdef".into(),
+            commits: 12,
+        };
+        let text = record.text().into_bytes();
+        assert_eq!(text.len(), 73);
+        assert_eq!(Record::parse(&text), Some(record));
+        for place in 0..text.len() {
+            let mut other = text.clone();
+            other[place] ^= 1;
+            assert_eq!(Record::parse(&other), None, "{place}");
+        }
+        assert_eq!(Record::parse(b""), None);
+    }
+}

@@ -1,0 +1,370 @@
+//! Nothing that a disk has changed is served.
+
+use sqlx::{AssertSqlSafe, Row};
+
+use super::*;
+use crate::{
+    job::{JobId, ResultAvailable},
+    mesh::MeshInfo,
+    store::parts::Part as ResultPart,
+};
+
+const PARTS: [&str; 4] = ["summary", "history", "steps", "fields"];
+
+fn result() -> Parts {
+    let part =
+        |name: &&str| ResultPart::new(name.to_string(), format!("{{\"{name}\":1.25}}").into());
+    Parts(PARTS.iter().map(part).collect())
+}
+
+/// Submits a job, solves it, and returns it.
+async fn solved(store: &Store, new: NewJob) -> Job {
+    store
+        .submit(by("ada", vec![new], None), false)
+        .await
+        .unwrap();
+    let claim = store.claim_next().await.unwrap().0.unwrap();
+    let (key, attempt) = (claim.job.key, claim.job.attempt);
+    let ending = Ending {
+        status: Status::Succeeded,
+        reason: None,
+        failure: None,
+        result: ResultAvailable::Final,
+    };
+    let parts = result();
+    assert!(store.write_before_end(key, attempt, &parts).await.unwrap());
+    let last = FinalBatch::default();
+    let finished = store
+        .finish(key, attempt, &ending, last, Some(&parts))
+        .await;
+    finished.unwrap().unwrap();
+    store.job(Owners::All, claim.job.id).await.unwrap().unwrap()
+}
+
+/// Everything that clients can read of a job, by name and as text.
+async fn everything(store: &Store, id: JobId, mesh: &str) -> Vec<(&'static str, Result<String>)> {
+    fn text<T: std::fmt::Debug>(read: Result<T>) -> Result<String> {
+        read.map(|read| format!("{read:?}"))
+    }
+    let mut all = vec![
+        ("job", text(store.job(Owners::All, id).await)),
+        ("problem", text(store.problem(1).await)),
+        ("events", text(store.events_after(1, 0, 100).await)),
+        ("piece", text(store.piece(1, "fields", 0).await)),
+        ("mesh", text(store.mesh(mesh).await)),
+        ("mesh body", text(store.mesh_body(mesh).await)),
+    ];
+    match store.snapshot(Owners::All, id).await {
+        Err(error) => all.extend(["snapshot"].map(|name| (name, Err(error.for_another())))),
+        Ok(None) => {}
+        Ok(Some(mut found)) => {
+            for part in PARTS {
+                all.push((part, text(found.part(part).await)));
+            }
+            let info = found.checked_part_info("fields").await;
+            all.push(("info", text(info.map(|info| info.map(|info| info.digest)))));
+        }
+    }
+    all
+}
+
+/// Sets a column of the only row of a table to a value written in SQL.
+async fn set(store: &Store, table: &str, row: i64, column: &str, value: &str) {
+    let key = if table == "event" { "seq" } else { "rowid" };
+    let statement = format!("update {table} set {column} = {value} where {key} = {row}");
+    sqlx::query(AssertSqlSafe(statement))
+        .execute(&store.writer)
+        .await
+        .unwrap();
+}
+
+#[tokio::test]
+async fn no_column_can_change_unnoticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    sqlx::query("pragma foreign_keys = off")
+        .execute(&store.writer)
+        .await
+        .unwrap();
+    let mesh: MeshInfo = serde_json::from_value(serde_json::json!({
+        "hash": "sha256:mesh", "format": "gmsh", "bytes": 1, "nodes": 8, "quadrilaterals": 1, "triangles": 0,
+        "dofs": 16, "extent": [[0, 1], [0, 1]], "boundaries": {}, "groups": {}, "node_sets": {}, "warnings": [],
+        "quality": { "least_jacobian_ratio": 1, "worst_element": 0 }, "created_at": "2023-11-14T22:13:20Z"
+    }))
+    .unwrap();
+    store
+        .write_mesh_pieces(&mesh.hash, 0, &[vec![1], vec![2]])
+        .await
+        .unwrap();
+    store.insert_mesh(&mesh, 2).await.unwrap().unwrap();
+    let job = solved(
+        &store,
+        NewJob {
+            title: Some("a title".into()),
+            ..new("1")
+        },
+    )
+    .await;
+    let before = everything(&store, job.id, &mesh.hash).await;
+    assert!(before.iter().all(|(_, read)| read.is_ok()), "{before:?}");
+    // by which a row is found: another value is another row
+    let found_by = ["id", "uuid", "job_id", "hash", "input_hash"];
+    for table in [
+        "job",
+        "problem",
+        "event",
+        "result_info",
+        "result_part",
+        "mesh",
+        "mesh_piece",
+    ] {
+        let key = if table == "event" { "seq" } else { "rowid" };
+        let key = match table {
+            "result_info" => "name",
+            _ => key,
+        };
+        let rows = format!("select {key} as place, * from {table}");
+        let rows = sqlx::query(AssertSqlSafe(rows))
+            .fetch_all(&store.writer)
+            .await
+            .unwrap();
+        for row in rows {
+            for column in row.columns().iter().map(sqlx::Column::name).skip(1) {
+                if found_by.contains(&column) || (table == "result_info" && column == "name") {
+                    continue;
+                }
+                let place = match row.try_get::<i64, _>("place") {
+                    Ok(number) => number.to_string(),
+                    Err(_) => format!("'{}'", row.get::<String, _>("place")),
+                };
+                let old = format!("select quote({column}) from {table} where {key} = {place}");
+                let old: String = sqlx::query_scalar(AssertSqlSafe(old))
+                    .fetch_one(&store.writer)
+                    .await
+                    .unwrap();
+                let put = async |value: &str, key: &str| {
+                    let statement =
+                        format!("update {table} set {column} = {value} where {key} = {place}");
+                    sqlx::query(AssertSqlSafe(statement))
+                        .execute(&store.writer)
+                        .await
+                        .unwrap();
+                };
+                let other = match old.as_str() {
+                    "NULL" if column == "checksum" => continue,
+                    "NULL" => "7".into(),
+                    text if text.starts_with('\'') => match (table, column) {
+                        ("job", "status") => "'failed'".into(),
+                        ("job", "cache") => "'use'".into(),
+                        ("job", "result_available") => "'partial'".into(),
+                        _ => format!("'x' || {text}"),
+                    },
+                    blob if blob.starts_with("X'") => "x'00'".into(),
+                    number if column == "seq" => format!("{number} + 100"),
+                    number => format!("{number} + 1"),
+                };
+                put(&other, key).await;
+                let after = everything(&store, job.id, &mesh.hash).await;
+                let noticed = after
+                    .iter()
+                    .any(|(_, read)| matches!(read, Err(StoreError::Damaged(_))));
+                assert!(noticed, "{table}.{column} {place}: {old} to {other}");
+                for (name, read) in &after {
+                    let was = before.iter().find(|(other, _)| other == name);
+                    if let (Some((_, Ok(was))), Ok(read)) = (was, read) {
+                        assert_eq!(was, read, "{table}.{column}: {name}");
+                    }
+                }
+                // the number by which it is found may be what was changed
+                if column == key {
+                    let back = format!("update {table} set {column} = {old} where {key} = {other}");
+                    sqlx::query(AssertSqlSafe(back))
+                        .execute(&store.writer)
+                        .await
+                        .unwrap();
+                } else {
+                    put(&old, key).await;
+                }
+            }
+        }
+    }
+    let again = everything(&store, job.id, &mesh.hash).await;
+    assert_eq!(format!("{again:?}"), format!("{before:?}"));
+    assert!(store.health().await.unwrap().damaged > 10);
+}
+
+#[tokio::test]
+async fn a_damaged_result_answers_no_other_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let cached = || NewJob {
+        cache: Cache::Use,
+        ..new("1")
+    };
+    let first = solved(&store, cached()).await;
+    set(&store, "result_part", 2, "body", "x'7b7d'").await;
+    let accepted = store
+        .submit(by("ada", vec![cached()], None), false)
+        .await
+        .unwrap();
+    assert_eq!(accepted.jobs[0].status, Status::Queued);
+    assert_eq!(store.health().await.unwrap().damaged, 1);
+    // an intact one does
+    let second = solved(
+        &store,
+        NewJob {
+            cache: Cache::Refresh,
+            ..new("2")
+        },
+    )
+    .await;
+    let like_it = NewJob {
+        cache: Cache::Use,
+        ..new("2")
+    };
+    // the queue still holds the job of the first input, which was claimed and solved instead
+    let accepted = store
+        .submit(by("ada", vec![like_it], None), false)
+        .await
+        .unwrap();
+    assert_ne!(first.id, second.id);
+    assert_eq!(accepted.jobs[0].input_hash, "sha256:2");
+}
+
+#[tokio::test]
+async fn a_damaged_job_does_not_stop_the_queue() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for input in ["1", "2", "3"] {
+        let job = NewJob {
+            problem: format!("{{\"n\":{input}}}"),
+            ..new(input)
+        };
+        store
+            .submit(by("ada", vec![job], None), false)
+            .await
+            .unwrap();
+    }
+    set(&store, "job", 1, "priority", "0.0 + 1").await;
+    set(&store, "problem", 2, "body", "'{}'").await;
+    let claim = store.claim_next().await.unwrap().0.unwrap();
+    assert_eq!(claim.job.key, 3);
+    let second = Filter {
+        input_hash: Some("sha256:2".into()),
+        ..Filter::default()
+    };
+    let jobs = store.jobs(Owners::All, &second, Order::NEWEST_FIRST, None, 10);
+    let failed = jobs.await.unwrap();
+    assert_eq!(failed[0].status, Status::Failed);
+    assert!(
+        failed[0]
+            .failure
+            .clone()
+            .unwrap()
+            .detail
+            .contains("problem")
+    );
+    assert!(store.claim_next().await.unwrap().0.is_none());
+    // to start again is possible
+    drop(claim);
+    assert_eq!(store.requeue_interrupted().await.unwrap(), 1);
+}
+
+#[tokio::test]
+async fn an_index_that_lacks_a_job_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let job = solved(&store, new("1")).await;
+    store.damages.note_indexes("row 1 missing from index").await;
+    assert!(store.job(Owners::All, job.id).await.is_ok());
+    let unknown = store.job(Owners::All, JobId::default()).await;
+    assert!(
+        matches!(unknown, Err(StoreError::Damaged(_))),
+        "{unknown:?}"
+    );
+}
+
+#[tokio::test]
+async fn what_is_intact_is_saved_and_the_rest_is_named() {
+    let (folder, new_folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let store = Store::open(folder.path()).await.unwrap();
+    let mut jobs = vec![];
+    for input in ["1", "2", "3", "4"] {
+        let labels = [("set".to_string(), input.to_string())].into();
+        jobs.push(
+            solved(
+                &store,
+                NewJob {
+                    labels,
+                    ..new(input)
+                },
+            )
+            .await,
+        );
+    }
+    // one that waits for another that is damaged
+    let waiting = || NewJob {
+        cache: Cache::Use,
+        ..new("5")
+    };
+    for _ in 0..2 {
+        store
+            .submit(by("ada", vec![waiting()], Some("key")), false)
+            .await
+            .unwrap();
+    }
+    store
+        .submit(by("ada", vec![waiting()], None), false)
+        .await
+        .unwrap();
+    set(&store, "event", 2, "t", "t + 1").await; // the second event of every job that has one
+    for key in [1, 3, 4] {
+        let back = format!("update event set t = t - 1 where seq = 2 and job_id = {key}");
+        sqlx::query(AssertSqlSafe(back))
+            .execute(&store.writer)
+            .await
+            .unwrap();
+    }
+    let third = "update result_part set body = x'00' where job_id = 3 and name = 'fields'";
+    sqlx::query(third).execute(&store.writer).await.unwrap();
+    set(&store, "job", 5, "owner", "'bob'").await;
+    store.close().await;
+    drop(store);
+    let report = inspect(folder.path(), Some(new_folder.path()))
+        .await
+        .unwrap();
+    let told = report.findings.join("\n");
+    assert_eq!((report.jobs, report.intact), (6, 3), "{told}");
+    assert!(told.contains(&format!("{}: event 2", jobs[1].id)), "{told}");
+    assert!(
+        told.contains(&format!("{}: result part fields", jobs[2].id)),
+        "{told}"
+    );
+    assert!(told.contains("(number 5): record"), "{told}");
+    let saved = Store::open(new_folder.path()).await.unwrap();
+    for kept in [&jobs[0], &jobs[3]] {
+        let found = saved.job(Owners::All, kept.id).await.unwrap().unwrap();
+        assert_eq!(format!("{found:?}"), format!("{kept:?}"));
+        let mut found = saved.snapshot(Owners::All, kept.id).await.unwrap().unwrap();
+        assert_eq!(
+            found.part("fields").await.unwrap().unwrap(),
+            b"{\"fields\":1.25}"
+        );
+    }
+    let labeled = Filter {
+        labels: vec![("set".into(), "4".into())],
+        ..Filter::default()
+    };
+    let listed = saved
+        .jobs(Owners::All, &labeled, Order::NEWEST_FIRST, None, 9)
+        .await
+        .unwrap();
+    assert_eq!(listed.len(), 1);
+    // the last one waits by itself now
+    assert_eq!(saved.claim_next().await.unwrap().0.unwrap().job.key, 6);
+    saved.close().await;
+    drop(saved);
+    let report = inspect(new_folder.path(), None).await.unwrap();
+    assert_eq!(report.findings, Vec::<String>::new());
+    assert_eq!((report.jobs, report.intact), (3, 3));
+}

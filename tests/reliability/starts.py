@@ -1,0 +1,201 @@
+"""Starting on what is there, and going on when it is taken away (R33; of R6: missing files, wrong tables).
+
+    starts.py [--soak]
+
+What cannot be served is refused within a second, with one line and an exit code of its own: two servers in one folder,
+also when files are removed from it; a folder that cannot be written; a port in use; a store that has lost its log or
+its database, or has tables of another version. A server whose database is removed accepts nothing more and says so.
+"""
+
+import os
+import pathlib
+import shutil
+import socket
+import sqlite3
+import stat
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+
+from outside import BINARY, Server, check, equal, example, submission
+
+LISTEN, FOLDER, LOCKED, SCHEMA, DAMAGED = 3, 4, 5, 6, 7
+ROUNDS = 20 if "--soak" in sys.argv else 1
+MOST_S = 1
+slowest = 0.0
+refusals = 0
+
+
+def refused(data, code, what, listen="127.0.0.1:0", **how):
+    """A start that is refused."""
+    global slowest, refusals
+    began = time.monotonic()
+    command = [BINARY, "serve", "--listen", listen, "--data", data]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=30, **how)
+    slowest, refusals = max(slowest, time.monotonic() - began), refusals + 1
+    reasons = [line for line in done.stderr.splitlines() if line.startswith("signorini: ")]
+    equal((done.returncode, len(reasons), done.stdout), (code, 1, ""), "%s: %s" % (what, done.stderr))
+    return reasons[0]
+
+
+def crash(server, folder):
+    """A copy of the store as a crash leaves it."""
+    copy = pathlib.Path(tempfile.mkdtemp(dir=folder)) / "data"
+    shutil.copytree(server.data, copy)
+    return copy
+
+
+def database(data, statement):
+    with sqlite3.connect(data / "signorini.db") as connection:
+        connection.execute(statement)
+    connection.close()
+
+
+def locks(server):
+    refused(server.data, LOCKED, "a second server")
+    for name in ("lock", "signorini.progress", "signorini.reserve"):
+        (server.data / name).unlink(missing_ok=True)
+    refused(server.data, LOCKED, "a second server, when the small files were removed")
+
+
+def lost_files(server, folder):
+    log, main = "signorini.db-wal", "signorini.db"
+    harms = {
+        "no log": lambda data: (data / log).unlink(),
+        "a log of zeros": lambda data: (data / log).write_bytes(bytes((data / log).stat().st_size)),
+        "an empty database": lambda data: (data / main).write_bytes(b""),
+        "no database": lambda data: (data / main).unlink(),
+        "an empty database and no log": lambda data: ((data / main).write_bytes(b""), (data / log).unlink()),
+    }
+    for what, harm in harms.items():
+        data = crash(server, folder)
+        harm(data)
+        reason = refused(data, DAMAGED, what)
+        check("doctor --accept" in reason, reason)
+        done = subprocess.run([BINARY, "doctor", "--data", data, "--accept"], capture_output=True, text=True)
+        equal(done.returncode, 0, "doctor --accept, %s" % done.stderr)
+        other = Server()
+        shutil.rmtree(other.data, ignore_errors=True)
+        shutil.copytree(data, other.data)
+        with other:
+            other.kill()
+    data = crash(server, folder)
+    (data / "signorini.db-shm").unlink(missing_ok=True)  # it holds nothing of its own
+    with Server() as other:
+        other.kill()
+        shutil.rmtree(other.data)
+        shutil.copytree(data, other.data)
+        other.start()
+        equal(len(other.every_job()), len(server.every_job()), "jobs without the shared memory")
+
+
+def wrong_tables(server, folder):
+    later = "insert into _sqlx_migrations (version, description, success, checksum, execution_time) values (99, '', 1, x'00', 0)"
+    for what, statement in (
+        ("a later version", later),
+        ("another program", "drop table _sqlx_migrations"),
+        ("a missing index", "drop index job_queue"),
+    ):
+        data = crash(server, folder)
+        database(data, statement)
+        refused(data, SCHEMA, what)
+    data = crash(server, folder)
+    (data / "signorini.db-wal").unlink()
+    (data / "signorini.db").write_bytes(b"not a database" * 1000)
+    refused(data, DAMAGED, "a file of something else")
+
+
+def folders(folder, server):
+    file = folder / "file"
+    file.write_text("")
+    refused(file, FOLDER, "a file in place of the folder")
+    if os.geteuid() == 0:
+        nobody = dict(user=65534, group=65534, extra_groups=[])
+    else:
+        nobody = {}
+    closed = folder / "closed"
+    closed.mkdir(mode=0o500)
+    program = folder / "signorini"
+    shutil.copy(BINARY, program)
+    os.chmod(folder, 0o755)
+    if nobody:
+        os.chown(closed, 65534, 65534)
+    before = globals()["BINARY"]
+    globals()["BINARY"] = program
+    refused(closed, FOLDER, "a folder that cannot be written", **nobody)
+    foreign = folder / "foreign"
+    foreign.mkdir(mode=0o700)
+    sealed = crash(server, folder)
+    sealed.parent.chmod(0o755)
+    for path in [*sealed.iterdir(), sealed]:
+        path.chmod(0o500 if path == sealed else 0o400)
+        if nobody:
+            os.chown(path, 65534, 65534)
+    refused(sealed, FOLDER, "a store that cannot be written", **nobody)
+    if nobody:
+        refused(foreign, FOLDER, "a folder of somebody else", **nobody)
+    globals()["BINARY"] = before
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        address = "127.0.0.1:%d" % taken.getsockname()[1]
+        refused(folder / "fresh", LISTEN, "a port in use", address)
+
+
+def modes(data):
+    found = {path.name: stat.S_IMODE(path.stat().st_mode) for path in [data, *data.iterdir()]}
+    for name, mode in found.items():
+        equal(mode, 0o700 if name == data.name else 0o600, "mode of %s" % name)
+
+
+def taken_away():
+    """The database is removed, or replaced, under a running server."""
+    told = 0.0
+    for what, harm in (
+        ("database removed", lambda data: (data / "signorini.db").unlink()),
+        ("log removed", lambda data: (data / "signorini.db-wal").unlink()),
+        ("folder removed", lambda data: shutil.rmtree(data)),
+        ("database emptied", lambda data: (data / "signorini.db").write_bytes(b"")),
+    ):
+        with Server() as server:
+            server.finished(server.submit(example()))
+            harm(server.data)
+            began = time.monotonic()
+            answer = server.call("POST", "/v1/jobs", submission(example()))
+            equal((answer.status, answer.json()["code"]), (503, "storage-lost"), "%s: %r" % (what, answer))
+            answer = server.call("GET", "/readyz")
+            equal((answer.status, answer.json()["code"]), (503, "storage-lost"), "%s: %r" % (what, answer))
+            told = max(told, time.monotonic() - began)
+            equal(server.call("GET", "/livez").status, 200, "livez")
+            time.sleep(2.2)
+            lines = [line for line in server.log.read_text().splitlines() if "nothing is stored until" in line]
+            equal(len(lines), 1, "%s: lines in the log" % what)
+            server.kill()
+    return told
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        for _ in range(ROUNDS):
+            with Server() as server:
+                for n in range(3):
+                    server.finished(server.submit(example(), name=str(n)))
+                modes(server.data)
+                lost_files(server, folder)
+                wrong_tables(server, folder)
+                locks(server)
+                server.stop()
+                modes(server.data)
+                if not folder.joinpath("closed").exists():
+                    folders(folder, server)
+    told = taken_away()
+    check(slowest <= MOST_S, "a refusal took %.2f s" % slowest)
+    print("figure: %d starts refused within %.2f s, each with one line and its exit code; a store taken away under a "
+          "running server is told within %.2f s" % (refusals, slowest, told))
+
+
+main()
