@@ -85,6 +85,13 @@ impl Store {
     }
 }
 
+impl Store {
+    /// An error if the disk is full but for what control needs; for what is written beside the database.
+    pub fn has_room(&self) -> Result<()> {
+        self.reserve.has_room()
+    }
+}
+
 /// Looks at the files of the store, flushes the record of its progress, and takes its reserve again, until the store is
 /// dropped or closed.
 pub(super) async fn watch(store: Weak<Store>) {

@@ -5,19 +5,16 @@
 
 use std::path::Path;
 
-use sqlx::{
-    AssertSqlSafe, Column, ConnectOptions, Connection, Row, SqliteConnection, TypeInfo, ValueRef,
-    sqlite::{SqliteConnectOptions, SqliteRow},
-};
+use sqlx::{ConnectOptions, Connection, Row, SqliteConnection, sqlite::SqliteConnectOptions};
 
 use super::{
-    checksum,
     database::{Store, Writing, compare_with_the_past},
     error::{Part, Result, StoreError},
     events,
     folder::{DATABASE, Folder},
     intact, keys, meshes, problems, progress,
-    rows::{find, seal},
+    rows::find,
+    salvage::{copy_job, copy_the_rest, insert, new_store},
 };
 use crate::{
     event::Payload,
@@ -71,22 +68,6 @@ pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
         target.close().await;
     }
     Ok(report)
-}
-
-async fn new_store(folder: &Path) -> Result<Store> {
-    let empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
-    if !empty {
-        let text = format!("{} is not empty; name a new folder", folder.display());
-        return Err(StoreError::Folder(text));
-    }
-    let (store, _) = Store::connect(folder).await?;
-    // jobs refer to each other, and are copied in the order of their numbers
-    let mut writer = store.writer.acquire().await?;
-    sqlx::query("pragma foreign_keys = off")
-        .execute(&mut *writer)
-        .await?;
-    drop(writer);
-    Ok(store)
 }
 
 impl Report {
@@ -305,114 +286,4 @@ async fn check_parts(source: &mut SqliteConnection, job: &Job) -> Result<()> {
             intact::check_result(source, job.result_key).await
         }
     }
-}
-
-async fn copy_job(source: &mut SqliteConnection, tx: &mut Writing, job: &Job) -> Result<()> {
-    let by_key = |statement| sqlx::query(statement).bind(job.key);
-    let problem = "select * from problem where input_hash = ?";
-    let problem = sqlx::query(problem).bind(&job.input_hash);
-    let rows = [
-        ("problem", problem.fetch_all(&mut *source).await?),
-        (
-            "job",
-            by_key("select * from job where id = ?")
-                .fetch_all(&mut *source)
-                .await?,
-        ),
-        (
-            "event",
-            by_key("select * from event where job_id = ?")
-                .fetch_all(&mut *source)
-                .await?,
-        ),
-    ];
-    for (table, rows) in &rows {
-        for row in rows {
-            insert(tx, table, row).await?;
-        }
-    }
-    for (name, value) in &job.labels {
-        sqlx::query(
-            "insert or ignore into job_label (key, value, created_at, job_id) values (?, ?, ?, ?)",
-        )
-        .bind(name)
-        .bind(value)
-        .bind(job.created_at.micros())
-        .bind(job.key)
-        .execute(&mut **tx)
-        .await?;
-    }
-    if job.result_available == ResultAvailable::None {
-        return Ok(());
-    }
-    for (table, statement) in [
-        ("result_info", "select * from result_info where job_id = ?"),
-        ("result_part", "select * from result_part where job_id = ?"),
-    ] {
-        let rows = sqlx::query(statement).bind(job.result_key);
-        for row in rows.fetch_all(&mut *source).await? {
-            insert(tx, table, &row).await?;
-        }
-    }
-    Ok(())
-}
-
-/// Copies what can be read of the rest, and sets right what refers to jobs that were not copied.
-async fn copy_the_rest(source: &mut SqliteConnection, target: &Store, last: i64) -> Result<()> {
-    let mut tx = target.begin().await?;
-    for (table, statement) in [
-        ("deleted_job", "select * from deleted_job"),
-        ("setting", "select * from setting"),
-    ] {
-        let rows = sqlx::query(statement).fetch_all(&mut *source).await;
-        for row in rows.unwrap_or_default() {
-            insert(&mut tx, table, &row).await?;
-        }
-    }
-    // a job waits by itself if the one that it waited for was not copied; the next one like it coalesces them again
-    let detached = "update job set coalesced_into = null, checksum = null
-         where coalesced_into not in (select id from job) returning id";
-    let mut changed: Vec<i64> = sqlx::query_scalar(detached).fetch_all(&mut *tx).await?;
-    let unsealed = "select id from job where checksum is null";
-    changed.extend(
-        sqlx::query_scalar::<_, i64>(unsealed)
-            .fetch_all(&mut *tx)
-            .await?,
-    );
-    for key in changed {
-        seal(&mut tx, key).await?;
-    }
-    // no number is given twice
-    sqlx::query("update sqlite_sequence set seq = max(seq, ?) where name = 'job'")
-        .bind(last)
-        .execute(&mut *tx)
-        .await?;
-    tx.commit().await
-}
-
-/// Inserts a row as it was read from the same table of another store.
-async fn insert(tx: &mut Writing, table: &str, row: &SqliteRow) -> Result<()> {
-    let names: Vec<&str> = row.columns().iter().map(|column| column.name()).collect();
-    let places = vec!["?"; names.len()].join(", ");
-    let statement = format!(
-        "insert or ignore into {table} ({}) values ({places})",
-        names.join(", ")
-    );
-    let mut query = sqlx::query(AssertSqlSafe(statement));
-    for column in row.columns() {
-        let value = row.try_get_raw(column.ordinal())?;
-        let kind = match value.is_null() {
-            true => "NULL".to_owned(),
-            false => value.type_info().name().to_owned(),
-        };
-        query = match kind.as_str() {
-            "NULL" => query.bind(None::<i64>),
-            "INTEGER" => query.bind(checksum::decode::<i64>(value)?),
-            "REAL" => query.bind(checksum::decode::<f64>(value)?),
-            "TEXT" => query.bind(checksum::decode::<String>(value)?),
-            _ => query.bind(checksum::decode::<Vec<u8>>(value)?),
-        };
-    }
-    query.execute(&mut **tx).await?;
-    Ok(())
 }

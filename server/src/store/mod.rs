@@ -66,6 +66,7 @@ mod settings;
 
 // A store that no server has open.
 mod inspect;
+mod salvage;
 
 #[cfg(test)]
 mod tests;

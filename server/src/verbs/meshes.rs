@@ -69,6 +69,7 @@ pub async fn upload(
     mut pieces: impl Stream<Item = Result<impl AsRef<[u8]>, ApiError>> + Unpin,
 ) -> Result<(MeshInfo, bool), ApiError> {
     service.accepting()?;
+    service.store.has_room()?;
     let limit_bytes = service.max_mesh_bytes;
     // without a name: the system removes it when the process ends
     let file = tempfile::tempfile_in(&service.data).map_err(unwritten)?;
