@@ -273,15 +273,16 @@ static int rename_file(int from_at, const char *from, int to_at, const char *to)
     return result;
 }
 
-/* Opening only to read never fails here. A file without a name (O_TMPFILE) counts, though there is nothing to undo. */
+/* Opening only to read never fails here, and to open what is there a full disk does not matter. A file without a name (O_TMPFILE) counts, though there is nothing to undo. */
 static int open_file(int at, const char *path, int flags, mode_t mode) {
     int writes = flags & (O_CREAT | O_WRONLY | O_RDWR | O_TRUNC);
     if (!control || !is_below(path) || !writes) return syscall(SYS_openat, at, path, flags | O_LARGEFILE, mode);
-    if (fails()) return -1;
+    int creates = flags & O_CREAT && access(path, F_OK) != 0, full = control->error == ENOSPC || control->error == EDQUOT;
+    if ((creates || !full) && fails()) return -1;
     pthread_mutex_lock(&changing);
     size_t length = strlen(path);
     int is_index = length > 4 && strcmp(path + length - 4, "-shm") == 0;
-    if (flags & O_CREAT && !is_index && access(path, F_OK) != 0) {
+    if (creates && !is_index) {
         number++;
         keep_name(CREATED, path);
     }
