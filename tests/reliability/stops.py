@@ -75,6 +75,7 @@ class Load:
             except OSError:
                 await asyncio.sleep(0.01)
                 continue
+            before = seen
             try:
                 request = "GET /v1/jobs/%s/events HTTP/1.1\r\nhost: x\r\nlast-event-id: %d\r\n\r\n"
                 writer.write((request % (job, seen)).encode())
@@ -92,7 +93,7 @@ class Load:
                             return
                     elif line == b"0\r\n":
                         # the end of a chunked body: in good order, though the job has not ended
-                        self.cut_sse += 1
+                        self.cut_sse += seen > before
                         check(self.stopping(), "a stream ended without done, and the server runs")
                         break
                 await asyncio.sleep(0.01)
@@ -107,6 +108,7 @@ class Load:
         try:
             seen, done = 0, False
             while not done and not self.failure:
+                before = seen
                 try:
                     with Client(self.server.address) as client:
                         for event in client.WatchJob(id=job, after_seq=seen):
@@ -118,7 +120,7 @@ class Load:
                 except grpc.RpcError as error:
                     equal(error.code().name, "UNAVAILABLE", "the end of WatchJob when the server stops")
                     check(self.stopping(), "UNAVAILABLE from a server that runs: %s" % error.details())
-                    self.cut_grpc += 1
+                    self.cut_grpc += seen > before
                 except KeyError:
                     pass  # reflection was cut off: the client knows no service
                 time.sleep(0.02)
