@@ -11,15 +11,13 @@ import asyncio
 import json
 import pathlib
 import random
-import shutil
-import sqlite3
 import sys
-import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 
 import outside
+from faults import check_database
 from outside import TERMINAL, Connection, Lost, Server, check, each, equal, example, submission
 
 KILLS = int(sys.argv[1]) if len(sys.argv) > 1 else 50
@@ -91,18 +89,6 @@ class Load:
                         return True
         finally:
             writer.close()
-
-
-def check_database(server):
-    """SQLite's own check of what a killed server leaves, on a copy. The write-ahead log belongs to it."""
-    with tempfile.TemporaryDirectory() as folder:
-        for name in ("signorini.db", "signorini.db-wal"):
-            if (server.data / name).exists():
-                shutil.copy(server.data / name, folder)
-        database = sqlite3.connect(pathlib.Path(folder) / "signorini.db")
-        equal(database.execute("pragma integrity_check").fetchall(), [("ok",)], "pragma integrity_check")
-        equal(database.execute("pragma foreign_key_check").fetchall(), [], "pragma foreign_key_check")
-        database.close()
 
 
 async def kill_under_load(server, dice):

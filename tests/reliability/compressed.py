@@ -1,0 +1,218 @@
+"""Compressed bodies, and files that are archives: refused, and never unpacked (R12).
+
+    compressed.py [--soak]
+
+A few kilobytes that would become 10 GiB: as gzip, deflate, br and zstd, one around the other, as a body of JSON and as
+a mesh in a gzip, zip or npz file; and compressed messages over gRPC. Each is refused at once with the status that tells
+why, and takes neither memory nor time.
+"""
+
+import http.client
+import struct
+import time
+import zlib
+
+import grpc
+
+from attack import DATA, END_STREAM, HEADERS, MIB, PREFACE, SOAK, Attacked, check, equal, frame, frames_of, head, settings
+from outside import Answer
+
+UNPACKED = 10 << 30
+ROUNDS = 20 if SOAK else 1
+MOST_MEMORY, MOST_CPU_S = 32 * MIB, 0.5
+# for 10 MB, which are read to the end if they may be a mesh; the small form runs beside other tests
+MOST_S = 0.5 if SOAK else 2
+
+
+def layer(content, wbits):
+    packer = zlib.compressobj(9, zlib.DEFLATED, wbits)
+    return packer.compress(content) + packer.flush()
+
+
+def deflated(wbits):
+    """10 GiB of spaces: in the middle the same bytes again and again, since a GiB takes seconds to pack. A full flush
+    leaves nothing that later blocks refer to, and so they may be repeated."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, wbits)
+    unit = 64 * MIB
+    start = packer.compress(b" " * MIB) + packer.flush(zlib.Z_FULL_FLUSH)
+    block = packer.compress(b" " * unit) + packer.flush(zlib.Z_FULL_FLUSH)
+    return start + block * (UNPACKED // unit)
+
+
+def nested(wbits):
+    """10 GiB in gzip in gzip in gzip: some kilobytes."""
+    return layer(layer(deflated(wbits), wbits), wbits)
+
+
+def zstd():
+    """A frame of 10 GiB: blocks that repeat one byte 128 KiB times. Four bytes each; there is no library for it here."""
+    most = 128 << 10
+    block = struct.pack("<I", most << 3 | 1 << 1)[:3] + b" "
+    last = struct.pack("<I", most << 3 | 1 << 1 | 1)[:3] + b" "
+    return b"\x28\xb5\x2f\xfd\xc0\x38" + struct.pack("<Q", UNPACKED) + block * (UNPACKED // most - 1) + last
+
+
+# an uncompressed meta-block cannot say 10 GiB in a few bytes, but whoever decodes br must first read this one: 16 MiB of
+# window, and a meta-block of 16 MiB that never comes
+BR = b"\x0b\xff\xff\x87" + bytes(range(256)) * 40
+
+
+def archive(name, content):
+    """A zip file with one member, whose content is there already deflated: 10 GiB by its own account."""
+    # by hand: zipfile would pack the 10 GiB
+    member = name.encode()
+    size = struct.pack("<HHQQ", 1, 16, UNPACKED, len(content))
+    local = struct.pack("<4s5H3I2H", b"PK\3\4", 45, 0, 8, 0, 0, 0, 0xFFFFFFFF, 0xFFFFFFFF, len(member), len(size)) + member + size
+    central = struct.pack("<4s6H3I5H2I", b"PK\1\2", 45, 45, 0, 8, 0, 0, 0, 0xFFFFFFFF, 0xFFFFFFFF, len(member), len(size), 0, 0, 0, 0, 0)
+    central += member + size
+    end = struct.pack("<4s4H2IH", b"PK\5\6", 0, 0, 1, 1, len(central), len(local) + len(content), 0)
+    return local + content + central + end
+
+
+class Measured:
+    """What the server used for one request."""
+
+    def __init__(self, server, what):
+        self.server, self.what = server, what
+
+    def __enter__(self):
+        self.server.forget_peak()
+        self.memory, self.cpu, self.began = self.server.memory(), self.server.cpu_s(), time.monotonic()
+
+    def __exit__(self, kind, *_):
+        if kind is not None:
+            return
+        took, cpu = time.monotonic() - self.began, self.server.cpu_s() - self.cpu
+        grown = self.server.peak() - self.memory
+        worst["memory"], worst["cpu"] = max(worst["memory"], grown), max(worst["cpu"], cpu)
+        worst["time"], worst["requests"] = max(worst["time"], took), worst["requests"] + 1
+        check(grown < MOST_MEMORY, "%s: memory grew by %.1f MiB" % (self.what, grown / MIB))
+        check(cpu < MOST_CPU_S, "%s: %.2f s of CPU" % (self.what, cpu))
+        check(took < MOST_S, "%s: refused after %.2f s" % (self.what, took))
+
+
+worst = dict(memory=0, cpu=0, time=0, requests=0)
+
+
+def post(server, path, body, headers):
+    """As the server's own client does, but reads the answer though the server takes no more of the body."""
+    connection = http.client.HTTPConnection(server.address, timeout=20)
+    try:
+        connection.putrequest("POST", path)
+        for name, value in {"content_type": "application/json", **headers}.items():
+            connection.putheader(name.replace("_", "-"), value)
+        connection.putheader("content-length", str(len(body)))
+        try:
+            connection.endheaders(body)
+        except OSError:
+            pass  # it has been refused already
+        response = connection.getresponse()
+        return Answer(response.status, {name.lower(): value for name, value in response.getheaders()}, response.read())
+    finally:
+        connection.close()
+
+
+def refused(server, path, body, wanted, what, **headers):
+    with Measured(server, what):
+        answer = post(server, path, body, headers)
+    found = answer.status, answer.json().get("code")
+    check(found in wanted, "%s: %r" % (what, answer))
+    equal(answer.headers["content-type"], "application/problem+json", what)
+    return "%d %s" % found
+
+
+def bodies(server, packed):
+    """Bodies of JSON with a Content-Encoding."""
+    for encoding, body in packed.items():
+        for path in ("/v1/jobs", "/v1/jobs/batch", "/v1/problems/validate"):
+            found = refused(server, path, body, [(415, "unsupported-media")], "%s to %s" % (encoding, path),
+                            content_encoding=encoding)
+        print("Content-Encoding %s, %d bytes: %s" % (encoding, len(body), found))
+    # an encoding that is not told: then it is not JSON
+    for encoding, body in packed.items():
+        found = refused(server, "/v1/problems/validate", body, [(400, "malformed-json")], "untold " + encoding)
+    print("without Content-Encoding: " + found)
+    # no lie: `identity` is no encoding
+    answer = server.call("POST", "/v1/problems/validate", {"problem": {}}, content_encoding="identity")
+    equal(answer.status, 200, "a body that is not encoded and says so")
+
+
+# as what it is not, or as what is not taken
+REFUSED = [(422, "invalid-problem"), (415, "unsupported-media")]
+
+
+def meshes(server, packed):
+    """Files that hold a mesh, or would."""
+    files = {
+        "a gzip file": packed["gzip"],
+        "a gzip file in a gzip file": packed["gzip, gzip, gzip"],
+        "a zip file": archive("mesh.msh", deflated(-15) + b"\3\0"),
+        "an npz file": archive("points.npy", deflated(-15) + b"\3\0"),
+        "a zstd file": packed["zstd"],
+    }
+    for what, content in files.items():
+        for headers in ({}, {"content_type": "application/octet-stream"}, {"content_type": "application/zip"}):
+            found = refused(server, "/v1/meshes", content, REFUSED, what, **headers)
+        print("%s as a mesh, %d bytes: %s" % (what, len(content), found))
+    for encoding in ("gzip", "zstd"):
+        found = refused(server, "/v1/meshes", packed[encoding], REFUSED, "a mesh as " + encoding,
+                        content_encoding=encoding)
+    print("a mesh with Content-Encoding: " + found)
+    equal(server.json("/v1/meshes")["meshes"], [], "meshes that were stored")
+
+
+def messages(server, packed):
+    """Messages of gRPC that say they are compressed."""
+    for encoding in ("gzip", "deflate", "zstd", "br", "none of these"):
+        for method in ("CreateJob", "ValidateProblem", "UploadMesh"):
+            # as much as may be sent before the server gives way for more
+            content = packed.get(", ".join([encoding] * 3) if encoding == "gzip" else encoding, b"x" * 10000)[:60000]
+            with Measured(server, "%s over gRPC" % encoding), server.socket() as connection:
+                connection.settimeout(10)
+                call = head("POST", "/signorini.v1.JobService/" + method, 1, content_type="application/grpc", te="trailers",
+                            grpc_encoding=encoding)
+                message = b"\1" + struct.pack(">I", len(content)) + content
+                connection.sendall(PREFACE + settings() + call)
+                for place in range(0, len(message), 16000):
+                    last = place + 16000 >= len(message)
+                    connection.sendall(frame(DATA, END_STREAM if last else 0, 1, message[place:place + 16000]))
+                flags = next(flags for kind, flags, _, _ in frames_of(connection) if kind == HEADERS)
+                check(flags & END_STREAM, "%s over gRPC was not refused" % encoding)
+    # what a client sees of it
+    with grpc.insecure_channel(server.address, compression=grpc.Compression.Gzip) as channel:
+        for method in ("CreateJob", "ValidateProblem"):
+            call = channel.unary_unary("/signorini.v1.JobService/" + method)
+            try:
+                with Measured(server, "gzip over gRPC"):
+                    call(b" " * 100000, timeout=10)
+                check(False, "a compressed message was accepted")
+            except grpc.RpcError as error:
+                equal(error.code().name, "UNIMPLEMENTED", "the answer to a compressed message, %s" % error.details())
+    print("compressed messages over gRPC: refused, to a client UNIMPLEMENTED")
+
+
+def main():
+    gzip = deflated(31)
+    packed = {
+        "gzip": gzip,
+        "deflate": deflated(15),
+        "gzip, gzip, gzip": nested(31),
+        "br": BR,
+        "zstd": zstd(),
+        "x-unknown": b"x" * 10000,
+    }
+    assert zlib.decompressobj(31).decompress(gzip, 100) == b" " * 100
+    with Attacked() as server:
+        job = server.finished_job()
+        for _ in range(ROUNDS):
+            bodies(server, packed)
+            meshes(server, packed)
+            messages(server, packed)
+        equal([one["id"] for one in server.every_job()], [job], "the jobs there are")
+        server.stop()
+    print("figure: %d compressed bodies, files and messages, of which the smallest (%d bytes) would become 10 GiB: all refused, "
+          "memory at most %+.1f MiB, %.2f s of CPU and %.0f ms each" % (
+              worst["requests"], len(packed["gzip, gzip, gzip"]), worst["memory"] / MIB, worst["cpu"], 1e3 * worst["time"]))
+
+
+main()

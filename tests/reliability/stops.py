@@ -1,0 +1,207 @@
+"""A server that is told to stop again and again under load (R18).
+
+    stops.py [--soak] [SEED]
+
+SIGTERM at random moments, sometimes twice or with a SIGHUP before it, while jobs are submitted, run and are watched.
+Each time it ends with 0 within its grace time; whoever waits is answered; server-sent events end without `done`, gRPC
+streams with UNAVAILABLE, and both resume after the restart without a gap. No acknowledged job is lost or fails.
+"""
+
+import asyncio
+import json
+import random
+import signal
+import sys
+import threading
+import time
+
+sys.path.insert(0, __file__.rsplit("/", 2)[0] + "/clients")
+
+import grpc
+from attack import SOAK, Attacked, check, equal, example, submission
+from faults import check_database
+from outside import TERMINAL, Connection, Lost, each, percentile, talkative
+from reflected import Client
+
+STOPS = 100 if SOAK else 20
+SEED = next((int(word) for word in sys.argv[1:] if word.isdigit()), random.randrange(1 << 32))
+GRACE_S = 3
+SUBMITTERS, PER_S, FOLLOWERS = 4, 40, 4
+# long enough to be interrupted by every stop
+LONG = dict(increments=400, refine=3)
+
+
+class Load:
+    """Clients that outlive the stops of the server."""
+
+    def __init__(self, server):
+        self.server, self.acknowledged, self.sent, self.over = server, {}, 0, False
+        self.refused = self.cut_sse = self.cut_grpc = self.events = 0
+        self.stopping_until = 0
+        self.failure, self.grpc_jobs = None, {}
+
+    def stopping(self):
+        """Whether a broken stream has its reason."""
+        return self.server.process.poll() is not None or time.monotonic() < self.stopping_until
+
+    async def submit(self, _):
+        connection = Connection(self.server)
+        problem = example()
+        while not self.over:
+            self.sent += 1
+            name, began = "job %d" % self.sent, time.monotonic()
+            try:
+                answer = await connection.call("POST", "/v1/jobs", submission(problem, name=name))
+                if answer.status == 503:
+                    equal(answer.json()["code"], "draining", "a refusal while stopping")
+                    check(self.stopping(), "draining, and nobody had asked for it")
+                    self.refused += 1
+                else:
+                    equal(answer.status, 202, "submit, %r" % answer)
+                    self.acknowledged[answer.json()["id"]] = name
+            except Lost:
+                check(self.stopping(), "a submit was cut off by a server that runs")
+                connection.close()
+            await asyncio.sleep(max(0, began + SUBMITTERS / PER_S - time.monotonic()))
+        connection.close()
+
+    async def follow(self, job):
+        """Server-sent events from stop to stop, with the number of the last one, until `done`."""
+        seen = 0
+        while True:
+            try:
+                host, port = self.server.address.split(":")
+                reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 20)
+            except OSError:
+                await asyncio.sleep(0.01)
+                continue
+            before = seen
+            try:
+                request = "GET /v1/jobs/%s/events HTTP/1.1\r\nhost: x\r\nlast-event-id: %d\r\n\r\n"
+                writer.write((request % (job, seen)).encode())
+                status = (await reader.readuntil(b"\r\n")).split()[1]
+                check(status in (b"200", b"503"), "events of %s: %r" % (job, status))
+                while status == b"200":
+                    line = await reader.readuntil(b"\n")
+                    if line.startswith(b"data: "):
+                        event = json.loads(line[6:])
+                        seen += 1
+                        equal(event["seq"], seen, "the next event of " + job)
+                        self.events += 1
+                        if event["type"] == "done":
+                            equal(event["job"]["status"], "succeeded", "the end of " + job)
+                            return
+                    elif line == b"0\r\n":
+                        # the end of a chunked body: in good order, though the job has not ended
+                        self.cut_sse += seen > before
+                        check(self.stopping(), "a stream ended without done, and the server runs")
+                        break
+                await asyncio.sleep(0.01)
+            except (OSError, EOFError):
+                check(self.stopping(), "a stream was cut off by a server that runs")
+                await asyncio.sleep(0.01)
+            finally:
+                writer.close()
+
+    def follow_grpc(self, job):
+        """The same by WatchJob, in a thread."""
+        try:
+            seen, done = 0, False
+            while not done and not self.failure:
+                before = seen
+                try:
+                    with Client(self.server.address) as client:
+                        for event in client.WatchJob(id=job, after_seq=seen):
+                            seen += 1
+                            equal(event.seq, seen, "the next event of " + job)
+                            self.events += 1
+                            done = event.WhichOneof("payload") == "done"
+                    check(done, "WatchJob of %s ended in good order before done" % job)
+                except grpc.RpcError as error:
+                    equal(error.code().name, "UNAVAILABLE", "the end of WatchJob when the server stops")
+                    check(self.stopping(), "UNAVAILABLE from a server that runs: %s" % error.details())
+                    self.cut_grpc += seen > before
+                except KeyError:
+                    pass  # reflection was cut off: the client knows no service
+                time.sleep(0.02)
+        except BaseException as error:
+            self.failure = error
+
+
+def stop(server, load, dice):
+    """Seconds until it had ended."""
+    began = time.monotonic()
+    load.stopping_until = began + GRACE_S + 10
+    kind = dice.choice(("once", "once", "twice", "at once twice", "hangup"))
+    if kind == "hangup":
+        server.process.send_signal(signal.SIGHUP)
+        time.sleep(0.02)
+        check(server.process.poll() is None, "SIGHUP ended it")
+    server.process.send_signal(signal.SIGTERM)
+    if kind.endswith("twice"):
+        if kind == "twice":
+            time.sleep(dice.uniform(0, 0.05))
+        if server.process.poll() is None:
+            server.process.send_signal(signal.SIGTERM)
+    equal(server.process.wait(timeout=GRACE_S + 20), 0, "exit code after SIGTERM (%s)" % kind)
+    took = time.monotonic() - began
+    check(took <= GRACE_S + 1, "it ended only %.2f s after SIGTERM (%s)" % (took, kind))
+    return took
+
+
+async def stop_under_load(server, dice):
+    load, loop = Load(server), asyncio.get_running_loop()
+    long = [server.submit(talkative(**LONG), priority=5) for _ in range(2)]
+    threads = [threading.Thread(target=load.follow_grpc, args=(job,), daemon=True) for job in long]
+    for thread in threads:
+        thread.start()
+    clients = [asyncio.ensure_future(each(range(SUBMITTERS), load.submit)),
+               asyncio.ensure_future(each(long * (FOLLOWERS // 2), load.follow))]
+    times = []
+    for _ in range(STOPS):
+        ended, _ = await asyncio.wait(clients, timeout=dice.uniform(0.05, 1), return_when=asyncio.FIRST_EXCEPTION)
+        for client in ended:
+            client.result()
+        check(load.failure is None, "gRPC: %r" % load.failure)
+        times.append(await loop.run_in_executor(None, stop, server, load, dice))
+        check_database(server)
+        await loop.run_in_executor(None, server.start)
+        load.stopping_until = time.monotonic() + 0.3  # whoever asked the old one hears of it a little later
+    load.over = True
+    await asyncio.wait_for(asyncio.gather(*clients), 300)
+    await loop.run_in_executor(None, lambda: [thread.join(60) for thread in threads])
+    check(load.failure is None, "gRPC: %r" % load.failure)
+    check(not any(thread.is_alive() for thread in threads), "a gRPC client that never ends")
+    return load, times
+
+
+def main():
+    print("seed %d" % SEED, flush=True)
+    dice = random.Random(SEED)
+    with Attacked("--workers", "2", "--grace-s", str(GRACE_S)) as server:
+        load, times = asyncio.run(stop_under_load(server, dice))
+        end = time.monotonic() + 120
+        while any(job["status"] not in TERMINAL for job in server.every_job()):
+            check(time.monotonic() < end, "jobs that never end")
+            time.sleep(0.2)
+        jobs = {job["id"]: job for job in server.every_job()}
+        for job, name in load.acknowledged.items():
+            check(job in jobs, "%s was acknowledged and is lost" % job)
+            equal((jobs[job]["name"], jobs[job]["status"]), (name, "succeeded"), "%s, acknowledged" % job)
+        names = [job["name"] for job in jobs.values() if job["name"]]
+        equal(len(names), len(set(names)), "the number of names, one for each submit")
+        for job in jobs:
+            events = server.events(job)
+            equal([event["seq"] for event in events], list(range(1, len(events) + 1)), "the numbers of " + job)
+            equal([event["type"] for event in events].count("done"), 1, "the ends of " + job)
+        server.stop()
+        check_database(server)
+    check(load.cut_sse and load.cut_grpc, "no stream was cut by a stop")
+    print("figure: %d stops under load, some by two SIGTERMs or after a SIGHUP: exit 0 after %.0f ms (median), %.0f ms at most "
+          "(grace %d s); %d jobs acknowledged, 0 lost, all succeeded; %d submits refused as draining; server-sent events ended "
+          "%d times without done, WatchJob %d times with UNAVAILABLE, all %d events heard in order" % (
+              STOPS, 1e3 * percentile(times, 0.5), 1e3 * max(times), GRACE_S, len(load.acknowledged), load.refused,
+              load.cut_sse, load.cut_grpc, load.events))
+
+
+main()

@@ -1,0 +1,261 @@
+"""Hundreds of watchers of a job that runs, half of them slow, and ten thousand who wait for the end of one (R9).
+
+    watchers.py [--soak]
+
+A solve alone, one with 200 watchers that read a byte a second, and one with 200 more that read at once, in turn:
+server-sent events, gRPC and long polls. It takes as long, who reads hears of all, a watcher costs little memory, and the
+write-ahead log stays small. Then a job ends for which thousands wait: all are answered, and the log says nothing of it.
+"""
+
+import asyncio
+import collections
+import socket
+import statistics
+import struct
+import time
+
+from attack import (
+    DATA, END_HEADERS, END_STREAM, HEADERS, MIB, PREFACE, SOAK, WINDOW_UPDATE, Attacked, Bystander, check, equal, example,
+    frame, head, settings,
+)
+from outside import talkative
+
+SLOW, QUICK = 200, 200
+KINDS = ("events", "grpc", "poll")
+WAITERS = 10_000 if SOAK else 2_000
+# the promise; the small form runs beside other tests, and its solves are short
+MOST_LONGER = 1.05 if SOAK else 1.5
+MOST_MEMORY, MOST_WAL = 64 << 10, 64 * MIB
+WATCHED_S, FEWEST_ROUNDS = (600, 10) if SOAK else (2, 2)
+# ten events for each increment
+INCREMENTS, REFINE = (100, 4) if SOAK else (10, 4)
+MOST_ANSWERED_S, MOST_WARNINGS = 10, 3
+# as large as a window of HTTP/2 may be: whoever reads at once need not enlarge it
+WHOLE = (1 << 31) - 1
+TRAILER = bytes([HEADERS, END_STREAM | END_HEADERS, 0, 0, 0, 1])
+
+
+def kinds_of(count):
+    """So many watchers, by their kinds."""
+    return collections.Counter(KINDS[place % len(KINDS)] for place in range(count))
+
+
+class Watchers:
+    """Clients of one job, in this process; how many bytes they have read."""
+
+    def __init__(self, server, job, slow, quick):
+        self.server, self.job, self.tasks, self.read = server, job, [], 0
+        self.slow, self.quick = slow, quick
+        self.ended = collections.Counter()  # those of each kind that heard of the end
+
+    def begin(self):
+        for slow, kinds in ((True, kinds_of(self.slow)), (False, kinds_of(self.quick))):
+            for kind in kinds.elements():
+                self.tasks.append(asyncio.ensure_future(getattr(self, kind)(slow)))
+
+    async def end(self):
+        for task in self.tasks:
+            if task.done() and not task.cancelled() and task.exception():
+                raise task.exception()
+            task.cancel()
+        await asyncio.gather(*self.tasks, return_exceptions=True)
+
+    async def connect(self, slow):
+        host, port = self.server.address.split(":")
+        one = socket.socket()
+        if slow:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)  # or the kernel would read for it
+        one.setblocking(False)
+        await asyncio.get_running_loop().sock_connect(one, (host, int(port)))
+        return one
+
+    async def take(self, one, slow):
+        """A byte a second, or whatever comes. Nothing: the server has closed."""
+        got = await asyncio.get_running_loop().sock_recv(one, 1 if slow else 1 << 16)
+        self.read += len(got)
+        if slow:
+            await asyncio.sleep(1)
+        return got
+
+    async def events(self, slow):
+        one = await self.connect(slow)
+        with one:
+            asked = b"GET /v1/jobs/%s/events HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n" % self.job.encode()
+            await asyncio.get_running_loop().sock_sendall(one, asked)
+            last = b""
+            while got := await self.take(one, slow):
+                last = (last + got)[-4000:]
+            check(slow or b"event: done" in last, "server-sent events ended without done: %r" % last[-300:])
+            self.ended["events"] += 1
+
+    async def grpc(self, slow):
+        """WatchJob. A slow one lets the server send a byte a second."""
+        one, loop = await self.connect(slow), asyncio.get_running_loop()
+        with one:
+            message = b"\x0a" + bytes([len(self.job)]) + self.job.encode()
+            window = 1 if slow else WHOLE
+            call = head("POST", "/signorini.v1.JobService/WatchJob", 1, content_type="application/grpc", te="trailers")
+            asked = PREFACE + settings(window=window) + call
+            asked += frame(DATA, END_STREAM, 1, b"\0" + struct.pack(">I", len(message)) + message)
+            asked += frame(WINDOW_UPDATE, 0, 0, struct.pack(">I", WHOLE - 65535))
+            await loop.sock_sendall(one, asked)
+            seen = b""
+            while slow:
+                await loop.sock_sendall(one, frame(WINDOW_UPDATE, 0, 1, struct.pack(">I", 1)))
+                await asyncio.sleep(1)
+                self.read += len(await loop.sock_recv(one, 1000))
+            # the last frame has the status, among the headers that end stream 1; the connection stays open
+            while TRAILER not in seen[-200:]:
+                got = await self.take(one, slow)
+                check(got, "WatchJob was cut off")
+                seen = (seen + got)[-4000:]
+            self.ended["grpc"] += 1
+
+    async def poll(self, slow):
+        """Waits for the end of the job, again and again."""
+        loop = asyncio.get_running_loop()
+        while True:
+            one = await self.connect(slow)
+            with one:
+                asked = b"GET /v1/jobs/%s?wait=30&until=terminal HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n" % self.job.encode()
+                await loop.sock_sendall(one, asked)
+                answer = b""
+                while got := await self.take(one, slow):
+                    answer += got
+            check(slow or answer.startswith((b"HTTP/1.1 200", b"HTTP/1.1 304")), "a poll: %r" % answer[:300])
+            if b'"status":"succeeded"' in answer:
+                self.ended["poll"] += 1
+                return
+
+
+async def solve(server, wal, slow=0, quick=0):
+    """Solves the problem; its time."""
+    job = server.submit(talkative(INCREMENTS, refine=REFINE))
+    watchers, wanted = Watchers(server, job, slow, quick), kinds_of(quick)
+    watchers.begin()
+    ended, loop = None, asyncio.get_running_loop()
+    while ended is None or ended["status"] in ("queued", "running"):
+        # seldom: it costs the solve time too
+        await asyncio.sleep(0.25)
+        wal.append((server.data / "signorini.db-wal").stat().st_size)
+        ended = await loop.run_in_executor(None, server.json, "/v1/jobs/" + job)
+    equal(ended["status"], "succeeded", "the watched job")
+    patience = time.monotonic() + 20
+    while not watchers.ended >= wanted and time.monotonic() < patience:
+        await asyncio.sleep(0.05)
+    await watchers.end()
+    check(watchers.ended >= wanted, "of %r that read at once only %r heard of the end within 20 s" % (dict(wanted), dict(watchers.ended)))
+    equal(server.call("DELETE", "/v1/jobs/" + job).status, 204, "deleting the job")
+    return ended["run_s"]
+
+
+async def memory_of_watchers(server):
+    """What a slow watcher costs, of a job that has ended with as many events: while one runs, the solver's own memory
+    would hide it."""
+    job = server.finished(server.submit(talkative(300)))["id"]
+    server.events(job)
+    watchers, before = Watchers(server, job, SLOW + QUICK, 0), server.memory()
+    server.forget_peak()
+    watchers.begin()
+    await asyncio.sleep(5)
+    grown = server.peak() - before
+    await watchers.end()
+    equal(server.call("DELETE", "/v1/jobs/" + job).status, 204, "deleting the job")
+    return grown / (SLOW + QUICK)
+
+
+async def solves(server, wal):
+    """Rounds of a solve alone, with slow watchers, and with all, so that each meets what else the machine does."""
+    rounds = []
+    while sum(one[1] + one[2] for one in rounds) < WATCHED_S or len(rounds) < FEWEST_ROUNDS:
+        rounds.append([await solve(server, wal), await solve(server, wal, SLOW), await solve(server, wal, SLOW, QUICK)])
+        print("alone %.2f s, with slow watchers %.2f s, with all %.2f s" % tuple(rounds[-1]), flush=True)
+        check(len(rounds) < 1000, "the solves are too short")
+    return rounds
+
+
+def many_watchers():
+    wal = []
+    with Attacked() as server:
+        job = server.finished_job()
+        asyncio.run(solve(server, wal))  # the first of all takes memory that the others find
+        with Bystander(server, "/v1/jobs/" + job) as bystander:
+            rounds = asyncio.run(solves(server, wal))
+            memory = asyncio.run(memory_of_watchers(server))
+    median = lambda value: statistics.median(value(*one) for one in rounds)
+    slow = median(lambda alone, slow, both: slow / alone)
+    both = median(lambda alone, slow, both: both / alone)
+    figure = ("with %d watchers that read a byte a second a solve of %.1f s took %.2f × as long, with %d more that read at once "
+              "%.2f × (median of %d rounds), %.0f KiB a watcher; write-ahead log at most %.1f MiB; a bystander waited %.0f ms (p99)" % (
+                  SLOW, median(lambda alone, slow, both: alone), slow, QUICK, both, len(rounds), memory / 1024,
+                  max(wal) / MIB, 1000 * bystander.p99_s))
+    print(figure, flush=True)
+    check(slow <= MOST_LONGER, "with slow watchers the solve took %.2f × as long" % slow)
+    check(both <= MOST_LONGER, "with all watchers the solve took %.2f × as long" % both)
+    check(memory <= MOST_MEMORY, "a watcher takes %.0f KiB" % (memory / 1024))
+    check(max(wal) <= MOST_WAL, "the write-ahead log grew to %.0f MiB" % (max(wal) / MIB))
+    bystander.check()
+    return figure
+
+
+async def wait_for_the_end(server, job):
+    """Seconds from the end of a job until all are answered."""
+    host, port = server.address.split(":")
+    ready, answered, statuses = 0, 0, []
+
+    async def wait():
+        nonlocal ready
+        reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 14)
+        writer.write(b"GET /v1/jobs/%s?wait=60&until=terminal HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n" % job.encode())
+        ready += 1
+        answer = await reader.read(-1)
+        statuses.append((answer[9:12], b'"status":"canceled"' in answer))
+        writer.close()
+
+    tasks = []
+    for place in range(WAITERS):
+        tasks.append(asyncio.ensure_future(wait()))
+        if place % 100 == 99:
+            await asyncio.sleep(0.02)  # no more than the backlog of a listener at a time
+    while ready < WAITERS:
+        await asyncio.sleep(0.05)
+        for task in tasks:
+            if task.done():
+                task.result()
+    await asyncio.sleep(2)  # the last of them has been read
+    equal(len(statuses), 0, "waiters answered before the end")
+    began = time.monotonic()
+    cancel = await asyncio.get_running_loop().run_in_executor(None, server.call, "POST", "/v1/jobs/%s/cancel" % job)
+    equal(cancel.json()["outcome"], "canceled", "the outcome of the cancel")
+    canceled = time.monotonic() - began
+    await asyncio.wait_for(asyncio.gather(*tasks), 60)
+    took = time.monotonic() - began
+    equal(set(statuses), {(b"200", True)}, "the answers to the waiters")
+    return took, canceled
+
+
+def many_waiters():
+    with Attacked("--max-connections", str(WAITERS + 500)) as server:
+        other = server.finished_job()
+        equal(server.call("POST", "/v1/queue/pause").status, 200, "pausing the queue")
+        job, lines = server.submit(example()), len(server.log.read_text().splitlines())
+        memory = server.memory()
+        server.forget_peak()
+        with Bystander(server, "/v1/jobs/" + other) as bystander:
+            took, canceled = asyncio.run(wait_for_the_end(server, job))
+        grown = (server.peak() - memory) / WAITERS
+        log = server.log.read_text().splitlines()[lines:]
+    warnings = [line for line in log if " WARN " in line or " ERROR " in line]
+    figure = ("%d waiters for one job were answered within %.2f s of its cancel, which took %.0f ms; %.0f KiB each; %d lines in the "
+              "log, %d of them warnings; a bystander waited %.0f ms (p99)" % (
+                  WAITERS, took, 1e3 * canceled, grown / 1024, len(log), len(warnings), 1e3 * bystander.p99_s))
+    print(figure, flush=True)
+    check(len(warnings) <= MOST_WARNINGS, "%d warnings, such as %r" % (len(warnings), warnings[:1]))
+    check(len(log) <= MOST_WARNINGS + 5, "%d lines in the log, such as %r" % (len(log), log[:3]))
+    check(took <= MOST_ANSWERED_S, "the last was answered after %.1f s" % took)
+    check(grown <= MOST_MEMORY, "a waiter takes %.0f KiB" % (grown / 1024))
+    bystander.check()
+    return figure
+
+
+print("figure: %s; %s" % (many_watchers(), many_waiters()))
