@@ -95,7 +95,8 @@ pub(super) fn run(
                 eprintln!("warning: {}: {}", warning.pointer, warning.message)
             }
             // Ctrl-C ends the process
-            Update::Step(_) | Update::Pulse => {}
+            Update::Step(_) | Update::Pulse | Update::Needs { .. } | Update::OutOfMemory { .. } => {
+            }
         }
         ControlFlow::Continue(())
     });

@@ -110,7 +110,7 @@ fn ending_of_error(job: &Job, error: &SolveError, out_of_time: bool) -> Ending {
             failed(Reason::SingularSystem)
         }
         SolveError::NonFinite { .. } => failed(Reason::NonFinite),
-        SolveError::ResourceExhausted => failed(Reason::ResourceExhausted),
+        SolveError::ResourceExhausted { .. } => failed(Reason::ResourceExhausted),
         // it was checked before it was accepted: an error of the service, not of the client
         SolveError::Invalid(_) => internal(job, error),
     }

@@ -59,7 +59,7 @@ pub(super) fn solve_and_report(
             Update::Iteration(row) => event(Payload::Iteration(row)),
             Update::Warning(warning) => event(Payload::Warning(warning.clone())),
             Update::Step(partial) => partials.next(&partial),
-            Update::Pulse => None,
+            Update::Pulse | Update::Needs { .. } | Update::OutOfMemory { .. } => None,
         })
     })?;
     let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite {
