@@ -123,12 +123,22 @@ impl Prepared {
     }
 }
 
-/// Checks a problem without solving it: its warnings, or all its violations.
-pub fn check(
-    problem: &Problem,
-    external: Option<External>,
-) -> Result<Vec<Warning>, Vec<Violation>> {
-    Model::new(problem, external).map(|model| model.warnings)
+/// What is known of a valid problem without solving it.
+#[derive(Clone, Debug)]
+pub struct Checked {
+    /// Its warnings.
+    pub warnings: Vec<Warning>,
+    /// What it will take to solve it.
+    pub estimate: Estimate,
+}
+
+/// Checks a problem without solving it: its warnings and its cost, or all its violations.
+pub fn check(problem: &Problem, external: Option<External>) -> Result<Checked, Vec<Violation>> {
+    let model = Model::new(problem, external)?;
+    Ok(Checked {
+        estimate: model.estimate(problem),
+        warnings: model.warnings,
+    })
 }
 
 fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {

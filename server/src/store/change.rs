@@ -4,7 +4,10 @@
 use sqlx::{Sqlite, SqliteConnection, Transaction};
 use tokio::sync::MutexGuard;
 
+use std::sync::Arc;
+
 use super::{database::Store, error::Result, waiting::Move};
+use crate::memory::Budget;
 
 /// An open transaction.
 pub(super) struct Change<'a> {
@@ -43,6 +46,11 @@ impl Change<'_> {
     /// The connection, for statements.
     pub(super) fn sql(&mut self) -> &mut SqliteConnection {
         &mut self.tx
+    }
+
+    /// The memory that running jobs share.
+    pub(super) fn budget(&self) -> &Arc<Budget> {
+        self.store.budget()
     }
 
     /// Changes the waiting jobs in memory, once this is committed.

@@ -22,7 +22,9 @@ impl Store {
 pub(super) const NEXT: &str = "select id from job indexed by job_queue
      where status = 'queued' and coalesced_into is null order by priority desc, id limit 1";
 
-/// Claims within a transaction.
+/// Claims within a transaction. The next job waits until it fits into the memory budget, and those after it wait with
+/// it, also if they would fit: the order is strict, so that no large job is overtaken for ever. Running jobs end within
+/// their time limits, and each of them alone fits.
 pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
     /// With more jobs than this, one transaction would take too long.
     const MOST_ANSWERED: usize = 100;
@@ -45,12 +47,27 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         {
             continue;
         }
+        let needed: Option<i64> =
+            sqlx::query_scalar("select memory_bytes from problem where input_hash = ?")
+                .bind(&waiting.input_hash)
+                .fetch_one(change.sql())
+                .await?;
+        let needed = needed.and_then(|bytes| u64::try_from(bytes).ok());
+        // given back if this transaction is rolled back
+        let Some(memory) = change.budget().reserve(needed) else {
+            return Ok(None);
+        };
         let job = lifecycle::start_attempt(change, &waiting).await?;
         let (problem, mesh) = sqlx::query_as("select body, mesh from problem where input_hash = ?")
             .bind(&job.input_hash)
             .fetch_one(change.sql())
             .await?;
-        return Ok(Some(Claim { job, problem, mesh }));
+        return Ok(Some(Claim {
+            job,
+            problem,
+            mesh,
+            memory,
+        }));
     }
     Ok(None)
 }

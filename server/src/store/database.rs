@@ -3,7 +3,7 @@
 use std::{
     fs::{File, OpenOptions, TryLockError},
     path::Path,
-    sync::{Mutex, MutexGuard, PoisonError, atomic::AtomicBool},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, atomic::AtomicBool},
     time::Duration,
 };
 
@@ -19,6 +19,7 @@ use super::{
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
+use crate::memory::Budget;
 
 /// How long a list waits for a connection.
 const LIST_PATIENCE: Duration = Duration::from_secs(5);
@@ -34,6 +35,8 @@ pub struct Store {
     pub(super) waiting: Mutex<WaitingJobs>,
     /// Whether the queue is paused, as it is on the disk after every commit.
     pub(super) paused: AtomicBool,
+    /// The memory that running jobs share; without limit until it is set.
+    pub(super) budget: OnceLock<Arc<Budget>>,
     /// One transaction at a time changes the jobs that wait.
     pub(super) change_lock: tokio::sync::Mutex<()>,
     /// Where submissions wait for the next commit.
@@ -79,6 +82,7 @@ impl Store {
             lists,
             waiting: Mutex::default(),
             paused: AtomicBool::default(),
+            budget: OnceLock::new(),
             change_lock: tokio::sync::Mutex::default(),
             inbox,
             _lock: lock,

@@ -9,7 +9,7 @@ use sqlx::{
 
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 5] = [
+const STEPS: [(i64, &str, &str); 6] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -30,6 +30,11 @@ const STEPS: [(i64, &str, &str); 5] = [
         5,
         "coalesced jobs",
         include_str!("../../../migrations/0005_coalesced_jobs.sql"),
+    ),
+    (
+        6,
+        "memory",
+        include_str!("../../../migrations/0006_memory.sql"),
     ),
 ];
 

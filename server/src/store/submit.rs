@@ -26,7 +26,7 @@ use crate::{
 
 impl Store {
     /// Accepts jobs. They are stored on the disk when this returns. With `claim` (a worker is free) the next job of the
-    /// queue is claimed in the same commit.
+    /// queue is claimed in the same commit, if it fits into the memory budget.
     pub async fn submit(&self, submission: Submission, claim: bool) -> Result<Accepted> {
         let (reply, answer) = oneshot::channel();
         let closed = || StoreError::Folder("the store is closed".into());
@@ -171,11 +171,14 @@ async fn insert(
         meshes::require(change.sql(), new.mesh.as_deref()).await?;
     }
     sqlx::query(
-        "insert into problem (input_hash, body, mesh) values (?, ?, ?) on conflict do nothing",
+        "insert into problem (input_hash, body, mesh, memory_bytes) values (?, ?, ?, ?)
+         on conflict do update set memory_bytes = excluded.memory_bytes
+         where memory_bytes is not excluded.memory_bytes",
     )
     .bind(&new.input_hash)
     .bind(&new.problem)
     .bind(&new.mesh)
+    .bind(i64::try_from(new.memory_bytes).unwrap_or(i64::MAX))
     .execute(change.sql())
     .await?;
     let now = Time::now();

@@ -13,8 +13,8 @@ pub struct Breaks<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stopped;
 
-/// Multiplications between two questions: 10 to 50 ms.
-const PORTION: f64 = 2e8;
+/// Multiplications between two questions: 5 to 50 ms.
+pub(super) const PORTION: f64 = 5e7;
 
 impl<'a> Breaks<'a> {
     /// Pauses in which `ask` is called; it answers whether to go on.

@@ -24,7 +24,7 @@ use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::blocked::{NoFactor, STRIP, cholesky};
-use super::breaks::Breaks;
+use super::breaks::{Breaks, PORTION};
 
 type Structure = SymbolicSupernodalCholesky<usize>;
 
@@ -55,6 +55,15 @@ pub(super) fn place(structure: &Structure, s: usize, row: usize, column: usize) 
     };
     structure.col_ptr_for_val()[s] + (column - begin) * (end - begin + pattern.len()) + local
 }
+
+/// Lines of a product that make one portion of work, where each takes this many multiplications.
+fn portion(of_one: usize) -> usize {
+    let lines = (PORTION / of_one.max(1) as f64) as usize;
+    lines.clamp(FEWEST, STRIP)
+}
+
+/// Fewer lines at once would take far more time than their part.
+const FEWEST: usize = 16;
 
 /// From the entries of A at their places in `values` to those of L.
 pub(super) fn factor(
@@ -99,8 +108,10 @@ pub(super) fn factor(
             );
             let pattern_d = &pattern_d[from..];
             let l = all.subrows(columns_d + from, pattern_d.len());
-            for start in (0..inside).step_by(STRIP) {
-                let (width, height) = (STRIP.min(inside - start), pattern_d.len() - start);
+            let mut start = 0;
+            while start < inside {
+                let height = pattern_d.len() - start;
+                let width = portion(height * columns_d).min(inside - start);
                 if update.len() < width * height {
                     update.resize(width * height, 0.0);
                 }
@@ -122,6 +133,7 @@ pub(super) fn factor(
                     added.for_each(|(&row, value)| column[local[row]] += value);
                 }
                 breaks.after((width * height * (columns_d + 4)) as f64)?;
+                start += width;
             }
             used[d] += inside;
             if let Some(&row) = pattern_d.get(inside) {
@@ -136,10 +148,7 @@ pub(super) fn factor(
             stopped => stopped,
         })?;
         // rows are independent of each other: a large block is solved in parts
-        let part = match below.len() * columns * columns > STRIP * STRIP * STRIP {
-            true => STRIP,
-            false => below.len().max(1),
-        };
+        let part = portion(columns * columns);
         for start in (0..below.len()).step_by(part) {
             let height = part.min(below.len() - start);
             let under = under.rb_mut().subrows_mut(start, height);
