@@ -94,7 +94,8 @@ pub(super) fn ending_of_attempt(
                 _ => ending,
             };
             let status = ending.status;
-            info!(job.id = %job.id, %status, iterations, "job {} solved: {status} after {iterations} iterations", job.id);
+            let reason = ending.reason.map(<&str>::from);
+            info!(job.id = %job.id, %status, reason, iterations, "job {} solved: {status} after {iterations} iterations", job.id);
             (ending, Some(parts))
         }
         Ok(Err(Unsolved::Mesh(cause))) => (internal(job, &cause), None),

@@ -136,6 +136,8 @@ fn taken_and_told(problem: &Value) -> (u64, u64) {
 /// An estimate is not below what a problem takes, and not three times as much.
 fn compare(problems: Vec<(String, Value)>) {
     let mut wrong = vec![];
+    // the first one also makes what all share for the life of the process
+    taken_and_told(&problems[0].1);
     for (name, problem) in problems {
         let (taken, told) = taken_and_told(&problem);
         let ratio = told as f64 / taken as f64;
