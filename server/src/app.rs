@@ -56,6 +56,7 @@ impl App {
                 "{orphans} pieces of meshes from interrupted uploads were removed"
             );
         }
+        store.set_budget(config.memory.bytes());
         let queue = Queue::new(store.clone(), solver::solve_on, config.workers);
         let service = Arc::new(Service::new(config, store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;

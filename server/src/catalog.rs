@@ -198,7 +198,7 @@ catalog! {
     FalseConvergence: of_job("The iteration settled in a state that is not a solution",
         "The method's own test was met, but the true residual is above the tolerance or the forces do not balance: the state is not a solution. Use algorithm auto, and check the supports if the forces do not balance."),
     SingularSystem: of_job("The stiffness matrix is singular",
-        "The body can move without resistance because its supports and contacts do not hold it (`detail` then names the motion and a node), or the matrix is singular to working precision (`detail` then names a pivot)."),
+        "The body can move without resistance because its supports and contacts do not hold it (`detail` then names the motion and a node), or the matrix is singular to working precision (`detail` then names a node and a direction)."),
     NonFinite: of_job("A number is not finite",
         "A NaN or an infinity arose during the solution; the numbers of the problem are too large or too small compared with each other."),
     TimedOut: of_job("The job exceeded its time limit",

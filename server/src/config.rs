@@ -74,10 +74,11 @@ pub struct Config {
     pub grace_s: u64,
 }
 
-/// The memory that one problem may need.
+/// The memory that running jobs share.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct MemoryBudget {
-    /// Maximum memory of one problem, by an estimate made before it is meshed
+    /// Memory that running jobs share: a job is refused if it is estimated to need more, waits until its estimate fits
+    /// beside those of the running jobs, and is ended if it uses twice its estimate, or 64 MiB beyond it if that is more
     /// [default: half of the machine's memory]
     #[arg(long, env = "SIGNORINI_MEMORY_BUDGET_BYTES", value_name = "BYTES")]
     memory_budget_bytes: Option<u64>,

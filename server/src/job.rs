@@ -390,6 +390,8 @@ pub struct QueuePosition {
 pub enum Waiting {
     /// All workers are busy.
     WorkersBusy,
+    /// A worker is idle, but the running jobs leave too little of the memory budget for the next job.
+    Memory,
     /// The queue is paused.
     Paused,
     /// It is coalesced into a job with the same input that waits or runs, and will end with its result.

@@ -6,6 +6,7 @@ pub mod caller;
 pub mod catalog;
 pub mod event;
 pub mod job;
+pub mod memory;
 pub mod mesh;
 pub mod time;
 
@@ -56,6 +57,11 @@ pub mod pb {
 
 #[cfg(test)]
 mod fake;
+
+/// As in the program: tests see what a job holds.
+#[cfg(test)]
+#[global_allocator]
+static ALLOCATOR: allocator::Counting = allocator::Counting;
 
 #[cfg(test)]
 mod tests {

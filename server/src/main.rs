@@ -2,6 +2,10 @@
 
 use std::process::ExitCode;
 
+/// Counts what each job holds (`service::memory`).
+#[global_allocator]
+static ALLOCATOR: allocator::Counting = allocator::Counting;
+
 fn main() -> ExitCode {
     service::cli::main()
 }

@@ -4,11 +4,9 @@
 //! contact and friction iteration runs on it; [`ElasticBody::displacements`] computes
 //! the whole field by one back-substitution. The factor is private to this module.
 
-use std::ops::ControlFlow;
-
 use crate::elasticity::{self, Dof, DofMap};
 use crate::error::SolveError;
-use crate::linear::{Dense, Factor, FactorError, Graph, Ordering, SparseSymmetric};
+use crate::linear::{Breaks, Dense, Factor, FactorError, Graph, Ordering, SparseSymmetric};
 use crate::model::{Held, Level, Model};
 use crate::solution::{Observer, Phase, Progress};
 
@@ -39,11 +37,7 @@ pub struct ElasticBody {
 impl ElasticBody {
     /// Assembles, factors and condenses, and reports each phase to the observer.
     pub fn new(model: &Model, observe: &mut Observer<'_>) -> Result<Self, SolveError> {
-        let mut phase = |phase| match observe(Progress::Phase(phase)) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(SolveError::Stopped),
-        };
-        phase(Phase::Assemble)?;
+        notify(observe, Progress::Phase(Phase::Assemble))?;
         let (map, interior) = number(model);
         let graph = Graph::from_cliques(
             model.mesh.nodes.len(),
@@ -75,16 +69,28 @@ impl ElasticBody {
             matrix.add(i, i, spring);
         }
 
-        phase(Phase::Order)?;
+        notify(observe, Progress::Phase(Phase::Order))?;
         let contact_unknowns = map.unknowns - interior;
-        let order = elimination_order(model, &map, interior)?;
-        let ordering = Ordering::new(&matrix, &order, contact_unknowns)?;
+        let ordering = elimination_order(model, &map, interior)
+            .and_then(|order| Ordering::new(&matrix, &order, contact_unknowns))
+            .map_err(|error| solve_error(error, &map))?;
 
-        phase(Phase::Factor)?;
-        let factor = Factor::new(&matrix, ordering)?;
+        notify(observe, Progress::Phase(Phase::Factor))?;
+        let bytes = ordering.bytes();
+        notify(observe, Progress::Needs { bytes })?;
+        let factor = Factor::new(
+            &matrix,
+            ordering,
+            &mut Breaks::new(&mut || observe(Progress::Pulse)),
+        );
+        let factor = factor.map_err(|error| solve_error(error, &map))?;
 
-        phase(Phase::Condense)?;
-        let mut stiffness = factor.trailing_schur_complement();
+        notify(observe, Progress::Phase(Phase::Condense))?;
+        let bytes = Dense::bytes(contact_unknowns);
+        notify(observe, Progress::Needs { bytes })?;
+        let stiffness =
+            factor.trailing_schur_complement(&mut Breaks::new(&mut || observe(Progress::Pulse)));
+        let mut stiffness = stiffness.map_err(|error| solve_error(error, &map))?;
         // f̂ = Ŝ u_c with u_c of the whole system, springs included, under the loads alone
         let condensed = |forces: &Vec<f64>| {
             if forces.iter().all(|f| *f == 0.0) {
@@ -299,11 +305,20 @@ fn on_unknowns(map: &DofMap, forces: &[[f64; 2]]) -> Vec<f64> {
     on_unknowns
 }
 
-impl From<FactorError> for SolveError {
-    fn from(error: FactorError) -> Self {
-        match error {
-            FactorError::NotPositiveDefinite { pivot } => SolveError::SingularSystem { pivot },
-            FactorError::TooLarge => SolveError::ResourceExhausted,
+fn solve_error(error: FactorError, map: &DofMap) -> SolveError {
+    match error {
+        FactorError::NotPositiveDefinite { unknown } => {
+            let (node, direction) = map.place_of(unknown);
+            SolveError::SingularSystem { node, direction }
         }
+        FactorError::TooLarge { bytes } => SolveError::ResourceExhausted { bytes },
+        FactorError::Stopped => SolveError::Stopped,
+    }
+}
+
+fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
+    match observe(progress).is_break() {
+        true => Err(SolveError::Stopped),
+        false => Ok(()),
     }
 }

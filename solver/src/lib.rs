@@ -123,12 +123,22 @@ impl Prepared {
     }
 }
 
-/// Checks a problem without solving it: its warnings, or all its violations.
-pub fn check(
-    problem: &Problem,
-    external: Option<External>,
-) -> Result<Vec<Warning>, Vec<Violation>> {
-    Model::new(problem, external).map(|model| model.warnings)
+/// What is known of a valid problem without solving it.
+#[derive(Clone, Debug)]
+pub struct Checked {
+    /// Its warnings.
+    pub warnings: Vec<Warning>,
+    /// What it will take to solve it.
+    pub estimate: Estimate,
+}
+
+/// Checks a problem without solving it: its warnings and its cost, or all its violations.
+pub fn check(problem: &Problem, external: Option<External>) -> Result<Checked, Vec<Violation>> {
+    let model = Model::new(problem, external)?;
+    Ok(Checked {
+        estimate: model.estimate(problem),
+        warnings: model.warnings,
+    })
 }
 
 fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
@@ -142,6 +152,90 @@ pub use model::estimate::{Estimate, MeshSize, estimate};
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use solution::Outcome;
+
+    /// A strip one element wide that touches with its long side: most of the work is dense.
+    fn wall(lines: u32, algorithm: &str) -> Problem {
+        let y: Vec<u32> = (0..lines).collect();
+        let problem = serde_json::json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": [0, 1], "y": y}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
+            "contacts": [{
+                "boundary": "right",
+                "obstacle": {"kind": "flat", "from": 0, "to": lines - 1},
+                "indentation": 0.01,
+                "friction": {"coefficient": 0.3, "nonlocal_radius": 2, "elastic_slip": 1e-4}
+            }],
+            "solver": {"algorithm": algorithm, "check_uniqueness": true, "check_increments": true}
+        });
+        serde_json::from_value(problem).unwrap()
+    }
+
+    /// Wherever it is told to stop, it does so: it begins nothing large, and asks only a few times more.
+    #[test]
+    fn a_solution_stops_at_any_question() {
+        for algorithm in ["auto", "fixed_point", "newton", "thesis"] {
+            let problem = wall(120, algorithm);
+            let mut questions = 0;
+            let whole = solve(&problem, &mut |_| {
+                questions += 1;
+                ControlFlow::Continue(())
+            });
+            assert!(whole.is_ok() && questions > 100, "{algorithm}: {questions}");
+            for stop_at in (0..questions).step_by(1 + questions / 60) {
+                let (mut asked, mut after) = (0, 0);
+                let mut steps_after = 0;
+                let stopped = solve(&problem, &mut |progress| {
+                    asked += 1;
+                    if asked <= stop_at {
+                        return ControlFlow::Continue(());
+                    }
+                    after += 1;
+                    steps_after += u32::from(matches!(progress, Progress::Iteration(_)));
+                    ControlFlow::Break(())
+                });
+                assert!(
+                    after <= 60,
+                    "{algorithm}: {after} questions after {stop_at}"
+                );
+                assert!(steps_after <= 3, "{algorithm}: {steps_after} iterations");
+                match stopped {
+                    Err(error) => assert_eq!(error, SolveError::Stopped),
+                    // a stop during the comparisons at the end leaves the solution
+                    Ok(solution) => assert!(matches!(
+                        solution.summary.outcome,
+                        Outcome::Canceled
+                            | Outcome::Converged
+                            | Outcome::FalseConvergence
+                            | Outcome::ContactCycling
+                            | Outcome::NotConverged
+                    )),
+                }
+            }
+        }
+    }
+
+    /// What it announces before it takes it: the factor, then Ŝ, then the matrices of the iterations.
+    #[test]
+    fn large_matrices_are_announced() {
+        let mut needs = Vec::new();
+        let solution = solve(&wall(120, "auto"), &mut |progress| {
+            if let Progress::Needs { bytes } = progress {
+                needs.push(bytes);
+            }
+            ControlFlow::Continue(())
+        });
+        let m = solution.unwrap().summary.contact_dofs;
+        assert!(needs[0] > 8 * m * m && needs[1] == 8 * m * m, "{needs:?}");
+        assert!(needs.len() > 4 && needs[2..].iter().all(|bytes| *bytes <= 8 * m * m));
+    }
+
     #[test]
     #[should_panic(expected = "attempt to add with overflow")]
     fn an_overflow_is_a_panic_in_the_profile_that_ships() {

@@ -26,7 +26,7 @@ pub fn run(
     } else {
         &model.steps
     };
-    let mut load_history = LoadHistory::new(model, body);
+    let mut load_history = LoadHistory::new(model, System::new(model, body, observe)?);
     let mut so_far: Option<Solution> = None;
     let mut fields = Fields::default();
     for (number, step) in steps.iter().enumerate() {
@@ -79,7 +79,7 @@ pub fn run(
     };
     if model.controls.check_increments && solution.summary.converged {
         let summary = &mut solution.summary;
-        let second = doubled(model, body, steps, summary, observe);
+        let second = doubled(model, load_history.system, steps, summary, observe);
         algorithm::note_doubled_increments(summary, second);
     }
     if model.steps.is_empty() {
@@ -92,13 +92,14 @@ pub fn run(
 /// The forces after twice the increments, without reporting to the observer.
 fn doubled(
     model: &Model,
-    body: &ElasticBody,
+    mut system: System<'_>,
     steps: &[Step],
     solution: &Summary,
     observe: &mut Observer<'_>,
 ) -> Comparison {
     let quiet: &mut Observer<'_> = &mut algorithm::quiet(observe);
-    let mut load_history = LoadHistory::new(model, body);
+    system.restart();
+    let mut load_history = LoadHistory::new(model, system);
     let mut last = None;
     for (number, step) in steps.iter().enumerate() {
         let (finished, _) = load_history.step(number as u32, step, 2, quiet);
@@ -135,10 +136,10 @@ struct LoadHistory<'a> {
 }
 
 impl<'a> LoadHistory<'a> {
-    fn new(model: &'a Model, body: &'a ElasticBody) -> Self {
+    fn new(model: &'a Model, system: System<'a>) -> Self {
         LoadHistory {
             model,
-            system: System::new(model, body),
+            system,
             last: None,
             level: Level::ZERO,
             anchors_moved: true,

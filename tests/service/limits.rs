@@ -107,19 +107,21 @@ async fn a_problem_over_the_memory_budget_is_refused_with_the_estimate() {
     let violation = &judgement["violations"][0];
     assert_eq!(
         (&violation["pointer"], &violation["reason"]),
-        (&json!("/problem/mesh"), &json!("too_large"))
+        (&json!("/problem/mesh/refine"), &json!("too_large"))
     );
     assert_eq!(judgement["estimate"], document["estimate"]);
-    // a size beyond all integers is refused as quickly
+    // a size beyond all integers is refused as quickly, with the place of the number
     let mut hopeless = example_json("sheet");
     hopeless["mesh"]["refine"] = json!(4_000_000_000u32);
-    let response = server
-        .post("/v1/jobs")
-        .json(&json!({ "problem": hopeless }))
-        .send()
-        .await
-        .unwrap();
-    assert_eq!(response.status(), StatusCode::PAYLOAD_TOO_LARGE);
+    let body = json!({ "problem": hopeless });
+    let (status, document) = answer(server.post("/v1/jobs").json(&body)).await;
+    assert_eq!(
+        (status, &document["violations"][0]["pointer"]),
+        (
+            StatusCode::UNPROCESSABLE_ENTITY,
+            &json!("/problem/mesh/refine")
+        )
+    );
 }
 
 /// Operations: CreateJob

@@ -24,7 +24,7 @@ const EXAMPLES: [&str; 5] = [
 fn with_solved(name: &str, check: impl FnOnce(&Model, &ElasticBody, &System<'_>, &Finished)) {
     let model = Model::new(&example(name), None).unwrap();
     let body = ElasticBody::new(&model, &mut quiet).unwrap();
-    let system = System::new(&model, &body);
+    let system = System::new(&model, &body, &mut quiet).unwrap();
     let finished = run(&system, &model.controls, Place::default(), None, &mut quiet);
     check(&model, &body, &system, &finished);
 }
@@ -276,7 +276,7 @@ fn a_solution_restarted_from_itself_does_not_change() {
             &finished.bound,
             &finished.state,
             1e-12,
-            &mut || ControlFlow::Continue(()),
+            &mut |_| ControlFlow::Continue(()),
         );
         let State { v, active } = &again.state;
         assert_eq!(active, &finished.state.active);
@@ -290,7 +290,7 @@ fn a_solution_restarted_from_itself_does_not_change() {
             &finished.bound,
             &system.rest(),
             1e-12,
-            &mut || ControlFlow::Continue(()),
+            &mut |_| ControlFlow::Continue(()),
         );
         assert!(
             from_rest

@@ -238,6 +238,7 @@ fn an_obstacle_that_covers_no_edge_is_refused_and_one_that_cuts_an_edge_gives_a_
     p.contacts[0].obstacle = obstacle(r#"{"kind": "flat", "from": 0, "to": 0.55}"#);
     let codes: Vec<_> = solver::check(&p, None)
         .unwrap()
+        .warnings
         .into_iter()
         .map(|w| w.code)
         .collect();
@@ -254,7 +255,7 @@ fn a_contact_with_a_corner_gives_a_warning() {
         (None, Some(vec![[0.0, 1.0], [2.0, 0.4], [5.0, 1.0]]));
     p.contacts[0].obstacle =
         serde_json::from_str(r#"{"kind": "flat", "from": 0.5, "to": 4}"#).unwrap();
-    let warnings = solver::check(&p, None).unwrap();
+    let warnings = solver::check(&p, None).unwrap().warnings;
     let turn = warnings
         .iter()
         .find(|w| w.code == WarningCode::ContactTurns)
@@ -263,6 +264,7 @@ fn a_contact_with_a_corner_gives_a_warning() {
     assert!(
         solver::check(&example("sheet"), None)
             .unwrap()
+            .warnings
             .iter()
             .all(|w| w.code != WarningCode::ContactTurns)
     );

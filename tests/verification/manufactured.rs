@@ -20,7 +20,7 @@
 
 use solver::elasticity::{Dof, DofMap, Section, assemble_stiffness, isotropic};
 use solver::element::{Element, Family, GaussPoint, Mapped, gauss};
-use solver::linear::{Factor, Graph, Ordering};
+use solver::linear::{Breaks, Factor, Graph, Ordering};
 use solver::mesh::{Mesh, grid_mesh, refine};
 use solver::problem::{Analysis, Grid};
 
@@ -219,7 +219,9 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, exact: Exact) -> [f64; 2
     let unknowns = Graph::from_cliques(map.unknowns, cliques.iter().map(|c| &c[..]));
     let order = Ordering::minimum_degree(&unknowns).unwrap();
     let ordering = Ordering::new(&matrix, &order, 0).unwrap();
-    Factor::new(&matrix, ordering).unwrap().solve(&mut load);
+    let go_on = &mut || std::ops::ControlFlow::Continue(());
+    let factor = Factor::new(&matrix, ordering, &mut Breaks::new(go_on));
+    factor.unwrap().solve(&mut load);
     let u = map.displacements(&load, 1.0);
     let (mut off, mut size) = ([0.0; 2], [0.0; 2]);
     at_points(&mut |element, m, place, weight| {

@@ -75,7 +75,11 @@ pub(super) fn run(
             return Ok(Exit::Invalid);
         }
     };
-    let (estimate, budget_bytes) = (solver::estimate(&problem, None), memory.bytes());
+    let budget_bytes = memory.bytes();
+    let estimate = match solver::estimate(&problem, None) {
+        Ok(estimate) => estimate,
+        Err(violation) => return Ok(invalid(file, &[violation])),
+    };
     if estimate.memory_bytes > budget_bytes {
         let too_large = ApiError::ProblemTooLarge {
             estimate,
@@ -95,7 +99,8 @@ pub(super) fn run(
                 eprintln!("warning: {}: {}", warning.pointer, warning.message)
             }
             // Ctrl-C ends the process
-            Update::Step(_) | Update::Pulse => {}
+            Update::Step(_) | Update::Pulse | Update::Needs { .. } | Update::OutOfMemory { .. } => {
+            }
         }
         ControlFlow::Continue(())
     });

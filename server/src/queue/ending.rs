@@ -7,8 +7,11 @@ use tokio::task::JoinError;
 use tracing::{error, info};
 use uuid::Uuid;
 
+use super::running::StopReason;
 use crate::{
+    error::size,
     job::{Failure, Job, Reason, ResultAvailable, Status},
+    memory::Outgrown,
     run::Document,
     store::{Ending, Parts},
 };
@@ -75,7 +78,7 @@ pub(super) fn ending_of_solution(document: &Document) -> Ending {
 pub(super) fn ending_of_attempt(
     job: &Job,
     solved: Result<Result<Solved, Unsolved>, JoinError>,
-    out_of_time: bool,
+    stopped: Option<StopReason>,
 ) -> (Ending, Option<Parts>) {
     match solved {
         Ok(Ok(Solved {
@@ -84,36 +87,69 @@ pub(super) fn ending_of_attempt(
             parts,
         })) => {
             let ending = match ending.status {
-                // the solver was asked to stop, and does not know why
-                Status::Canceled if out_of_time => Ending {
+                Status::Canceled => Ending {
                     result: ending.result,
-                    ..timed_out(job)
+                    ..stopped_for(job, stopped)
                 },
                 _ => ending,
             };
             let status = ending.status;
-            info!(job.id = %job.id, %status, iterations, "job {} solved: {status} after {iterations} iterations", job.id);
+            let reason = ending.reason.map(<&str>::from);
+            info!(job.id = %job.id, %status, reason, iterations, "job {} solved: {status} after {iterations} iterations", job.id);
             (ending, Some(parts))
         }
         Ok(Err(Unsolved::Mesh(cause))) => (internal(job, &cause), None),
-        Ok(Err(Unsolved::Solve(error))) => (ending_of_error(job, &error, out_of_time), None),
+        Ok(Err(Unsolved::Solve(error))) => {
+            let ending = ending_of_error(job, &error, stopped);
+            if let (Some(reason), Some(failure)) = (ending.reason, &ending.failure) {
+                let (reason, detail) = (<&str>::from(reason), &failure.detail);
+                info!(job.id = %job.id, reason, "job {} ended without a result: {reason}: {detail}", job.id);
+            }
+            (ending, None)
+        }
         Err(panic) => (internal(job, &panicked(panic)), None),
     }
 }
 
-fn ending_of_error(job: &Job, error: &SolveError, out_of_time: bool) -> Ending {
+fn ending_of_error(job: &Job, error: &SolveError, stopped: Option<StopReason>) -> Ending {
     let failed = |reason| Ending::failed(reason, error.to_string());
     match error {
-        SolveError::Stopped if out_of_time => timed_out(job),
-        SolveError::Stopped => Ending::canceled(),
+        SolveError::Stopped => stopped_for(job, stopped),
         SolveError::SingularSystem { .. } | SolveError::Unheld { .. } => {
             failed(Reason::SingularSystem)
         }
         SolveError::NonFinite { .. } => failed(Reason::NonFinite),
-        SolveError::ResourceExhausted => failed(Reason::ResourceExhausted),
+        SolveError::ResourceExhausted { .. } => failed(Reason::ResourceExhausted),
         // it was checked before it was accepted: an error of the service, not of the client
         SolveError::Invalid(_) => internal(job, error),
     }
+}
+
+/// The end of a job whose solver was asked to stop, and does not know why.
+fn stopped_for(job: &Job, reason: Option<StopReason>) -> Ending {
+    match reason {
+        Some(StopReason::OutOfTime) => timed_out(job),
+        Some(StopReason::OutOfMemory(outgrown)) => out_of_memory(&outgrown),
+        Some(StopReason::Unwanted) | None => Ending::canceled(),
+    }
+}
+
+/// Failed since it needs more memory than its share, without a result.
+fn out_of_memory(
+    Outgrown {
+        used,
+        needed,
+        share,
+    }: &Outgrown,
+) -> Ending {
+    let detail = format!(
+        "it used {} and needed {} more, of a share of {}: use a coarser mesh, above all along the contacts, or \
+         fewer load steps",
+        size(*used),
+        size(*needed),
+        size(*share)
+    );
+    Ending::failed(Reason::ResourceExhausted, detail)
 }
 
 /// Failed at its time limit, without a result.

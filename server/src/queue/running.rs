@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
+use crate::memory::Outgrown;
+
 /// The handle on a running solver.
 #[derive(Clone, Debug)]
 pub(super) struct Running {
@@ -23,6 +25,8 @@ impl Running {
 pub(super) enum StopReason {
     /// The job has reached its time limit.
     OutOfTime,
+    /// It needs more memory than its share.
+    OutOfMemory(Outgrown),
     /// Its result is not needed: the job was canceled or requeued.
     Unwanted,
 }

@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     event::Payload,
+    memory::{Meter, Outgrown},
     run::{self, PartialSolution, Update},
     store::{Parts, Store},
     time::Time,
@@ -30,14 +31,25 @@ pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Mesh, Unsolved> {
     postcard::from_bytes(&body).map_err(|error| failed(&error))
 }
 
-/// Reads the problem and solves it. `report` is called with every report to record, and with `None` if the solver
-/// only asks whether to continue. On a blocking thread.
+/// What a solver tells while it is at work; the answer is whether it is to continue.
+pub(super) enum Told {
+    /// To record.
+    Report(Report),
+    /// It needs more memory than its share.
+    OutOfMemory(Outgrown),
+    /// It only asks.
+    Nothing,
+}
+
+/// Reads the problem and solves it, within a share of memory (bytes). On a blocking thread.
 pub(super) fn solve_and_report(
     problem: &str,
     mesh: Option<Mesh>,
     solve: Solve,
-    mut report: impl FnMut(Option<Report>) -> ControlFlow<()>,
+    share: u64,
+    mut tell: impl FnMut(Told) -> ControlFlow<()>,
 ) -> Result<Solved, SolveError> {
+    let mut meter = Meter::new(share);
     let start = Instant::now();
     let problem: Problem = files::parse(problem).map_err(SolveError::Invalid)?;
     let parse_s = start.elapsed().as_secs_f64();
@@ -47,19 +59,40 @@ pub(super) fn solve_and_report(
         && matches!(problem.mesh.refine, Refine::Times(_))
     {
         // the next report asks again whether to stop
-        let _ = report(Some(Report::OneLevel));
+        let _ = tell(Told::Report(Report::OneLevel));
     }
     let event = |payload| Some(Report::Event(Time::now(), payload));
     let mut partials = Partials::default();
     let solve =
         |observe: &mut Observer<'_>| solve(&problem, files::external_mesh(&problem, mesh), observe);
     let document = run::run(&problem, parse_s, solve, &mut |update| {
-        report(match update {
-            Update::Phase(stage) => event(Payload::Stage { stage }),
-            Update::Iteration(row) => event(Payload::Iteration(row)),
-            Update::Warning(warning) => event(Payload::Warning(warning.clone())),
-            Update::Step(partial) => partials.next(&partial),
-            Update::Pulse => None,
+        let mut needed = 0;
+        // what is reported belongs to the recorder then, whose thread frees it
+        let told = meter.hand_over(|| {
+            let report = match update {
+                Update::Phase(stage) => event(Payload::Stage { stage }),
+                Update::Iteration(row) => event(Payload::Iteration(row)),
+                Update::Warning(warning) => event(Payload::Warning(warning.clone())),
+                Update::Step(partial) => partials.next(&partial),
+                Update::Pulse => None,
+                Update::Needs { bytes } => {
+                    needed = bytes;
+                    None
+                }
+                Update::OutOfMemory { bytes } => {
+                    // the machine has less than the share: more than it is needed, whatever is used
+                    needed = bytes.max(share);
+                    None
+                }
+            };
+            report.map_or(ControlFlow::Continue(()), |report| {
+                tell(Told::Report(report))
+            })
+        });
+        told?;
+        tell(match meter.check(needed) {
+            ControlFlow::Break(outgrown) => Told::OutOfMemory(outgrown),
+            ControlFlow::Continue(()) => Told::Nothing,
         })
     })?;
     let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite {

@@ -10,7 +10,7 @@ use super::{
     ending::{Unsolved, ending_of_attempt, timed_out},
     recorder,
     running::{Running, StopReason},
-    solving::{solve_and_report, stored_mesh},
+    solving::{Told, solve_and_report, stored_mesh},
     state::Queue,
 };
 use crate::{
@@ -27,19 +27,29 @@ const TIMEOUT_GRACE: Duration = Duration::from_secs(2);
 /// One attempt to solve a job, from claim to end.
 pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Running) {
     let Claim {
-        job, problem, mesh, ..
+        job,
+        problem,
+        mesh,
+        memory,
     } = claim;
     info!(job.id = %job.id, job.attempt, "job {} started", job.id);
     let (sender, reports) = mpsc::channel(MOST_UNRECORDED);
-    let stop = running.stop.clone();
-    let solve = queue.solve;
+    let stop = running.clone();
+    let (solve, share) = (queue.solve, memory.share());
     let store = queue.store.clone();
     let solving = tokio::task::spawn_blocking(move || {
         let mesh = mesh.map(|hash| stored_mesh(&store, &hash)).transpose()?;
-        solve_and_report(&problem, mesh, solve, |report| {
+        solve_and_report(&problem, mesh, solve, share, |told| {
             // an error means that the recorder has ended: the result is not needed
-            let recording = report.is_none_or(|report| sender.blocking_send(report).is_ok());
-            if recording && stop.get().is_none() {
+            let recording = match told {
+                Told::Report(report) => sender.blocking_send(report).is_ok(),
+                Told::OutOfMemory(outgrown) => {
+                    stop.stop(StopReason::OutOfMemory(outgrown));
+                    true
+                }
+                Told::Nothing => true,
+            };
+            if recording && stop.stop.get().is_none() {
                 ControlFlow::Continue(())
             } else {
                 ControlFlow::Break(())
@@ -51,11 +61,9 @@ pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Runni
     let last = recorder::record(queue, &job, &running, reports).await;
     let solved = solving.await;
     timer.abort();
-    let (ending, parts) = ending_of_attempt(
-        &job,
-        solved,
-        running.stop.get() == Some(&StopReason::OutOfTime),
-    );
+    // the solver has returned: another job may have its memory
+    drop(memory);
+    let (ending, parts) = ending_of_attempt(&job, solved, running.stop.get().copied());
     // when the service stops, it is requeued then or at the next start, and not canceled
     if !(ending.status == Status::Canceled && queue.stopping.is_cancelled()) {
         end_with_retries(queue, &job, ending, last, parts).await;
@@ -71,8 +79,15 @@ async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
     // in its own task: a solver that returns now stops this timer, but not a commit that has begun
     tokio::spawn(async move {
         let ending = timed_out(&job);
-        if let Err(cause) = queue.end_attempt(job.key, running.attempt, &ending).await {
-            error!(job.id = %job.id, %cause, "job {} could not be ended: {cause}", job.id);
+        match queue.end_attempt(job.key, running.attempt, &ending).await {
+            Ok(true) => warn!(
+                job.id = %job.id,
+                "job {} was ended at its time limit, and its solver has not stopped yet", job.id
+            ),
+            Ok(false) => {}
+            Err(cause) => {
+                error!(job.id = %job.id, %cause, "job {} could not be ended: {cause}", job.id);
+            }
         }
     });
 }

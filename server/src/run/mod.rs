@@ -31,6 +31,16 @@ pub enum Update<'a> {
     Step(PartialSolution<'a>),
     /// Nothing new: the solver is at work, and asks whether to go on.
     Pulse,
+    /// The solver is about to take more memory, and asks whether it may.
+    Needs {
+        /// Bytes.
+        bytes: u64,
+    },
+    /// There was not so much memory.
+    OutOfMemory {
+        /// Bytes that the solver needed.
+        bytes: u64,
+    },
 }
 
 /// The solution at the end of a load step that is not the last.
@@ -88,6 +98,8 @@ pub fn run(
                 times: watch.times(),
             }),
             Progress::Pulse => Update::Pulse,
+            Progress::Needs { bytes } => Update::Needs { bytes },
+            Progress::OutOfMemory { bytes } => Update::OutOfMemory { bytes },
         };
         match non_finite {
             true => ControlFlow::Break(()),

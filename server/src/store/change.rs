@@ -1,7 +1,7 @@
 //! One transaction of the single writer, and its effects once it is committed: changes to the waiting jobs that are
 //! kept in memory, and jobs whose watchers are to be notified.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, sync::Arc};
 
 use sqlx::SqliteConnection;
 use tokio::sync::MutexGuard;
@@ -13,7 +13,7 @@ use super::{
     rows,
     waiting::Move,
 };
-use crate::{job::Job, time::Time};
+use crate::{job::Job, memory::Budget, time::Time};
 
 /// An open transaction.
 pub(super) struct Change<'a> {
@@ -61,6 +61,11 @@ impl Change<'_> {
     /// The connection, for statements.
     pub(super) fn sql(&mut self) -> &mut SqliteConnection {
         &mut self.tx
+    }
+
+    /// The memory that running jobs share.
+    pub(super) fn budget(&self) -> &Arc<Budget> {
+        self.store.budget()
     }
 
     /// Changes the waiting jobs in memory, once this is committed.

@@ -50,7 +50,9 @@ async fn next(change: &mut Change<'_>) -> Result<Option<Job>> {
     }
 }
 
-/// Claims within a transaction.
+/// Claims within a transaction. The next job waits until it fits into the memory budget, and those after it wait with
+/// it, also if they would fit: the order is strict, so that no large job is overtaken for ever. Running jobs end within
+/// their time limits, and each of them alone fits.
 pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
     /// With more jobs than this, one transaction would take too long.
     const MOST_ANSWERED: usize = 100;
@@ -72,9 +74,19 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
             continue;
         }
         let stored = problems::read(change.sql(), &waiting).await;
+        let needed = match &stored {
+            Ok(stored) => stored.memory_bytes,
+            // it is not going to be solved
+            Err(StoreError::Damaged(_)) => Some(0),
+            Err(_) => None,
+        };
+        // given back if this transaction is rolled back
+        let Some(memory) = change.budget().reserve(needed) else {
+            return Ok(None);
+        };
         let job = lifecycle::start_attempt(change, &waiting).await?;
         let (problem, mesh) = match stored {
-            Ok(stored) => stored,
+            Ok(stored) => (stored.body, stored.mesh),
             // it fails alone, and does not stop the queue
             Err(StoreError::Damaged(damage)) => {
                 end::end(change, &job, &Ending::damaged(&damage)).await?;
@@ -82,7 +94,12 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
             }
             Err(error) => return Err(error),
         };
-        return Ok(Some(Claim { job, problem, mesh }));
+        return Ok(Some(Claim {
+            job,
+            problem,
+            mesh,
+            memory,
+        }));
     }
     Ok(None)
 }

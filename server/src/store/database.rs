@@ -5,7 +5,7 @@ use std::{
     ops::{Deref, DerefMut},
     path::Path,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, MutexGuard, OnceLock, PoisonError,
         atomic::{AtomicBool, AtomicI64},
     },
     time::Duration,
@@ -28,6 +28,7 @@ use super::{
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
+use crate::memory::Budget;
 
 /// How long a list waits for a connection.
 const LIST_PATIENCE: Duration = Duration::from_secs(5);
@@ -43,6 +44,8 @@ pub struct Store {
     pub(super) waiting: Mutex<WaitingJobs>,
     /// Whether the queue is paused, as it is on the disk after every commit.
     pub(super) paused: AtomicBool,
+    /// The memory that running jobs share; without limit until it is set.
+    pub(super) budget: OnceLock<Arc<Budget>>,
     /// One transaction at a time changes the jobs that wait.
     pub(super) change_lock: tokio::sync::Mutex<()>,
     /// Where submissions wait for the next commit.
@@ -147,6 +150,7 @@ impl Store {
             lists,
             waiting: Mutex::default(),
             paused: AtomicBool::default(),
+            budget: OnceLock::new(),
             change_lock: tokio::sync::Mutex::default(),
             inbox,
             cancels: Mutex::default(),

@@ -36,7 +36,7 @@ impl Store {
             };
             let title = sqlx::query_scalar("select title from job where id = ?");
             let title = title.bind(key).fetch_one(&mut *tx).await?;
-            let (body, _) = problems::read(&mut tx, &job).await?;
+            let body = problems::read(&mut tx, &job).await?.body;
             Ok(Some((title, body)))
         };
         self.damages.noting(read).await

@@ -60,6 +60,7 @@ impl Store {
             let Some(primary) = job.coalesced_into else {
                 let reason = match self.is_paused() {
                     true => Waiting::Paused,
+                    false if self.budget().is_short() => Waiting::Memory,
                     false => Waiting::WorkersBusy,
                 };
                 // none if it has been started since it was read

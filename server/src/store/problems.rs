@@ -9,37 +9,65 @@ use super::{
 };
 use crate::job::Job;
 
+/// A stored problem.
+pub(super) struct StoredProblem {
+    /// JSON, without its title.
+    pub(super) body: String,
+    /// The stored mesh that it names.
+    pub(super) mesh: Option<String>,
+    /// What it is estimated to need; unknown for those of earlier versions.
+    pub(super) memory_bytes: Option<u64>,
+}
+
 /// Writes the problem of a job, unless it is there already. One that is damaged is mended so.
 pub(super) async fn write(tx: &mut SqliteConnection, new: &NewJob) -> Result<()> {
-    let checksum = checksum(&new.input_hash, &new.problem, new.mesh.as_deref());
+    let memory_bytes = i64::try_from(new.memory_bytes).unwrap_or(i64::MAX);
+    let checksum = checksum(
+        &new.input_hash,
+        &new.problem,
+        new.mesh.as_deref(),
+        Some(memory_bytes),
+    );
     sqlx::query(
-        "insert into problem (input_hash, body, mesh, checksum) values (?, ?, ?, ?)
-         on conflict do update set body = excluded.body, mesh = excluded.mesh, checksum = excluded.checksum
+        "insert into problem (input_hash, body, mesh, memory_bytes, checksum) values (?, ?, ?, ?, ?)
+         on conflict do update set body = excluded.body, mesh = excluded.mesh, memory_bytes = excluded.memory_bytes,
+                                   checksum = excluded.checksum
          where checksum is not excluded.checksum or body <> excluded.body",
     )
     .bind(&new.input_hash)
     .bind(&new.problem)
     .bind(&new.mesh)
+    .bind(memory_bytes)
     .bind(checksum.stored())
     .execute(tx)
     .await?;
     Ok(())
 }
 
-/// The problem of a job as JSON, without its title, and the stored mesh that it names.
-pub(super) async fn read(tx: &mut SqliteConnection, job: &Job) -> Result<(String, Option<String>)> {
+/// The problem of a job.
+pub(super) async fn read(tx: &mut SqliteConnection, job: &Job) -> Result<StoredProblem> {
     let part = || Part::of_job(job.key, "problem");
-    let found = sqlx::query_as("select body, mesh, checksum from problem where input_hash = ?")
-        .bind(&job.input_hash)
-        .fetch_optional(tx)
-        .await;
-    let found: Option<(String, Option<String>, Option<i64>)> =
+    let found = sqlx::query_as(
+        "select body, mesh, memory_bytes, checksum from problem where input_hash = ?",
+    )
+    .bind(&job.input_hash)
+    .fetch_optional(tx)
+    .await;
+    let found: Option<(String, Option<String>, Option<i64>, Option<i64>)> =
         found.map_err(|error| crate::store::StoreError::from(error).reading(part))?;
-    let (body, mesh, stored) = found.ok_or_else(|| part().damaged("it is missing"))?;
-    checksum(&job.input_hash, &body, mesh.as_deref()).verify(stored, part)?;
-    Ok((body, mesh))
+    let (body, mesh, memory, stored) = found.ok_or_else(|| part().damaged("it is missing"))?;
+    checksum(&job.input_hash, &body, mesh.as_deref(), memory).verify(stored, part)?;
+    Ok(StoredProblem {
+        body,
+        mesh,
+        memory_bytes: memory.and_then(|bytes| u64::try_from(bytes).ok()),
+    })
 }
 
-fn checksum(input_hash: &str, body: &str, mesh: Option<&str>) -> Checksum {
-    Checksum::new().text(input_hash).text(body).optional(mesh)
+fn checksum(input_hash: &str, body: &str, mesh: Option<&str>, memory: Option<i64>) -> Checksum {
+    let sum = Checksum::new().text(input_hash).text(body).optional(mesh);
+    match memory {
+        Some(bytes) => sum.int(bytes),
+        None => sum,
+    }
 }

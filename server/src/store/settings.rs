@@ -1,8 +1,9 @@
 //! Settings that can be changed while the service runs, and are kept across restarts.
 
-use std::sync::atomic::Ordering;
+use std::sync::{Arc, atomic::Ordering};
 
 use super::{database::Store, error::Result};
+use crate::memory::Budget;
 
 impl Store {
     /// Reads the settings, when the store is opened.
@@ -13,6 +14,16 @@ impl Store {
                 .await?;
         self.paused.store(paused, Ordering::Relaxed);
         Ok(())
+    }
+
+    /// Sets the memory that running jobs share (bytes), once and before any is claimed.
+    pub fn set_budget(&self, bytes: u64) {
+        let _ = self.budget.set(Budget::new(bytes)); // fails if it is set already, which is kept
+    }
+
+    /// The memory that running jobs share.
+    pub(super) fn budget(&self) -> &Arc<Budget> {
+        self.budget.get_or_init(|| Budget::new(u64::MAX))
     }
 
     /// Whether the queue is paused.

@@ -5,7 +5,10 @@ use std::collections::BTreeMap;
 use tokio::sync::{mpsc, oneshot};
 
 use super::error::Result;
-use crate::job::{Cache, Job, JobId, Limits};
+use crate::{
+    job::{Cache, Job, JobId, Limits},
+    memory::Reservation,
+};
 
 /// A job that is about to be accepted.
 #[derive(Clone, Debug)]
@@ -32,6 +35,8 @@ pub struct NewJob {
     pub problem: String,
     /// The stored mesh that it names.
     pub mesh: Option<String>,
+    /// Memory that it is estimated to need (bytes).
+    pub memory_bytes: u64,
     /// Fingerprint of everything that the client submitted.
     pub payload: String,
 }
@@ -80,6 +85,8 @@ pub struct Claim {
     pub problem: String,
     /// The stored mesh that it names.
     pub mesh: Option<String>,
+    /// The memory that is reserved for it until its solver has returned.
+    pub memory: Reservation,
 }
 
 /// Most submissions that share a commit.

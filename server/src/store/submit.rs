@@ -25,7 +25,7 @@ use crate::{
 
 impl Store {
     /// Accepts jobs. They are stored on the disk when this returns. With `claim` (a worker is free) the next job of the
-    /// queue is claimed in the same commit.
+    /// queue is claimed in the same commit, if it fits into the memory budget.
     pub async fn submit(&self, submission: Submission, claim: bool) -> Result<Accepted> {
         for job in submission.jobs.iter().filter(|job| job.cache == Cache::Use) {
             let checked = self.check_earlier_result(&job.input_hash);

@@ -94,6 +94,7 @@ pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJo
                 input_hash,
                 json,
                 mesh,
+                memory_bytes,
             } = admitted.map_err(ApiError::InvalidProblem)?;
             let Envelope {
                 name,
@@ -114,6 +115,7 @@ pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJo
                 input_hash,
                 problem: json,
                 mesh,
+                memory_bytes,
                 payload,
             })
         }

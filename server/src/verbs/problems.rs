@@ -3,10 +3,10 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use solver::{
-    Estimate,
+    Checked, Estimate,
     error::{Reason, Violation},
     mesh::Mesh,
-    problem::Problem,
+    problem::{Problem, Refine},
     solution::Warning,
 };
 
@@ -52,12 +52,22 @@ pub async fn validate(
         stored => stored?,
     };
     let check = move || {
-        let estimate = estimate(&problem, stored.as_ref());
-        let checked = match estimate.memory_bytes > budget_bytes {
-            true => Err(vec![too_large(&estimate, budget_bytes)]),
-            false => check(&problem, stored),
+        let within = |estimate: Estimate| match estimate.memory_bytes > budget_bytes {
+            true => Err(vec![too_large(&problem, &estimate, budget_bytes)]),
+            false => Ok(()),
         };
-        let (warnings, violations) = match checked {
+        // told by the checked problem, which has all numbers; of an invalid one only by what comes before meshing
+        let mut estimate = None;
+        let checked = || {
+            let before = self::estimate(&problem, stored.as_ref()).map_err(|v| vec![v])?;
+            estimate = Some(before);
+            within(before)?;
+            let checked = check(&problem, stored)?;
+            estimate = Some(checked.estimate);
+            within(checked.estimate)?;
+            Ok(checked.warnings)
+        };
+        let (warnings, violations) = match checked() {
             Ok(warnings) => (warnings, vec![]),
             Err(violations) => (vec![], violations),
         };
@@ -69,7 +79,7 @@ pub async fn validate(
             valid: violations.is_empty(),
             violations,
             warnings: warnings.into_iter().map(at).collect(),
-            estimate: Some(estimate),
+            estimate,
             input_hash: digest::input_hash(&problem).ok(),
         }
     };
@@ -89,10 +99,13 @@ impl Validation {
 }
 
 /// The violation of a problem that exceeds the memory budget.
-fn too_large(estimate: &Estimate, budget_bytes: u64) -> Violation {
+fn too_large(problem: &Problem, estimate: &Estimate, budget_bytes: u64) -> Violation {
     let (unknowns, memory) = (count(estimate.dofs), size(estimate.memory_bytes));
     Violation {
-        pointer: format!("{PROBLEM}/mesh"),
+        pointer: match problem.mesh.refine {
+            Refine::Times(0) => format!("{PROBLEM}/mesh"),
+            Refine::Times(_) | Refine::Adaptive(_) => format!("{PROBLEM}/mesh/refine"),
+        },
         reason: Reason::TooLarge,
         got: format!("{unknowns} unknowns, which need about {memory}"),
         expected: format!("at most {} of memory", size(budget_bytes)),
@@ -111,6 +124,8 @@ pub(super) struct Admitted {
     pub json: String,
     /// The stored mesh that it refers to.
     pub mesh: Option<String>,
+    /// Memory that it is estimated to need (bytes).
+    pub memory_bytes: u64,
 }
 
 /// The stored mesh that a problem refers to, if it does.
@@ -129,14 +144,17 @@ pub(super) async fn admit(service: &Service, mut problem: Problem) -> Result<Adm
     let budget_bytes = service.memory_budget_bytes;
     let stored = stored(service, &problem).await?;
     let admit = move || {
-        let estimate = estimate(&problem, stored.as_ref());
-        if estimate.memory_bytes > budget_bytes {
-            return Err(ApiError::ProblemTooLarge {
+        let within = |estimate: Estimate| match estimate.memory_bytes > budget_bytes {
+            true => Err(ApiError::ProblemTooLarge {
                 estimate,
                 budget_bytes,
-            });
-        }
-        check(&problem, stored).map_err(ApiError::InvalidProblem)?;
+            }),
+            false => Ok(estimate),
+        };
+        let before = estimate(&problem, stored.as_ref());
+        within(before.map_err(|violation| ApiError::InvalidProblem(vec![violation]))?)?;
+        let checked = check(&problem, stored).map_err(ApiError::InvalidProblem)?;
+        let memory_bytes = within(checked.estimate)?.memory_bytes;
         let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
         let title = problem.title.take();
         let json = serde_json::to_string(&problem).map_err(ApiError::internal)?;
@@ -145,21 +163,20 @@ pub(super) async fn admit(service: &Service, mut problem: Problem) -> Result<Adm
             input_hash,
             json,
             mesh: problem.mesh.stored().map(str::to_owned),
+            memory_bytes,
         })
     };
     service.work(admit).await?
 }
 
 /// The estimate is made before meshing, since the mesh itself may need too much memory.
-fn estimate(problem: &Problem, stored: Option<&(MeshInfo, Mesh)>) -> Estimate {
+fn estimate(problem: &Problem, stored: Option<&(MeshInfo, Mesh)>) -> Result<Estimate, Violation> {
     let size = stored.map(|(info, _)| info.size());
-    solver::estimate(problem, size.as_ref())
+    let within = |violation| prefixed(PROBLEM, vec![violation]).remove(0);
+    solver::estimate(problem, size.as_ref()).map_err(within)
 }
 
-fn check(
-    problem: &Problem,
-    stored: Option<(MeshInfo, Mesh)>,
-) -> Result<Vec<Warning>, Vec<Violation>> {
+fn check(problem: &Problem, stored: Option<(MeshInfo, Mesh)>) -> Result<Checked, Vec<Violation>> {
     let external = files::external_mesh(problem, stored.map(|(_, mesh)| mesh));
     solver::check(problem, external).map_err(|violations| prefixed(PROBLEM, violations))
 }

@@ -11,7 +11,7 @@ use crate::algorithm::track::{Measured, Row, Track};
 use crate::elasticity::Dof;
 use crate::friction::Source;
 use crate::linear::least_squares;
-use crate::solution::{Observer, Outcome, Progress, Stage};
+use crate::solution::{Observer, Outcome, Stage};
 
 /// q above which sweeps are accelerated.
 const SLOW: f64 = 0.7;
@@ -36,9 +36,7 @@ pub(super) fn sweep(
         state,
         steps,
         residual,
-    } = minimise(track.system, &bound, start, tolerance, &mut || {
-        observe(Progress::Pulse)
-    });
+    } = minimise(track.system, &bound, start, tolerance, observe);
     let measured = Measured::new(track.system, state, bound);
     let row = Row {
         stage,

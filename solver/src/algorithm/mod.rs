@@ -127,6 +127,8 @@ fn bonded_state(
 pub fn quiet(observe: &mut Observer<'_>) -> impl FnMut(Progress<'_>) -> ControlFlow<()> {
     |progress| match progress {
         Progress::Iteration(_) | Progress::Pulse => observe(Progress::Pulse),
+        Progress::Needs { bytes } => observe(Progress::Needs { bytes }),
+        Progress::OutOfMemory { bytes } => observe(Progress::OutOfMemory { bytes }),
         _ => ControlFlow::Continue(()),
     }
 }

@@ -12,15 +12,15 @@
 //! to twenty steps.
 
 use crate::algorithm::convex::{
-    close, follow, free_dofs, least_along, semidefinite_shift, update_active,
+    close, dense, follow, free_dofs, least_along, semidefinite_shift, update_active,
 };
 use crate::algorithm::finished::End;
 use crate::algorithm::system::{Point, State, System};
 use crate::algorithm::track::{Measured, Row, Track};
 use crate::elasticity::Dof;
 use crate::friction::Source;
-use crate::linear::solve_general;
-use crate::solution::{Observer, Outcome, Stage};
+use crate::linear::{Breaks, Dense, General, Unsolved};
+use crate::solution::{Observer, Outcome, Progress, Stage};
 
 /// Steps without progress after which the method gives up.
 const PATIENCE: u32 = 20;
@@ -41,7 +41,10 @@ pub(super) fn run(
     let mut since_best = 0;
     for _ in 0..most_steps {
         close(system, &mut state);
-        let Some((measured, changed)) = next(system, &state, residual_before) else {
+        let Some((measured, changed)) = next(system, &state, residual_before, observe) else {
+            if observe(Progress::Pulse).is_break() {
+                end.outcome = Outcome::Canceled;
+            }
             return end;
         };
         state = measured.state.clone();
@@ -84,8 +87,13 @@ pub(super) fn run(
 
 /// The state after a step: the whole step if it reduces the residual, else the part of it with the least
 /// energy; and whether the contact set changed.
-fn next(system: &System<'_>, state: &State, residual: f64) -> Option<(Measured, bool)> {
-    let target = step(system, state)?;
+fn next(
+    system: &System<'_>,
+    state: &State,
+    residual: f64,
+    observe: &mut Observer<'_>,
+) -> Option<(Measured, bool)> {
+    let target = step(system, state, observe)?;
     let reach = |part: f64| {
         let moved = state.v.iter().zip(&target).map(|(a, b)| a + part * (b - a));
         let mut reached = State {
@@ -110,7 +118,7 @@ fn implied_bound(system: &System<'_>, state: &State) -> Vec<f64> {
 }
 
 /// v after one Newton step; active nodes stay on the obstacle.
-fn step(system: &System<'_>, state: &State) -> Option<Vec<f64>> {
+fn step(system: &System<'_>, state: &State, observe: &mut Observer<'_>) -> Option<Vec<f64>> {
     let free = free_dofs(system, |i| state.active[i]);
     let mut place = vec![usize::MAX; system.load.len()];
     free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
@@ -124,15 +132,45 @@ fn step(system: &System<'_>, state: &State) -> Option<Vec<f64>> {
     } else {
         0.0
     };
+    let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
+    let delta = dense(free.len(), observe, |breaks| {
+        let h = jacobian(
+            system,
+            state,
+            (&bound, &pressures),
+            &free,
+            &place,
+            shift,
+            breaks,
+        )?;
+        h.solve(&rhs, breaks)
+    })?;
+    let mut v = state.v.clone();
+    free.iter().zip(&delta).for_each(|(&dof, d)| v[dof] += d);
+    Some(v)
+}
+
+/// H on the free unknowns; `place`: where each of all unknowns is among them.
+fn jacobian(
+    system: &System<'_>,
+    state: &State,
+    (bound, pressures): (&[f64], &[f64]),
+    free: &[usize],
+    place: &[usize],
+    shift: f64,
+    breaks: &mut Breaks<'_>,
+) -> Result<General, Unsolved> {
     let n = free.len();
-    let mut h: Vec<Vec<f64>> = (0..n)
-        .map(|j| {
-            let column = system.stiffness.column(free[j]);
-            free.iter().map(|&i| column[i]).collect()
-        })
-        .collect();
-    (0..n).for_each(|i| h[i][i] += shift);
-    for (point, tau) in system.points.iter().zip(&bound) {
+    let bytes = Dense::bytes(n);
+    let mut h = General::try_zero(n).ok_or(Unsolved::TooLarge { bytes })?;
+    for (j, &dof) in free.iter().enumerate() {
+        let (column, elastic) = (h.column_mut(j), system.stiffness.column(dof));
+        let entries = column.iter_mut().zip(free);
+        entries.for_each(|(entry, &i)| *entry = elastic[i]);
+        column[j] += shift;
+        breaks.after(n as f64)?;
+    }
+    for (point, tau) in system.points.iter().zip(bound) {
         let (law, slip) = (system.law(point), system.slip(&state.v, point));
         let rows: Vec<(usize, f64)> = (0..3)
             .filter_map(|i| match system.nodes[point.nodes[i]].tangent {
@@ -143,10 +181,10 @@ fn step(system: &System<'_>, state: &State) -> Option<Vec<f64>> {
         let stiffness = point.weight * tau * law.phi_slope(slip);
         for &(row, a) in &rows {
             for &(column, b) in &rows {
-                h[column][row] += stiffness * a * b;
+                h.column_mut(column)[row] += stiffness * a * b;
             }
         }
-        let coupling = point.weight * law.phi(slip) * law.bound.slope(averaged(point, &pressures));
+        let coupling = point.weight * law.phi(slip) * law.bound.slope(averaged(point, pressures));
         if coupling == 0.0 {
             continue;
         }
@@ -155,15 +193,13 @@ fn step(system: &System<'_>, state: &State) -> Option<Vec<f64>> {
             let column = system.stiffness.column(dof);
             for (k, &free_dof) in free.iter().enumerate() {
                 let value = coupling * weight * column[free_dof];
-                rows.iter().for_each(|&(row, a)| h[k][row] -= a * value);
+                let h = h.column_mut(k);
+                rows.iter().for_each(|&(row, a)| h[row] -= a * value);
             }
+            breaks.after(10.0 * n as f64)?; // each to another column: far slower than a sum
         }
     }
-    let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
-    let delta = solve_general(&h, &rhs).filter(|d| d.iter().all(|x| x.is_finite()))?;
-    let mut v = state.v.clone();
-    free.iter().zip(&delta).for_each(|(&dof, d)| v[dof] += d);
-    Some(v)
+    Ok(h)
 }
 
 fn averaged(point: &Point, pressures: &[f64]) -> f64 {

@@ -3,16 +3,17 @@
 
 use crate::body::ElasticBody;
 use crate::elasticity::Dof;
+use crate::error::SolveError;
 use crate::friction::{Average, BoundLaw, Chain, FrictionLaw, Source};
 use crate::linear::Dense;
 use crate::model::{ContactModel, Level, Model};
 use crate::problem::{Condition, FrictionPoints, History, Measure};
+use crate::solution::{Observer, Progress};
 
 /// A friction point whose bound is below this part of the largest is open: its anchor follows it.
 const OPEN: f64 = 1e-12;
 
 /// The data of the iterations, all contacts in a row.
-#[derive(Clone)]
 pub struct System<'a> {
     /// Ŝ.
     pub stiffness: &'a Dense,
@@ -123,8 +124,13 @@ pub struct Work {
 }
 
 impl<'a> System<'a> {
-    /// Collects the contacts of a model on its condensed body, at full load.
-    pub fn new(model: &'a Model, body: &'a ElasticBody) -> Self {
+    /// Collects the contacts of a model on its condensed body, at full load. The observer is asked at every friction
+    /// point: a wide average along a long contact takes minutes.
+    pub fn new(
+        model: &'a Model,
+        body: &'a ElasticBody,
+        observe: &mut Observer<'_>,
+    ) -> Result<Self, SolveError> {
         let mut system = System {
             stiffness: &body.stiffness,
             load: Vec::new(),
@@ -140,7 +146,7 @@ impl<'a> System<'a> {
             model,
         };
         for contact in &model.contacts {
-            system.add(model, contact);
+            system.add(model, contact, observe)?;
         }
         system.set_level(Level::FULL);
         let most =
@@ -153,10 +159,15 @@ impl<'a> System<'a> {
                 .flat_map(|contact| [contact.indentation, contact.tangential_displacement]),
         );
         system.reference_force = (stiffest * pushed).max(most(&mut system.load.iter().copied()));
-        system
+        Ok(system)
     }
 
-    fn add(&mut self, model: &Model, contact: &'a ContactModel) {
+    fn add(
+        &mut self,
+        model: &Model,
+        contact: &'a ContactModel,
+        observe: &mut Observer<'_>,
+    ) -> Result<(), SolveError> {
         let (first, boundary) = (self.nodes.len(), &contact.boundary);
         let count = boundary.nodes.len();
         let on_axis = |i: usize| model.axis.holds(boundary.positions[i]);
@@ -209,19 +220,25 @@ impl<'a> System<'a> {
                 anchor: 0.0,
                 past_displacement: 0.0,
             };
+            let mut add = |point: Point| {
+                self.points.push(point);
+                match observe(Progress::Pulse).is_break() {
+                    true => Err(SolveError::Stopped),
+                    false => Ok(()),
+                }
+            };
             match law.points {
-                FrictionPoints::Gauss3 => self.points.extend(
-                    boundary
-                        .friction_points
-                        .iter()
-                        .map(|p| point(p.s, p.nodes, p.shape, p.weight)),
-                ),
+                FrictionPoints::Gauss3 => {
+                    for p in &boundary.friction_points {
+                        add(point(p.s, p.nodes, p.shape, p.weight))?;
+                    }
+                }
                 // a node on the axis has no weight, and no friction
                 FrictionPoints::Nodal => {
-                    self.points
-                        .extend((0..count).filter(|&i| !on_axis(i)).map(|i| {
-                            point(boundary.s[i], [i; 3], [1.0, 0.0, 0.0], boundary.weights[i])
-                        }))
+                    for i in (0..count).filter(|&i| !on_axis(i)) {
+                        let (s, weight) = (boundary.s[i], boundary.weights[i]);
+                        add(point(s, [i; 3], [1.0, 0.0, 0.0], weight))?;
+                    }
                 }
             }
         }
@@ -230,6 +247,15 @@ impl<'a> System<'a> {
             first,
             law,
         });
+        Ok(())
+    }
+
+    /// Forgets the increments so far: anchors and work.
+    pub fn restart(&mut self) {
+        self.past_work = 0.0;
+        for point in &mut self.points {
+            (point.anchor, point.past_displacement) = (0.0, 0.0);
+        }
     }
 
     /// Moves obstacles, loads and supports to a load level; anchors stay.
@@ -260,14 +286,20 @@ impl<'a> System<'a> {
 
     /// This system with u_t = d at all nodes of contacts with friction: everything sticks.
     pub fn bonded(&self) -> Self {
-        let mut bonded = self.clone();
+        // without friction points, whose averages are most of a large system
+        let mut bonded = System {
+            load: self.load.clone(),
+            nodes: self.nodes.clone(),
+            points: Vec::new(),
+            patches: self.patches.clone(),
+            ..*self
+        };
         for patch in bonded.patches.iter().filter(|patch| patch.law.is_some()) {
             let count = patch.contact.boundary.nodes.len();
             for node in &mut bonded.nodes[patch.first..patch.first + count] {
                 node.held_tangent = Some(node.drag);
             }
         }
-        bonded.points.clear();
         bonded
     }
 
@@ -383,7 +415,11 @@ impl<'a> System<'a> {
 
     /// Nodal reactions R = f̂_n − (Ŝ v)_n of the obstacle on active nodes; exactly 0 on the others.
     pub fn reactions(&self, state: &State) -> Vec<f64> {
-        let force = self.elastic_force(&state.v);
+        self.reactions_of(state, &self.elastic_force(&state.v))
+    }
+
+    /// The same from Ŝ v − f̂, which takes a product with a dense matrix.
+    fn reactions_of(&self, state: &State, force: &[f64]) -> Vec<f64> {
         let reaction = |(node, active): (&ContactNode, &bool)| match node.normal {
             Dof::Free(dof) if *active => -force[dof],
             _ => 0.0,
@@ -442,7 +478,7 @@ impl<'a> System<'a> {
         self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
         let elastic = self.elastic_force(&state.v);
         let force: Vec<f64> = elastic.iter().zip(&friction).map(|(a, b)| a + b).collect();
-        let reactions = self.reactions(state);
+        let reactions = self.reactions_of(state, &elastic);
         let mut defect: f64 = 0.0;
         for (i, node) in self.nodes.iter().enumerate() {
             if let Dof::Free(dof) = node.tangent {

@@ -43,6 +43,21 @@ impl DofMap {
         self.dofs.iter().zip(&self.axes).map(node).collect()
     }
 
+    /// The node of an unknown, and its direction.
+    pub fn place_of(&self, unknown: usize) -> (u32, [f64; 2]) {
+        let is_it = |dof: &Dof| matches!(dof, Dof::Free(i) if *i == unknown);
+        let places = self.dofs.iter().zip(&self.axes).enumerate();
+        let found = places.flat_map(|(node, (dofs, axes))| {
+            let axes = axes.unwrap_or([[1.0, 0.0], [0.0, 1.0]]);
+            let free = dofs.iter().zip(axes).filter(|(dof, _)| is_it(dof));
+            free.map(move |(_, axis)| (node as u32, axis))
+        });
+        match found.into_iter().next() {
+            Some(place) => place,
+            None => unreachable!("every unknown belongs to a node"),
+        }
+    }
+
     /// A vector per node along x and y, turned to the node's own axes.
     pub fn to_axes(&self, node: usize, [x, y]: [f64; 2]) -> [f64; 2] {
         match self.axes[node] {

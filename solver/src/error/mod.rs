@@ -87,8 +87,10 @@ pub enum SolveError {
     Invalid(Vec<Violation>),
     /// The stiffness matrix has no Cholesky factor although the supports looked sufficient.
     SingularSystem {
-        /// The pivot (in factor order) at which the factorisation stopped.
-        pivot: usize,
+        /// The node at which the factorisation stopped.
+        node: u32,
+        /// The direction in which nothing holds it.
+        direction: [f64; 2],
     },
     /// Neither the supports nor the contacts of the final state hold the body.
     Unheld {
@@ -97,8 +99,11 @@ pub enum SolveError {
         /// A node that moves.
         node: u32,
     },
-    /// The factor of the stiffness matrix has more entries than fit into memory.
-    ResourceExhausted,
+    /// There is not as much memory as a matrix needs.
+    ResourceExhausted {
+        /// Bytes that it needs.
+        bytes: u64,
+    },
     /// A phase computed NaN or infinity.
     NonFinite {
         /// The phase.
@@ -115,9 +120,12 @@ impl fmt::Display for SolveError {
                 write!(f, "the problem has {} violation(s)", violations.len())?;
                 violations.iter().try_for_each(|v| write!(f, "\n  {v}"))
             }
-            SolveError::SingularSystem { pivot } => write!(
+            SolveError::SingularSystem {
+                node,
+                direction: [x, y],
+            } => write!(
                 f,
-                "the stiffness matrix is singular to working precision (pivot {pivot}): check the \
+                "the stiffness matrix is singular to working precision, at node {node} along ({x}, {y}): check the \
                  supports, the ratio of the largest to the smallest element, and whether 2 × 2 \
                  quadrature leaves a mode without stiffness (3 × 3 has none)"
             ),
@@ -127,12 +135,11 @@ impl fmt::Display for SolveError {
                  this motion to contact, which in the end does not touch, or not where it would hold the \
                  body. Add a support, or loads that press the body against the obstacle"
             ),
-            SolveError::ResourceExhausted => {
-                write!(
-                    f,
-                    "the factor of the stiffness matrix does not fit into memory: use a coarser mesh"
-                )
-            }
+            SolveError::ResourceExhausted { bytes } => write!(
+                f,
+                "a matrix of {:.0} MiB does not fit into memory: use a coarser mesh, above all along the contacts",
+                *bytes as f64 / f64::from(1 << 20)
+            ),
             SolveError::NonFinite { phase } => write!(
                 f,
                 "the phase `{}` computed a number that is not finite: check the magnitudes of moduli, lengths and loads",

@@ -1,7 +1,14 @@
 //! Dense symmetric matrices.
 
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use faer::linalg::matmul::matmul;
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Accum, MatMut, MatRef, Par};
+
+use super::blocked::{self, NoFactor};
+use super::breaks::{Breaks, Stopped};
+
+/// Rows of a block of a product; a smaller matrix is multiplied row by row.
+const BLOCK: usize = 256;
 
 /// A dense symmetric matrix, by columns, both triangles stored.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,12 +18,15 @@ pub struct Dense {
 }
 
 impl Dense {
-    /// All zeros.
-    pub fn zero(size: usize) -> Self {
-        Dense {
-            size,
-            values: vec![0.0; size * size],
-        }
+    /// All zeros; none if that does not fit into memory.
+    pub fn try_zero(size: usize) -> Option<Self> {
+        let values = zeros(size)?;
+        Some(Dense { size, values })
+    }
+
+    /// What a matrix of this size takes.
+    pub fn bytes(size: usize) -> u64 {
+        8 * (size as u64).saturating_mul(size as u64)
     }
 
     /// Number of rows.
@@ -40,39 +50,197 @@ impl Dense {
         self.values[i * self.size + j] = value;
     }
 
+    /// Row i, of which only the lower triangle is given until the matrix is complete.
+    pub(super) fn row_mut(&mut self, i: usize) -> &mut [f64] {
+        &mut self.values[i * self.size..(i + 1) * self.size]
+    }
+
+    /// From L, given by rows in the lower triangle: L Lᵀ, in its place.
+    ///
+    ///   (L Lᵀ)_ij = Σ_{k ≤ j} L_ik L_jk,   j ≤ i
+    ///
+    /// From the last row up and in each from the last column down, so that every entry of L is read before it is
+    /// overwritten.
+    pub(super) fn times_its_transpose(&mut self, breaks: &mut Breaks<'_>) -> Result<(), Stopped> {
+        match self.size <= BLOCK {
+            true => self.multiply_rows(),
+            false => self.multiply_blocks(breaks)?,
+        }
+        self.mirror(breaks)
+    }
+
+    /// Row by row: so were small matrices multiplied from the beginning, and results keep their bits.
+    fn multiply_rows(&mut self) {
+        let n = self.size;
+        for i in (0..n).rev() {
+            let (above, row) = self.values.split_at_mut(i * n);
+            row[i] = row[..=i].iter().map(|a| a * a).sum();
+            for j in (0..i).rev() {
+                let other = &above[j * n..=j * n + j];
+                row[j] = row[..=j].iter().zip(other).map(|(a, b)| a * b).sum();
+            }
+        }
+    }
+
+    fn multiply_blocks(&mut self, breaks: &mut Breaks<'_>) -> Result<(), Stopped> {
+        let n = self.size;
+        let mut product = vec![0.0; BLOCK * BLOCK];
+        let starts: Vec<usize> = (0..n).step_by(BLOCK).collect();
+        for &i in starts.iter().rev() {
+            let rows = BLOCK.min(n - i);
+            for &j in starts.iter().rev().filter(|j| **j <= i) {
+                let columns = BLOCK.min(n - j);
+                let l = MatRef::from_row_major_slice(&self.values, n, n).subcols(0, j + columns);
+                let product = &mut product[..rows * columns];
+                let into = MatMut::from_row_major_slice_mut(product, rows, columns);
+                let (left, right) = (l.subrows(i, rows), l.subrows(j, columns));
+                matmul(into, Accum::Replace, left, right.transpose(), 1.0, Par::Seq);
+                for (k, row) in product.chunks_exact(columns).enumerate() {
+                    self.values[(i + k) * n + j..][..columns].copy_from_slice(row);
+                }
+                breaks.after((rows * columns * (j + columns)) as f64)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Copies the lower triangle to the upper one, by blocks that fit into the cache.
+    fn mirror(&mut self, breaks: &mut Breaks<'_>) -> Result<(), Stopped> {
+        const TILE: usize = 32;
+        let n = self.size;
+        for first in (0..n).step_by(TILE) {
+            for under in (first..n).step_by(TILE) {
+                for i in under..n.min(under + TILE) {
+                    for j in first..i.min(first + TILE) {
+                        self.values[j * n + i] = self.values[i * n + j];
+                    }
+                }
+            }
+            breaks.after((TILE * (n - first)) as f64)?;
+        }
+        Ok(())
+    }
+
     /// A v.
     pub fn times(&self, v: &[f64]) -> Vec<f64> {
-        (0..self.size)
-            .map(|i| self.column(i).iter().zip(v).map(|(a, b)| a * b).sum())
-            .collect()
+        /// Rows at once: a sum waits for its last addition, four do not wait for each other.
+        const ROWS: usize = 4;
+        let n = self.size;
+        let mut product = vec![0.0; n];
+        for (k, sums) in product.chunks_mut(ROWS).enumerate() {
+            match sums {
+                [a, b, c, d] => {
+                    let row = |r: usize| self.column(ROWS * k + r)[..n].iter();
+                    let (mut p, mut q, mut r, mut s) = (-0.0, -0.0, -0.0, -0.0);
+                    let rows = row(0).zip(row(1)).zip(row(2).zip(row(3)));
+                    for (((w, x), (y, z)), v) in rows.zip(v) {
+                        p += w * v;
+                        q += x * v;
+                        r += y * v;
+                        s += z * v;
+                    }
+                    (*a, *b, *c, *d) = (p, q, r, s);
+                }
+                rest => {
+                    for (r, sum) in rest.iter_mut().enumerate() {
+                        let row = self.column(ROWS * k + r).iter();
+                        *sum = row.zip(v).map(|(a, b)| a * b).sum();
+                    }
+                }
+            }
+        }
+        product
+    }
+}
+
+/// A matrix of zeros by columns; none if it does not fit into memory.
+fn zeros(size: usize) -> Option<Vec<f64>> {
+    let mut values = Vec::new();
+    let count = size.checked_mul(size)?;
+    values.try_reserve_exact(count).ok()?;
+    values.resize(count, 0.0);
+    Some(values)
+}
+
+/// Why a dense system has no solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unsolved {
+    /// The matrix is not positive definite, or has no inverse.
+    Singular,
+    /// The matrix does not fit into memory: what it would take.
+    TooLarge {
+        /// Bytes.
+        bytes: u64,
+    },
+    /// Stopped on request.
+    Stopped,
+}
+
+impl From<Stopped> for Unsolved {
+    fn from(_: Stopped) -> Self {
+        Unsolved::Stopped
     }
 }
 
 /// Solves (A + Σ aᵢⱼ eᵢeⱼᵀ) x = b: A positive definite, given by its entries; `additions` lists
-/// (i, j, aᵢⱼ), symmetric. `None` when the sum is not positive definite.
+/// (i, j, aᵢⱼ), symmetric.
 pub fn solve_positive_definite(
     size: usize,
     entry: impl Fn(usize, usize) -> f64,
     additions: &[(usize, usize, f64)],
     b: &[f64],
-) -> Option<Vec<f64>> {
+    breaks: &mut Breaks<'_>,
+) -> Result<Vec<f64>, Unsolved> {
+    let bytes = Dense::bytes(size);
+    let mut values = zeros(size).ok_or(Unsolved::TooLarge { bytes })?;
     // the factorisation reads the lower triangle only
-    let mut a = Mat::from_fn(size, size, |i, j| if i >= j { entry(i, j) } else { 0.0 });
+    for (j, column) in values.chunks_exact_mut(size.max(1)).enumerate() {
+        (j..size).for_each(|i| column[i] = entry(i, j));
+        breaks.after((size - j) as f64)?;
+    }
+    let mut a = MatMut::from_column_major_slice_mut(&mut values, size, size);
     for &(i, j, value) in additions.iter().filter(|(i, j, _)| i >= j) {
         a[(i, j)] += value;
     }
-    let factor = a.llt(Side::Lower).ok()?;
-    let x = factor.solve(Mat::from_fn(size, 1, |i, _| b[i]));
-    Some((0..size).map(|i| x[(i, 0)]).collect())
+    blocked::cholesky(a.rb_mut(), breaks).map_err(|error| match error {
+        NoFactor::NotPositiveDefinite(_) => Unsolved::Singular,
+        NoFactor::Stopped => Unsolved::Stopped,
+    })?;
+    let mut x = b.to_vec();
+    let into = MatMut::from_column_major_slice_mut(&mut x, size, 1);
+    blocked::solve_cholesky(a.rb(), into);
+    Ok(x)
 }
 
-/// Solves A x = b for a general square A given by its columns. `None` when a solution is not finite.
-pub fn solve_general(columns: &[Vec<f64>], b: &[f64]) -> Option<Vec<f64>> {
-    let n = b.len();
-    let a = Mat::from_fn(n, n, |i, j| columns[j][i]);
-    let x = a.partial_piv_lu().solve(Mat::from_fn(n, 1, |i, _| b[i]));
-    let x: Vec<f64> = (0..n).map(|i| x[(i, 0)]).collect();
-    x.iter().all(|x| x.is_finite()).then_some(x)
+/// A general square matrix, by columns.
+pub struct General {
+    size: usize,
+    values: Vec<f64>,
+}
+
+impl General {
+    /// All zeros; none if that does not fit into memory.
+    pub fn try_zero(size: usize) -> Option<Self> {
+        let values = zeros(size)?;
+        Some(General { size, values })
+    }
+
+    /// A column.
+    pub fn column_mut(&mut self, j: usize) -> &mut [f64] {
+        &mut self.values[j * self.size..(j + 1) * self.size]
+    }
+
+    /// Solves A x = b; the factors take the place of A.
+    pub fn solve(mut self, b: &[f64], breaks: &mut Breaks<'_>) -> Result<Vec<f64>, Unsolved> {
+        let n = self.size;
+        let mut x = b.to_vec();
+        let a = MatMut::from_column_major_slice_mut(&mut self.values, n, n);
+        blocked::solve_lu(a, MatMut::from_column_major_slice_mut(&mut x, n, 1), breaks)?;
+        match x.iter().all(|x| x.is_finite()) {
+            true => Ok(x),
+            false => Err(Unsolved::Singular),
+        }
+    }
 }
 
 /// The x for which |Σ x_k a_k − b| is least, by Gram–Schmidt; columns that the others nearly span
@@ -121,16 +289,129 @@ pub fn least_squares(columns: &[Vec<f64>], b: &[f64]) -> Option<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::ops::ControlFlow;
+
     use super::*;
+
+    /// Without a stop.
+    fn go_on<T>(work: impl FnOnce(&mut Breaks<'_>) -> T) -> T {
+        work(&mut Breaks::new(&mut || ControlFlow::Continue(())))
+    }
+
+    fn general(size: usize, entry: impl Fn(usize, usize) -> f64) -> General {
+        let mut a = General::try_zero(size).unwrap();
+        (0..size).for_each(|j| (0..size).for_each(|i| a.column_mut(j)[i] = entry(i, j)));
+        a
+    }
+
+    /// Irregular numbers in −½ … ½.
+    fn number(i: usize, j: usize) -> f64 {
+        let mixed = (i * 7919 + j * 104_729 + i * j * 31 + 12_345) % 10_007;
+        mixed as f64 / 10_007.0 - 0.5
+    }
 
     #[test]
     fn a_general_system_is_solved_and_a_singular_one_refused() {
-        let columns = [vec![0.0, 2.0], vec![1.0, 3.0]];
-        assert_eq!(solve_general(&columns, &[4.0, 14.0]), Some(vec![1.0, 4.0]));
-        assert_eq!(
-            solve_general(&[vec![0.0, 0.0], vec![1.0, 3.0]], &[4.0, 14.0]),
-            None
+        let solve = |columns: [[f64; 2]; 2]| {
+            go_on(|breaks| general(2, |i, j| columns[j][i]).solve(&[4.0, 14.0], breaks))
+        };
+        assert_eq!(solve([[0.0, 2.0], [1.0, 3.0]]), Ok(vec![1.0, 4.0]));
+        let singular = solve([[0.0, 0.0], [1.0, 3.0]]);
+        assert_eq!(singular, Err(Unsolved::Singular));
+    }
+
+    /// Sizes in one piece, in several blocks, and not a multiple of a block; some diagonals are zero, so that rows
+    /// must be swapped.
+    #[test]
+    fn systems_of_any_size_are_solved_by_blocks() {
+        for n in [1, 5, 64, 255, 256, 257, 300, 511, 700] {
+            let exact: Vec<f64> = (0..n).map(|i| number(i, 3)).collect();
+            let entry = |i: usize, j: usize| match i == j && i % 3 == 0 {
+                true => 0.0,
+                false => number(i, j),
+            };
+            let row = |i: usize| (0..n).map(|j| entry(i, j) * exact[j]).sum();
+            let b: Vec<f64> = (0..n).map(row).collect();
+            if n > 1 {
+                let x = go_on(|breaks| general(n, entry).solve(&b, breaks)).unwrap();
+                let off = x.iter().zip(&exact).map(|(a, b)| (a - b).abs());
+                assert!(off.fold(0.0, f64::max) < 1e-8, "{n}");
+            }
+            // symmetric and diagonally dominant
+            let entry = |i: usize, j: usize| {
+                let off = number(i.max(j), i.min(j));
+                if i == j { n as f64 } else { off }
+            };
+            let row = |i: usize| (0..n).map(|j| entry(i, j) * exact[j]).sum();
+            let b: Vec<f64> = (0..n).map(row).collect();
+            let x = go_on(|breaks| solve_positive_definite(n, entry, &[], &b, breaks)).unwrap();
+            let off = x.iter().zip(&exact).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-13, "{n}");
+        }
+    }
+
+    #[test]
+    fn a_late_pivot_that_is_not_positive_is_found_in_its_block() {
+        let entry = |i: usize, j: usize| match (i == j, i) {
+            (true, 600) => -1.0,
+            (true, _) => 1.0,
+            (false, _) => 0.0,
+        };
+        let b = vec![1.0; 700];
+        let refused = go_on(|breaks| solve_positive_definite(700, entry, &[], &b, breaks));
+        assert_eq!(refused, Err(Unsolved::Singular));
+    }
+
+    #[test]
+    fn a_product_by_blocks_is_that_by_rows() {
+        let factor = |n: usize| {
+            let mut l = Dense::try_zero(n).unwrap();
+            (0..n).for_each(|i| (0..=i).for_each(|j| l.row_mut(i)[j] = number(i, j)));
+            l
+        };
+        for n in [1, 40, 256, 257, 700] {
+            let mut product = factor(n);
+            go_on(|breaks| product.times_its_transpose(breaks)).unwrap();
+            let mut by_rows = factor(n);
+            by_rows.multiply_rows();
+            for i in 0..n {
+                for j in 0..n {
+                    let expected = by_rows.values[i.max(j) * n + i.min(j)];
+                    assert!((product.at(i, j) - expected).abs() < 1e-12, "{n}: {i}, {j}");
+                }
+            }
+        }
+    }
+
+    /// 1,500 unknowns are some portions of work: every kind of it stops at the first question.
+    #[test]
+    fn dense_work_stops_when_it_is_told_to() {
+        let n = 1500;
+        let b = vec![1.0; n];
+        let mut asked = 0;
+        let mut stop = || {
+            asked += 1;
+            ControlFlow::Break(())
+        };
+        let entry = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
+        let solved = solve_positive_definite(n, entry, &[], &b, &mut Breaks::new(&mut stop));
+        assert_eq!(solved, Err(Unsolved::Stopped));
+        let solved = general(n, entry).solve(&b, &mut Breaks::new(&mut stop));
+        assert_eq!(solved, Err(Unsolved::Stopped));
+        let mut product = Dense::try_zero(n).unwrap();
+        assert!(
+            product
+                .times_its_transpose(&mut Breaks::new(&mut stop))
+                .is_err()
         );
+        assert_eq!(asked, 3);
+    }
+
+    #[test]
+    fn a_matrix_that_fits_into_no_memory_is_refused() {
+        assert!(Dense::try_zero(1 << 31).is_none() && General::try_zero(usize::MAX).is_none());
+        assert_eq!(Dense::bytes(1 << 40), u64::MAX);
     }
 
     #[test]
@@ -147,10 +428,14 @@ mod tests {
 
     #[test]
     fn a_positive_definite_system_is_solved_and_an_indefinite_one_refused() {
-        let a = |i: usize, j: usize| [[3.0, 1.5], [1.5, 3.0]][i][j];
+        let a: fn(usize, usize) -> f64 = |i, j| [[3.0, 1.5], [1.5, 3.0]][i][j];
         let additions = [(0, 0, 1.0), (0, 1, -0.5), (1, 0, -0.5)];
-        let x = solve_positive_definite(2, a, &additions, &[6.0, 7.0]).unwrap();
+        let solve = |a: fn(usize, usize) -> f64, additions: &[_]| {
+            go_on(|breaks| solve_positive_definite(2, a, additions, &[6.0, 7.0], breaks))
+        };
+        let x = solve(a, &additions).unwrap();
         assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] - 2.0).abs() < 1e-15);
-        assert!(solve_positive_definite(1, |_, _| -1.0, &[], &[1.0]).is_none());
+        let indefinite: fn(usize, usize) -> f64 = |i, j| [[3.0, 4.0], [4.0, 3.0]][i][j];
+        assert_eq!(solve(indefinite, &[]), Err(Unsolved::Singular));
     }
 }

@@ -6,18 +6,20 @@
 //!       | A_ci  A_cc |
 
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltError;
 use faer::perm::PermRef;
+use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::amd;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
+use super::blocked::NoFactor;
+use super::breaks::{Breaks, Stopped};
+use super::supernodal;
 use crate::linear::{Dense, Graph, SparseSymmetric};
 
 /// Parallelism of one job: none. Two jobs use the two cores, and a second thread gave no speed-up.
@@ -28,11 +30,22 @@ const PAR: Par = Par::Seq;
 pub enum FactorError {
     /// The matrix is not positive definite: a pivot is not positive.
     NotPositiveDefinite {
-        /// Its place in the order of elimination.
-        pivot: usize,
+        /// Its unknown.
+        unknown: usize,
     },
-    /// The factor has more entries than fit into memory.
-    TooLarge,
+    /// It does not fit into memory.
+    TooLarge {
+        /// What it would take.
+        bytes: u64,
+    },
+    /// Stopped on request.
+    Stopped,
+}
+
+impl From<Stopped> for FactorError {
+    fn from(_: Stopped) -> Self {
+        FactorError::Stopped
+    }
 }
 
 /// An order of elimination and the structure of the factor it leads to.
@@ -64,8 +77,30 @@ impl Ordering {
         };
         let ordering = SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, n));
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, parameters)
-            .map_err(|_| FactorError::TooLarge)?; // its only errors: index range and memory
+            .map_err(|_| too_large(n))?; // its only errors: index range and memory
         Ok(Ordering { symbolic, trailing })
+    }
+
+    /// What the factor takes.
+    pub fn bytes(&self) -> u64 {
+        8 * self.symbolic.len_val() as u64
+    }
+
+    fn structure(&self) -> &SymbolicSupernodalCholesky<usize> {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(structure) => structure,
+            SymbolicCholeskyRaw::Simplicial(_) => {
+                unreachable!("Ordering::new forces the supernodal factor")
+            }
+        }
+    }
+
+    /// The unknown at each place in the order of elimination, and the place of each unknown.
+    fn permutation(&self) -> (&[usize], &[usize]) {
+        match self.symbolic.perm() {
+            Some(permutation) => permutation.arrays(),
+            None => unreachable!("Ordering::new gives the order"),
+        }
     }
 
     /// A fill-reducing order of the vertices of a graph (approximate minimum degree).
@@ -95,8 +130,15 @@ impl Ordering {
             control,
             MemStack::new(&mut memory),
         )
-        .map_err(|_| FactorError::TooLarge)?;
+        .map_err(|_| too_large(n))?;
         Ok(order)
+    }
+}
+
+/// A structure that cannot even be planned: it needs more than a word for each unknown.
+fn too_large(unknowns: usize) -> FactorError {
+    FactorError::TooLarge {
+        bytes: 8 * unknowns as u64,
     }
 }
 
@@ -108,31 +150,28 @@ pub struct Factor {
 
 impl Factor {
     /// Factors `matrix`, which has the pattern that `ordering` was made for.
-    pub fn new(matrix: &SparseSymmetric, ordering: Ordering) -> Result<Self, FactorError> {
-        let n = matrix.size();
-        let symbolic = &ordering.symbolic;
-        let pattern =
-            SymbolicSparseColMatRef::new_checked(n, n, &matrix.column_starts, None, &matrix.rows);
-        let a = SparseColMatRef::new(pattern, &matrix.values[..]);
-        let mut values = vec![0.0; symbolic.len_val()];
-        let mut memory =
-            MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(PAR, Default::default()));
-        let stack = MemStack::new(&mut memory);
-        symbolic
-            .factorize_numeric_llt(
-                &mut values,
-                a,
-                Side::Lower,
-                Default::default(),
-                PAR,
-                stack,
-                Default::default(),
-            )
-            .map_err(|error| match error {
-                LltError::NonPositivePivot { index } => {
-                    FactorError::NotPositiveDefinite { pivot: index }
-                }
-            })?;
+    pub fn new(
+        matrix: &SparseSymmetric,
+        ordering: Ordering,
+        breaks: &mut Breaks<'_>,
+    ) -> Result<Self, FactorError> {
+        let mut values = Vec::new();
+        let too_large = |_| FactorError::TooLarge {
+            bytes: ordering.bytes(),
+        };
+        values
+            .try_reserve_exact(ordering.symbolic.len_val())
+            .map_err(too_large)?;
+        values.resize(ordering.symbolic.len_val(), 0.0);
+        let (unknowns, places) = ordering.permutation();
+        let structure = ordering.structure();
+        scatter(matrix, structure, places, &mut values);
+        supernodal::factor(structure, &mut values, breaks).map_err(|error| match error {
+            NoFactor::NotPositiveDefinite(pivot) => FactorError::NotPositiveDefinite {
+                unknown: unknowns[pivot],
+            },
+            NoFactor::Stopped => FactorError::Stopped,
+        })?;
         Ok(Factor { ordering, values })
     }
 
@@ -151,30 +190,24 @@ impl Factor {
     }
 
     /// Ŝ = L_cc L_ccᵀ, the Schur complement of the trailing unknowns, in their order.
-    pub fn trailing_schur_complement(&self) -> Dense {
-        let l = self.trailing_factor();
-        let m = l.len();
-        let mut schur = Dense::zero(m);
-        for i in 0..m {
-            for j in 0..=i {
-                schur.set(i, j, l[i][..=j].iter().zip(&l[j]).map(|(a, b)| a * b).sum());
-            }
-        }
-        schur
+    pub fn trailing_schur_complement(&self, breaks: &mut Breaks<'_>) -> Result<Dense, FactorError> {
+        let m = self.ordering.trailing;
+        let bytes = Dense::bytes(m);
+        let mut schur = Dense::try_zero(m).ok_or(FactorError::TooLarge { bytes })?;
+        self.trailing_factor(&mut schur);
+        schur.times_its_transpose(breaks)?;
+        Ok(schur)
     }
 
-    /// L_cc by rows: row i holds its entries 0..=i.
-    fn trailing_factor(&self) -> Vec<Vec<f64>> {
+    /// Puts L_cc into the lower triangle, by rows.
+    fn trailing_factor(&self, l: &mut Dense) {
         let m = self.ordering.trailing;
         let n = self.ordering.symbolic.nrows();
         let first = n - m;
-        let mut l: Vec<Vec<f64>> = (0..m).map(|i| vec![0.0; i + 1]).collect();
         if m == 0 {
-            return l; // and an empty matrix has no supernodes to walk
+            return; // an empty matrix has no supernodes to walk
         }
-        let SymbolicCholeskyRaw::Supernodal(structure) = self.ordering.symbolic.raw() else {
-            unreachable!("Ordering::new forces the supernodal factor");
-        };
+        let structure = self.ordering.structure();
         let factor = SupernodalLltRef::<usize, f64>::new(structure, &self.values);
         // Relaxation may merge the trailing columns into a larger supernode, or leave them in
         // several: walk the supernodes from the end.
@@ -191,19 +224,38 @@ impl Factor {
                 }
                 let column = start + j - first;
                 for i in j..columns {
-                    l[start + i - first][column] = block[(i, j)];
+                    l.row_mut(start + i - first)[column] = block[(i, j)];
                 }
                 for (r, &row) in node.pattern().iter().enumerate() {
-                    l[row - first][column] = block[(columns + r, j)];
+                    l.row_mut(row - first)[column] = block[(columns + r, j)];
                 }
             }
         }
-        l
+    }
+}
+
+/// Puts the entries of A where L will have its own.
+fn scatter(
+    matrix: &SparseSymmetric,
+    structure: &SymbolicSupernodalCholesky<usize>,
+    places: &[usize],
+    values: &mut [f64],
+) {
+    let supernodes = supernodal::supernode_of_columns(structure);
+    for j in 0..matrix.size() {
+        for entry in matrix.column_starts[j]..matrix.column_starts[j + 1] {
+            let (i, j) = (places[matrix.rows[entry]], places[j]);
+            let (row, column) = (i.max(j), i.min(j));
+            let at = supernodal::place(structure, supernodes[column], row, column);
+            values[at] = matrix.values[entry];
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+
     use super::*;
 
     /// A 9-point grid operator with a varying diagonal: connected, positive definite, irregular.
@@ -240,6 +292,27 @@ mod tests {
         (matrix, graph)
     }
 
+    fn factor(
+        matrix: &SparseSymmetric,
+        order: &[usize],
+        trailing: usize,
+    ) -> Result<Factor, FactorError> {
+        let ordering = Ordering::new(matrix, order, trailing).unwrap();
+        Factor::new(
+            matrix,
+            ordering,
+            &mut Breaks::new(&mut || ControlFlow::Continue(())),
+        )
+    }
+
+    fn schur(matrix: &SparseSymmetric, order: &[usize], trailing: usize) -> Dense {
+        let factor = factor(matrix, order, trailing).unwrap();
+        let go_on = &mut || ControlFlow::Continue(());
+        factor
+            .trailing_schur_complement(&mut Breaks::new(go_on))
+            .unwrap()
+    }
+
     /// Minimum degree on all but the trailing unknowns, which follow in their own order.
     fn order_with_trailing(graph: &Graph, trailing: &[usize]) -> Vec<usize> {
         let mut order = Ordering::minimum_degree(graph).unwrap();
@@ -255,12 +328,7 @@ mod tests {
         // scattered, and not in ascending order: a permutation inside the block would show
         let trailing: Vec<usize> = (0..40).map(|k| (k * 211 + 17) % n).collect();
         let order = order_with_trailing(&graph, &trailing);
-        let schur = Factor::new(
-            &matrix,
-            Ordering::new(&matrix, &order, trailing.len()).unwrap(),
-        )
-        .unwrap()
-        .trailing_schur_complement();
+        let schur = schur(&matrix, &order, trailing.len());
         // dense: column c of Ŝ⁻¹ is the trailing part of A⁻¹ e_c
         let column = |k: usize| {
             let mut unit = vec![0.0; n];
@@ -308,17 +376,15 @@ mod tests {
         let exact: Vec<f64> = (0..144).map(|i| f64::from(i % 5) - 2.0).collect();
         let mut x = matrix.times(&exact);
         let order = order_with_trailing(&graph, &[]);
-        Factor::new(&matrix, Ordering::new(&matrix, &order, 0).unwrap())
-            .unwrap()
-            .solve(&mut x);
+        factor(&matrix, &order, 0).unwrap().solve(&mut x);
         assert!(x.iter().zip(&exact).all(|(a, b)| (a - b).abs() < 1e-13));
     }
 
     #[test]
     fn an_empty_matrix_has_an_empty_factor() {
         let matrix = SparseSymmetric::zero(0, |_, _| {});
-        let factor = Factor::new(&matrix, Ordering::new(&matrix, &[], 0).unwrap()).unwrap();
-        assert_eq!(factor.trailing_schur_complement().size(), 0);
+        assert_eq!(schur(&matrix, &[], 0).size(), 0);
+        let factor = factor(&matrix, &[], 0).unwrap();
         factor.solve(&mut []);
     }
 
@@ -331,10 +397,7 @@ mod tests {
                 let mut matrix = SparseSymmetric::zero(n, |j, rows| rows.push(j));
                 (0..n).for_each(|j| matrix.add(j, j, 4.0 + j as f64));
                 let order: Vec<usize> = (0..n).collect();
-                let ordering = Ordering::new(&matrix, &order, trailing).unwrap();
-                let schur = Factor::new(&matrix, ordering)
-                    .unwrap()
-                    .trailing_schur_complement();
+                let schur = schur(&matrix, &order, trailing);
                 for k in 0..trailing {
                     let exact = 4.0 + (n - trailing + k) as f64;
                     assert!((schur.at(k, k) - exact).abs() < 1e-14, "{n}, {trailing}");
@@ -349,6 +412,10 @@ mod tests {
         matrix.add(0, 0, 1.0);
         matrix.add(1, 0, -2.0);
         matrix.add(1, 1, 1.0);
-        assert!(Factor::new(&matrix, Ordering::new(&matrix, &[0, 1], 1).unwrap()).is_err());
+        let unknown = |order: &[usize]| factor(&matrix, order, 1).err();
+        for (order, last) in [([0, 1], 1), ([1, 0], 0)] {
+            let refused = FactorError::NotPositiveDefinite { unknown: last };
+            assert_eq!(unknown(&order), Some(refused));
+        }
     }
 }

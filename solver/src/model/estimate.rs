@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::problem::{MeshInput, MeshSource, Problem, Refine};
+use super::{ContactModel, Model};
+use crate::error::{Reason, Violation};
+use crate::problem::{FrictionPoints, MeshSource, Problem, Refine};
 
 /// The cost of solving a problem on one core.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -33,89 +35,251 @@ pub struct MeshSize {
     pub boundaries: BTreeMap<String, u64>,
 }
 
+/// What the cost depends on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Size {
+    nodes: f64,
+    /// Unknowns on all contacts.
+    contact: f64,
+    /// Entries of all averages.
+    weights: f64,
+    /// Nodes and friction points on all contacts, with results for each step.
+    profile: f64,
+    steps: f64,
+    increments: f64,
+    /// The solution is computed once more so often.
+    repeats: f64,
+}
+
 /// Bytes of a mesh file for one element, underestimated rather than overestimated: in the larger files that
 /// Gmsh writes an element of second order has about 150 with its nodes, one of first order 100.
 const BYTES_PER_ELEMENT: f64 = 80.0;
 
-/// Bytes of history of an increment: about twenty rows, kept for the step and for the whole.
-const INCREMENT: f64 = 1e4;
+/// Most elements that can be numbered, with up to eight nodes each.
+const MOST_ELEMENTS: f64 = u32::MAX as f64 / 8.0;
 
-/// Estimates from the numbers of elements alone; the constants are measured in `docs/performance.md`.
-/// `stored`: the mesh that the problem names by its hash, if it does.
-pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Estimate {
+/// A first bound, from the number of elements alone, and not above that of [`Model::estimate`]: it refuses what would be
+/// too large to mesh. `stored`: the mesh that the problem names by its hash, if it does. Elements that cannot be
+/// numbered are a violation.
+pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate, Violation> {
     let mesh = &problem.mesh;
-    let split = 4f64.powi(halvings(mesh));
-    let adaptive = matches!(mesh.refine, Refine::Adaptive(_));
-    let elements = match &mesh.source {
+    // nodes of an element in a large mesh: of triangles fewer
+    let (elements, nodes) = match &mesh.source {
         MeshSource::Grid(grid) => {
-            grid.x.len().saturating_sub(1) as f64 * grid.y.len().saturating_sub(1) as f64
+            let lines = |lines: usize| lines.saturating_sub(1) as f64;
+            (lines(grid.x.len()) * lines(grid.y.len()), 3.0)
         }
-        MeshSource::Inline(inline) => inline.elements.len() as f64,
-        MeshSource::Gmsh(text) | MeshSource::Abaqus(text) => text.len() as f64 / BYTES_PER_ELEMENT,
-        MeshSource::Stored(_) => stored.map_or(0.0, |size| size.elements as f64),
+        MeshSource::Inline(inline) => (inline.elements.len() as f64, 2.0),
+        MeshSource::Gmsh(text) | MeshSource::Abaqus(text) => {
+            (text.len() as f64 / BYTES_PER_ELEMENT, 2.0)
+        }
+        MeshSource::Stored(_) => (stored.map_or(0.0, |size| size.elements as f64), 2.0),
     };
-    // A large mesh has three nodes an element, a small one up to eight.
-    let n = match adaptive {
-        // the largest mesh of the refinement
-        true => elements.max(MOST_ADAPTIVE_ELEMENTS as f64),
-        false => split * elements,
-    };
-    let nodes = (3.0 * n + 4.0 * n.sqrt() + 1.0).min(8.0 * n);
-    let dofs = 2.0 * nodes;
-    // fill of a minimum-degree factor in the plane grows like n log n
-    let fill = dofs * dofs.max(2.0).log2();
-    let contact = match adaptive {
-        true => 4.0 * (MOST_ADAPTIVE_LINES * problem.contacts.len()) as f64,
-        false => contact_dofs(problem, stored, n.sqrt()),
-    };
-    let increments: f64 = problem.steps.iter().map(|s| f64::from(s.increments)).sum();
-    let memory = 1500.0 * dofs + 95.0 * fill + 60.0 * contact * contact + INCREMENT * increments;
-    let once_more = 1
-        + u32::from(problem.solver.check_uniqueness)
-        + 2 * u32::from(problem.solver.check_increments);
-    let iterations = increments.max(1.0) * f64::from(once_more);
-    let time = 6e-6 * dofs + 4e-9 * dofs.powf(1.5) + 1e-9 * contact.powi(3) * iterations;
-    // floats saturate when cast: an impossibly large problem gets the largest number
-    Estimate {
-        dofs: dofs as u64,
-        memory_bytes: memory as u64,
-        run_s: time,
-    }
-}
-
-fn halvings(mesh: &MeshInput) -> i32 {
-    match mesh.refine {
-        Refine::Times(times) => times.min(64) as i32,
+    let times = match mesh.refine {
+        Refine::Times(times) => times,
         Refine::Adaptive(_) => 0,
+    };
+    // powers of two as floats end in infinity, and nothing overflows
+    let elements = 4f64.powi(times.min(1000) as i32) * elements;
+    if elements > MOST_ELEMENTS {
+        let (place, found) = match times {
+            0 => ("/mesh", format!("{elements:.1e} elements")),
+            _ => ("/mesh/refine", format!("{times}: {elements:.1e} elements")),
+        };
+        return Err(Violation::new(
+            place,
+            Reason::TooLarge,
+            found,
+            format!("at most {MOST_ELEMENTS:.1e} elements"),
+            "Each refinement divides every element into four.",
+        ));
+    }
+    let size = Size {
+        nodes: nodes * elements,
+        ..Size::default()
+    };
+    Ok(size.estimate(1.0))
+}
+
+impl Model {
+    /// What it will take to solve this model of `problem`: more rather than less than it does. Of adaptive refinement
+    /// the largest mesh.
+    pub fn estimate(&self, problem: &Problem) -> Estimate {
+        let adaptive = matches!(problem.mesh.refine, Refine::Adaptive(_));
+        let nodes = self.mesh.nodes.len() as f64;
+        let contacts = self.contacts.iter();
+        let contacts = contacts.map(|contact| Along::new(contact, adaptive));
+        let all = contacts.fold(Along::default(), |all, one| Along {
+            nodes: all.nodes + one.nodes,
+            points: all.points + one.points,
+            weights: all.weights + one.weights,
+        });
+        let controls = &self.controls;
+        let again = u32::from(controls.check_uniqueness) + 2 * u32::from(controls.check_increments);
+        let increments: f64 = self.steps.iter().map(|s| f64::from(s.increments)).sum();
+        let size = Size {
+            nodes: match adaptive {
+                true => nodes.max(3.1 * MOST_ADAPTIVE_ELEMENTS as f64),
+                false => nodes,
+            },
+            contact: 2.0 * all.nodes,
+            weights: all.weights,
+            profile: all.nodes + all.points,
+            steps: self.steps.len().max(1) as f64,
+            increments: increments.max(1.0),
+            repeats: f64::from(1 + again),
+        };
+        size.estimate(MARGIN)
     }
 }
 
-/// Unknowns on the contact boundaries: two for each of two nodes per edge, taken from the sides of
-/// the mesh.
-fn contact_dofs(problem: &Problem, stored: Option<&MeshSize>, side: f64) -> f64 {
-    let mesh = &problem.mesh;
-    let split = 2f64.powi(halvings(mesh));
-    let edges = |name: &str| {
-        let given = match &mesh.source {
-            MeshSource::Grid(grid) if name == "left" || name == "right" => Some(grid.y.len()),
-            MeshSource::Grid(grid) => Some(grid.x.len()),
-            MeshSource::Inline(inline) => inline.boundaries.get(name).map(Vec::len),
-            MeshSource::Gmsh(_) | MeshSource::Abaqus(_) => None,
-            MeshSource::Stored(_) => stored
-                .and_then(|size| size.boundaries.get(name))
-                .map(|edges| *edges as usize),
+/// How far the factors of meshes of other shapes lie above those that the fill is fitted to.
+const MARGIN: f64 = 1.2;
+
+impl Size {
+    /// The constants are those of `server/src/queue/tests/estimates.rs`, which compares estimates with measurements.
+    fn estimate(&self, margin: f64) -> Estimate {
+        let dofs = 2.0 * self.nodes;
+        let contact = self.contact;
+        // entries of the factor for each unknown away from contact, by minimum degree in the plane
+        let log = dofs.max(2.0).log2();
+        let fill = 0.6 * log * log - 3.04 * log + 31.4;
+        // The contact's own block, and as much again below the columns that reach it. Beside them Ŝ, and a matrix of
+        // the same size that is factored (Cholesky's or Newton's).
+        let factor = margin * fill * dofs + 2.0 * contact * contact;
+        let dense = 2.0 * contact * contact;
+        // mesh, stiffness, graph and symbolic factor; later displacements and stresses, and the stored result
+        let of_nodes = 1500.0 * margin * self.nodes;
+        // profiles and rows are held as numbers and as text; a step is also part of what is stored on the way
+        let history = 1.2e4 * self.increments
+            + self.steps * (6e3 + 400.0 * self.profile)
+            + 200.0 * self.profile;
+        let memory = 8.0 * (factor + dense + self.weights) + of_nodes + history + FLOOR;
+        let sweeps = contact.powi(3) * (1.0 + 2.0 * self.increments * self.repeats);
+        let time = 6e-6 * dofs + 4e-9 * dofs.powf(1.5) + 1e-9 * sweeps + 2.5e-6 * self.weights;
+        Estimate {
+            dofs: dofs as u64,
+            memory_bytes: memory as u64,
+            run_s: time,
+        }
+    }
+}
+
+/// What even the smallest problem takes (bytes).
+const FLOOR: f64 = 65_536.0;
+
+/// Numbers along contacts.
+#[derive(Clone, Copy, Debug, Default)]
+struct Along {
+    nodes: f64,
+    points: f64,
+    /// Entries of the averages.
+    weights: f64,
+}
+
+impl Along {
+    fn new(contact: &ContactModel, adaptive: bool) -> Along {
+        let s = &contact.boundary.s;
+        let friction = contact.friction.as_ref().filter(|law| law.bound.acts());
+        if adaptive {
+            let lines = (MOST_ADAPTIVE_LINES as f64).max(0.5 * s.len() as f64);
+            let (nodes, points) = (2.0 * lines + 1.0, 3.0 * lines);
+            let weights = friction.map_or(0.0, |_| nodes * points);
+            return Along {
+                nodes,
+                points,
+                weights,
+            };
+        }
+        let mut along = Along {
+            nodes: s.len() as f64,
+            ..Along::default()
         };
-        given.map_or(side, |edges| edges as f64 * split)
-    };
-    let name = |boundary: &str| {
-        mesh.boundaries
-            .get(boundary)
-            .and_then(|part| part.side.clone())
-            .unwrap_or_else(|| boundary.to_owned())
-    };
-    problem
-        .contacts
-        .iter()
-        .map(|contact| 4.0 * edges(&name(&contact.boundary)))
-        .sum()
+        let Some(law) = friction else { return along };
+        let radius = law.bound.averaged_over().unwrap_or(0.0);
+        // nodes of the edges that an average reaches: an edge has up to four beyond those within the radius
+        let mut add = |at: f64| {
+            let first = s.partition_point(|node| *node < at - radius);
+            let last = s.partition_point(|node| *node <= at + radius);
+            along.points += 1.0;
+            along.weights += (last - first) as f64 + 4.0 + POINT;
+        };
+        match law.points {
+            FrictionPoints::Gauss3 => contact
+                .boundary
+                .friction_points
+                .iter()
+                .for_each(|p| add(p.s)),
+            FrictionPoints::Nodal => s.iter().for_each(|at| add(*at)),
+        }
+        along
+    }
+}
+
+/// What a friction point takes beside its average, in numbers.
+const POINT: f64 = 24.0;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn problem(refine: u32, lines: u32) -> Problem {
+        let y: Vec<u32> = (0..lines).collect();
+        let problem = serde_json::json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {
+                "grid": {"x": [0, 1], "y": y},
+                "boundaries": {"wall": {"normal": [1, 0]}},
+                "refine": refine
+            },
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
+            "contacts": [{
+                "boundary": "wall",
+                "obstacle": {"kind": "flat", "from": 0, "to": lines - 1},
+                "indentation": 0.01,
+                "friction": {"coefficient": 0.3, "nonlocal_radius": 2, "elastic_slip": 1e-4}
+            }]
+        });
+        serde_json::from_value(problem).unwrap()
+    }
+
+    #[test]
+    fn a_refinement_beyond_all_numbers_is_a_violation_of_its_field() {
+        for times in [15, 100, u32::MAX] {
+            let violation = estimate(&problem(times, 6), None).unwrap_err();
+            let found = (&violation.pointer[..], violation.reason);
+            assert_eq!(found, ("/mesh/refine", Reason::TooLarge));
+        }
+        assert!(estimate(&problem(10, 6), None).unwrap().memory_bytes > 1 << 30);
+    }
+
+    /// A contact under any name counts, and its dense matrices are most of what a long one takes.
+    #[test]
+    fn a_contact_is_counted_by_its_nodes_and_not_by_its_name() {
+        let problem = problem(0, 1001);
+        let first = estimate(&problem, None).unwrap().memory_bytes;
+        let model = Model::new(&problem, None).unwrap();
+        let told = model.estimate(&problem).memory_bytes;
+        let dense = 8 * 4002 * 4002;
+        assert!(3 * dense < told && told < 5 * dense, "{told}");
+        assert!(first < told / 20, "{first}");
+    }
+
+    #[test]
+    fn steps_and_wide_averages_are_counted() {
+        let told = |problem: &Problem| {
+            let model = Model::new(problem, None).unwrap();
+            model.estimate(problem).memory_bytes
+        };
+        let mut problem = problem(0, 101);
+        let plain = told(&problem);
+        problem.steps = vec![crate::problem::Step::whole(); 1000];
+        assert!(told(&problem) - plain > 1000 * 400 * 500);
+        problem.steps.clear();
+        let friction = problem.contacts[0].friction.as_mut().unwrap();
+        friction.nonlocal_radius = Some(100.0);
+        assert!(told(&problem) - plain > 8 * 300 * 180);
+    }
 }

@@ -566,6 +566,16 @@ pub enum Progress<'a> {
     Step(&'a Solution),
     /// The solver is at work, and asks whether to continue.
     Pulse,
+    /// The solver is about to take this much more memory at once, and asks whether it may.
+    Needs {
+        /// Bytes.
+        bytes: u64,
+    },
+    /// There was not so much memory: the solver goes on without, and cannot get far.
+    OutOfMemory {
+        /// Bytes that it needed.
+        bytes: u64,
+    },
 }
 
 /// The observer of a solution: called at every phase and iteration; it may stop the solution.

@@ -3,6 +3,8 @@
 
 mod attempts;
 mod coalescing;
+mod estimates;
+mod memory;
 mod order;
 mod submits;
 
@@ -67,6 +69,7 @@ fn new(priority: i32) -> NewJob {
         input_hash: digest::input_hash(&problem).unwrap(),
         problem: serde_json::to_string(&problem).unwrap(),
         mesh: None,
+        memory_bytes: 1 << 20,
         payload: "payload".into(),
     }
 }

@@ -55,6 +55,7 @@ fn new(input: &str) -> NewJob {
         input_hash: format!("sha256:{input}"),
         problem: "{}".into(),
         mesh: None,
+        memory_bytes: 1 << 20,
         payload: "payload".into(),
     }
 }

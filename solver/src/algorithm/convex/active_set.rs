@@ -1,10 +1,9 @@
 //! Primal–dual active set with semi-smooth Newton steps.
 
-use std::ops::ControlFlow;
-
 use super::step::{AIM, Minimum, close, follow, free_dofs, gradient, newton_direction};
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
+use crate::solution::{Observer, Progress};
 
 /// Steps of the active set before falling back.
 const ACTIVE_SET_STEPS: u32 = 30;
@@ -15,7 +14,7 @@ pub(super) fn run(
     bound: &[f64],
     start: &State,
     tolerance: f64,
-    go_on: &mut dyn FnMut() -> ControlFlow<()>,
+    observe: &mut Observer<'_>,
 ) -> Minimum {
     let mut state = start.clone();
     let mut best: Option<Minimum> = None;
@@ -23,7 +22,7 @@ pub(super) fn run(
         close(system, &mut state);
         let free: Vec<usize> = free_dofs(system, |i| state.active[i]);
         let force = gradient(system, &state.v, bound);
-        let Some(delta) = newton_direction(system, bound, &state.v, &force, &free) else {
+        let Some(delta) = newton_direction(system, bound, &state.v, &force, &free, observe) else {
             break;
         };
         free.iter()
@@ -42,7 +41,7 @@ pub(super) fn run(
         }
         let reached = best.as_ref().map_or(f64::INFINITY, |b| b.residual);
         let arrived = !changed && residual <= AIM * tolerance || settled && reached <= tolerance;
-        if arrived || go_on().is_break() {
+        if arrived || observe(Progress::Pulse).is_break() {
             break;
         }
     }

@@ -13,26 +13,26 @@ mod step;
 pub(super) use active_set::update_active;
 pub(super) use projected_newton::least_along;
 pub use step::Minimum;
-pub(super) use step::{close, follow, free_dofs, semidefinite_shift};
-
-use std::ops::ControlFlow;
+pub(super) use step::{close, dense, follow, free_dofs, semidefinite_shift};
 
 use crate::algorithm::system::{State, System};
+use crate::solution::{Observer, Progress};
 
 /// Minimises J from `start` until the KKT residual is below `tolerance`, and somewhat further where
-/// that is cheap. `go_on` is called at every Newton step and may stop it.
+/// that is cheap. The observer is asked at every Newton step, and within long ones, and may stop it.
 pub fn minimise(
     system: &System<'_>,
     bound: &[f64],
     start: &State,
     tolerance: f64,
-    go_on: &mut dyn FnMut() -> ControlFlow<()>,
+    observe: &mut Observer<'_>,
 ) -> Minimum {
-    let by_active_set = active_set::run(system, bound, start, tolerance, go_on);
-    if by_active_set.residual <= tolerance || go_on().is_break() {
+    let by_active_set = active_set::run(system, bound, start, tolerance, observe);
+    if by_active_set.residual <= tolerance || observe(Progress::Pulse).is_break() {
         return by_active_set;
     }
-    let mut fallback = projected_newton::run(system, bound, &by_active_set.state, tolerance, go_on);
+    let mut fallback =
+        projected_newton::run(system, bound, &by_active_set.state, tolerance, observe);
     fallback.steps += by_active_set.steps;
     if fallback.residual <= by_active_set.residual {
         fallback

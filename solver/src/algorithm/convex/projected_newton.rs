@@ -1,11 +1,10 @@
 //! Projected Newton (Bertsekas 1982) with a line search: slower, but J decreases at every step.
 
-use std::ops::ControlFlow;
-
 use super::step::{AIM, Minimum, close, follow, free_dofs, gradient, newton_direction};
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::elasticity::Dof;
 use crate::friction::FrictionLaw;
+use crate::solution::{Observer, Progress};
 
 /// Steps of projected Newton; a dozen are usual.
 const PROJECTED_STEPS: u32 = 300;
@@ -23,7 +22,7 @@ pub(super) fn run(
     bound: &[f64],
     start: &State,
     tolerance: f64,
-    go_on: &mut dyn FnMut() -> ControlFlow<()>,
+    observe: &mut Observer<'_>,
 ) -> Minimum {
     let mut best = Minimum {
         state: start.clone(),
@@ -55,7 +54,7 @@ pub(super) fn run(
             let stale = steps - best.steps.min(steps);
             let arrived =
                 best.residual <= AIM * tolerance || best.residual <= tolerance && stale >= PATIENCE;
-            if arrived || go_on().is_break() {
+            if arrived || observe(Progress::Pulse).is_break() {
                 break;
             }
             steps += 1;
@@ -69,7 +68,8 @@ pub(super) fn run(
             }
             force = gradient(system, &v, bound);
             let free = free_dofs(system, |i| held[i]);
-            let Some(direction) = newton_direction(system, bound, &v, &force, &free) else {
+            let Some(direction) = newton_direction(system, bound, &v, &force, &free, observe)
+            else {
                 break;
             };
             let mut d = vec![0.0; v.len()];

@@ -2,7 +2,8 @@
 
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
-use crate::linear::solve_positive_definite;
+use crate::linear::{Breaks, Dense, Unsolved, solve_positive_definite};
+use crate::solution::{Observer, Progress};
 
 /// The best approximation of the minimiser.
 pub struct Minimum {
@@ -77,13 +78,36 @@ pub(in crate::algorithm) fn semidefinite_shift(system: &System<'_>) -> f64 {
     1e-9 * diagonal / size as f64
 }
 
-/// −H⁻¹ ∇J on the free unknowns, H = Ŝ + Σ w τ φ′ h hᵀ.
+/// The solution of a dense system of this size, for whose matrix the observer is asked first. None if there is none,
+/// or the observer stops.
+pub(in crate::algorithm) fn dense(
+    size: usize,
+    observe: &mut Observer<'_>,
+    solve: impl FnOnce(&mut Breaks<'_>) -> Result<Vec<f64>, Unsolved>,
+) -> Option<Vec<f64>> {
+    let bytes = Dense::bytes(size);
+    if observe(Progress::Needs { bytes }).is_break() {
+        return None;
+    }
+    match solve(&mut Breaks::new(&mut || observe(Progress::Pulse))) {
+        Ok(x) => Some(x),
+        Err(Unsolved::TooLarge { bytes }) => {
+            // the answer is given again at the next question
+            let _ = observe(Progress::OutOfMemory { bytes });
+            None
+        }
+        Err(Unsolved::Singular | Unsolved::Stopped) => None,
+    }
+}
+
+/// −H⁻¹ ∇J on the free unknowns, H = Ŝ + Σ w τ φ′ h hᵀ. None if H has no factor, or the observer stops.
 pub(super) fn newton_direction(
     system: &System<'_>,
     bound: &[f64],
     v: &[f64],
     force: &[f64],
     free: &[usize],
+    observe: &mut Observer<'_>,
 ) -> Option<Vec<f64>> {
     let mut place = vec![usize::MAX; system.load.len()];
     free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
@@ -114,6 +138,8 @@ pub(super) fn newton_direction(
         system.stiffness.at(free[i], free[j]) + shift
     };
     let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
-    let direction = solve_positive_definite(free.len(), elastic, &friction, &rhs)?;
+    let direction = dense(free.len(), observe, |breaks| {
+        solve_positive_definite(free.len(), elastic, &friction, &rhs, breaks)
+    })?;
     direction.iter().all(|d| d.is_finite()).then_some(direction)
 }

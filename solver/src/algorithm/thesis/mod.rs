@@ -16,14 +16,14 @@ mod average;
 mod friction;
 mod rows;
 
-use crate::algorithm::convex::{close, follow, free_dofs};
+use crate::algorithm::convex::{close, dense, follow, free_dofs};
 use crate::algorithm::finished::End;
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::algorithm::track::{Measured, Row, Track, relative_change};
 use crate::elasticity::Dof;
 use crate::linear::solve_positive_definite;
 use crate::problem::{ThesisOptions, ThesisPressure};
-use crate::solution::{Observer, Outcome, Stage};
+use crate::solution::{Observer, Outcome, Progress, Stage};
 use friction::{Friction, relax, signed_ratio};
 use rows::Rows;
 
@@ -40,9 +40,11 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
     let mut state = first_guess(system, &options);
     let mut normal_stress: Option<Vec<f64>> = None;
     let mut end: Option<(End, Vec<f64>)> = None;
+    let mut stopped = false;
     for _ in 0..track.controls.max_iterations {
         // steps 1 and 2; the iteration ends where the system cannot be solved
-        let Some(v) = solve(system, &state.active, &friction.traction) else {
+        let Some(v) = solve(system, &state.active, &friction.traction, observe) else {
+            stopped = observe(Progress::Pulse).is_break();
             break;
         };
         state.v = v;
@@ -98,14 +100,19 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
         relax(&mut friction, new, options.relaxation);
         state.active = next;
     }
-    end.unwrap_or_else(|| {
+    let (end, tractions) = end.unwrap_or_else(|| {
         let measured = Measured::new(system, state, friction.bound);
         let reached = End {
             exhausted: true,
             ..End::new(measured, Stage::Thesis, Outcome::NotConverged)
         };
         (reached, friction.traction)
-    })
+    });
+    let outcome = match stopped {
+        true => Outcome::Canceled,
+        false => end.outcome,
+    };
+    (End { outcome, ..end }, tractions)
 }
 
 /// Γ_C*⁽¹⁾: the user's guess by arc length, else all of Γ_C.
@@ -123,7 +130,12 @@ fn first_guess(system: &System<'_>, options: &ThesisOptions) -> State {
 }
 
 /// Steps 1 and 2. u_n = s on Γ_C*, σ_n = 0 off it, and K u = F − F̂.
-fn solve(system: &System<'_>, active: &[bool], traction: &[f64]) -> Option<Vec<f64>> {
+fn solve(
+    system: &System<'_>,
+    active: &[bool],
+    traction: &[f64],
+    observe: &mut Observer<'_>,
+) -> Option<Vec<f64>> {
     let mut state = State {
         v: vec![0.0; system.load.len()],
         active: active.to_vec(),
@@ -134,7 +146,9 @@ fn solve(system: &System<'_>, active: &[bool], traction: &[f64]) -> Option<Vec<f
     system.add_traction_force(traction, &mut force);
     let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
     let entry = |i: usize, j: usize| system.stiffness.at(free[i], free[j]);
-    let solved = solve_positive_definite(free.len(), entry, &[], &rhs)?;
+    let solved = dense(free.len(), observe, |breaks| {
+        solve_positive_definite(free.len(), entry, &[], &rhs, breaks)
+    })?;
     free.iter()
         .zip(solved)
         .for_each(|(&dof, value)| state.v[dof] += value);

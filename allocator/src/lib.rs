@@ -1,0 +1,128 @@
+//! The system's allocator, which counts for each thread how many bytes it has taken and not given back.
+//!
+//! A job is solved on one thread, so this is what the job holds; the server ends a job that outgrows its share. The
+//! crates that count allocations do so for the whole process, or only within a closure for a test: none answers, in the
+//! middle of a job, what this thread holds. So it is written here, and it is all that this crate does: `GlobalAlloc`
+//! can only be implemented with `unsafe`, which the other crates forbid.
+//!
+//! Counting is two additions to a thread-local number, about a nanosecond. Bytes that another thread gives back are
+//! taken from that thread's count: a thread that hands over what it has made keeps it in its own.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+thread_local! {
+    // both constant and without a destructor: using them allocates nothing
+    static HELD: Cell<i64> = const { Cell::new(0) };
+    static HIGHEST: Cell<i64> = const { Cell::new(0) };
+}
+
+/// The system's allocator with a count for each thread, for `#[global_allocator]`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counting;
+
+/// Bytes that this thread has taken and not given back; negative if it has given back what others took. 0 in a program
+/// that does not use [`Counting`].
+pub fn held() -> i64 {
+    HELD.get()
+}
+
+/// The highest count of this thread since [`forget_highest`].
+pub fn highest() -> i64 {
+    HIGHEST.get()
+}
+
+/// Begins a new highest count.
+pub fn forget_highest() {
+    HIGHEST.set(HELD.get());
+}
+
+/// Adds to the count of this thread. Sizes are below `isize::MAX`.
+fn count(bytes: i64) {
+    let held = HELD.get().wrapping_add(bytes);
+    HELD.set(held);
+    if held > HIGHEST.get() {
+        HIGHEST.set(held);
+    }
+}
+
+// SAFETY: every call is passed to the system's allocator as it is, and its answer returned as it is; counting neither
+// allocates nor unwinds.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: the caller's promises are those that `System` asks for
+        let memory = unsafe { System.alloc(layout) };
+        if !memory.is_null() {
+            count(layout.size() as i64);
+        }
+        memory
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: as above
+        let memory = unsafe { System.alloc_zeroed(layout) };
+        if !memory.is_null() {
+            count(layout.size() as i64);
+        }
+        memory
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        // SAFETY: as above; the memory is from `System`, since all of it is
+        unsafe { System.dealloc(memory, layout) };
+        count(-(layout.size() as i64));
+    }
+
+    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
+        // SAFETY: as above
+        let moved = unsafe { System.realloc(memory, layout, new_size) };
+        if !moved.is_null() {
+            count(new_size as i64 - layout.size() as i64);
+        }
+        moved
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[global_allocator]
+    static COUNTING: Counting = Counting;
+
+    #[test]
+    fn what_a_thread_takes_is_counted_until_it_gives_it_back() {
+        let before = held();
+        forget_highest();
+        let mut bytes: Vec<u8> = Vec::with_capacity(1000);
+        assert_eq!(held() - before, 1000);
+        bytes.reserve_exact(3000);
+        assert_eq!(held() - before, 3000);
+        let zeros = std::hint::black_box(vec![0u64; 500]);
+        assert_eq!(held() - before, 7000);
+        drop((bytes, zeros));
+        assert_eq!(held() - before, 0);
+        assert_eq!(highest() - before, 7000);
+    }
+
+    #[test]
+    fn every_thread_has_its_own_count() {
+        let bytes = vec![1u8; 100_000];
+        let before = held();
+        let there = std::thread::spawn(move || {
+            let start = held();
+            drop(bytes);
+            held() - start
+        });
+        assert_eq!(there.join().ok(), Some(-100_000));
+        assert!((held() - before).abs() < 10_000, "only the thread itself");
+    }
+
+    #[test]
+    fn an_allocation_that_fails_counts_nothing() {
+        let before = held();
+        let mut bytes: Vec<u8> = Vec::new();
+        assert!(bytes.try_reserve_exact(isize::MAX as usize - 8).is_err());
+        assert_eq!(held(), before);
+    }
+}

@@ -1,0 +1,191 @@
+//! What a problem is told to need, against what it takes: from its text to the stored form of its result.
+
+use serde_json::{Value, json};
+
+use std::ops::ControlFlow;
+
+use super::*;
+use crate::queue::solving::{Told, solve_and_report};
+
+/// Problems of different shapes, by what is large in them.
+fn problems() -> Vec<(String, Value)> {
+    let mut problems = vec![];
+    for (name, text) in [
+        (
+            "annular punch",
+            include_str!("../../../../examples/annular_punch.json"),
+        ),
+        (
+            "cylinder",
+            include_str!("../../../../examples/cylinder.json"),
+        ),
+        (
+            "cylinder on end",
+            include_str!("../../../../examples/cylinder_on_end.json"),
+        ),
+        (
+            "rectangular punch",
+            include_str!("../../../../examples/rectangular_punch.json"),
+        ),
+        ("sheet", include_str!("../../../../examples/sheet.json")),
+    ] {
+        let example: Value = serde_json::from_str(text).unwrap();
+        for refine in [0, 1, 2, 3] {
+            let mut refined = example.clone();
+            refined["mesh"]["refine"] = json!(refine);
+            problems.push((format!("{name}, refine {refine}"), refined));
+        }
+        let with = |change: &dyn Fn(&mut Value)| {
+            let mut changed = example.clone();
+            changed["mesh"]["refine"] = json!(2);
+            change(&mut changed);
+            changed
+        };
+        problems.push((
+            format!("{name}, Newton"),
+            with(&|p| p["solver"] = json!({"algorithm": "newton"})),
+        ));
+        problems.push((
+            format!("{name}, thesis"),
+            with(&|p| p["solver"] = json!({"algorithm": "thesis", "max_iterations": 60})),
+        ));
+        problems.push((
+            format!("{name}, uniqueness"),
+            with(&|p| p["solver"] = json!({"check_uniqueness": true})),
+        ));
+        problems.push((
+            format!("{name}, 40 steps"),
+            with(&|p| {
+                let step = |k: u32| {
+                    json!({"indentation": f64::from(k) / 40.0, "loads": f64::from(k) / 40.0,
+                "supports": f64::from(k) / 40.0, "tangential_displacement": f64::from(k) / 40.0})
+                };
+                p["steps"] = (1..=40).map(step).collect();
+            }),
+        ));
+        problems.push((
+            format!("{name}, 100 increments"),
+            with(&|p| {
+                p["steps"] = json!([{"increments": 100}]);
+                p["contacts"][0]["friction"]["history"] = json!("incremental");
+            }),
+        ));
+        problems.push((
+            format!("{name}, wide average"),
+            with(&|p| p["contacts"][0]["friction"]["nonlocal_radius"] = json!(0.6)),
+        ));
+    }
+    for lines in [10, 100, 300] {
+        problems.push((format!("wall of {lines} lines"), wall(lines, 2.0)));
+    }
+    problems.push(("wall of 100 lines, wide average".into(), wall(100, 200.0)));
+    let mut newton = wall(150, 20.0);
+    newton["solver"] = json!({"algorithm": "newton"});
+    problems.push(("wall of 150 lines, Newton".into(), newton));
+    let side: Vec<u32> = (0..80).collect();
+    problems.push(("block, two contacts".into(), json!({
+        "analysis": {"kind": "plane_stress", "thickness": 1},
+        "mesh": {"grid": {"x": side, "y": side}, "boundaries": {
+            "roof": {"side": "top", "x": [5, 60]}, "wall": {"side": "left", "y": [20, 70]}}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [
+            {"boundary": "roof", "obstacle": {"kind": "circle", "radius": 400, "center": 25}, "indentation": 0.1,
+             "friction": {"coefficient": 0.3, "nonlocal_radius": 5, "elastic_slip": 0.001}},
+            {"boundary": "wall", "obstacle": {"kind": "flat", "from": 0, "to": 50}, "indentation": 0.01},
+        ],
+    })));
+    problems
+}
+
+/// A strip one element wide that touches with all of its long side, which has a name of its own.
+fn wall(lines: u32, radius: f64) -> Value {
+    let y: Vec<u32> = (0..lines).collect();
+    json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [0, 1], "y": y}, "boundaries": {"wall": {"normal": [1, 0]}}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
+        "contacts": [{
+            "boundary": "wall",
+            "obstacle": {"kind": "flat", "from": 0, "to": lines - 1},
+            "indentation": 0.01,
+            "friction": {"coefficient": 0.3, "nonlocal_radius": radius, "elastic_slip": 1e-4}
+        }]
+    })
+}
+
+/// What solving a problem has taken at most, and what it was told to.
+fn taken_and_told(problem: &Value) -> (u64, u64) {
+    let text = problem.to_string();
+    let parsed = files::parse(&text).unwrap();
+    let checked = solver::check(&parsed, files::external_mesh(&parsed, None));
+    let told = checked.unwrap_or_else(|v| panic!("{v:?}")).estimate;
+    let before = allocator::held();
+    allocator::forget_highest();
+    let go_on = |told| {
+        drop(told);
+        ControlFlow::Continue(())
+    };
+    let solved = solve_and_report(&text, None, solver::solve_on, u64::MAX, go_on);
+    let taken = allocator::highest() - before;
+    drop(solved.map(|solved| solved.parts));
+    (taken as u64, told.memory_bytes)
+}
+
+/// An estimate is not below what a problem takes, and not three times as much.
+fn compare(problems: Vec<(String, Value)>) {
+    let mut wrong = vec![];
+    // the first one also makes what all share for the life of the process
+    taken_and_told(&problems[0].1);
+    for (name, problem) in problems {
+        let (taken, told) = taken_and_told(&problem);
+        let ratio = told as f64 / taken as f64;
+        println!(
+            "{name}: takes {} KiB, told {} KiB, {ratio:.2}",
+            taken >> 10,
+            told >> 10
+        );
+        if !(1.0..3.0).contains(&ratio) {
+            wrong.push((name, taken, told));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn estimates_lie_between_what_is_taken_and_three_times_that() {
+    let problems = problems();
+    assert!(problems.len() >= 30);
+    compare(problems);
+}
+
+/// Minutes, and up to 1 GiB: `cargo test --release --workspace --lib long_contacts -- --ignored --nocapture`.
+#[test]
+#[ignore = "minutes, and up to 1 GiB"]
+fn estimates_of_long_contacts_do_too() {
+    let walls = [500, 1000, 1500].map(|lines| (format!("wall of {lines} lines"), wall(lines, 2.0)));
+    compare(walls.into());
+}
+
+/// A job that outgrows its share ends at the next question: its solver sees a stop, and the worker why.
+#[test]
+fn a_job_that_needs_more_than_its_share_is_stopped() {
+    let text = wall(300, 2.0).to_string();
+    let mut stopped_for = None;
+    let solved = solve_and_report(&text, None, solver::solve_on, 16 << 20, |told| match told {
+        Told::OutOfMemory(outgrown) => {
+            stopped_for = Some(outgrown);
+            ControlFlow::Break(())
+        }
+        _ => ControlFlow::Continue(()),
+    });
+    assert!(matches!(solved.err(), Some(SolveError::Stopped)));
+    let outgrown = stopped_for.unwrap();
+    assert_eq!(outgrown.share, 16 << 20);
+    // the factor alone is larger
+    assert!(
+        outgrown.needed > 16 << 20 && outgrown.used < 16 << 20,
+        "{outgrown:?}"
+    );
+}

@@ -1,0 +1,95 @@
+//! The memory budget of running jobs.
+
+use super::*;
+
+const MIB: u64 = 1 << 20;
+
+/// Two workers, and a budget of 100 MiB.
+async fn rig_of_100_mib(solve: Solve) -> Rig {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    store.set_budget(100 * MIB);
+    let queue = Queue::new(store.clone(), solve, 2);
+    queue.start();
+    Rig {
+        store,
+        queue,
+        folder,
+    }
+}
+
+/// A job of an input of its own, which is estimated to need so much.
+fn needing(mib: u64) -> NewJob {
+    NewJob {
+        input_hash: format!("sha256:{mib}"),
+        memory_bytes: mib * MIB,
+        ..new(0)
+    }
+}
+
+#[tokio::test]
+async fn a_job_waits_until_it_fits_beside_the_running_ones_and_is_not_overtaken() {
+    let rig = rig_of_100_mib(fake::solve_until_stopped).await;
+    let first = rig.submit_as(needing(60)).await;
+    rig.until_at_work(&first).await;
+    let second = rig.submit_as(needing(50)).await;
+    let third = rig.submit_as(needing(10)).await;
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    for (job, position) in [(&second, 1), (&third, 2)] {
+        let waiting = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
+        let place = waiting.queue.unwrap();
+        assert_eq!(
+            (place.position, place.reason),
+            (position, Waiting::Memory),
+            "the third would fit, and a worker is idle"
+        );
+    }
+    assert_eq!(rig.queue.state().idle, 1);
+    rig.queue.cancel(first.key).await.unwrap();
+    // both fit now
+    rig.until_at_work(&second).await;
+    rig.until_at_work(&third).await;
+}
+
+#[tokio::test]
+async fn a_job_of_more_than_the_budget_runs_alone() {
+    let rig = rig_of_100_mib(fake::solve_until_stopped).await;
+    let large = rig.submit_as(needing(1000)).await;
+    rig.until_at_work(&large).await;
+    let small = rig.submit_as(needing(1)).await;
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    let waiting = rig.store.job(Owners::All, small.id).await.unwrap().unwrap();
+    assert_eq!(waiting.status, Status::Queued);
+    rig.queue.cancel(large.key).await.unwrap();
+    rig.until_at_work(&small).await;
+}
+
+/// A solver that needs more than its share, and obeys when it is told to stop.
+fn solve_greedily(
+    _: &Problem,
+    _: Option<External>,
+    observe: &mut Observer<'_>,
+) -> Result<Solution, SolveError> {
+    let bytes = 1 << 40;
+    match observe(Progress::Needs { bytes }).is_break() {
+        true => Err(SolveError::Stopped),
+        false => Ok(fake::solution()),
+    }
+}
+
+#[tokio::test]
+async fn a_job_that_outgrows_its_share_fails_with_figures_and_its_worker_goes_on() {
+    let rig = rig_of_100_mib(solve_greedily).await;
+    for _ in 0..3 {
+        let job = rig.submit_as(needing(10)).await;
+        let ended = rig.until_done(&job).await;
+        assert_eq!(ended.status, Status::Failed);
+        assert_eq!(ended.reason, Some(Reason::ResourceExhausted));
+        let detail = ended.failure.unwrap().detail;
+        assert!(
+            detail.contains("1.0 TiB more") || detail.contains("1024.0 GiB more"),
+            "{detail}"
+        );
+        assert!(detail.contains("a share of 74.0 MiB"), "{detail}");
+    }
+}

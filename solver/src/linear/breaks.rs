@@ -1,0 +1,37 @@
+//! Pauses in long work, in which it asks whether to go on.
+
+use std::ops::ControlFlow;
+
+/// Asks whether to go on whenever another [`PORTION`] of work has been done. Work is counted in operations and not in
+/// seconds, since the solver has no clock.
+pub struct Breaks<'a> {
+    ask: &'a mut dyn FnMut() -> ControlFlow<()>,
+    done: f64,
+}
+
+/// The work was stopped on request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stopped;
+
+/// Multiplications between two questions: 5 to 50 ms.
+pub(super) const PORTION: f64 = 5e7;
+
+impl<'a> Breaks<'a> {
+    /// Pauses in which `ask` is called; it answers whether to go on.
+    pub fn new(ask: &'a mut dyn FnMut() -> ControlFlow<()>) -> Self {
+        Breaks { ask, done: 0.0 }
+    }
+
+    /// Notes work that has been done (multiplications), and asks if it is time to.
+    pub fn after(&mut self, work: f64) -> Result<(), Stopped> {
+        self.done += work;
+        if self.done < PORTION {
+            return Ok(());
+        }
+        self.done = 0.0;
+        match (self.ask)() {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Stopped),
+        }
+    }
+}

@@ -1,0 +1,90 @@
+"""How soon a worker is free after its job has ended by time or was canceled, in the middle of dense work (R7).
+
+    stuck.py [--soak]
+
+The jobs are a strip one element wide that touches with all of its long side: few bytes, and a dense matrix of two
+unknowns for each contact node. One is stopped by its time limit, another by a cancel; a small job waits behind it, on
+the only worker. --soak takes up to 3,000 elements along the contact (6,001 nodes, 12,000 unknowns).
+"""
+
+import pathlib
+import sys
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+
+from outside import Server, check, equal, example
+
+SOAK = "--soak" in sys.argv[1:]
+# elements along the contact
+SIZES = (1_000, 2_000, 3_000) if SOAK else (1_000,)
+# seconds from the end of a job to the start of the next; the machine may be at work for others
+MOST_S = 1.0
+TIMEOUT_S = 3.0
+
+
+def strip(elements):
+    return {
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [0, 1], "y": list(range(elements + 1))}, "boundaries": {"wall": {"normal": [1, 0]}}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
+        "contacts": [{
+            "boundary": "wall", "obstacle": {"kind": "flat", "from": 0, "to": elements}, "indentation": 0.01,
+            "friction": {"coefficient": 0.3, "nonlocal_radius": 2, "elastic_slip": 1e-4},
+        }],
+    }
+
+
+def seconds(text):
+    """The seconds of an RFC 3339 time within its day, and its day."""
+    date, clock = text.rstrip("Z").split("T")
+    hours, minutes, rest = clock.split(":")
+    return time.mktime(time.strptime(date, "%Y-%m-%d")) + 3600 * int(hours) + 60 * int(minutes) + float(rest)
+
+
+def wait_until_running(server, job):
+    for _ in range(2_000):
+        if server.json("/v1/jobs/" + job)["status"] != "queued":
+            return
+        time.sleep(0.01)
+    raise AssertionError("job %s was not started within 20 s" % job)
+
+
+def gap(server, stopped, following):
+    """Seconds from the end of one job to the start of the one behind it."""
+    ended, began = server.finished(stopped), server.finished(following)
+    equal(began["status"], "succeeded", "the job behind")
+    return ended, seconds(began["started_at"]) - seconds(ended["finished_at"])
+
+
+def attack(server, elements, stop_after):
+    """One job stopped by its time limit, one canceled at `stop_after` seconds: the two gaps."""
+    large, small = strip(elements), example()
+    slow = server.submit(large, limits={"timeout_s": TIMEOUT_S})
+    ended, by_time = gap(server, slow, server.submit(small))
+    equal((ended["status"], ended["reason"]), ("failed", "timed_out"), "a job at its time limit")
+    slow = server.submit(large)
+    following = server.submit(small)
+    wait_until_running(server, slow)
+    time.sleep(stop_after)
+    server.call("POST", "/v1/jobs/%s/cancel" % slow)
+    ended, by_cancel = gap(server, slow, following)
+    equal(ended["status"], "canceled", "a job that was canceled")
+    return by_time, by_cancel
+
+
+def main():
+    told = []
+    with Server("--workers", "1", "--memory-budget-bytes", str(6 << 30)) as server:
+        for elements in SIZES:
+            gaps = []
+            # in the factorisation of the body, and later, in that of the contact's matrix
+            for stop_after in (1.0, 6.0, 12.0) if SOAK else (1.5,):
+                gaps.extend(attack(server, elements, stop_after))
+            told.append("%d elements along the contact: %.2f s" % (elements, max(gaps)))
+            check(max(gaps) <= MOST_S, "the worker was free after %s s, %d elements" % (gaps, elements))
+    print("figure: after a time-out or a cancel the worker was free within, at the most, " + "; ".join(told))
+
+
+main()
