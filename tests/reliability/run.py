@@ -1,10 +1,11 @@
 """Runs the commands of `table.py`, and keeps what they found.
 
     run.py [--soak] [--record] [ROW ...]
+    run.py --page
 
 Each command ends with a line `figure: …`. With --record the figures and the date are written to figures.json, and
 docs/reliability.md is written anew; tests/soak does that. Without it the page is only compared with what the table and
-the recorded figures say.
+the recorded figures say. With --page it is written anew from them, and nothing is run.
 """
 
 import datetime
@@ -70,12 +71,12 @@ def main():
     commands = dict.fromkeys(row.soak if "--soak" in options else row.small for row in rows)
     figures = json.loads(FIGURES.read_text(encoding="utf-8")) if FIGURES.exists() else {}
     for command in commands:
-        if command:
+        if command and "--page" not in options:
             figure = run(command)
             if "--record" in options:
                 figures[command] = {"figure": figure, "date": datetime.date.today().isoformat()}
                 FIGURES.write_text(json.dumps(figures, indent=1, ensure_ascii=False, sort_keys=True) + "\n", encoding="utf-8")
-    if "--record" in options:
+    if "--record" in options or "--page" in options:
         PAGE.write_text(page(figures), encoding="utf-8")
     elif PAGE.read_text(encoding="utf-8") != page(figures):
         sys.exit("docs/reliability.md is not what the table and the recorded figures say: run.py --record writes it")
