@@ -5,6 +5,7 @@
 A solve alone, one with 200 watchers that read a byte a second, and one with 200 more that read at once, in turn:
 server-sent events, gRPC and long polls. It takes as long, who reads hears of all, a watcher costs little memory, and the
 write-ahead log stays small. Then a job ends for which thousands wait: all are answered, and the log says nothing of it.
+Nor is anybody forgotten who begins to wait just when a job ends.
 """
 
 import asyncio
@@ -18,10 +19,11 @@ from attack import (
     DATA, END_HEADERS, END_STREAM, HEADERS, MIB, PREFACE, SOAK, WINDOW_UPDATE, Attacked, Bystander, check, equal, example,
     frame, head, settings,
 )
-from outside import talkative
+from outside import Connection, each, submission, talkative
 
 SLOW, QUICK = 200, 200
 KINDS = ("events", "grpc", "poll")
+JOBS = 20_000 if SOAK else 1_000
 WAITERS = 10_000 if SOAK else 2_000
 # The promise, which needs a processor for the solver and one for the rest, since these clients take most of one. The
 # small form runs beside other tests: there only the time of processors that the server takes tells something.
@@ -258,6 +260,35 @@ async def wait_for_the_end(server, job):
     return took, canceled
 
 
+async def wait_for_each(server):
+    """Small jobs, each waited for at once, so that many end just when somebody begins to wait. The longest wait."""
+    numbers, longest = iter(range(JOBS)), 0
+
+    async def client(_):
+        nonlocal longest
+        connection = Connection(server)
+        for _ in numbers:
+            job = (await connection.call("POST", "/v1/jobs", submission(example()))).json()["id"]
+            began = time.monotonic()
+            answer = await connection.call("GET", "/v1/jobs/%s?wait=8&until=terminal" % job)
+            took = time.monotonic() - began
+            check(answer.json()["status"] == "succeeded" and took < 6, "who waited for %s was told after %.1f s that it is %s, and it is %s" % (
+                job, took, answer.json()["status"], server.json("/v1/jobs/" + job)["status"]))
+            longest = max(longest, took)
+        connection.close()
+
+    await each(range(8), client)
+    return longest
+
+
+def nobody_is_forgotten():
+    with Attacked() as server:
+        longest = asyncio.run(wait_for_each(server))
+    figure = "%d jobs waited for from their submit on: told after %.2f s at most" % (JOBS, longest)
+    print(figure, flush=True)
+    return figure
+
+
 def many_waiters():
     with Attacked("--max-connections", str(WAITERS + 500)) as server:
         other = server.finished_job()
@@ -282,4 +313,4 @@ def many_waiters():
     return figure
 
 
-print("figure: %s; %s" % (many_watchers(), many_waiters()))
+print("figure: %s; %s; %s" % (nobody_is_forgotten(), many_waiters(), many_watchers()))
