@@ -66,9 +66,11 @@ class Faulty(Attacked):
         self.write("fail_at", self.read("calls") + n)
 
     def heal(self):
-        """No call fails from now on; so many have."""
+        """No call fails from now on; so many have since it was last asked."""
         self.write("fail_at", 0)
-        return self.read("failed")
+        failed = self.read("failed")
+        self.write("failed", 0)
+        return failed
 
     def cut_power(self, dice, everything):
         """Takes back what the disk may not have had when the process was killed: everything that was not synced, or any

@@ -70,14 +70,14 @@ def attempt(server, n, error, count):
     server.fail(n, error, count)
     name = "%s, call %d" % (named(error, count), n)
     answer = server.call("POST", "/v1/jobs", submission(example(), name=name))
-    accepted = clean(answer, (202,), error, "submit")
+    accepted, met = clean(answer, (202,), error, "submit"), 0
     if accepted:
         job = answer.json()["id"]
         # with a lasting fault it cannot end, unless it had ended before
         found = until_ended(server, job, 0.3 if count == FOREVER else LATEST_S)
         if count == FOREVER and found["status"] not in ENDED:
             lasting(server, job, error)
-            server.heal()
+            met = server.heal()
             found = until_ended(server, job, LATEST_S)
         equal(found["status"], "succeeded", "%s: an accepted job" % name)
         events = server.events(job)
@@ -89,7 +89,7 @@ def attempt(server, n, error, count):
         equal(status, 410 if deleted else 200, "%s: after a deletion that was%s answered with 204" % (name, "" if deleted else " not"))
     elif count == FOREVER:
         lasting(server, None, error)
-    met = server.heal()
+    met += server.heal()
     check(server.process.poll() is None, "%s: the server ended" % name)
     if not accepted:
         listed = [job["id"] for job in server.json("/v1/jobs?page_size=50")["jobs"] if job["name"] == name]
