@@ -47,14 +47,14 @@ def unread():
 
 def signals():
     def limit():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (8 * MIB, resource.RLIM_INFINITY))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (24 * MIB, resource.RLIM_INFINITY))
 
-    limited = ("prlimit", "--fsize=%d:" % (8 * MIB))
+    limited = ("prlimit", "--fsize=%d:" % (24 * MIB))
     with Attacked(wrapper=limited) as server:
         server.process.send_signal(signal.SIGHUP)
         job = server.finished_job()
         refused, statuses = 0, []
-        for _ in range(200):
+        for _ in range(2000):
             answer = server.call("POST", "/v1/jobs", submission(example(), labels={str(k): "x" * 250 for k in range(60)}))
             statuses.append(answer.status)
             if answer.status == 507:
@@ -64,7 +64,7 @@ def signals():
         check(refused > 3, "no submit was refused: %r" % statuses[-5:])
         equal(server.call("GET", "/v1/jobs/" + job).status, 200, "a read with a full store")
         server.stop()
-    return "SIGHUP and SIGXFSZ survived; %d submits until a file limit of 8 MiB, then 507" % statuses.count(202)
+    return "SIGHUP and SIGXFSZ survived; %d submits until a file limit of 24 MiB, then 507" % statuses.count(202)
 
 
 print("figure: " + "; ".join([unread(), signals()]))
