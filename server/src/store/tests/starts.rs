@@ -19,7 +19,7 @@ fn crashed(folder: &Path) -> tempfile::TempDir {
 }
 
 async fn refused(folder: &Path) -> StoreError {
-    Store::open(folder).await.err().expect("it is refused")
+    Store::open(folder).await.unwrap_err()
 }
 
 async fn submit(store: &Store, input: &str) -> Result<Job> {
@@ -35,13 +35,12 @@ async fn a_store_that_has_lost_transactions_is_refused_until_that_is_accepted() 
     let store = Store::open(folder.path()).await.unwrap();
     let older = crashed(folder.path());
     submit(&store, "1").await.unwrap();
-    let (database, log): (fn(&Path) -> PathBuf, fn(&Path) -> PathBuf) = (
-        |folder| folder.join("signorini.db"),
-        |folder| folder.join("signorini.db-wal"),
-    );
+    let database = |folder: &Path| -> PathBuf { folder.join("signorini.db") };
+    let log = |folder: &Path| -> PathBuf { folder.join("signorini.db-wal") };
+    type Harm<'a> = (&'a str, &'a dyn Fn(&Path));
     let whole = crashed(folder.path());
     Store::open(whole.path()).await.unwrap();
-    let harms: [(&str, &dyn Fn(&Path)); 6] = [
+    let harms: [Harm<'_>; 6] = [
         ("log removed", &|f| fs::remove_file(log(f)).unwrap()),
         ("log emptied", &|f| fs::write(log(f), b"").unwrap()),
         ("log zeroed", &|f| {
