@@ -4,12 +4,13 @@
 
 Every body must be answered by 400, 413 or 422 (or by the violations, where a problem is only validated) in a short
 document, and its peak of memory be at most ten times the body and 16 MiB. Without --soak the bodies have 1 MiB and
-must be answered in 100 ms, the best of six times, since other programs take part of that; with it they have 16 MiB
-and may take one CPU second each.
+must be answered in 100 ms, the best of six times; where other programs keep all processors busy, 100 ms of CPU time
+count instead. With it they have 16 MiB and may take one CPU second each.
 """
 
 import concurrent.futures
 import json
+import os
 import pathlib
 import sys
 import time
@@ -23,7 +24,7 @@ SOAK = "--soak" in sys.argv
 MIB = 1 << 20
 # a little less than the limit of a body
 SIZE = 16 * MIB - 4096 if SOAK else MIB
-MOST_CPU_S, MOST_S = (1.0, None) if SOAK else (0.25, 0.1)
+MOST_CPU_S, MOST_S = (1.0, None) if SOAK else (0.1, 0.1)
 # beside ten times the body: what the process takes for its first request of a kind
 FLOOR = 16 * MIB
 LONGEST_ANSWER = 256 << 10
@@ -114,7 +115,9 @@ def bodies():
     for place, text in places.items():
         for empty in empties:
             yield "%s in %s" % (empty, place), around(text, empty)
-    yield "lines of a grid that are all 0", around(problem(mesh='"mesh":{"grid":{"x":[§],"y":[0,1]}}'), "0")
+    # refused for their number; half a million are a sound list, and the answer is one of meaning
+    if SOAK:
+        yield "lines of a grid that are all 0", around(problem(mesh='"mesh":{"grid":{"x":[§],"y":[0,1]}}'), "0")
     yield "names of boundaries", around(inline(more=',"boundaries":{§}'), '"%d":[]')
     yield "names of parts", around(problem(mesh='"mesh":{"grid":{"x":[0,1],"y":[0,1]},"boundaries":{§}}'), '"%d":{}')
     yield "loads that are almost all forms", around(
@@ -167,7 +170,8 @@ def attack(server, name, text):
         check(len(answer.body) < LONGEST_ANSWER, "%s: an answer of %d bytes" % (name, len(answer.body)))
         check(share <= 10, "%s: memory of %.1f times its %d bytes" % (name, share, len(text)))
         check(cpu <= MOST_CPU_S, "%s: %.2f CPU s" % (name, cpu))
-        check(MOST_S is None or took <= MOST_S, "%s: %.0f ms" % (name, 1e3 * took))
+        busy = os.getloadavg()[0] > (os.cpu_count() or 1)
+        check(MOST_S is None or busy or took <= MOST_S, "%s: %.0f ms" % (name, 1e3 * took))
         worst = [max(pair) for pair in zip(worst, (grown / len(text), cpu, took))]
     return worst
 

@@ -59,10 +59,10 @@ def main():
 
     def collect(process, name):
         output = process.communicate()[0].decode(errors="replace")
-        lines.extend(re.findall(r"fuzz ([\w-]+): (\d+) executions in (\d+) s, corpus (\d+), .*", output))
-        for line in output.splitlines():
-            if line.startswith("fuzz "):
-                print(line, flush=True)
+        told = re.finditer(r"fuzz ([\w-]+): (\d+) executions in (\d+) s, corpus (\d+), .*", output)
+        for line in told:
+            lines.append(line.groups())
+            print(line.group(), flush=True)
         if process.returncode != 0 or " 1 passed" not in output:
             failed.append("%s:\n%s" % (name, output[-3000:]))
 
