@@ -155,6 +155,9 @@ pub fn cause(mut error: axum::Error) -> Result<ApiError, axum::Error> {
 
 /// The body of a request, which fails when nothing of it arrives for [`LONGEST_PAUSE`].
 pub fn with_longest_pause(body: Body) -> Body {
+    if body.is_end_stream() {
+        return body;
+    }
     let body = TimeoutBody::new(LONGEST_PAUSE, body);
     Body::new(body.map_err(|error| match error.is::<TimeoutError>() {
         true => BodyError::from(ApiError::RequestTimeout).into(),

@@ -116,8 +116,12 @@ async fn a_mesh_is_stored_once_and_identified_by_its_content() {
 async fn a_file_that_is_not_a_mesh_is_refused_with_its_line() {
     let server = server().await;
     for (bytes, expected) in [
-        (b"solid cube".to_vec(), "a file that begins differently"),
-        (Vec::new(), "a file that begins differently"),
+        (b"solid cube".to_vec(), "an STL surface"),
+        (
+            b"Point(1) = {0, 0};".to_vec(),
+            "a file that begins differently",
+        ),
+        (Vec::new(), "an empty file"),
         (
             file("gmsh/sheet-tri6-msh41-ascii.msh")[..3000].to_vec(),
             "the end of the file",

@@ -130,7 +130,7 @@ async fn a_port_in_use_is_refused_in_one_line() {
     let address = server.url.trim_start_matches("http://");
     let second = Command::new(SIGNORINI)
         .args(["serve", "--listen", address, "--data"])
-        .arg(folder.path())
+        .arg(folder.path().join("data"))
         .output()
         .unwrap();
     assert!(!second.status.success());

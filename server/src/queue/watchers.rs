@@ -8,7 +8,7 @@ use std::{
 use tokio::sync::watch;
 
 use super::feed::{Feed, News};
-use crate::store::{self, Store};
+use crate::store::{self, Store, StoreError};
 
 /// From so many watchers of one job on, each looks for news less often.
 const CROWD: usize = 16;
@@ -64,11 +64,14 @@ impl Watchers {
                 feed: Feed::default(),
             })
         });
+        let receiver = watched.changes.subscribe();
+        let seen = receiver.borrow().of_job;
         Subscription {
             watchers: self,
             key,
-            receiver: watched.changes.subscribe(),
+            receiver,
             watched: watched.clone(),
+            seen,
         }
     }
 
@@ -84,6 +87,8 @@ pub struct Subscription<'a> {
     key: i64,
     watched: Arc<Watched>,
     receiver: watch::Receiver<Changes>,
+    /// Changes of the job that were announced before the subscription, or returned for.
+    seen: u64,
 }
 
 impl Subscription<'_> {
@@ -95,19 +100,27 @@ impl Subscription<'_> {
 
     /// Returns when a change of the job itself was announced since the subscription or the last call.
     pub async fn job_changed(&mut self) {
-        let seen = self.receiver.borrow_and_update().of_job;
-        let _ = self
-            .receiver
-            .wait_for(|changes| changes.of_job != seen)
-            .await;
+        let seen = self.seen;
+        let changed = self.receiver.wait_for(|changes| changes.of_job != seen);
+        // an error would mean that the sender is gone, but it lives as long as this subscription
+        if let Ok(changes) = changed.await.map(|changes| *changes) {
+            self.seen = changes.of_job;
+        }
     }
 
     /// Events after number `after`, and whether the job has ended. All watchers of a job share what one of them reads.
-    pub async fn news(&mut self, store: &Store, after: i64) -> store::Result<News> {
+    /// It is read in a task of its own: a client that does not read stops its stream at any point, and would stop
+    /// the others if it held what they wait for.
+    pub async fn news(&mut self, store: &Arc<Store>, after: i64) -> store::Result<News> {
         let announced = self.receiver.borrow_and_update().all;
         let others = self.receiver_count() > 1;
-        let feed = &self.watched.feed;
-        feed.news(store, self.key, announced, after, others).await
+        let (store, watched, key) = (store.clone(), self.watched.clone(), self.key);
+        let reading = tokio::spawn(async move {
+            let feed = &watched.feed;
+            feed.news(&store, key, announced, after, others).await
+        });
+        let read = reading.await;
+        read.unwrap_or_else(|panic| Err(StoreError::Unexpected(panic.to_string())))
     }
 
     /// Whether so many watch this job that each of them should look for news less often.
@@ -144,6 +157,9 @@ mod tests {
         let mut subscription = watchers.subscribe(7);
         watchers.announce(7);
         subscription.changed().await;
+        subscription.job_changed().await;
+        watchers.announce(7);
+        subscription.job_changed().await;
     }
 
     #[tokio::test(start_paused = true)]

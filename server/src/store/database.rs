@@ -128,6 +128,15 @@ impl Store {
                 let whole = !connection.is_in_transaction();
                 Box::pin(async move { Ok(whole) })
             })
+            // SQLite opens a file that it cannot write for reading only, and that would last: such a connection is
+            // none, and the next transaction tries again
+            .after_connect(|connection, _| {
+                Box::pin(async move {
+                    let writes = "begin immediate; rollback";
+                    sqlx::raw_sql(writes).execute(connection).await?;
+                    Ok(())
+                })
+            })
             .connect_with(writing)
             .await?;
         migrations::run(&writer).await?;

@@ -142,6 +142,8 @@ mod code {
     // of these, the details: reading failed, or ended early
     pub(super) const IOERR_READ: u32 = 266;
     pub(super) const IOERR_SHORT_READ: u32 = 522;
+    // writing failed: over a quota, a limit on files, or on a disk that fails
+    pub(super) const IOERR_WRITE: u32 = 778;
 }
 
 impl From<sqlx::Error> for StoreError {
@@ -157,7 +159,7 @@ impl From<sqlx::Error> for StoreError {
             {
                 Part::named("database").damaged(error)
             }
-            _ if number == code::FULL => StoreError::Full,
+            _ if matches!(number, code::FULL | code::IOERR_WRITE) => StoreError::Full,
             _ if matches!(number & 0xff, code::READ_ONLY | code::CANNOT_OPEN) => {
                 StoreError::Folder(format!("the database cannot be written: {error}"))
             }

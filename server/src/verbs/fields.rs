@@ -8,7 +8,7 @@ use solver::solution::Fields;
 
 use super::{
     results::{no_result, with_result},
-    service::Service,
+    service::{Service, detached},
 };
 use crate::{
     caller::Caller,
@@ -57,9 +57,14 @@ impl StoredFields {
         const PIECE: u64 = PIECE_BYTES as u64;
         try_stream! {
             for piece in start / PIECE..end.div_ceil(PIECE) {
-                let share = service.sent.wait_for(PIECE_BYTES).await?;
-                let found = service.store.piece(key, "fields", piece as i64).await?;
-                let mut bytes = found.ok_or(ApiError::Deleted(id))?;
+                // in a task of its own: a client that does not read may stop this stream at any point
+                let service = service.clone();
+                let read = detached(async move {
+                    let share = service.sent.wait_for(PIECE_BYTES).await?;
+                    let found = service.store.piece(key, "fields", piece as i64).await?;
+                    Ok((share, found.ok_or(ApiError::Deleted(id))?))
+                });
+                let (share, mut bytes) = read.await?;
                 let first = piece * PIECE;
                 bytes.truncate(end.saturating_sub(first) as usize);
                 let skipped = start.saturating_sub(first) as usize;

@@ -160,7 +160,7 @@ async fn no_column_can_change_unnoticed() {
                         _ => format!("'x' || {text}"),
                     },
                     blob if blob.starts_with("X'") => "x'00'".into(),
-                    number if column == "seq" => format!("{number} + 100"),
+                    number if matches!(column, "seq" | "piece") => format!("{number} + 100"),
                     number => format!("{number} + 1"),
                 };
                 put(&other, key).await;
