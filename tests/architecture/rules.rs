@@ -32,7 +32,7 @@ const RESERVED: &[Reserved] = &[
     Reserved { path: "crate::mesh",     within: "solver/src/friction/",   only: &[] },
     Reserved { path: "crate::contact",  within: "solver/src/elasticity/", only: &[] },
     Reserved { path: "crate::friction", within: "solver/src/elasticity/", only: &[] },
-    Reserved { path: "crate::pb",   within: "",       only: &["server/src/grpc/", "server/src/convert/", "server/src/cli/demo.rs"] },
+    Reserved { path: "crate::pb",   within: "",       only: &["server/src/grpc/", "server/src/convert/", "server/src/codec.rs", "server/src/cli/demo.rs"] },
 ];
 
 /// Everything that is wrong, sorted.

@@ -137,15 +137,15 @@ impl Deck {
                         self.raw.node_sets.keys(),
                     ),
                 },
-                Target::Set(name) if !self.raw.node_sets.contains_key(&**name) => {
-                    if !incomplete.names {
-                        unknown(
-                            &mut faults,
-                            &format!("the node set `{name:.60}`"),
-                            "a node or a set of nodes",
-                            self.raw.node_sets.keys(),
-                        );
-                    }
+                Target::Set(name)
+                    if !incomplete.names && !self.raw.node_sets.contains_key(&**name) =>
+                {
+                    unknown(
+                        &mut faults,
+                        &format!("the node set `{name:.60}`"),
+                        "a node or a set of nodes",
+                        self.raw.node_sets.keys(),
+                    );
                 }
                 _ => {}
             }

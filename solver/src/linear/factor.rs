@@ -156,6 +156,9 @@ impl Factor {
         breaks: &mut Breaks<'_>,
     ) -> Result<Self, FactorError> {
         let mut values = Vec::new();
+        if matrix.size() == 0 {
+            return Ok(Factor { ordering, values }); // it has no supernodes
+        }
         let too_large = |_| FactorError::TooLarge {
             bytes: ordering.bytes(),
         };
