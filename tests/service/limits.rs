@@ -116,7 +116,7 @@ async fn a_problem_over_the_memory_budget_is_refused_with_the_estimate() {
     let body = json!({ "problem": hopeless });
     let (status, document) = answer(server.post("/v1/jobs").json(&body)).await;
     assert_eq!(
-        (status, &document["violations"][0]["pointer"]),
+        (status, &document["errors"][0]["pointer"]),
         (
             StatusCode::UNPROCESSABLE_ENTITY,
             &json!("/problem/mesh/refine")
