@@ -13,7 +13,7 @@ import time
 
 from attack import MIB, SOAK, Attacked, check, equal, example, submission
 
-SUBMITS = 10000 if SOAK else 1000
+SUBMITS = 10000 if SOAK else 400
 
 
 class Unread(Attacked):
