@@ -172,7 +172,7 @@ mod tests {
                 "indentation": 0.01,
                 "friction": {"coefficient": 0.3, "nonlocal_radius": 2, "elastic_slip": 1e-4}
             }],
-            "solver": {"algorithm": algorithm, "check_uniqueness": true, "check_increments": true}
+            "solver": {"algorithm": algorithm, "check_uniqueness": true}
         });
         serde_json::from_value(problem).unwrap()
     }

@@ -90,11 +90,12 @@ impl Latest {
                 ended: self.ended,
             });
         }
-        let first = self.last + 1 - self.events.len() as i64;
-        if after < first - 1 || after >= self.last {
+        // the event before those that are kept
+        let before = self.last - self.events.len() as i64;
+        if after >= self.last {
             return None;
         }
-        let skipped = usize::try_from(after + 1 - first).ok()?;
+        let skipped = usize::try_from(after.checked_sub(before)?).ok()?;
         Some(News {
             events: self.events.iter().skip(skipped).cloned().collect(),
             // there are events to come after these: the watcher will ask again
@@ -109,7 +110,7 @@ impl Latest {
             self.last = after;
         }
         self.events.extend(news.events.iter().cloned());
-        self.last += news.events.len() as i64;
+        self.last = news.events.last().map_or(self.last, |event| event.seq);
         let excess = self.events.len().saturating_sub(MOST as usize);
         self.events.drain(..excess);
         let complete = (news.events.len() as i64) < MOST;
@@ -167,6 +168,23 @@ mod tests {
         // the first is no longer kept
         assert_eq!(known(&latest, 1, 0), None);
         assert_eq!(known(&latest, 1, 1).unwrap().len() as i64, MOST);
+    }
+
+    /// Clients name any number.
+    #[test]
+    fn a_watcher_may_resume_after_any_number() {
+        let mut latest = Latest::default();
+        latest.add(&news(1..=3), 1, 0);
+        assert_eq!(known(&latest, 1, i64::MIN), None);
+        assert_eq!(known(&latest, 1, i64::MAX), None);
+        let none = News {
+            events: vec![],
+            ended: Some(false),
+        };
+        latest.add(&none, 1, i64::MAX);
+        assert_eq!(known(&latest, 1, i64::MAX), Some(vec![]));
+        assert_eq!(known(&latest, 1, i64::MIN), None);
+        assert_eq!(known(&latest, 1, 3), None);
     }
 
     #[test]

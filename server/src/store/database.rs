@@ -64,7 +64,7 @@ pub struct Store {
     pub(super) reserve: Reserve,
     // last: SQLite's files are closed before
     pub(super) identity: Identity,
-    _folder: Folder,
+    folder: Folder,
 }
 
 /// A transaction of the single writer; unless it is committed it is rolled back.
@@ -168,7 +168,7 @@ impl Store {
             progress,
             reserve,
             identity,
-            _folder: folder,
+            folder,
         };
         Ok((store, submissions))
     }
@@ -179,7 +179,7 @@ impl Store {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Closes every connection, and with the last one the write-ahead log.
+    /// Closes every connection, and with the last one the write-ahead log. Another server may use the folder then.
     pub async fn close(&self) {
         self.lists.close().await;
         self.reader.close().await;
@@ -187,6 +187,7 @@ impl Store {
         if let Err(error) = self.progress.sync() {
             tracing::warn!(%error, "{}: {error}", progress::FILE);
         }
+        self.folder.unlock();
     }
 
     /// Begins a transaction of the single writer.

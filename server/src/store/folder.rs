@@ -33,7 +33,7 @@ const OLD_LOCK: &str = "lock";
 #[derive(Debug)]
 pub(super) struct Folder {
     path: PathBuf,
-    _locks: Vec<File>,
+    locks: Vec<File>,
 }
 
 impl Folder {
@@ -64,8 +64,15 @@ impl Folder {
         }
         Ok(Folder {
             path: path.to_owned(),
-            _locks: locks,
+            locks,
         })
+    }
+
+    /// Lets another server in, once nothing is written any more.
+    pub(super) fn unlock(&self) {
+        for file in &self.locks {
+            let _ = file.unlock(); // it ends with the file, too
+        }
     }
 
     /// Where the database is.

@@ -12,7 +12,7 @@ use super::{
     error::{Part, Result, StoreError},
     events,
     folder::{DATABASE, Folder},
-    intact, keys, meshes, problems, progress,
+    intact, keys, meshes, migrations, problems, progress,
     rows::find,
     salvage::{copy_job, copy_the_rest, insert, new_store},
 };
@@ -58,6 +58,10 @@ pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
     }
     match options.read_only(true).connect().await {
         Ok(mut source) => {
+            // damage to the list of steps is found below, as damage
+            if let Err(error @ StoreError::Schema(_)) = migrations::are_current(&mut source).await {
+                return Err(error);
+            }
             let inspected = report.inspect(&mut source, target.as_ref()).await;
             source.close().await?;
             inspected?;

@@ -110,6 +110,19 @@ pub(super) async fn check(connection: &mut SqliteConnection) -> Result<()> {
     Ok(())
 }
 
+/// An error if the tables are of an earlier version.
+pub(super) async fn are_current(connection: &mut SqliteConnection) -> Result<()> {
+    let steps: i64 = sqlx::query_scalar("select count(*) from _sqlx_migrations")
+        .fetch_one(connection)
+        .await?;
+    match steps == STEPS.len() as i64 {
+        true => Ok(()),
+        false => Err(StoreError::Schema(
+            "the store is of an earlier version of this program: start the service on it once, which brings it up to date".into(),
+        )),
+    }
+}
+
 /// The statements that made the tables and indexes, by name.
 async fn schema(connection: &mut SqliteConnection) -> Result<BTreeMap<String, Option<String>>> {
     let all: Vec<(String, Option<String>)> =

@@ -162,7 +162,7 @@ fn jacobian(
 ) -> Result<General, Unsolved> {
     let n = free.len();
     let bytes = Dense::bytes(n);
-    let mut h = General::try_zero(n).ok_or(Unsolved::TooLarge { bytes })?;
+    let mut h = General::try_zero(n, breaks)?.ok_or(Unsolved::TooLarge { bytes })?;
     for (j, &dof) in free.iter().enumerate() {
         let (column, elastic) = (h.column_mut(j), system.stiffness.column(dof));
         let entries = column.iter_mut().zip(free);

@@ -9,6 +9,24 @@ pub struct Breaks<'a> {
     done: f64,
 }
 
+/// Zeros for a matrix, with questions: the first touch of a GiB takes up to a second. `None` if there is not so much
+/// memory.
+pub(super) fn zeros(count: usize, breaks: &mut Breaks<'_>) -> Result<Option<Vec<f64>>, Stopped> {
+    /// Numbers written between two questions: 32 MiB.
+    const AT_ONCE: usize = 4 << 20;
+    let mut values = Vec::new();
+    if values.try_reserve_exact(count).is_err() {
+        return Ok(None);
+    }
+    while values.len() < count {
+        let more = AT_ONCE.min(count - values.len());
+        values.resize(values.len() + more, 0.0);
+        // so that every whole piece asks
+        breaks.after(PORTION * more as f64 / AT_ONCE as f64)?;
+    }
+    Ok(Some(values))
+}
+
 /// The work was stopped on request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stopped;

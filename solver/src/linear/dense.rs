@@ -5,7 +5,7 @@ use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::blocked::{self, NoFactor};
-use super::breaks::{Breaks, Stopped};
+use super::breaks::{Breaks, Stopped, zeros};
 
 /// Rows of a block of a product; a smaller matrix is multiplied row by row.
 const BLOCK: usize = 256;
@@ -19,14 +19,14 @@ pub struct Dense {
 
 impl Dense {
     /// All zeros; none if that does not fit into memory.
-    pub fn try_zero(size: usize) -> Option<Self> {
-        let values = zeros(size)?;
-        Some(Dense { size, values })
+    pub fn try_zero(size: usize, breaks: &mut Breaks<'_>) -> Result<Option<Self>, Stopped> {
+        let values = zeros(size.saturating_mul(size), breaks)?;
+        Ok(values.map(|values| Dense { size, values }))
     }
 
     /// What a matrix of this size takes.
     pub fn bytes(size: usize) -> u64 {
-        8 * (size as u64).saturating_mul(size as u64)
+        (size as u64).saturating_mul(size as u64).saturating_mul(8)
     }
 
     /// Number of rows.
@@ -153,15 +153,6 @@ impl Dense {
     }
 }
 
-/// A matrix of zeros by columns; none if it does not fit into memory.
-fn zeros(size: usize) -> Option<Vec<f64>> {
-    let mut values = Vec::new();
-    let count = size.checked_mul(size)?;
-    values.try_reserve_exact(count).ok()?;
-    values.resize(count, 0.0);
-    Some(values)
-}
-
 /// Why a dense system has no solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsolved {
@@ -192,7 +183,8 @@ pub fn solve_positive_definite(
     breaks: &mut Breaks<'_>,
 ) -> Result<Vec<f64>, Unsolved> {
     let bytes = Dense::bytes(size);
-    let mut values = zeros(size).ok_or(Unsolved::TooLarge { bytes })?;
+    let values = zeros(size.saturating_mul(size), breaks)?;
+    let mut values = values.ok_or(Unsolved::TooLarge { bytes })?;
     // the factorisation reads the lower triangle only
     for (j, column) in values.chunks_exact_mut(size.max(1)).enumerate() {
         (j..size).for_each(|i| column[i] = entry(i, j));
@@ -220,9 +212,9 @@ pub struct General {
 
 impl General {
     /// All zeros; none if that does not fit into memory.
-    pub fn try_zero(size: usize) -> Option<Self> {
-        let values = zeros(size)?;
-        Some(General { size, values })
+    pub fn try_zero(size: usize, breaks: &mut Breaks<'_>) -> Result<Option<Self>, Stopped> {
+        let values = zeros(size.saturating_mul(size), breaks)?;
+        Ok(values.map(|values| General { size, values }))
     }
 
     /// A column.
@@ -300,7 +292,9 @@ mod tests {
     }
 
     fn general(size: usize, entry: impl Fn(usize, usize) -> f64) -> General {
-        let mut a = General::try_zero(size).unwrap();
+        let mut a = go_on(|breaks| General::try_zero(size, breaks))
+            .unwrap()
+            .unwrap();
         (0..size).for_each(|j| (0..size).for_each(|i| a.column_mut(j)[i] = entry(i, j)));
         a
     }
@@ -327,7 +321,7 @@ mod tests {
     fn systems_of_any_size_are_solved_by_blocks() {
         for n in [1, 5, 64, 255, 256, 257, 300, 511, 700] {
             let exact: Vec<f64> = (0..n).map(|i| number(i, 3)).collect();
-            let entry = |i: usize, j: usize| match i == j && i % 3 == 0 {
+            let entry = |i: usize, j: usize| match i == j && i.is_multiple_of(3) {
                 true => 0.0,
                 false => number(i, j),
             };
@@ -366,7 +360,7 @@ mod tests {
     #[test]
     fn a_product_by_blocks_is_that_by_rows() {
         let factor = |n: usize| {
-            let mut l = Dense::try_zero(n).unwrap();
+            let mut l = go_on(|breaks| Dense::try_zero(n, breaks)).unwrap().unwrap();
             (0..n).for_each(|i| (0..=i).for_each(|j| l.row_mut(i)[j] = number(i, j)));
             l
         };
@@ -399,7 +393,7 @@ mod tests {
         assert_eq!(solved, Err(Unsolved::Stopped));
         let solved = general(n, entry).solve(&b, &mut Breaks::new(&mut stop));
         assert_eq!(solved, Err(Unsolved::Stopped));
-        let mut product = Dense::try_zero(n).unwrap();
+        let mut product = go_on(|breaks| Dense::try_zero(n, breaks)).unwrap().unwrap();
         assert!(
             product
                 .times_its_transpose(&mut Breaks::new(&mut stop))
@@ -410,7 +404,12 @@ mod tests {
 
     #[test]
     fn a_matrix_that_fits_into_no_memory_is_refused() {
-        assert!(Dense::try_zero(1 << 31).is_none() && General::try_zero(usize::MAX).is_none());
+        assert_eq!(go_on(|breaks| Dense::try_zero(1 << 31, breaks)), Ok(None));
+        assert!(
+            go_on(|breaks| General::try_zero(usize::MAX, breaks))
+                .unwrap()
+                .is_none()
+        );
         assert_eq!(Dense::bytes(1 << 40), u64::MAX);
     }
 

@@ -18,7 +18,7 @@ use faer::sparse::linalg::cholesky::{
 use faer::{Conj, MatMut, Par, Side};
 
 use super::blocked::NoFactor;
-use super::breaks::{Breaks, Stopped};
+use super::breaks::{Breaks, Stopped, zeros};
 use super::supernodal;
 use crate::linear::{Dense, Graph, SparseSymmetric};
 
@@ -155,17 +155,14 @@ impl Factor {
         ordering: Ordering,
         breaks: &mut Breaks<'_>,
     ) -> Result<Self, FactorError> {
-        let mut values = Vec::new();
         if matrix.size() == 0 {
-            return Ok(Factor { ordering, values }); // it has no supernodes
+            // a body that is held everywhere: its structure has neither supernodes nor a permutation
+            let values = Vec::new();
+            return Ok(Factor { ordering, values });
         }
-        let too_large = |_| FactorError::TooLarge {
-            bytes: ordering.bytes(),
-        };
-        values
-            .try_reserve_exact(ordering.symbolic.len_val())
-            .map_err(too_large)?;
-        values.resize(ordering.symbolic.len_val(), 0.0);
+        let bytes = ordering.bytes();
+        let values = zeros(ordering.symbolic.len_val(), breaks)?;
+        let mut values = values.ok_or(FactorError::TooLarge { bytes })?;
         let (unknowns, places) = ordering.permutation();
         let structure = ordering.structure();
         scatter(matrix, structure, places, &mut values);
@@ -196,7 +193,7 @@ impl Factor {
     pub fn trailing_schur_complement(&self, breaks: &mut Breaks<'_>) -> Result<Dense, FactorError> {
         let m = self.ordering.trailing;
         let bytes = Dense::bytes(m);
-        let mut schur = Dense::try_zero(m).ok_or(FactorError::TooLarge { bytes })?;
+        let mut schur = Dense::try_zero(m, breaks)?.ok_or(FactorError::TooLarge { bytes })?;
         self.trailing_factor(&mut schur);
         schur.times_its_transpose(breaks)?;
         Ok(schur)
