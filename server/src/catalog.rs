@@ -208,7 +208,7 @@ catalog! {
     ResourceExhausted: of_job("The job needs more memory than there is",
         "Memory ran out while the job was solved, although its estimate was within the budget. Use a coarser mesh."),
     WorkerLost: of_job("The worker was lost too often",
-        "The process died during each of max_attempts attempts at this job. Other jobs continue. If the job is the cause, please report it."),
+        "The process died during several attempts at this job; attempts that ended because the service was stopped are not counted. Other jobs continue. If the job is the cause, please report it."),
     UserCancel: of_job("The job was canceled",
         "A client canceled the job."),
 }

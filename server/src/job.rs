@@ -239,7 +239,7 @@ pub enum Reason {
     QueueExpired,
     /// It needs more memory than is available.
     ResourceExhausted,
-    /// The process died during each of `max_attempts` attempts.
+    /// The process died during several attempts.
     WorkerLost,
     /// An error of the service itself.
     Internal,

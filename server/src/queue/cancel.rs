@@ -56,6 +56,19 @@ impl Queue {
         Ok(outcome)
     }
 
+    /// Asks the first of these jobs to stop: those that wait in one transaction. Returns how many were dealt with, and
+    /// how many of them had not ended before.
+    pub async fn cancel_some(self: &Arc<Self>, keys: &[i64]) -> Result<(usize, usize)> {
+        let batch = self.store.cancel_queued(keys).await?;
+        self.announce(&batch.changed);
+        self.wake.notify_one();
+        let mut changed = batch.done;
+        for key in batch.running {
+            changed += usize::from(self.cancel(key).await? != CancelOutcome::AlreadyTerminal);
+        }
+        Ok((batch.seen, changed))
+    }
+
     /// Cancels a job whose solver does not stop in time; does nothing if it has stopped. This is retried for as long as
     /// it takes, since the client was told that the job ends.
     async fn force_cancel(self: Arc<Self>, key: i64, attempt: i32) {

@@ -4,7 +4,7 @@ use std::any::Any;
 
 use solver::{error::SolveError, solution::Outcome};
 use tokio::task::JoinError;
-use tracing::{error, info};
+use tracing::{debug, error};
 use uuid::Uuid;
 
 use super::running::StopReason;
@@ -93,20 +93,11 @@ pub(super) fn ending_of_attempt(
                 },
                 _ => ending,
             };
-            let status = ending.status;
-            let reason = ending.reason.map(<&str>::from);
-            info!(job.id = %job.id, %status, reason, iterations, "job {} solved: {status} after {iterations} iterations", job.id);
+            debug!(job.id = %job.id, iterations, "job {}: its solver returned after {iterations} iterations", job.id);
             (ending, Some(parts))
         }
         Ok(Err(Unsolved::Mesh(cause))) => (internal(job, &cause), None),
-        Ok(Err(Unsolved::Solve(error))) => {
-            let ending = ending_of_error(job, &error, stopped);
-            if let (Some(reason), Some(failure)) = (ending.reason, &ending.failure) {
-                let (reason, detail) = (<&str>::from(reason), &failure.detail);
-                info!(job.id = %job.id, reason, "job {} ended without a result: {reason}: {detail}", job.id);
-            }
-            (ending, None)
-        }
+        Ok(Err(Unsolved::Solve(error))) => (ending_of_error(job, &error, stopped), None),
         Err(panic) => (internal(job, &panicked(panic)), None),
     }
 }

@@ -5,15 +5,21 @@ use std::{collections::BTreeSet, sync::Arc};
 
 use sqlx::SqliteConnection;
 use tokio::sync::MutexGuard;
+use tracing::info;
 
 use super::{
     database::{Store, Writing},
     error::{Result, StoreError},
     intact::{self, WHOLE},
+    lifecycle::Ending,
     rows,
     waiting::Move,
 };
-use crate::{job::Job, memory::Budget, time::Time};
+use crate::{
+    job::{Job, JobId},
+    memory::Budget,
+    time::Time,
+};
 
 /// An open transaction.
 pub(super) struct Change<'a> {
@@ -24,9 +30,17 @@ pub(super) struct Change<'a> {
     changed: Vec<i64>,
     /// Rows of jobs that need a new checksum.
     touched: BTreeSet<i64>,
+    /// Jobs that end or are deleted, for the log.
+    gone: Vec<(JobId, Gone)>,
     /// Held until the moves are applied: no other change begins before, so that moves are applied in the order of
     /// commits.
     _lock: MutexGuard<'a, ()>,
+}
+
+/// What the log tells of a job.
+enum Gone {
+    Ended(Ending),
+    Deleted,
 }
 
 /// A point in a transaction to which it can be rolled back.
@@ -34,6 +48,7 @@ pub(super) struct Change<'a> {
 pub(super) struct Savepoint {
     moves: usize,
     changed: usize,
+    gone: usize,
 }
 
 impl Store {
@@ -53,6 +68,7 @@ impl Store {
             moves: vec![],
             changed: vec![],
             touched: BTreeSet::new(),
+            gone: vec![],
         })
     }
 }
@@ -81,6 +97,16 @@ impl Change<'_> {
     /// The row of this job has changed.
     pub(super) fn touched(&mut self, key: i64) {
         self.touched.insert(key);
+    }
+
+    /// A job ends: told in the log, once this is committed.
+    pub(super) fn ended(&mut self, id: JobId, ending: &Ending) {
+        self.gone.push((id, Gone::Ended(ending.clone())));
+    }
+
+    /// A job is deleted: told in the log, once this is committed.
+    pub(super) fn deleted(&mut self, id: JobId) {
+        self.gone.push((id, Gone::Deleted));
     }
 
     /// What was read, unless it is damaged, which is noted.
@@ -146,6 +172,7 @@ impl Change<'_> {
         Ok(Savepoint {
             moves: self.moves.len(),
             changed: self.changed.len(),
+            gone: self.gone.len(),
         })
     }
 
@@ -165,6 +192,7 @@ impl Change<'_> {
         self.release().await?;
         self.moves.truncate(savepoint.moves);
         self.changed.truncate(savepoint.changed);
+        self.gone.truncate(savepoint.gone);
         Ok(())
     }
 
@@ -179,6 +207,32 @@ impl Change<'_> {
         self.moves
             .into_iter()
             .for_each(|change| waiting.apply(change));
+        drop(waiting);
+        self.gone.iter().for_each(|(id, gone)| gone.log(*id));
         Ok(self.changed)
+    }
+}
+
+impl Gone {
+    fn log(&self, job: JobId) {
+        match self {
+            Gone::Deleted => info!(job.id = %job, "job {job} was deleted"),
+            Gone::Ended(Ending {
+                status,
+                reason,
+                failure,
+                ..
+            }) => {
+                let (status, reason) = (<&str>::from(*status), reason.map(<&str>::from));
+                let detail = failure.as_ref().map_or("", |failure| &failure.detail);
+                let words = [
+                    Some(status),
+                    reason,
+                    Some(detail).filter(|detail| !detail.is_empty()),
+                ];
+                let words: Vec<&str> = words.into_iter().flatten().collect();
+                info!(job.id = %job, status, reason, "job {job} has ended: {}", words.join(": "));
+            }
+        }
     }
 }

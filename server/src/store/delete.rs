@@ -2,7 +2,7 @@
 
 use sqlx::SqliteConnection;
 
-use super::{database::Store, error::Result, results, rows::find};
+use super::{change::Change, database::Store, error::Result, results, rows::find};
 use crate::{caller::Owners, job::JobId, time::Time};
 
 /// How long the id of a deleted job is answered with *deleted*; then it is unknown.
@@ -27,42 +27,11 @@ impl Store {
 
     async fn try_to_delete(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
         let mut change = self.control_change().await?;
-        let job = find(change.sql(), key).await?;
-        let Some(job) = job.filter(|job| owners.include(&job.owner)) else {
-            return Ok(Deletion::Unknown);
-        };
-        if !job.status.is_terminal() {
-            return Ok(Deletion::Active);
+        let deletion = delete(&mut change, owners, key).await?;
+        if deletion == Deletion::Deleted {
+            change.commit().await?;
         }
-        let now = change.now();
-        let tx = change.sql();
-        sqlx::query("insert into deleted_job (uuid, id, owner, deleted_at) values (?, ?, ?, ?)")
-            .bind(job.id.0.to_string())
-            .bind(key)
-            .bind(&job.owner)
-            .bind(now.micros())
-            .execute(&mut *tx)
-            .await?;
-        for statement in [
-            "delete from event where job_id = ?",
-            "delete from job_label where job_id = ?",
-            "delete from job where id = ?",
-        ] {
-            sqlx::query(statement).bind(key).execute(&mut *tx).await?;
-        }
-        sqlx::query(
-            "delete from problem where input_hash = ?1 and not exists (select 1 from job where input_hash = ?1)",
-        )
-        .bind(&job.input_hash)
-        .execute(&mut *tx)
-        .await?;
-        for result in [key, job.result_key] {
-            if !is_in_use(tx, result).await? {
-                results::remove(tx, result).await?;
-            }
-        }
-        change.commit().await?;
-        Ok(Deletion::Deleted)
+        Ok(deletion)
     }
 
     /// Whether a job of these owners with this public id was deleted recently.
@@ -90,6 +59,51 @@ impl Store {
         }
         Ok(())
     }
+}
+
+/// Deletes a job that has ended.
+pub(super) async fn delete(
+    change: &mut Change<'_>,
+    owners: Owners<'_>,
+    key: i64,
+) -> Result<Deletion> {
+    let job = find(change.sql(), key).await?;
+    let Some(job) = job.filter(|job| owners.include(&job.owner)) else {
+        return Ok(Deletion::Unknown);
+    };
+    if !job.status.is_terminal() {
+        return Ok(Deletion::Active);
+    }
+    let now = change.now();
+    let tx = change.sql();
+    sqlx::query("insert into deleted_job (uuid, id, owner, deleted_at) values (?, ?, ?, ?)")
+        .bind(job.id.0.to_string())
+        .bind(key)
+        .bind(&job.owner)
+        .bind(now.micros())
+        .execute(&mut *tx)
+        .await?;
+    for statement in [
+        "delete from event where job_id = ?",
+        "delete from job_label where job_id = ?",
+        "delete from job where id = ?",
+    ] {
+        sqlx::query(statement).bind(key).execute(&mut *tx).await?;
+    }
+    sqlx::query(
+        "delete from problem where input_hash = ?1 and not exists (select 1 from job where input_hash = ?1)",
+    )
+    .bind(&job.input_hash)
+    .execute(&mut *tx)
+    .await?;
+    for result in [key, job.result_key] {
+        if !is_in_use(tx, result).await? {
+            results::remove(tx, result).await?;
+        }
+    }
+    change.deleted(job.id);
+    change.changed(key);
+    Ok(Deletion::Deleted)
 }
 
 /// The owner of a job that was deleted recently; `None` if there was no such job.

@@ -112,6 +112,7 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
     };
     events::append(change.sql(), job.key, job.attempt, &[(now, done)]).await?;
     change.changed(job.key);
+    change.ended(job.id, ending);
     Ok(())
 }
 

@@ -47,7 +47,8 @@ mod end;
 mod lifecycle;
 mod requeue;
 
-// Submitted, under request keys; edited; deleted.
+// Submitted, under request keys; edited; deleted; many at once.
+mod bulk;
 mod delete;
 mod edit;
 mod keys;

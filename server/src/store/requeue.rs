@@ -1,5 +1,7 @@
 //! Running jobs back in the queue: when the service stops, and after it has crashed.
 
+use sqlx::SqliteConnection;
+
 use super::{
     change::Change,
     coalescing,
@@ -59,10 +61,8 @@ impl Store {
             if job.cancel_requested {
                 end(&mut change, &job, &Ending::canceled()).await?;
             } else if job.attempt >= job.max_attempts {
-                let detail = format!(
-                    "the process died during each of {} attempts",
-                    job.max_attempts
-                );
+                let deaths = count_deaths(change.sql(), job.key).await? + 1;
+                let detail = format!("the process died during {deaths} attempts at this job");
                 end(
                     &mut change,
                     &job,
@@ -76,6 +76,15 @@ impl Store {
         change.commit().await?;
         Ok(rows.len())
     }
+}
+
+/// How many attempts at a job ended with the process, before the current one.
+async fn count_deaths(tx: &mut SqliteConnection, key: i64) -> Result<i64> {
+    let counting = sqlx::query_scalar(
+        "select count(*) from event where job_id = ? and type = 'status' and json_extract(body, '$.reason') = ?",
+    );
+    let lost = <&str>::from(Requeue::WorkerLost);
+    Ok(counting.bind(key).bind(lost).fetch_one(tx).await?)
 }
 
 /// Puts a running job back in the queue.

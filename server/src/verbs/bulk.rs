@@ -3,16 +3,13 @@
 use std::sync::Arc;
 
 use schemars::JsonSchema;
+use tracing::info;
 
 use super::{
     filters,
     service::{Service, detached},
 };
-use crate::{
-    caller::Caller,
-    error::ApiError,
-    store::{CancelOutcome, Deletion, Filter},
-};
+use crate::{caller::Caller, error::ApiError, store::Filter};
 
 /// How many jobs a bulk operation matched and changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, JsonSchema)]
@@ -49,8 +46,8 @@ enum Action {
     Delete,
 }
 
-/// Applies the action to every job that matches a filter, each in a transaction of its own, so that other requests
-/// do not wait for all of them. It continues if the client disconnects.
+/// Applies the action to every job that matches a filter, in many short transactions, so that other requests do not
+/// wait for all of them. It continues if the client disconnects.
 async fn for_each(
     service: &Arc<Service>,
     caller: &Caller,
@@ -68,37 +65,41 @@ async fn for_each(
             let keys = store.keys(caller.visible_owners(), &filter, after, last, AT_ONCE);
             let keys = keys.await?;
             let Some(end) = keys.last() else {
+                info!(
+                    many.matched,
+                    many.changed, "{action:?} by filter: {} of {} jobs", many.changed, many.matched
+                );
                 return Ok(many);
             };
             after = *end;
-            for key in keys {
-                many.matched += 1;
-                many.changed += u64::from(act(&service, &caller, key, action).await?);
+            let mut rest = &keys[..];
+            while !rest.is_empty() {
+                let (seen, changed) = act(&service, &caller, rest, action).await?;
+                many.matched += seen as u64;
+                many.changed += changed as u64;
+                rest = rest.get(seen..).unwrap_or_default();
             }
         }
     })
     .await
 }
 
-/// Whether that changed the job.
+/// Does it to the first of these jobs. Returns how many these were, and how many of them it changed.
 async fn act(
     service: &Service,
     caller: &Caller,
-    key: i64,
+    keys: &[i64],
     action: Action,
-) -> Result<bool, ApiError> {
+) -> Result<(usize, usize), ApiError> {
     match action {
-        Action::Cancel => {
-            let outcome = service.queue.cancel(key).await?;
-            Ok(outcome != CancelOutcome::AlreadyTerminal)
-        }
+        Action::Cancel => Ok(service.queue.cancel_some(keys).await?),
         Action::Delete => {
-            let deleted =
-                service.store.delete(caller.visible_owners(), key).await? == Deletion::Deleted;
-            if deleted {
-                service.queue.announce(&[key]);
-            }
-            Ok(deleted)
+            let batch = service
+                .store
+                .delete_ended(caller.visible_owners(), keys)
+                .await?;
+            service.queue.announce(&batch.changed);
+            Ok((batch.seen, batch.done))
         }
     }
 }
