@@ -110,10 +110,10 @@ pub(super) async fn read(
         })
         .collect::<Result<_>>()?;
     // they are numbered without a gap
-    let expected = (last - after).clamp(0, limit);
-    let dense = (after + 1..)
+    let expected = last.saturating_sub(after).clamp(0, limit);
+    let dense = (0..)
         .zip(&events)
-        .all(|(seq, event)| event.seq == seq);
+        .all(|(place, event)| event.seq - 1 - place == after);
     match dense && events.len() as i64 == expected {
         true => Ok(events),
         false => Err(Part::of_job(key, "events").damaged("some are missing")),
