@@ -1,7 +1,7 @@
 //! The running service: opens the store, requeues the jobs that a crash interrupted, starts the queue, listens,
 //! and stops in reverse order.
 
-use std::{net::SocketAddr, sync::Arc, time::Duration};
+use std::{env, net::SocketAddr, path::Path, process::Command, sync::Arc, time::Duration};
 
 use anyhow::Context;
 use tokio::{task::JoinHandle, time::timeout};
@@ -10,10 +10,10 @@ use tonic_health::server::HealthReporter;
 use tracing::{info, warn};
 
 use crate::{
-    config::Config,
+    config::{Config, Isolation},
     grpc,
     listener::{self, Listener},
-    queue::Queue,
+    queue::{Processes, Queue, Solver},
     rest,
     store::Store,
     verbs::Service,
@@ -37,6 +37,22 @@ pub struct App {
 #[error("cannot listen on {0}")]
 pub struct CannotListen(SocketAddr);
 
+/// The argument of the program by which it serves as a worker process.
+pub const WORKER: &str = "worker";
+
+/// This program, as a worker process.
+fn worker_process() -> Command {
+    // it leads to the running program even after an upgrade has replaced the file
+    const LINUX: &str = "/proc/self/exe";
+    let program = match Path::new(LINUX).exists() {
+        true => LINUX.into(),
+        false => env::current_exe().unwrap_or_else(|_| env!("CARGO_PKG_NAME").into()),
+    };
+    let mut command = Command::new(program);
+    command.arg(WORKER);
+    command
+}
+
 impl App {
     /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
@@ -57,7 +73,11 @@ impl App {
             );
         }
         store.set_budget(config.memory.bytes());
-        let queue = Queue::new(store.clone(), solver::solve_on, config.workers);
+        let solver = match config.isolation {
+            Isolation::Thread => Solver::Threads(solver::solve_on),
+            Isolation::Process => Solver::Processes(Processes::new(worker_process)),
+        };
+        let queue = Queue::new(store.clone(), solver, config.workers);
         let service = Arc::new(Service::new(config, store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;
         let router = rest::router(service, grpc);

@@ -2,7 +2,7 @@
 
 use std::{net::SocketAddr, path::PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 /// Settings of the service. A flag takes precedence over its environment variable.
 #[derive(Clone, Debug, Args)]
@@ -29,6 +29,11 @@ pub struct Config {
     #[arg(long, env = "SIGNORINI_WORKERS", default_value_t = 2, value_name = "N",
           value_parser = clap::value_parser!(u16).range(1..=256))]
     pub workers: u16,
+
+    /// Where jobs are solved. In a process of its own, one for each worker and kept from job to job, a job that ends the
+    /// process takes no other job and no request with it
+    #[arg(long, env = "SIGNORINI_ISOLATION", value_enum, default_value_t = Isolation::Thread)]
+    pub isolation: Isolation,
 
     /// Maximum number of jobs in the queue; further ones are refused
     #[arg(
@@ -72,6 +77,15 @@ pub struct Config {
         value_name = "SECONDS"
     )]
     pub grace_s: u64,
+}
+
+/// Where jobs are solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Isolation {
+    /// On threads of the service
+    Thread,
+    /// In processes of their own
+    Process,
 }
 
 /// The memory that running jobs share.

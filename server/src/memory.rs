@@ -9,6 +9,8 @@ use std::{
     },
 };
 
+use serde::{Deserialize, Serialize};
+
 /// The budget of all running jobs together (bytes).
 #[derive(Debug)]
 pub struct Budget {
@@ -86,7 +88,7 @@ impl Drop for Reservation {
 }
 
 /// A job has outgrown its share.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Outgrown {
     /// What it had in use (bytes).
     pub used: u64,

@@ -14,7 +14,7 @@ use tonic::transport::Channel;
 use super::{examples, exit::Exit, output, report};
 use crate::{
     app::App,
-    config::{Config, MemoryBudget},
+    config::{Config, Isolation, MemoryBudget},
     event::{Event, Payload},
     job::{Job, Status},
     pb::{self, job_service_client::JobServiceClient},
@@ -26,6 +26,7 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         listen: ([127, 0, 0, 1], 0).into(),
         data: folder.path().to_path_buf(),
         workers: 2,
+        isolation: Isolation::Thread,
         max_queued: 100,
         memory: MemoryBudget::default(),
         max_body_bytes: 16 << 20,

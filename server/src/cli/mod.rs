@@ -17,7 +17,7 @@ use clap::{Parser, Subcommand};
 use tracing::level_filters::LevelFilter;
 
 use self::exit::Exit;
-use crate::{config::Config, rest};
+use crate::{app::WORKER, config::Config, queue, rest};
 
 /// Solves frictional contact problems, one at a time or as jobs of a service
 #[derive(Debug, Parser)]
@@ -46,6 +46,9 @@ enum Command {
         #[arg(long)]
         reference: bool,
     },
+    /// Solve what the service sends over standard input, for `serve --isolation process`
+    #[command(name = WORKER, hide = true)]
+    Worker,
     /// Start a temporary service, submit the five examples over REST and gRPC, and watch them converge
     Demo,
 }
@@ -74,6 +77,11 @@ pub fn main() -> ExitCode {
                 false => format!("{:#}\n", rest::openapi()),
             };
             output::print(&text).map(|()| Exit::Ok).map_err(Into::into)
+        }
+        Command::Worker => {
+            let _lines = log::start(LevelFilter::WARN);
+            let served = queue::run_worker_process(solver::solve_on);
+            served.map(|()| Exit::Ok).map_err(Into::into)
         }
         Command::Demo => {
             let _lines = log::start(LevelFilter::WARN);

@@ -5,7 +5,11 @@ use std::{sync::Arc, time::Duration};
 use tokio::sync::OwnedSemaphorePermit;
 use tracing::error;
 
-use super::{running::Running, state::Queue, worker};
+use super::{
+    running::Running,
+    state::{Queue, Solver},
+    worker,
+};
 use crate::{
     store::{Accepted, Claim, Result, Submission},
     time::Time,
@@ -17,6 +21,9 @@ const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 impl Queue {
     /// Starts the workers. They run until the service stops.
     pub fn start(self: &Arc<Self>) {
+        if let Solver::Processes(processes) = &self.solver {
+            processes.prepare(self.workers);
+        }
         self.slots.add_permits(usize::from(self.workers));
         tokio::spawn(self.clone().dispatch());
         tokio::spawn(self.clone().run_periodic_tasks());

@@ -2,8 +2,8 @@
 
 use std::any::Any;
 
+use serde::{Deserialize, Serialize};
 use solver::{error::SolveError, solution::Outcome};
-use tokio::task::JoinError;
 use tracing::{debug, error};
 use uuid::Uuid;
 
@@ -24,10 +24,34 @@ pub(super) struct Solved {
 }
 
 /// Why there is no solution.
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) enum Unsolved {
-    Solve(SolveError),
-    /// The mesh, which was there when the job was accepted, cannot be read.
-    Mesh(String),
+    /// The solver was asked to stop before it had a state to return.
+    Stopped,
+    /// The job fails, with this detail.
+    Failed(Reason, String),
+    /// An error of the service, not of the client.
+    Internal(String),
+    /// The process that solved it died: how.
+    Lost(String),
+}
+
+impl From<SolveError> for Unsolved {
+    fn from(error: SolveError) -> Self {
+        let detail = error.to_string();
+        match error {
+            SolveError::Stopped => Unsolved::Stopped,
+            SolveError::SingularSystem { .. } | SolveError::Unheld { .. } => {
+                Unsolved::Failed(Reason::SingularSystem, detail)
+            }
+            SolveError::NonFinite { .. } => Unsolved::Failed(Reason::NonFinite, detail),
+            SolveError::ResourceExhausted { .. } => {
+                Unsolved::Failed(Reason::ResourceExhausted, detail)
+            }
+            // it was checked before it was accepted
+            SolveError::Invalid(_) => Unsolved::Internal(detail),
+        }
+    }
 }
 
 /// What the outcome of a solution means for its job.
@@ -74,18 +98,18 @@ pub(super) fn ending_of_solution(document: &Document) -> Ending {
     }
 }
 
-/// How the job ends, by what its solver has returned, or its panic; with the result that is to be stored.
+/// How the job ends, by what its solver has returned; with the result that is to be stored.
 pub(super) fn ending_of_attempt(
     job: &Job,
-    solved: Result<Result<Solved, Unsolved>, JoinError>,
+    solved: Result<Solved, Unsolved>,
     stopped: Option<StopReason>,
 ) -> (Ending, Option<Parts>) {
-    match solved {
-        Ok(Ok(Solved {
+    let unsolved = match solved {
+        Ok(Solved {
             ending,
             iterations,
             parts,
-        })) => {
+        }) => {
             let ending = match ending.status {
                 Status::Canceled => Ending {
                     result: ending.result,
@@ -94,26 +118,17 @@ pub(super) fn ending_of_attempt(
                 _ => ending,
             };
             debug!(job.id = %job.id, iterations, "job {}: its solver returned after {iterations} iterations", job.id);
-            (ending, Some(parts))
+            return (ending, Some(parts));
         }
-        Ok(Err(Unsolved::Mesh(cause))) => (internal(job, &cause), None),
-        Ok(Err(Unsolved::Solve(error))) => (ending_of_error(job, &error, stopped), None),
-        Err(panic) => (internal(job, &panicked(panic)), None),
-    }
-}
-
-fn ending_of_error(job: &Job, error: &SolveError, stopped: Option<StopReason>) -> Ending {
-    let failed = |reason| Ending::failed(reason, error.to_string());
-    match error {
-        SolveError::Stopped => stopped_for(job, stopped),
-        SolveError::SingularSystem { .. } | SolveError::Unheld { .. } => {
-            failed(Reason::SingularSystem)
-        }
-        SolveError::NonFinite { .. } => failed(Reason::NonFinite),
-        SolveError::ResourceExhausted { .. } => failed(Reason::ResourceExhausted),
-        // it was checked before it was accepted: an error of the service, not of the client
-        SolveError::Invalid(_) => internal(job, error),
-    }
+        Err(unsolved) => unsolved,
+    };
+    let ending = match unsolved {
+        Unsolved::Stopped => stopped_for(job, stopped),
+        Unsolved::Failed(reason, detail) => Ending::failed(reason, detail),
+        // (the worker requeues a job whose process was lost)
+        Unsolved::Internal(cause) | Unsolved::Lost(cause) => internal(job, &cause),
+    };
+    (ending, None)
 }
 
 /// The end of a job whose solver was asked to stop, and does not know why.
@@ -164,15 +179,13 @@ fn internal(job: &Job, cause: &dyn std::fmt::Display) -> Ending {
     }
 }
 
-fn panicked(error: JoinError) -> String {
-    let Ok(panic) = error.try_into_panic() else {
-        return "the solver's thread was lost".into();
-    };
+/// What a panic says.
+pub(super) fn panicked(panic: &(dyn Any + Send)) -> String {
     let text = |panic: &(dyn Any + Send)| {
         panic
             .downcast_ref::<String>()
             .cloned()
             .or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()))
     };
-    format!("the solver panicked: {}", text(&*panic).unwrap_or_default())
+    format!("the solver panicked: {}", text(panic).unwrap_or_default())
 }

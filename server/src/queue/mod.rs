@@ -2,7 +2,7 @@
 //!
 //! `workers` slots each hold one job at a time. The dispatcher claims the next job of the store whenever a
 //! slot is free; a submit that finds one free does that in its own transaction, and starts the claimed job in
-//! that slot. Each claim is solved on a blocking thread. Beside each running solver a recorder task commits
+//! that slot. Each claim is solved on a blocking thread, or in a process that such a thread feeds (`process`). Beside each running solver a recorder task commits
 //! its events in batches and then announces that there are some; watchers read them from the store, together. No event
 //! travels through a channel to a watcher, so none is repeated, missed, or undone by a crash.
 //!
@@ -16,11 +16,16 @@ mod feed;
 mod running;
 mod watchers;
 
-mod state;
+mod report;
 
 mod ending;
-mod recorder;
 mod solving;
+
+mod process;
+
+mod state;
+
+mod recorder;
 mod worker;
 
 mod cancel;
@@ -31,6 +36,7 @@ mod tests;
 
 pub use self::{
     feed::News,
-    state::{Queue, Solve, State},
+    process::{Processes, run_worker_process},
+    state::{Queue, Solver, State},
     watchers::Subscription,
 };

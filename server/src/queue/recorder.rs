@@ -10,6 +10,7 @@ use tracing::warn;
 
 use super::{
     backoff::Backoff,
+    report::Report,
     running::{Running, StopReason},
     state::Queue,
 };
@@ -24,18 +25,6 @@ use crate::{
 const MOST_EVENTS: usize = 50;
 /// … and the longest time from its first event until it is stored.
 const LATENCY: Duration = Duration::from_millis(50);
-
-/// A report of a solver.
-#[derive(Debug)]
-pub(super) enum Report {
-    /// An event, with the time when it happened.
-    Event(Time, Payload),
-    /// A partial result, ready to be stored.
-    Partial(Box<Parts>),
-    /// There is one load level on one grid: when its iterations end, the job ends, and the time until then can be
-    /// estimated.
-    OneLevel,
-}
 
 /// Reports that are stored together.
 #[derive(Debug, Default)]

@@ -11,34 +11,29 @@ use solver::{
 
 use super::{
     ending::{Solved, Unsolved, ending_of_solution},
-    recorder::Report,
-    state::Solve,
+    report::{Report, Told},
 };
 use crate::{
     event::Payload,
-    memory::{Meter, Outgrown},
-    run::{self, PartialSolution, Update},
+    memory::Meter,
+    run::{self, PartialSolution, Solve, Update},
     store::{Parts, Store},
     time::Time,
 };
 
-/// Reads a mesh from the store. On a blocking thread.
-pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Mesh, Unsolved> {
-    let failed = |cause: &dyn std::fmt::Display| Unsolved::Mesh(format!("mesh {hash}: {cause}"));
+/// The stored form of a mesh, which was there when the job was accepted. On a blocking thread.
+pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Vec<u8>, Unsolved> {
+    let failed =
+        |cause: &dyn std::fmt::Display| Unsolved::Internal(format!("mesh {hash}: {cause}"));
     let body = tokio::runtime::Handle::current().block_on(store.mesh_body(hash));
     let body = body.map_err(|error| failed(&error))?;
-    let body = body.ok_or_else(|| failed(&"it is not stored"))?;
-    postcard::from_bytes(&body).map_err(|error| failed(&error))
+    body.ok_or_else(|| failed(&"it is not stored"))
 }
 
-/// What a solver tells while it is at work; the answer is whether it is to continue.
-pub(super) enum Told {
-    /// To record.
-    Report(Report),
-    /// It needs more memory than its share.
-    OutOfMemory(Outgrown),
-    /// It only asks.
-    Nothing,
+/// A mesh from its stored form.
+pub(super) fn read_mesh(body: &[u8]) -> Result<Mesh, Unsolved> {
+    postcard::from_bytes(body)
+        .map_err(|error| Unsolved::Internal(format!("a stored mesh cannot be read: {error}")))
 }
 
 /// Reads the problem and solves it, within a share of memory (bytes). On a blocking thread.

@@ -5,35 +5,37 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-use solver::{
-    error::SolveError,
-    mesh::External,
-    problem::Problem,
-    solution::{Observer, Solution},
-};
 use tokio::sync::{Notify, RwLock, Semaphore, SemaphorePermit};
 use tokio_util::sync::CancellationToken;
 
 use super::{
+    process::Processes,
     running::Running,
     watchers::{Subscription, Watchers},
 };
 use crate::{
     job::Job,
+    run::Solve,
     store::{self, Ending, FinalBatch, Store},
 };
 
 /// Reads of jobs by those who wait for them, at the same time: a few for each connection to the database.
 const MOST_TURNS: usize = 16;
 
-/// The solver, or its substitute in a test.
-pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Solution, SolveError>;
+/// Where problems are solved.
+#[derive(Debug)]
+pub enum Solver {
+    /// On blocking threads of this process.
+    Threads(Solve),
+    /// In processes that are fed by blocking threads.
+    Processes(Processes),
+}
 
 /// Runs, cancels and announces jobs.
 #[derive(Debug)]
 pub struct Queue {
     pub(super) store: Arc<Store>,
-    pub(super) solve: Solve,
+    pub(super) solver: Solver,
     /// One permit for each idle worker.
     pub(super) slots: Arc<Semaphore>,
     pub(super) workers: u16,
@@ -68,10 +70,10 @@ pub struct State {
 
 impl Queue {
     /// A queue over `store`, not yet started.
-    pub fn new(store: Arc<Store>, solve: Solve, workers: u16) -> Arc<Queue> {
+    pub fn new(store: Arc<Store>, solver: Solver, workers: u16) -> Arc<Queue> {
         Arc::new(Queue {
             store,
-            solve,
+            solver,
             slots: Arc::new(Semaphore::new(0)),
             workers,
             wake: Notify::new(),

@@ -7,11 +7,13 @@ use tracing::{error, info, warn};
 
 use super::{
     backoff::Backoff,
-    ending::{Unsolved, ending_of_attempt, timed_out},
+    ending::{Unsolved, ending_of_attempt, panicked, timed_out},
+    process::Task,
     recorder,
+    report::Told,
     running::{Running, StopReason},
-    solving::{Told, solve_and_report, stored_mesh},
-    state::Queue,
+    solving::{read_mesh, solve_and_report, stored_mesh},
+    state::{Queue, Solver},
 };
 use crate::{
     job::{Job, Status},
@@ -35,11 +37,12 @@ pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Runni
     info!(job.id = %job.id, job.attempt, "job {} started", job.id);
     let (sender, reports) = mpsc::channel(MOST_UNRECORDED);
     let stop = running.clone();
-    let (solve, share) = (queue.solve, memory.share());
-    let store = queue.store.clone();
+    let share = memory.share();
+    let queue_of_solver = queue.clone();
     let solving = tokio::task::spawn_blocking(move || {
-        let mesh = mesh.map(|hash| stored_mesh(&store, &hash)).transpose()?;
-        solve_and_report(&problem, mesh, solve, share, |told| {
+        let Queue { store, solver, .. } = &*queue_of_solver;
+        let mesh = mesh.map(|hash| stored_mesh(store, &hash)).transpose()?;
+        let tell = |told| {
             // an error means that the recorder has ended: the result is not needed
             let recording = match told {
                 Told::Report(report) => sender.blocking_send(report).is_ok(),
@@ -54,21 +57,59 @@ pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Runni
             } else {
                 ControlFlow::Break(())
             }
-        })
-        .map_err(Unsolved::Solve)
+        };
+        match solver {
+            Solver::Threads(solve) => {
+                let mesh = mesh.as_deref().map(read_mesh).transpose()?;
+                solve_and_report(&problem, mesh, *solve, share, tell).map_err(Unsolved::from)
+            }
+            Solver::Processes(processes) => {
+                let task = Task {
+                    problem,
+                    mesh,
+                    share,
+                };
+                processes.solve(task, tell)
+            }
+        }
     });
     let timer = tokio::spawn(time_out(queue.clone(), job.clone(), running.clone()));
     let last = recorder::record(queue, &job, &running, reports).await;
-    let solved = solving.await;
+    let solved = solving.await.unwrap_or_else(|panic| {
+        let panic = panic.try_into_panic().map(|panic| panicked(&*panic));
+        let cause = panic.unwrap_or_else(|_| "the solver's thread was lost".into());
+        Err(Unsolved::Internal(cause))
+    });
     timer.abort();
     // the solver has returned: another job may have its memory
     drop(memory);
-    let (ending, parts) = ending_of_attempt(&job, solved, running.stop.get().copied());
-    // when the service stops, it is requeued then or at the next start, and not canceled
-    if !(ending.status == Status::Canceled && queue.stopping.is_cancelled()) {
-        end_with_retries(queue, &job, ending, last, parts).await;
+    if let Err(Unsolved::Lost(how)) = &solved {
+        requeue_with_retries(queue, &job, how).await;
+    } else {
+        let (ending, parts) = ending_of_attempt(&job, solved, running.stop.get().copied());
+        // when the service stops, it is requeued then or at the next start, and not canceled
+        if !(ending.status == Status::Canceled && queue.stopping.is_cancelled()) {
+            end_with_retries(queue, &job, ending, last, parts).await;
+        }
     }
     queue.release(&job);
+}
+
+/// Requeues a job whose process died, or ends it if that was its last attempt; for as long as it takes.
+async fn requeue_with_retries(queue: &Queue, job: &Job, how: &str) {
+    warn!(job.id = %job.id, job.attempt, "the process that solved job {} died: {how}", job.id);
+    let mut backoff = Backoff::default();
+    loop {
+        match queue.store.requeue_lost(job.key, job.attempt, how).await {
+            Ok(changed) => return queue.announce(&changed),
+            Err(cause) => {
+                warn!(job.id = %job.id, %cause, "job {} could not be requeued yet: {cause}", job.id);
+            }
+        }
+        if !backoff.wait(&queue.stopping).await {
+            return;
+        }
+    }
 }
 
 /// Stops a job at its time limit, and ends it by force if its solver does not stop.

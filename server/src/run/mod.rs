@@ -9,6 +9,7 @@ use std::ops::ControlFlow;
 use solver::{
     error::SolveError,
     finite::is_finite,
+    mesh::External,
     problem::Problem,
     solution::{Fields, Observer, Outcome, Phase, Progress, Solution, Warning},
 };
@@ -17,6 +18,9 @@ use crate::event::TimedIteration;
 pub use document::{Document, Step, Summary};
 pub use stopwatch::Timings;
 use stopwatch::{Stopwatch, Times};
+
+/// The solver, or its substitute in a test.
+pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Solution, SolveError>;
 
 /// What a run reports while it goes on.
 #[derive(Debug)]

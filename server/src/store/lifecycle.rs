@@ -1,5 +1,7 @@
 //! The lifecycle of one job: its attempts start, and it ends. Every change of status goes through `set_status`.
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     change::Change,
     error::{Damage, Result, StoreError},
@@ -13,7 +15,7 @@ use crate::{
 };
 
 /// How a job ends.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Ending {
     /// A terminal status.
     pub status: Status,

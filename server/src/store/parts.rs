@@ -76,6 +76,18 @@ impl Parts {
         Ok(Parts(parts.into_iter().map(hashed).collect()))
     }
 
+    /// Name, JSON and SHA-256 of each part.
+    pub fn into_parts(self) -> impl Iterator<Item = (String, Vec<u8>, Vec<u8>)> {
+        let part = |Part { name, body, digest }| (name, body, digest);
+        self.0.into_iter().map(part)
+    }
+
+    /// From name, JSON and SHA-256 of each part.
+    pub fn from_parts(parts: Vec<(String, Vec<u8>, Vec<u8>)>) -> Parts {
+        let part = |(name, body, digest)| Part { name, body, digest };
+        Parts(parts.into_iter().map(part).collect())
+    }
+
     /// The size of all parts together.
     pub fn bytes(&self) -> usize {
         self.0.iter().map(|part| part.body.len()).sum()

@@ -58,24 +58,42 @@ impl Store {
             let Ok(job) = self.damages.noting(async { from_row(row) }).await else {
                 continue; // damaged: the service starts with the others
             };
-            if job.cancel_requested {
-                end(&mut change, &job, &Ending::canceled()).await?;
-            } else if job.attempt >= job.max_attempts {
-                let deaths = count_deaths(change.sql(), job.key).await? + 1;
-                let detail = format!("the process died during {deaths} attempts at this job");
-                end(
-                    &mut change,
-                    &job,
-                    &Ending::failed(Reason::WorkerLost, detail),
-                )
-                .await?;
-            } else {
-                requeue(&mut change, &job, Requeue::WorkerLost).await?;
-            }
+            requeue_after_death(&mut change, &job, "the service died with it").await?;
         }
         change.commit().await?;
         Ok(rows.len())
     }
+
+    /// Requeues a running job whose own process died; ends it if it was asked to stop, or if its attempts are used up.
+    /// `how` it died is told to the client then. Returns the jobs that have changed.
+    pub async fn requeue_lost(&self, key: i64, attempt: i32, how: &str) -> Result<Vec<i64>> {
+        self.control(|| self.try_to_requeue_lost(key, attempt, how))
+            .await
+    }
+
+    async fn try_to_requeue_lost(&self, key: i64, attempt: i32, how: &str) -> Result<Vec<i64>> {
+        let mut change = self.control_change().await?;
+        if !is_current(change.sql(), key, attempt).await? {
+            return Ok(vec![]);
+        }
+        let job = read(change.sql(), key).await?;
+        requeue_after_death(&mut change, &job, how).await?;
+        change.commit().await
+    }
+}
+
+/// Requeues a job whose process died, or ends it.
+async fn requeue_after_death(change: &mut Change<'_>, job: &Job, how: &str) -> Result<()> {
+    if job.cancel_requested {
+        return end(change, job, &Ending::canceled()).await;
+    }
+    if job.attempt < job.max_attempts {
+        return requeue(change, job, Requeue::WorkerLost).await;
+    }
+    let deaths = count_deaths(change.sql(), job.key).await? + 1;
+    let detail =
+        format!("the process died during {deaths} attempts at this job; the last time {how}");
+    end(change, job, &Ending::failed(Reason::WorkerLost, detail)).await
 }
 
 /// How many attempts at a job ended with the process, before the current one.

@@ -21,12 +21,12 @@ use super::{
 };
 use crate::{
     caller::{Caller, Scope},
-    config::{Config, MemoryBudget},
+    config::{Config, Isolation, MemoryBudget},
     error::ApiError,
     fake,
     formats::Format,
     job::{Cache, Job, JobId, Status},
-    queue::Queue,
+    queue::{Queue, Solver},
     store::{Edit, Filter, GroupBy, Store},
 };
 
@@ -36,6 +36,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
         listen: ([127, 0, 0, 1], 0).into(),
         data: folder.to_path_buf(),
         workers: 1,
+        isolation: Isolation::Thread,
         max_queued: 10,
         memory: MemoryBudget::default(),
         max_body_bytes: 1 << 20,
@@ -46,7 +47,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
         grace_s: 1,
     };
     let store = Store::open(folder).await.unwrap();
-    let queue = Queue::new(store.clone(), fake::solve, 1);
+    let queue = Queue::new(store.clone(), Solver::Threads(fake::solve), 1);
     Arc::new(Service::new(&config, store, queue))
 }
 

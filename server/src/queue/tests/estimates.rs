@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use std::ops::ControlFlow;
 
 use super::*;
-use crate::queue::solving::{Told, solve_and_report};
+use crate::queue::{report::Told, solving::solve_and_report};
 
 /// Problems of different shapes, by what is large in them.
 fn problems() -> Vec<(String, Value)> {

@@ -9,7 +9,7 @@ async fn rig_of_100_mib(solve: Solve) -> Rig {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     store.set_budget(100 * MIB);
-    let queue = Queue::new(store.clone(), solve, 2);
+    let queue = Queue::new(store.clone(), Solver::Threads(solve), 2);
     queue.start();
     Rig {
         store,

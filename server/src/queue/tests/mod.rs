@@ -6,6 +6,7 @@ mod coalescing;
 mod estimates;
 mod memory;
 mod order;
+mod processes;
 mod submits;
 
 use std::{
@@ -27,6 +28,7 @@ use crate::{
     event::{Event, Payload},
     fake,
     job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status, Waiting},
+    run::Solve,
     store::{
         Accepted, CancelOutcome, Edit, Ending, Filter, FinalBatch, GroupBy, NewJob, Order, Parts,
         RequestKey, Store, StoreError, Submission,
@@ -46,7 +48,7 @@ struct Rig {
 async fn rig(solve: Solve) -> Rig {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
-    let queue = Queue::new(store.clone(), solve, 1);
+    let queue = Queue::new(store.clone(), Solver::Threads(solve), 1);
     Rig {
         store,
         queue,

@@ -69,7 +69,7 @@ async fn a_paused_queue_starts_nothing_until_it_is_resumed_even_across_a_restart
             Err(_) => tokio::time::sleep(Duration::from_millis(10)).await,
         }
     };
-    let queue = Queue::new(store.clone(), fake::solve, 1);
+    let queue = Queue::new(store.clone(), Solver::Threads(fake::solve), 1);
     queue.start();
     assert!(queue.state().paused);
     let rig = Rig {

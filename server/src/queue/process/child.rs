@@ -1,0 +1,166 @@
+//! The worker process: solves one task after the other, until its input ends.
+
+use std::{
+    io::{self, Read},
+    ops::ControlFlow,
+    os::{fd::AsFd, unix::net::UnixStream},
+    panic::{AssertUnwindSafe, catch_unwind},
+    process::exit,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering::Relaxed},
+        mpsc,
+    },
+    thread,
+};
+
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+
+use super::{
+    super::{
+        ending::{Unsolved, panicked},
+        report::{Report, Told},
+        solving::{read_mesh, solve_and_report},
+    },
+    Order, Reply, send, take,
+};
+use crate::{run::Solve, store::Parts};
+
+/// What a solver may use beyond its share before the system refuses it memory: its program, buffers, and what the
+/// allocator keeps. The share itself is watched by the solver's own thread, which can say what it needed.
+const MARGIN_BYTES: u64 = 64 << 20;
+
+/// A task of the input.
+struct Task {
+    problem: String,
+    mesh: Option<Vec<u8>>,
+    share: u64,
+}
+
+/// Solves tasks until the input ends.
+pub fn run(solve: Solve) -> io::Result<()> {
+    let mut service = UnixStream::from(io::stdin().as_fd().try_clone_to_owned()?);
+    let orders = service.try_clone()?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let (sender, tasks) = mpsc::channel();
+    let stopping = stop.clone();
+    // a thread of its own, so that orders are read while a task is solved
+    thread::spawn(move || {
+        let _ = read_orders(orders, &sender, &stopping);
+        // the service is gone, or talks nonsense: nobody needs what is being solved
+        exit(0);
+    });
+    for task in tasks {
+        limit_memory(task.share)?;
+        solve_task(&task, solve, &stop, &mut service)?;
+    }
+    Ok(())
+}
+
+fn read_orders(
+    mut service: UnixStream,
+    tasks: &mpsc::Sender<Task>,
+    stop: &AtomicBool,
+) -> io::Result<()> {
+    let (mut received, mut some) = (vec![], vec![0; 64 << 10]);
+    loop {
+        while let Some((order, content)) = take(&mut received)? {
+            match order {
+                Order::Stop => stop.store(true, Relaxed),
+                Order::Solve {
+                    problem,
+                    on_mesh,
+                    share,
+                } => {
+                    // an order to stop that came too late was meant for the task before
+                    stop.store(false, Relaxed);
+                    let mesh = on_mesh.then_some(content);
+                    let task = Task {
+                        problem,
+                        mesh,
+                        share,
+                    };
+                    tasks.send(task).map_err(io::Error::other)?;
+                }
+            }
+        }
+        match service.read(&mut some)? {
+            0 => return Ok(()),
+            count => received.extend(&some[..count]),
+        }
+    }
+}
+
+fn solve_task(
+    task: &Task,
+    solve: Solve,
+    stop: &AtomicBool,
+    service: &mut UnixStream,
+) -> io::Result<()> {
+    let mut sent = Ok(());
+    let mut tell = |told| {
+        let must_stop = matches!(told, Told::OutOfMemory(_));
+        sent = pass_on(told, service);
+        match must_stop || sent.is_err() || stop.load(Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    };
+    let solving = || {
+        let mesh = task.mesh.as_deref().map(read_mesh).transpose()?;
+        solve_and_report(&task.problem, mesh, solve, task.share, &mut tell).map_err(Unsolved::from)
+    };
+    // what a panic leaves behind is not used again
+    let solved = catch_unwind(AssertUnwindSafe(solving));
+    sent?;
+    match solved.unwrap_or_else(|panic| Err(Unsolved::Internal(panicked(&*panic)))) {
+        Ok(solved) => {
+            send_parts(solved.parts, service)?;
+            let (ending, iterations) = (solved.ending, solved.iterations);
+            send(service, &Reply::Solved { ending, iterations }, &[])
+        }
+        Err(unsolved) => send(service, &Reply::Unsolved(unsolved), &[]),
+    }
+}
+
+fn pass_on(told: Told, service: &mut UnixStream) -> io::Result<()> {
+    match told {
+        Told::Nothing => Ok(()),
+        Told::OutOfMemory(outgrown) => send(service, &Reply::OutOfMemory(outgrown), &[]),
+        Told::Report(Report::OneLevel) => send(service, &Reply::OneLevel, &[]),
+        Told::Report(Report::Event(time, payload)) => {
+            send(service, &Reply::Event(time, payload), &[])
+        }
+        Told::Report(Report::Partial(parts)) => {
+            send_parts(*parts, service)?;
+            send(service, &Reply::Partial, &[])
+        }
+    }
+}
+
+fn send_parts(parts: Parts, service: &mut UnixStream) -> io::Result<()> {
+    for (name, body, digest) in parts.into_parts() {
+        send(service, &Reply::Part { name, digest }, &body)?;
+    }
+    Ok(())
+}
+
+/// Lets the system refuse memory beyond the share of a task.
+fn limit_memory(share: u64) -> io::Result<()> {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let data = status.lines().find_map(|line| line.strip_prefix("VmData:"));
+    let kib = data.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok());
+    let Some(kib) = kib else {
+        return Ok(()); // not Linux
+    };
+    let most = share
+        .saturating_add(kib * 1024)
+        .saturating_add(MARGIN_BYTES);
+    let maximum = getrlimit(Resource::Data).maximum;
+    let current = maximum.map_or(most, |maximum| most.min(maximum));
+    let limit = Rlimit {
+        current: Some(current),
+        maximum,
+    };
+    setrlimit(Resource::Data, limit).map_err(io::Error::from)
+}

@@ -1,0 +1,131 @@
+//! Solving in a process of its own: what kills the solver costs only its job.
+//!
+//! A worker process is the same program (`signorini worker`), started beforehand and kept for many jobs. It talks with
+//! the service over a socket, which is its standard input: nothing that is printed can get in between. It ends when
+//! the service closes that socket, or dies. In the service it is served by the blocking task of a worker, which passes
+//! the reports on as if it solved the job itself, and kills a process that does not stop when it is asked to.
+
+mod child;
+mod parent;
+
+use std::io::{self, Write};
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use super::ending::Unsolved;
+use crate::{event::Payload, memory::Outgrown, store::Ending, time::Time};
+
+pub use child::run as run_worker_process;
+pub use parent::Processes;
+pub(super) use parent::Task;
+
+/// To a worker process.
+#[derive(Debug, Serialize, Deserialize)]
+enum Order {
+    /// Solve a problem, on this mesh if it refers to a stored one: its content follows.
+    Solve {
+        problem: String,
+        on_mesh: bool,
+        /// Bytes that it may use.
+        share: u64,
+    },
+    /// Stop solving, and report the last state.
+    Stop,
+}
+
+/// From a worker process.
+#[derive(Debug, Serialize, Deserialize)]
+enum Reply {
+    /// An event, with the time when it happened.
+    Event(Time, Payload),
+    /// There is one load level on one grid.
+    OneLevel,
+    /// It needs more memory than its share, and stops.
+    OutOfMemory(Outgrown),
+    /// A part of a result: its content follows.
+    Part { name: String, digest: Vec<u8> },
+    /// The parts so far are a partial result.
+    Partial,
+    /// The parts so far are the result.
+    Solved { ending: Ending, iterations: usize },
+    /// There is no result.
+    Unsolved(Unsolved),
+}
+
+/// A message begins with its length, and that of the bytes that follow it.
+const HEADER: usize = 16;
+
+/// Writes a message and the bytes that follow it.
+fn send(out: &mut impl Write, message: &impl Serialize, content: &[u8]) -> io::Result<()> {
+    let message = serde_json::to_vec(message)?;
+    let mut bytes = Vec::with_capacity(HEADER + message.len());
+    for length in [message.len(), content.len()] {
+        bytes.extend((length as u64).to_le_bytes());
+    }
+    bytes.extend(message);
+    out.write_all(&bytes)?;
+    out.write_all(content)
+}
+
+/// Removes the first message and the bytes that follow it from what was received; none if it is not complete yet.
+fn take<T: DeserializeOwned>(received: &mut Vec<u8>) -> io::Result<Option<(T, Vec<u8>)>> {
+    let length = |header: &[u8]| header.try_into().map(u64::from_le_bytes).ok();
+    let lengths = received
+        .get(..HEADER)
+        .and_then(|header| length(&header[..8]).zip(length(&header[8..])));
+    let Some((message, content)) = lengths else {
+        return Ok(None);
+    };
+    let begin = (HEADER as u64).saturating_add(message);
+    let end = begin.saturating_add(content);
+    if (received.len() as u64) < end {
+        return Ok(None);
+    }
+    let rest = received.split_off(end as usize);
+    let content = received.split_off(begin as usize);
+    let message = serde_json::from_slice(&received[HEADER..])?;
+    *received = rest;
+    Ok(Some((message, content)))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_message_is_received_as_it_was_sent_also_byte_by_byte() {
+        let mut sent = vec![];
+        let (name, digest) = ("fields".to_string(), vec![1, 2]);
+        send(&mut sent, &Reply::Part { name, digest }, b"content").unwrap();
+        send(&mut sent, &Reply::OneLevel, b"").unwrap();
+        let (mut received, mut messages) = (vec![], vec![]);
+        for byte in sent {
+            received.push(byte);
+            messages.extend(take::<Reply>(&mut received).unwrap());
+        }
+        assert!(received.is_empty());
+        let [
+            (Reply::Part { name, digest }, content),
+            (Reply::OneLevel, nothing),
+        ] = &messages[..]
+        else {
+            panic!("{messages:?}")
+        };
+        assert_eq!(
+            (&**name, &**digest, &**content),
+            ("fields", &[1, 2][..], &b"content"[..])
+        );
+        assert!(nothing.is_empty());
+    }
+
+    #[test]
+    fn what_is_no_message_is_an_error() {
+        let mut received = vec![];
+        send(&mut received, &"Nonsense", b"").unwrap();
+        assert!(take::<Reply>(&mut received).is_err());
+        // one of that length never becomes complete
+        let mut received = vec![0xff; 40];
+        assert!(take::<Reply>(&mut received).unwrap().is_none());
+    }
+}

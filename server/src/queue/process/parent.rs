@@ -1,0 +1,298 @@
+//! The other side of worker processes: starts them, gives them tasks, passes on what they report, kills them.
+
+use std::{
+    io::{self, BufRead, BufReader, Read},
+    ops::ControlFlow,
+    os::unix::{
+        net::UnixStream,
+        process::{CommandExt, ExitStatusExt},
+    },
+    process::{Child, ChildStderr, Command, ExitStatus, Stdio},
+    sync::{Mutex, MutexGuard, PoisonError},
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use solver::error::SolveError;
+use tracing::{info, warn};
+
+use super::{
+    super::{
+        ending::{Solved, Unsolved},
+        report::{Report, Told},
+    },
+    Order, Reply, send, take,
+};
+use crate::store::Parts;
+
+/// How often it is asked whether to stop while a process reports nothing.
+const PULSE: Duration = Duration::from_millis(20);
+/// How long a process may take to stop when it is asked to; then it is killed. A solver takes less (see `Breaks` in
+/// `solver`), and its worker is free a second after the end of the job.
+const STOP_GRACE: Duration = Duration::from_millis(750);
+/// How long it may leave an order unread.
+const UNREAD: Duration = Duration::from_secs(10);
+
+/// How a worker process is started.
+pub(super) type Start = fn() -> Command;
+
+/// Worker processes: those without a task are kept for the next one.
+#[derive(Debug)]
+pub struct Processes {
+    start: Start,
+    idle: Mutex<Vec<Process>>,
+}
+
+/// What a worker process is to solve.
+pub(in crate::queue) struct Task {
+    pub(in crate::queue) problem: String,
+    /// The stored mesh that the problem refers to.
+    pub(in crate::queue) mesh: Option<Vec<u8>>,
+    /// Bytes that it may use.
+    pub(in crate::queue) share: u64,
+}
+
+impl Processes {
+    /// None yet.
+    pub fn new(start: Start) -> Processes {
+        Processes {
+            start,
+            idle: Mutex::default(),
+        }
+    }
+
+    /// Starts some, so that the first tasks need not wait for them.
+    pub(in crate::queue) fn prepare(&self, count: u16) {
+        for _ in 0..count {
+            match Process::start(self.start) {
+                Ok(process) => self.idle().push(process),
+                // the first job tries again, and tells it
+                Err(error) => return warn!(%error, "a worker process cannot be started: {error}"),
+            }
+        }
+    }
+
+    /// Solves a task in a process; `tell` is called as by `solve_and_report`. On a blocking thread.
+    pub(in crate::queue) fn solve(
+        &self,
+        task: Task,
+        tell: impl FnMut(Told) -> ControlFlow<()>,
+    ) -> Result<Solved, Unsolved> {
+        let mut process = self.take()?;
+        match process.solve(task, tell) {
+            Ok(solved) => {
+                self.idle().push(process);
+                solved
+            }
+            // dropped, and with that killed: the next task gets another one
+            Err(Gone::Unwilling) => {
+                info!("a worker process did not stop, and was killed");
+                Err(Unsolved::Stopped)
+            }
+            Err(Gone::Dead(error)) => Err(process.cause_of_death(&error)),
+        }
+    }
+
+    /// One that waits, or a new one.
+    fn take(&self) -> Result<Process, Unsolved> {
+        loop {
+            let idle = self.idle().pop();
+            let process = match idle {
+                Some(mut process) => match process.child.try_wait() {
+                    Ok(None) => Ok(process),
+                    _ => continue, // it was killed meanwhile
+                },
+                None => Process::start(self.start),
+            };
+            return process.map_err(|error| {
+                Unsolved::Internal(format!("a worker process cannot be started: {error}"))
+            });
+        }
+    }
+
+    fn idle(&self) -> MutexGuard<'_, Vec<Process>> {
+        // No code panics while it holds this lock.
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A worker process; killed when it is dropped.
+#[derive(Debug)]
+struct Process {
+    child: Child,
+    socket: UnixStream,
+    /// What was received and not used yet.
+    received: Vec<u8>,
+    /// Reads its standard error; returns the last line.
+    words: Option<JoinHandle<String>>,
+}
+
+/// Why a process is of no use any more.
+enum Gone {
+    /// It did not stop when it was asked to.
+    Unwilling,
+    /// It died.
+    Dead(io::Error),
+}
+
+impl From<io::Error> for Gone {
+    fn from(error: io::Error) -> Self {
+        Gone::Dead(error)
+    }
+}
+
+impl Process {
+    fn start(start: Start) -> io::Result<Process> {
+        let (socket, other) = UnixStream::pair()?;
+        socket.set_read_timeout(Some(PULSE))?;
+        socket.set_write_timeout(Some(UNREAD))?;
+        let mut child = start()
+            .stdin(Stdio::from(std::os::fd::OwnedFd::from(other)))
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            // Ctrl-C in a terminal is for the service, which then decides about its jobs
+            .process_group(0)
+            .spawn()?;
+        let words = child
+            .stderr
+            .take()
+            .map(|words| std::thread::spawn(move || log_lines(words)));
+        Ok(Process {
+            child,
+            socket,
+            received: vec![],
+            words,
+        })
+    }
+
+    fn solve(
+        &mut self,
+        task: Task,
+        mut tell: impl FnMut(Told) -> ControlFlow<()>,
+    ) -> Result<Result<Solved, Unsolved>, Gone> {
+        let Task {
+            problem,
+            mesh,
+            share,
+        } = task;
+        let on_mesh = mesh.is_some();
+        let order = Order::Solve {
+            problem,
+            on_mesh,
+            share,
+        };
+        send(&mut self.socket, &order, &mesh.unwrap_or_default())?;
+        let mut asked: Option<Instant> = None;
+        let mut parts = vec![];
+        loop {
+            let told = match self.next() {
+                Ok(None) => Told::Nothing,
+                Ok(Some((reply, content))) => match reply {
+                    Reply::Event(time, payload) => Told::Report(Report::Event(time, payload)),
+                    Reply::OneLevel => Told::Report(Report::OneLevel),
+                    Reply::OutOfMemory(outgrown) => Told::OutOfMemory(outgrown),
+                    Reply::Part { name, digest } => {
+                        parts.push((name, content, digest));
+                        continue;
+                    }
+                    Reply::Partial => {
+                        let parts = Parts::from_parts(std::mem::take(&mut parts));
+                        Told::Report(Report::Partial(Box::new(parts)))
+                    }
+                    Reply::Solved { ending, iterations } => {
+                        return Ok(Ok(Solved {
+                            ending,
+                            iterations,
+                            parts: Parts::from_parts(parts),
+                        }));
+                    }
+                    Reply::Unsolved(unsolved) => return Ok(Err(unsolved)),
+                },
+                // its end is known, whatever it died of
+                Err(_) if asked.is_some() => return Err(Gone::Unwilling),
+                Err(error) => return Err(Gone::Dead(error)),
+            };
+            if tell(told).is_break() && asked.is_none() {
+                asked = Some(Instant::now());
+                send(&mut self.socket, &Order::Stop, &[])?;
+            }
+            if asked.is_some_and(|asked| asked.elapsed() > STOP_GRACE) {
+                return Err(Gone::Unwilling);
+            }
+        }
+    }
+
+    /// The next reply; `None`: there has been none for a while.
+    fn next(&mut self) -> io::Result<Option<(Reply, Vec<u8>)>> {
+        let mut some = [0; 64 << 10];
+        loop {
+            if let Some(reply) = take(&mut self.received)? {
+                return Ok(Some(reply));
+            }
+            match self.socket.read(&mut some) {
+                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+                Ok(count) => self.received.extend(&some[..count]),
+                Err(error) => match error.kind() {
+                    io::ErrorKind::WouldBlock
+                    | io::ErrorKind::TimedOut
+                    | io::ErrorKind::Interrupted => return Ok(None),
+                    _ => return Err(error),
+                },
+            }
+        }
+    }
+
+    /// Why there is no result of a process that died.
+    fn cause_of_death(mut self, error: &io::Error) -> Unsolved {
+        let _ = self.child.kill(); // if it is alive, it does not keep to the protocol
+        let status = self.child.wait();
+        let words = self.words.take().and_then(|words| words.join().ok());
+        let words = words.unwrap_or_default();
+        // what the standard library says before it aborts
+        let refused = words.strip_prefix("memory allocation of ");
+        if let Some(bytes) = refused.and_then(|words| words.split(' ').next()?.parse().ok()) {
+            return SolveError::ResourceExhausted { bytes }.into();
+        }
+        Unsolved::Lost(match status {
+            Ok(status) => how_it_ended(status),
+            Err(_) => error.to_string(),
+        })
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // fails if it is dead already
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Logs what a process prints; returns the last line.
+fn log_lines(words: ChildStderr) -> String {
+    const LONGEST: u64 = 1 << 10;
+    let mut words = BufReader::new(words);
+    let mut last = String::new();
+    loop {
+        let mut line = vec![];
+        match words.by_ref().take(LONGEST).read_until(b'\n', &mut line) {
+            Ok(0) | Err(_) => return last,
+            Ok(_) => {
+                let line = String::from_utf8_lossy(&line);
+                if !line.trim().is_empty() {
+                    last = line.trim().to_owned();
+                    warn!("a worker process: {last}");
+                }
+            }
+        }
+    }
+}
+
+fn how_it_ended(status: ExitStatus) -> String {
+    const KILL: i32 = 9;
+    match (status.signal(), status.code()) {
+        (Some(KILL), _) => "it was killed, as the system does when memory runs out".into(),
+        (Some(signal), _) => format!("it was ended by signal {signal}"),
+        (None, code) => format!("it ended with exit code {}", code.unwrap_or_default()),
+    }
+}

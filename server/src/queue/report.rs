@@ -1,0 +1,25 @@
+//! What a solver reports while it is at work.
+
+use crate::{event::Payload, memory::Outgrown, store::Parts, time::Time};
+
+/// What a solver tells; the answer is whether it is to continue.
+pub(super) enum Told {
+    /// To record.
+    Report(Report),
+    /// It needs more memory than its share.
+    OutOfMemory(Outgrown),
+    /// It only asks.
+    Nothing,
+}
+
+/// A report of a solver.
+#[derive(Debug)]
+pub(super) enum Report {
+    /// An event, with the time when it happened.
+    Event(Time, Payload),
+    /// A partial result, ready to be stored.
+    Partial(Box<Parts>),
+    /// There is one load level on one grid: when its iterations end, the job ends, and the time until then can be
+    /// estimated.
+    OneLevel,
+}

@@ -1,0 +1,162 @@
+//! Solvers in processes of their own: what kills one costs only its job (R21).
+
+use std::process::Command;
+
+use super::*;
+
+/// Tells the test below that it is to serve as a worker process.
+const SERVES: &str = "SIGNORINI_TEST_WORKER_PROCESS";
+
+/// Runs the tests of this program again: the one that serves.
+fn worker_process() -> Command {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    let this = "queue::tests::processes::serve_as_a_worker_process";
+    command.args(["--exact", this]).env(SERVES, "");
+    command
+}
+
+#[test]
+fn serve_as_a_worker_process() {
+    if std::env::var_os(SERVES).is_some() {
+        run_worker_process(poisoned).unwrap();
+    }
+}
+
+/// Does what the title of the problem says.
+fn poisoned(
+    problem: &Problem,
+    external: Option<External>,
+    observe: &mut Observer<'_>,
+) -> Result<Solution, SolveError> {
+    match problem.title.as_deref() {
+        Some("abort") => std::process::abort(),
+        Some("overflow") => assert!(overflow(1) > 0),
+        Some("exit") => std::process::exit(42),
+        Some("panic") => panic!("on purpose"),
+        Some("allocate") => assert!(std::hint::black_box(vec![1u8; 1 << 40]).len() > 1),
+        Some("loop") => loop {
+            std::hint::spin_loop();
+        },
+        _ => {}
+    }
+    fake::solve(problem, external, observe)
+}
+
+#[allow(unconditional_recursion)]
+fn overflow(depth: u64) -> u64 {
+    std::hint::black_box([depth; 1024]);
+    overflow(depth + 1) + 1
+}
+
+async fn processes() -> Rig {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let solver = Solver::Processes(Processes::new(worker_process));
+    let queue = Queue::new(store.clone(), solver, 1);
+    queue.start();
+    Rig {
+        store,
+        queue,
+        folder,
+    }
+}
+
+fn titled(title: &str) -> NewJob {
+    let mut problem = fake::problem();
+    problem.title = Some(title.into());
+    NewJob {
+        title: problem.title.clone(),
+        problem: serde_json::to_string(&problem).unwrap(),
+        ..new(0)
+    }
+}
+
+impl Rig {
+    /// How a job of this title ends, while one after it succeeds.
+    async fn end_of(&self, title: &str) -> Job {
+        let job = self.submit_as(titled(title)).await;
+        let next = self.submit_as(titled("harmless")).await;
+        let done = self.until_done(&job).await;
+        assert_eq!(self.until_done(&next).await.status, Status::Succeeded);
+        done
+    }
+}
+
+#[tokio::test]
+async fn a_process_solves_as_a_thread_does_and_is_kept() {
+    let rig = processes().await;
+    let job = rig.submit_as(titled("harmless")).await;
+    let events = rig
+        .until(&job, |event| matches!(event.payload, Payload::Done { .. }))
+        .await;
+    let iterations = events
+        .iter()
+        .filter(|e| matches!(e.payload, Payload::Iteration(_)));
+    assert_eq!(iterations.count(), 3);
+    assert_eq!(rig.until_done(&job).await.status, Status::Succeeded);
+    let threads = super::rig(fake::solve).await;
+    threads.queue.start();
+    let same = threads.submit_as(titled("harmless")).await;
+    threads.until_done(&same).await;
+    for part in ["steps", "profile/top", "fields"] {
+        let piece = rig.store.piece(job.key, part, 0).await.unwrap();
+        assert_eq!(piece, threads.store.piece(same.key, part, 0).await.unwrap());
+        assert!(piece.is_some(), "{part}");
+    }
+}
+
+#[tokio::test]
+async fn what_kills_the_process_costs_only_its_job() {
+    let rig = processes().await;
+    for (title, how) in [
+        ("abort", "signal 6"),
+        ("overflow", "signal 6"),
+        ("exit", "exit code 42"),
+    ] {
+        let done = rig.end_of(title).await;
+        let (reason, detail) = (done.reason, done.failure.unwrap().detail);
+        assert_eq!(
+            (done.status, reason, done.attempt),
+            (Status::Failed, Some(Reason::WorkerLost), 3),
+            "{title}"
+        );
+        assert!(
+            detail.contains("during 3 attempts") && detail.contains(how),
+            "{detail}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn memory_that_the_system_refuses_and_panics_end_the_job_at_once() {
+    let rig = processes().await;
+    let done = rig.end_of("allocate").await;
+    assert_eq!(
+        (done.reason, done.attempt),
+        (Some(Reason::ResourceExhausted), 1)
+    );
+    let done = rig.end_of("panic").await;
+    assert_eq!((done.reason, done.attempt), (Some(Reason::Internal), 1));
+    assert!(!done.failure.unwrap().detail.contains("on purpose"));
+}
+
+#[tokio::test]
+async fn an_endless_loop_is_killed_when_it_is_canceled() {
+    let rig = processes().await;
+    let job = rig.submit_as(titled("loop")).await;
+    let next = rig.submit_as(titled("harmless")).await;
+    while rig.queue.state().running == 0 {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    rig.queue.cancel(job.key).await.unwrap();
+    let canceled = Instant::now();
+    assert_eq!(rig.until_done(&job).await.status, Status::Canceled);
+    assert!(canceled.elapsed() < Duration::from_millis(500));
+    assert_eq!(rig.until_done(&next).await.status, Status::Succeeded);
+    // the worker is free a second after the end; the rest is for a slow machine
+    assert!(
+        canceled.elapsed() < Duration::from_secs(3),
+        "{:?}",
+        canceled.elapsed()
+    );
+}
