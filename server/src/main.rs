@@ -7,5 +7,6 @@ use std::process::ExitCode;
 static ALLOCATOR: allocator::Counting = allocator::Counting;
 
 fn main() -> ExitCode {
+    allocator::give_back_large_memory();
     service::cli::main()
 }

@@ -197,7 +197,13 @@ mod tests {
                         return ControlFlow::Continue(());
                     }
                     after += 1;
-                    steps_after += u32::from(matches!(progress, Progress::Iteration(_)));
+                    if let Progress::Iteration(row) = progress {
+                        steps_after += 1;
+                        assert!(
+                            finite::is_finite(row),
+                            "{algorithm}: {row:?} after {stop_at}"
+                        );
+                    }
                     ControlFlow::Break(())
                 });
                 assert!(

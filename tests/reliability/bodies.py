@@ -172,7 +172,9 @@ def attack(server, name, text):
         check(cpu <= MOST_CPU_S, "%s: %.2f CPU s" % (name, cpu))
         busy = os.getloadavg()[0] > (os.cpu_count() or 1)
         check(MOST_S is None or busy or took <= MOST_S, "%s: %.0f ms" % (name, 1e3 * took))
-        worst = [max(pair) for pair in zip(worst, (grown / len(text), cpu, took))]
+        # of a small body it says nothing: a request takes some memory of its own
+        times = grown / len(text) if len(text) >= MIB / 2 else 0.0
+        worst = [max(pair) for pair in zip(worst, (times, cpu, took))]
     return worst
 
 
@@ -222,7 +224,7 @@ def main():
         check(server.call("GET", "/readyz").status == 200, "the server is ready")
         peak = memory(server.process.pid, "VmRSS")
     print("%d checks" % outside.checks)
-    print("figure: %d hostile bodies of up to %.0f MiB refused in words; the worst took %.1f times its size in memory, "
+    print("figure: %d hostile bodies of up to %.0f MiB refused in words; the large ones took at most %.1f times their size in memory, "
           "%.2f CPU s and %.0f ms; four at once of empty arrays took %.0f MiB; %.0f MiB held afterwards" % (
               count, largest / MIB, worst[0], worst[1], 1e3 * worst[2], grown / MIB, peak / MIB))
 

@@ -22,7 +22,7 @@ LIBRARY = glob.glob("/usr/lib/*/faketime/libfaketime.so.1")
 HOUR, DAY = 3600, 86400
 TO_1970 = -int(time.time()) + 1000
 JUMPS = [HOUR, -HOUR, DAY, -DAY, TO_1970] if "--soak" in sys.argv else [HOUR, -HOUR, TO_1970]
-LONG = talkative(2000, refine=2)  # some seconds, and its solver asks often whether to stop
+LONG = talkative(1000, refine=4)  # some seconds, and its solver asks often whether to stop
 # the queue looks once a second for jobs that have waited too long, and this machine may be busy
 TOLERANCE_S = 1.3
 worst = 0.0

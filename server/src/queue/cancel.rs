@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use tracing::{error, info};
+use tracing::{error, info, warn};
 
 use super::{
     backoff::Backoff,
@@ -74,8 +74,19 @@ impl Queue {
     async fn force_cancel(self: Arc<Self>, key: i64, attempt: i32) {
         tokio::time::sleep(CANCEL_GRACE).await;
         let mut backoff = Backoff::default();
-        while let Err(cause) = self.end_attempt(key, attempt, &Ending::canceled()).await {
-            error!(job.key = key, %cause, "job could not be canceled yet: {cause}");
+        loop {
+            match self.end_attempt(key, attempt, &Ending::canceled()).await {
+                Ok(true) => {
+                    return warn!(
+                        job.key = key,
+                        "job canceled, and its solver has not stopped yet: its worker stays busy"
+                    );
+                }
+                Ok(false) => return,
+                Err(cause) => {
+                    error!(job.key = key, %cause, "job could not be canceled yet: {cause}")
+                }
+            }
             if !backoff.wait(&self.stopping).await {
                 return;
             }

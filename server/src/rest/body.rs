@@ -37,14 +37,7 @@ pub(super) async fn json_text(
     if essence != "application/json" && !json {
         return Err(ApiError::UnsupportedMedia(content_type.into()));
     }
-    if let Some(coding) = headers.get(header::CONTENT_ENCODING)
-        && coding.as_bytes() != b"identity"
-    {
-        let coding = String::from_utf8_lossy(coding.as_bytes());
-        return Err(ApiError::UnsupportedMedia(format!(
-            "a body with the encoding {coding}"
-        )));
-    }
+    is_not_encoded(headers)?;
     let mut pieces = body.into_data_stream();
     let length = declared_length(headers);
     let mut bytes = Vec::new();
@@ -70,6 +63,19 @@ pub(super) async fn json_text(
         return Err(ApiError::PayloadTooLarge { limit_bytes });
     }
     String::from_utf8(bytes).map_err(|error| ApiError::MalformedJson(error.to_string()))
+}
+
+/// An error if the body is compressed: it would have to be unpacked before its size is known.
+pub(super) fn is_not_encoded(headers: &HeaderMap) -> Result<(), ApiError> {
+    match headers.get(header::CONTENT_ENCODING) {
+        Some(coding) if coding.as_bytes() != b"identity" => {
+            let coding = String::from_utf8_lossy(coding.as_bytes());
+            Err(ApiError::UnsupportedMedia(format!(
+                "a body with the encoding {coding}"
+            )))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Why a body could not be read to its end.

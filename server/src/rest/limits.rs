@@ -10,7 +10,12 @@ use axum::{
     response::Response,
 };
 
-use super::reply::{is_grpc, refusal};
+use tonic_types::StatusExt;
+
+use super::{
+    refused,
+    reply::{is_grpc, refusal},
+};
 use crate::{
     error::ApiError,
     transfer::{Received, counted, with_longest_pause, with_share},
@@ -40,10 +45,22 @@ pub(super) async fn limits(
     let response = next.run(Request::from_parts(parts, body)).await;
     // the bytes, and what was made of them, were needed until here
     drop(received);
+    if grpc && let Some(status) = tonic::Status::from_header_map(response.headers()) {
+        note_status(&status, &path);
+    }
     let (parts, body) = response.into_parts();
     match with_share(body, &service.sent) {
         Ok(body) => Response::from_parts(parts, body),
         Err(error) => refusal(grpc, &path, error),
+    }
+}
+
+/// A refusal over gRPC that answered before any message.
+fn note_status(status: &tonic::Status, path: &str) {
+    if status.code() != tonic::Code::Ok {
+        let kind = status.get_details_error_info().map(|info| info.reason);
+        let kind = kind.unwrap_or_else(|| format!("gRPC {:?}", status.code()));
+        refused::note(&kind, path);
     }
 }
 

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    body::{declared_length, discard, incomplete},
+    body::{declared_length, discard, incomplete, is_not_encoded},
     call::Call,
 };
 use crate::{
@@ -23,7 +23,9 @@ use crate::{
 pub(super) async fn upload(call: Call) -> Result<Response, ApiError> {
     let limit_bytes = call.service.max_mesh_bytes;
     let mut pieces = call.body.into_data_stream();
-    let found = if declared_length(&call.headers).is_some_and(|length| length > limit_bytes) {
+    let found = if let Err(error) = is_not_encoded(&call.headers) {
+        Err(error)
+    } else if declared_length(&call.headers).is_some_and(|length| length > limit_bytes) {
         Err(ApiError::PayloadTooLarge { limit_bytes })
     } else {
         let stream = (&mut pieces).map(|piece| piece.map_err(incomplete));

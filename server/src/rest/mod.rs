@@ -14,6 +14,7 @@ mod object;
 
 // Answers.
 mod data;
+mod refused;
 mod reply;
 
 // Handlers, by subject.

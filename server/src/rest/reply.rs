@@ -10,6 +10,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
+use super::refused;
 use crate::error::ApiError;
 
 impl IntoResponse for ApiError {
@@ -46,6 +47,7 @@ fn with_document(mut response: Response, path: &str) -> Response {
     let Some(error) = response.extensions_mut().remove::<ApiError>() else {
         return response;
     };
+    refused::note(error.code().kind().code, path);
     let document = error.document(path).to_string();
     let (mut parts, _) = response.into_parts();
     parts.headers.insert(
@@ -65,7 +67,10 @@ pub(super) fn is_grpc(request: &Request) -> bool {
 /// Refuses a request before it reaches its handler: with a gRPC status, or with an error document.
 pub(super) fn refusal(grpc: bool, path: &str, error: ApiError) -> Response {
     match grpc {
-        true => tonic::Status::from(error).into_http(),
+        true => {
+            refused::note(error.code().kind().code, path);
+            tonic::Status::from(error).into_http()
+        }
         false => with_document(error.into_response(), path),
     }
 }

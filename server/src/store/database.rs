@@ -20,7 +20,7 @@ use tokio::sync::mpsc;
 use super::{
     damage::Damages,
     error::{Result, StoreError},
-    folder::{Folder, Identity, LOG},
+    folder::{Folder, Identity, JOURNAL, LOG},
     intact::Intact,
     migrations,
     progress::{self, Progress, Record},
@@ -101,6 +101,11 @@ impl Store {
     /// Connects to the database in `folder`, created if necessary, and brings its tables up to date. Also
     /// returns the receiver of submissions. The data kept in memory is not read yet.
     pub(super) async fn connect(path: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
+        let connected = Store::try_to_connect(path).await;
+        connected.map_err(|error| with_advice(error, path))
+    }
+
+    async fn try_to_connect(path: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
         let folder = Folder::lock(path)?;
         let known = progress::read(path).map_err(|error| {
             StoreError::Folder(format!("cannot read {}: {error}", progress::FILE))
@@ -110,9 +115,7 @@ impl Store {
             .filename(&database)
             .foreign_keys(true)
             .busy_timeout(Duration::from_secs(5));
-        compare_with_the_past(path, known.as_ref(), options.clone())
-            .await
-            .map_err(|error| with_advice(error, path))?;
+        compare_with_the_past(path, known.as_ref(), options.clone()).await?;
         folder.prepare()?;
         folder.tighten();
         let reserve = Reserve::new(path);
@@ -238,7 +241,9 @@ pub(super) async fn compare_with_the_past(
             None => Ok(()),
         };
     }
-    let mut connection = options.read_only(true).connect().await?;
+    // the disk failed when the database was created: what was half done is undone first
+    let half_created = progress::has_content(&path.join(JOURNAL));
+    let mut connection = options.read_only(!half_created).connect().await?;
     let compared = async {
         migrations::check(&mut connection).await?;
         match known {
@@ -272,6 +277,9 @@ fn with_advice(error: StoreError, path: &Path) -> StoreError {
             damage.cause,
             path.display()
         )),
+        StoreError::Full | StoreError::Database(_) | StoreError::Migrate(_) => StoreError::Folder(
+            format!("the store in {} cannot be opened: {error}", path.display()),
+        ),
         other => other,
     }
 }

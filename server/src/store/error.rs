@@ -178,6 +178,7 @@ impl StoreError {
         match self {
             StoreError::Full => StoreError::Full,
             StoreError::Busy => StoreError::Busy,
+            StoreError::Folder(why) => StoreError::Folder(why.clone()),
             StoreError::Replaced(how) => StoreError::Replaced(how.clone()),
             StoreError::Damaged(damage) => StoreError::Damaged(damage.clone()),
             other => StoreError::Unexpected(other.to_string()),

@@ -16,12 +16,14 @@ use super::{
 /// The database, and the write-ahead log beside it.
 pub(super) const DATABASE: &str = "signorini.db";
 pub(super) const LOG: &str = "signorini.db-wal";
+/// Beside a database that is being created, before it has a write-ahead log.
+pub(super) const JOURNAL: &str = "signorini.db-journal";
 /// Every file of a store.
 const FILES: [&str; 7] = [
     DATABASE,
     LOG,
     "signorini.db-shm",
-    "signorini.db-journal",
+    JOURNAL,
     progress::FILE,
     reserve::FILE,
     OLD_LOCK,

@@ -108,6 +108,9 @@ pub async fn watch(
     if job.status.is_terminal() && first.is_empty() {
         return Ok(None);
     }
+    if !job.status.is_terminal() {
+        service.accepting()?; // it would end at once
+    }
     Ok(Some(follow(service.clone(), (id, job.key), after, first)))
 }
 

@@ -114,12 +114,20 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         }
     }
     if raw.sets_span_boundaries {
+        // the place in `surface` of the side with this midside: sets are many, and each is gone through once
+        let mut sides = vec![NO_NODE; raw.nodes.len()];
+        for ([_, _, mid], place) in surface.iter().zip(0..) {
+            sides[*mid as usize] = place;
+        }
         for (name, set) in &raw.node_sets {
             let held = |node: &u32| set.binary_search(node).is_ok();
-            let edges: Vec<Edge> = surface
+            let side = |node: &u32| Some(sides[*node as usize]).filter(|place| *place != NO_NODE);
+            let mut places: Vec<u32> = set.iter().filter_map(side).collect();
+            places.retain(|place| surface[*place as usize].iter().all(held));
+            places.sort_unstable();
+            let edges: Vec<Edge> = places
                 .iter()
-                .filter(|e| e.iter().all(held))
-                .copied()
+                .map(|place| surface[*place as usize])
                 .collect();
             if !edges.is_empty() {
                 boundaries.entry(name.clone()).or_insert(edges);
@@ -228,13 +236,27 @@ fn second_order(raw: &mut RawMesh) -> usize {
     }
     // between two corners of a set the new midside belongs to it, as the straight side did
     if raw.sets_span_boundaries {
+        let mut degree = vec![0; raw.nodes.len()];
+        let new = || middles.iter().filter(|(_, mid)| **mid >= old);
+        for ((a, b), _) in new() {
+            degree[*a as usize] += 1;
+            degree[*b as usize] += 1;
+        }
+        // each side with the corner that has fewer of them: a set is gone through once, also with the hub of a fan
+        let mut sides: HashMap<u32, Vec<(u32, u32)>> = HashMap::new();
+        for (&(a, b), &mid) in new() {
+            let (few, other) = match degree[a as usize] <= degree[b as usize] {
+                true => (a, b),
+                false => (b, a),
+            };
+            sides.entry(few).or_default().push((other, mid));
+        }
         for set in raw.node_sets.values_mut() {
             set.sort_unstable();
-            let held = |node: u32| set.binary_search(&node).is_ok();
-            let between = |((a, b), mid): (&(u32, u32), &u32)| {
-                (*mid >= old && held(*a) && held(*b)).then_some(*mid)
-            };
-            let mut new: Vec<u32> = middles.iter().filter_map(between).collect();
+            let held = |node: &u32| set.binary_search(node).is_ok();
+            let of_corner = set.iter().filter_map(|corner| sides.get(corner)).flatten();
+            let between = of_corner.filter(|(other, _)| held(other));
+            let mut new: Vec<u32> = between.map(|(_, mid)| *mid).collect();
             new.sort_unstable();
             set.extend(new);
         }
@@ -374,6 +396,27 @@ impl Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A set that holds both corners of a straight side holds its midside too, and so the side as a boundary.
+    #[test]
+    fn a_set_of_corners_is_the_boundary_between_them() {
+        let mut raw = two_squares();
+        raw.sets_span_boundaries = true;
+        // a node may be named twice, and in any order
+        raw.node_sets.insert("base".to_owned(), vec![3, 1, 2, 3]);
+        let (mesh, _) = build(raw).unwrap();
+        let x = |edge: &Edge| mesh.edge_nodes(edge).map(|[x, y]| [x, y]);
+        let base: Vec<_> = mesh.boundaries["base"].iter().map(x).collect();
+        assert_eq!(
+            base,
+            [
+                [[1.0, 0.0], [0.0, 0.0], [0.5, 0.0]],
+                [[2.0, 0.0], [1.0, 0.0], [1.5, 0.0]]
+            ]
+        );
+        assert_eq!(mesh.node_sets["base"].len(), 5);
+        assert!(!mesh.boundaries.contains_key("corner"));
+    }
 
     /// Two unit squares side by side, corners only; the right one runs clockwise.
     fn two_squares() -> RawMesh {

@@ -123,8 +123,8 @@ struct Process {
     socket: UnixStream,
     /// What was received and not used yet.
     received: Vec<u8>,
-    /// Reads its standard error; returns the last line.
-    words: Option<JoinHandle<String>>,
+    /// Reads its standard error; returns how many bytes the system refused, if it died of that.
+    words: Option<JoinHandle<Option<u64>>>,
 }
 
 /// Why a process is of no use any more.
@@ -246,11 +246,8 @@ impl Process {
     fn cause_of_death(mut self, error: &io::Error) -> Unsolved {
         let _ = self.child.kill(); // if it is alive, it does not keep to the protocol
         let status = self.child.wait();
-        let words = self.words.take().and_then(|words| words.join().ok());
-        let words = words.unwrap_or_default();
-        // what the standard library says before it aborts
-        let refused = words.strip_prefix("memory allocation of ");
-        if let Some(bytes) = refused.and_then(|words| words.split(' ').next()?.parse().ok()) {
+        let refused = self.words.take().and_then(|words| words.join().ok());
+        if let Some(bytes) = refused.flatten() {
             return SolveError::ResourceExhausted { bytes }.into();
         }
         Unsolved::Lost(match status {
@@ -268,21 +265,21 @@ impl Drop for Process {
     }
 }
 
-/// Logs what a process prints; returns the last line.
-fn log_lines(words: ChildStderr) -> String {
+/// Logs what a process prints; returns how many bytes the system refused, which the standard library says before it
+/// aborts.
+fn log_lines(words: ChildStderr) -> Option<u64> {
     const LONGEST: u64 = 1 << 10;
     let mut words = BufReader::new(words);
-    let mut last = String::new();
+    let mut refused = None;
     loop {
         let mut line = vec![];
         match words.by_ref().take(LONGEST).read_until(b'\n', &mut line) {
-            Ok(0) | Err(_) => return last,
+            Ok(0) | Err(_) => return refused,
             Ok(_) => {
                 let line = String::from_utf8_lossy(&line);
-                if !line.trim().is_empty() {
-                    last = line.trim().to_owned();
-                    warn!("a worker process: {last}");
-                }
+                warn!("a worker process: {}", line.trim_end());
+                let bytes = line.strip_prefix("memory allocation of ");
+                refused = refused.or(bytes.and_then(|rest| rest.split(' ').next()?.parse().ok()));
             }
         }
     }

@@ -81,7 +81,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .summary("Streams the events of a job, past ones first, then live ones, until `done`")
             .answers(200, "The events, each with its number; a comment every 15 s", [stream::<Event>(), lines()].concat())
             .answers(204, "The job has ended, and there are no events after that number", nothing())
-            .fails(&[Code::NotAcceptable]),
+            .fails(&[Code::NotAcceptable, Code::Draining]),
         patch("/v1/jobs/{id}", (ID, IF_MATCH), jobs::update)
             .rpcs(&["UpdateJob"])
             .summary("Changes the name, labels or priority of a job, or whether it is kept permanently")

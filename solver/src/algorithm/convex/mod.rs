@@ -27,8 +27,15 @@ pub fn minimise(
     tolerance: f64,
     observe: &mut Observer<'_>,
 ) -> Minimum {
-    let by_active_set = active_set::run(system, bound, start, tolerance, observe);
-    if by_active_set.residual <= tolerance || observe(Progress::Pulse).is_break() {
+    let mut by_active_set = active_set::run(system, bound, start, tolerance, observe);
+    if by_active_set.residual <= tolerance {
+        return by_active_set;
+    }
+    if observe(Progress::Pulse).is_break() {
+        if by_active_set.steps == 0 {
+            // stopped within the first step: its residual is infinite, which would be taken for an overflow
+            by_active_set.residual = system.kkt_residual(&by_active_set.state, bound);
+        }
         return by_active_set;
     }
     let mut fallback =

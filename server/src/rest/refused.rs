@@ -1,0 +1,71 @@
+//! Refused requests in the log: a line for each kind every ten seconds at most, however many there are.
+
+use std::{
+    collections::BTreeMap,
+    sync::{LazyLock, Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+
+use tracing::info;
+
+/// How often a kind is logged.
+const INTERVAL: Duration = Duration::from_secs(10);
+/// A client chooses the path.
+const LONGEST_PATH: usize = 100;
+
+/// By kind: when it was last logged, and how many requests were refused since. There are as many kinds as errors.
+static KINDS: LazyLock<Mutex<BTreeMap<String, Kind>>> = LazyLock::new(Mutex::default);
+
+struct Kind {
+    logged: Instant,
+    since: u64,
+}
+
+/// A request was refused for this kind of error.
+pub(super) fn note(kind: &str, path: &str) {
+    let Some(count) = due(kind, Instant::now()) else {
+        return;
+    };
+    let path: String = path.chars().take(LONGEST_PATH).collect();
+    info!(
+        error = kind,
+        count,
+        "refused as {kind}: {count} requests since this was last logged, the latest to {path:?}"
+    );
+}
+
+/// How many requests a line is due for.
+fn due(kind: &str, now: Instant) -> Option<u64> {
+    let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
+    match kinds.get_mut(kind) {
+        Some(known) => {
+            known.since += 1;
+            let due = now.saturating_duration_since(known.logged) >= INTERVAL;
+            due.then(|| {
+                known.logged = now;
+                std::mem::take(&mut known.since)
+            })
+        }
+        None => {
+            let (logged, since) = (now, 0);
+            kinds.insert(kind.to_owned(), Kind { logged, since });
+            Some(1)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kind_is_logged_at_once_and_then_every_ten_seconds_with_its_number() {
+        let start = Instant::now();
+        let after = |seconds| due("a kind of this test", start + Duration::from_secs(seconds));
+        assert_eq!(after(0), Some(1));
+        assert_eq!((after(1), after(9)), (None, None));
+        assert_eq!(after(10), Some(3));
+        assert_eq!(after(11), None);
+        assert_eq!(due("another one", start), Some(1));
+    }
+}

@@ -1,0 +1,55 @@
+"""One cancel, and one deletion, of very many jobs (item 11 of the attacks).
+
+    bulk.py [--soak]
+
+All jobs that wait are canceled by one request, and all that have ended are deleted by another, while a bystander asks
+for a job. Each used to take a commit for every job: four milliseconds.
+"""
+
+import json
+import time
+
+from attack import SOAK, Attacked, Bystander, check, equal, example
+
+JOBS = 97_704 if SOAK else 4_000
+BATCH = 500
+# a quarter of what a commit for each takes, so that a busy machine does not decide
+MOST_S_EACH = 1e-3
+
+
+def submit(server, count):
+    one = {"problem": example(), "cache": "off", "labels": {"study": "bulk"}}
+    while count > 0:
+        body = json.dumps({"jobs": [one] * min(BATCH, count)}).encode()
+        equal(server.call("POST", "/v1/jobs/batch", body).status, 202, "a batch")
+        count -= BATCH
+
+
+def timed(server, method, path, expected):
+    began = time.monotonic()
+    answer = server.call(method, path)
+    took = time.monotonic() - began
+    equal(answer.status, 200, path)
+    found = answer.json()
+    equal((found["matched"], found["changed"]), (expected, expected), path)
+    check(took <= expected * MOST_S_EACH, "%s took %.1f s" % (path, took))
+    return took
+
+
+def main():
+    with Attacked() as server:
+        seen = server.finished_job()
+        equal(server.call("POST", "/v1/queue/pause").status, 200, "pause")
+        submit(server, JOBS)
+        with Bystander(server, "/v1/jobs/" + seen) as bystander:
+            canceled = timed(server, "POST", "/v1/jobs/cancel?status=queued", JOBS)
+            deleted = timed(server, "DELETE", "/v1/jobs?status=canceled", JOBS)
+        bystander.check()
+        equal(server.json("/v1/jobs/" + seen)["status"], "succeeded", "the job of the bystander")
+        log = server.log.read_text()
+        check("has ended: canceled" in log and "was deleted" in log, "the log tells of each")
+    print("figure: %d jobs canceled by one request in %.1f s, %d deleted in %.1f s; bystander %.0f ms (p99)" % (
+        JOBS, canceled, JOBS, deleted, 1000 * bystander.p99_s))
+
+
+main()
