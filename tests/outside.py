@@ -104,13 +104,26 @@ class Server:
             check(time.monotonic() < began + 60, "the server was not ready within a minute")
         return time.monotonic() - began
 
+    def note_peak(self):
+        """Notes the most memory that the process has used, and the budget of its jobs, if somebody wants to know."""
+        noted, status = os.environ.get("SIGNORINI_PEAKS"), pathlib.Path("/proc/%d/status" % self.process.pid)
+        if not noted or not status.exists() or "VmHWM" not in (text := status.read_text()):
+            return
+        peak = int(text.split("VmHWM:")[1].split()[0]) * 1024
+        chosen = dict(zip(self.options, self.options[1:])).get("--memory-budget-bytes")
+        budget = chosen or os.environ["SIGNORINI_MEMORY_BUDGET_BYTES"]
+        with open(noted, "a", encoding="utf-8") as file:
+            file.write("%d %s %s\n" % (peak, budget, pathlib.Path(sys.argv[0]).name))
+
     def kill(self):
         """As a crash would."""
+        self.note_peak()
         self.process.kill()
         self.process.wait()
 
     def stop(self):
         """As an operator would."""
+        self.note_peak()
         self.process.send_signal(signal.SIGTERM)
         equal(self.process.wait(timeout=30), 0, "exit code after SIGTERM")
 

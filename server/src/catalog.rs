@@ -189,7 +189,7 @@ catalog! {
         "Large bodies or answers of other requests occupy the memory that this service has for them, or all its connections are busy. Small requests are still answered on open connections. Try again."),
     StorageLost: of_request("The store was removed or replaced", 503, Grpc::Unavailable, Some(60),
         "The database was removed, replaced or cut short while the service was running. Nothing is accepted, since it would be lost. The operator can stop the service, put the files back as they were, and start it again."),
-    StorageFull: of_request("The disk is full", 507, Grpc::ResourceExhausted, Some(60),
+    StorageFull: of_request("The disk is full or cannot be written", 507, Grpc::ResourceExhausted, Some(60),
         "Nothing more can be stored: the disk is full, or a quota is reached, or it refuses to be written. Reading still works, and running jobs wait; the operator can free space."),
     NotConverged: of_job("The iteration did not converge",
         "The residual is still above the tolerance: max_iterations was reached, or the iteration stopped making progress, or Newton's method failed. The last state and the whole history are kept as a partial result. Look at the convergence plot: refine the mesh, raise elastic_slip, apply the load in more increments, or choose algorithm auto."),

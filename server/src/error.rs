@@ -179,7 +179,7 @@ pub enum ApiError {
     #[error("the store was removed or replaced while the service was running; nothing is stored")]
     StorageLost,
     /// The disk is full.
-    #[error("the disk is full")]
+    #[error("the disk is full, or cannot be written")]
     StorageFull,
 }
 

@@ -1,8 +1,9 @@
 """Measures the service from outside and prints the tables of docs/performance.md, "The service".
 
     service.py [JOBS]
+    service.py --isolation
 
-JOBS (1,000,000 when absent) is how many jobs the lists are read from; what they show is compared with plain
+With --isolation only the second table. JOBS (1,000,000 when absent) is how many jobs the lists are read from; what they show is compared with plain
 SQL over the same rows. `cargo build --release`
 comes first: requests are sent by `target/release/load`.
 """
@@ -22,9 +23,10 @@ import uuid
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 
-from outside import TERMINAL, TOP, Server, check, equal, example, percentile, submission
+from outside import TERMINAL, TOP, Server, check, equal, example, percentile, submission, talkative
 
-JOBS = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
+ISOLATION = sys.argv[1:] == ["--isolation"]
+JOBS = int(sys.argv[1]) if len(sys.argv) > 1 and not ISOLATION else 1_000_000
 LOAD = TOP / "target/release/load"
 MANY = ("--max-queued", "1000000")
 
@@ -91,6 +93,25 @@ def waited(server):
            ("of it in the queue (`queue_wait_s`)", share("queue_wait_s", 0.5), share("queue_wait_s", 0.99)),
            ("of it with a worker (`run_s`)", share("run_s", 0.5), share("run_s", 0.99)),
            ("answered from the cache, none solved: request to answer", cached["p50_ms"], cached["p99_ms"])])
+
+
+def isolation():
+    """The same jobs solved on threads of the service and in processes of their own, in turns."""
+    kinds = {"56 elements": (example(), 200), "56 elements, 500 load steps, some 5,000 events": (talkative(500), 3),
+             "14,336 elements, a result of 5 MB": (example(refine=4), 2)}
+    found = {kind: {"thread": [], "process": []} for kind in kinds}
+    with Server() as threads, Server("--isolation", "process") as processes:
+        for _ in range(5):
+            for kind, (problem, count) in kinds.items():
+                sent = request("POST", "/v1/jobs", submission(problem), prefer="wait=60")
+                for where, server in (("thread", threads), ("process", processes)):
+                    found[kind][where].append(load(server, 1, count, sent, 201)["p50_ms"])
+    rows = []
+    for kind, spans in found.items():
+        thread, process = (percentile(spans[where], 0.5) for where in ("thread", "process"))
+        rows.append((kind, thread, process, process - thread, process / thread))
+    table("Request to answer, solved on a thread and in a process of its own, ms (median of 5 medians, in turns)",
+          ("the job", "thread", "process", "more", "ratio"), rows)
 
 
 def submits():
@@ -255,10 +276,13 @@ def lists():
 
 def main():
     check(LOAD.exists(), "%s is missing: cargo build --release" % LOAD)
+    if ISOLATION:
+        return isolation()
     with tempfile.TemporaryDirectory() as folder:
         commits(folder)
     with Server() as server:
         waited(server)
+    isolation()
     submits()
     lists()
 

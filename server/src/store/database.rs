@@ -6,7 +6,7 @@ use std::{
     path::Path,
     sync::{
         Arc, Mutex, MutexGuard, OnceLock, PoisonError,
-        atomic::{AtomicBool, AtomicI64},
+        atomic::{AtomicBool, AtomicI64, Ordering::Relaxed},
     },
     time::Duration,
 };
@@ -37,6 +37,8 @@ const LIST_PATIENCE: Duration = Duration::from_secs(5);
 #[derive(Debug)]
 pub struct Store {
     pub(super) writer: SqlitePool,
+    /// The connection of the writer could not begin a transaction: it is to be replaced.
+    cannot_begin: Arc<AtomicBool>,
     pub(super) reader: SqlitePool,
     /// For lists and counts, which may be slow, so that they do not delay other reads.
     pub(super) lists: SqlitePool,
@@ -124,21 +126,15 @@ impl Store {
             .clone()
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full);
-        // A full disk makes SQLite end a transaction by itself, which leaves the driver's count of open ones
-        // wrong permanently: such a connection is replaced by a new one.
+        // Two kinds of connections are replaced by new ones. A full disk makes SQLite end a transaction by itself, which
+        // leaves the driver's count of open ones wrong permanently. And SQLite opens a file that it cannot write for
+        // reading only, which would last: the first transaction of such a connection fails.
+        let cannot_begin = Arc::new(AtomicBool::default());
+        let failed = cannot_begin.clone();
         let writer = pool(1)
-            .before_acquire(|connection, _| {
-                let whole = !connection.is_in_transaction();
+            .before_acquire(move |connection, _| {
+                let whole = !connection.is_in_transaction() && !failed.swap(false, Relaxed);
                 Box::pin(async move { Ok(whole) })
-            })
-            // SQLite opens a file that it cannot write for reading only, and that would last: such a connection is
-            // none, and the next transaction tries again
-            .after_connect(|connection, _| {
-                Box::pin(async move {
-                    let writes = "begin immediate; rollback";
-                    sqlx::raw_sql(writes).execute(connection).await?;
-                    Ok(())
-                })
             })
             .connect_with(writing)
             .await?;
@@ -158,6 +154,7 @@ impl Store {
         let store = Store {
             damages: Arc::new(Damages::new(reader.clone())),
             writer,
+            cannot_begin,
             reader,
             lists,
             waiting: Mutex::default(),
@@ -202,7 +199,8 @@ impl Store {
     /// The same for what must work even if the disk is full.
     pub(super) async fn begin_control(&self) -> Result<Writing> {
         self.identity.check()?;
-        let mut tx = self.writer.begin_with("begin immediate").await?;
+        let begun = self.writer.begin_with("begin immediate").await;
+        let mut tx = begun.inspect_err(|_| self.cannot_begin.store(true, Relaxed))?;
         let count = "update progress set commits = commits + 1 returning commits";
         let number = sqlx::query_scalar(count).fetch_one(&mut *tx).await?;
         let progress = self.progress.clone();

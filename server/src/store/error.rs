@@ -40,8 +40,8 @@ pub enum StoreError {
     /// Too many lists are requested at once.
     #[error("too many lists at once")]
     Busy,
-    /// The disk is full.
-    #[error("the disk is full")]
+    /// The disk is full, or cannot be written: SQLite reports a quota and a limit on file sizes as errors of the disk.
+    #[error("the disk is full, or cannot be written")]
     Full,
     /// The database was removed or replaced while the store is open.
     #[error("{0}")]
