@@ -30,8 +30,8 @@ pub struct Config {
           value_parser = clap::value_parser!(u16).range(1..=256))]
     pub workers: u16,
 
-    /// Where jobs are solved. In a process of its own, one for each worker and kept from job to job, a job that ends the
-    /// process takes no other job and no request with it
+    /// Where jobs are solved: on threads of the service, or in processes, one for each worker and kept from job to job.
+    /// What kills a process, such as a stack overflow, then costs only the job that it is solving
     #[arg(long, env = "SIGNORINI_ISOLATION", value_enum, default_value_t = Isolation::Thread)]
     pub isolation: Isolation,
 
