@@ -124,7 +124,7 @@ impl Store {
             result: ending.result.min(ResultAvailable::Partial),
             ..Ending::canceled()
         };
-        let ending = match job.cancel_requested || self.cancels().contains(&key) {
+        let ending = match self.is_asked_to_stop(&job) {
             true if ending.status == Status::Succeeded => &canceled,
             _ => ending,
         };
@@ -134,8 +134,13 @@ impl Store {
         Ok(Some(changed))
     }
 
+    /// Whether a client has asked a running job to stop, even if that could not be stored.
+    pub(super) fn is_asked_to_stop(&self, job: &Job) -> bool {
+        job.cancel_requested || self.cancels().contains(&job.key)
+    }
+
     /// Running jobs that a client has canceled.
-    fn cancels(&self) -> MutexGuard<'_, HashSet<i64>> {
+    pub(super) fn cancels(&self) -> MutexGuard<'_, HashSet<i64>> {
         // No code panics while it holds this lock; if one did, the set would still be whole.
         self.cancels.lock().unwrap_or_else(PoisonError::into_inner)
     }

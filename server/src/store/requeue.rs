@@ -32,7 +32,7 @@ impl Store {
         }
         let job = read(change.sql(), key).await?;
         // the client that asked it to stop does not have to wait for the restart
-        let status = if job.cancel_requested {
+        let status = if self.is_asked_to_stop(&job) {
             end(&mut change, &job, &Ending::canceled()).await?;
             Status::Canceled
         } else {
@@ -40,6 +40,7 @@ impl Store {
             Status::Queued
         };
         change.commit().await?;
+        self.cancels().remove(&key);
         Ok(Some(status))
     }
 
@@ -76,9 +77,12 @@ impl Store {
         if !is_current(change.sql(), key, attempt).await? {
             return Ok(vec![]);
         }
-        let job = read(change.sql(), key).await?;
+        let mut job = read(change.sql(), key).await?;
+        job.cancel_requested = self.is_asked_to_stop(&job);
         requeue_after_death(&mut change, &job, how).await?;
-        change.commit().await
+        let changed = change.commit().await?;
+        self.cancels().remove(&key);
+        Ok(changed)
     }
 }
 
