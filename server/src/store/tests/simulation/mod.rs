@@ -8,6 +8,7 @@
 mod checks;
 mod jobs;
 mod restarts;
+mod submissions;
 mod workers;
 
 use std::{
@@ -215,8 +216,11 @@ impl World {
             }
             Err(error) => panic!("{error}"),
         }
-        let thorough = self.once_in(8);
-        self.check(thorough).await;
+        match self.dice.u32(0..12) {
+            0 => self.check(true).await,
+            1..4 => self.check(false).await,
+            _ => {} // most of the time would be spent with checks
+        }
     }
 
     /// Ends every job, as workers do that nothing disturbs.

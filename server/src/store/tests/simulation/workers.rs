@@ -102,7 +102,7 @@ impl World {
             ),
             parts::Part::new("history".into(), b"[]".to_vec()),
         ];
-        if self.once_in(25) {
+        if self.once_in(40) {
             parts.push(parts::Part::new("fields".into(), vec![b' '; LARGE]));
         }
         Parts(parts)
