@@ -9,7 +9,7 @@ use super::{
     change::Change,
     coalescing,
     database::Store,
-    error::Result,
+    error::{Result, StoreError},
     events::{self, FinalBatch},
     lifecycle::{self, Ending},
     parts::Parts,
@@ -17,6 +17,7 @@ use super::{
     rows::{find, is_current, read},
 };
 use crate::{
+    failpoint::{self, Point},
     job::{Job, Reason, ResultAvailable, Status},
     time::Time,
 };
@@ -129,6 +130,9 @@ impl Store {
             _ => ending,
         };
         end(&mut change, &job, ending).await?;
+        if failpoint::fails(Point::Ended, job.id) {
+            return Err(StoreError::Full);
+        }
         let changed = change.commit().await?;
         self.cancels().remove(&key);
         Ok(Some(changed))

@@ -65,6 +65,12 @@ impl Store {
         Ok(rows.len())
     }
 
+    /// The jobs that run, with the numbers of their attempts.
+    pub async fn running(&self) -> Result<Vec<(i64, i32)>> {
+        let running = sqlx::query_as("select id, attempt from job where status = 'running'");
+        Ok(running.fetch_all(&self.reader).await?)
+    }
+
     /// Requeues a running job whose own process died; ends it if it was asked to stop, or if its attempts are used up.
     /// `how` it died is told to the client then. Returns the jobs that have changed.
     pub async fn requeue_lost(&self, key: i64, attempt: i32, how: &str) -> Result<Vec<i64>> {
