@@ -5,6 +5,10 @@ use solver::solution::Phase;
 
 use crate::job::JobId;
 
+pub(crate) use points::fails;
+#[cfg(test)]
+pub(crate) use points::{Failing, set, was_missed};
+
 /// A boundary between two stages of a job, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(test, derive(strum::VariantArray))]
@@ -65,6 +69,12 @@ impl Point {
     }
 }
 
+/// Lets a job fail at a point where the caller cannot return an error.
+#[inline]
+pub(crate) fn pass(point: Point, job: JobId) {
+    fails(point, job);
+}
+
 #[cfg(not(test))]
 mod points {
     use super::{JobId, Point};
@@ -118,14 +128,4 @@ mod points {
             None => false,
         }
     }
-}
-
-pub(crate) use points::fails;
-#[cfg(test)]
-pub(crate) use points::{Failing, set, was_missed};
-
-/// The same where the caller cannot return an error.
-#[inline]
-pub(crate) fn pass(point: Point, job: JobId) {
-    fails(point, job);
 }
