@@ -283,4 +283,6 @@ fn check_job(job: &Job, jobs: &[Job]) {
     assert!(!primary.status.is_terminal(), "{job:?} waits for ever");
     assert_eq!(primary.coalesced_into, None);
     assert_eq!(primary.input_hash, job.input_hash);
+    let outranked = primary.status == Status::Queued && primary.priority < job.priority;
+    assert!(!outranked, "{job:?} waits for one of lower priority");
 }

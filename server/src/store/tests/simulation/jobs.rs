@@ -11,7 +11,11 @@ impl World {
     }
 
     pub(super) async fn cancel(&mut self) -> Result<()> {
-        let Some(key) = self.any_job() else {
+        let key = match self.dice.bool() {
+            true => self.any_running().map(|(key, _)| key),
+            false => self.any_job(),
+        };
+        let Some(key) = key else {
             return Ok(());
         };
         self.note(format!("cancel {key}"));

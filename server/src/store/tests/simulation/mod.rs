@@ -181,9 +181,16 @@ impl World {
         }
         let before = match self.full {
             true => {
-                if self.once_in(2) {
-                    let more = self.dice.i64(0..6);
-                    self.store.bound(more).await;
+                match self.dice.u32(0..4) {
+                    0 | 1 => {
+                        let more = self.dice.i64(0..6);
+                        self.store.bound(more).await;
+                    }
+                    2 => {
+                        let commits = self.dice.u32(1..3);
+                        self.store.full_commits.store(commits, Ordering::Relaxed);
+                    }
+                    _ => {}
                 }
                 Some(self.rows().await)
             }

@@ -15,6 +15,40 @@ pub(super) fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// What a store has written at some moment.
+struct Written {
+    database: Vec<u8>,
+    log: Vec<u8>,
+    progress: Vec<u8>,
+}
+
+impl Written {
+    fn in_folder(folder: &Path) -> Written {
+        let read = |name| fs::read(folder.join(name)).unwrap_or_default();
+        Written {
+            database: read("signorini.db"),
+            log: read("signorini.db-wal"),
+            progress: read(PROGRESS),
+        }
+    }
+
+    /// Leaves a part of what was written since to the log. If the log was begun anew meanwhile nothing is left.
+    fn cut(self, folder: &Path, part: f64) {
+        let now = Written::in_folder(folder);
+        let goes_on = now.database == self.database && now.log.starts_with(&self.log);
+        let log = match goes_on {
+            true => {
+                let more = (now.log.len() - self.log.len()) as f64 * part;
+                &now.log[..self.log.len() + more as usize]
+            }
+            false => &self.log,
+        };
+        fs::write(folder.join("signorini.db"), &self.database).unwrap();
+        fs::write(folder.join("signorini.db-wal"), log).unwrap();
+        fs::write(folder.join(PROGRESS), &self.progress).unwrap();
+    }
+}
+
 /// Keeps the record of the progress as it is at a start: after a power cut it may be no newer.
 pub(super) fn keep_progress(folder: &Path, home: &Path) {
     fs::copy(folder.join(PROGRESS), home.join(PROGRESS)).unwrap();
@@ -66,6 +100,7 @@ impl World {
     pub(super) async fn crash(&mut self) -> Result<()> {
         let key = format!("key of start {}", self.starts);
         let unanswered = !self.full && self.dice.bool();
+        let halfway = unanswered && self.dice.bool();
         let mut submission = Submission {
             max_queued: 1000,
             key: Some(RequestKey {
@@ -75,13 +110,20 @@ impl World {
             owner: OWNERS[0].into(),
             jobs: vec![self.new_job()],
         };
-        if unanswered {
+        let (old, new) = (self.folder(self.starts - 1), self.folder(self.starts));
+        let before = Written::in_folder(&old);
+        if halfway {
+            self.note("submit, but the crash comes first".into());
+            self.store.submit(submission.clone(), false).await.unwrap();
+        } else if unanswered {
             self.submit_this(submission.clone(), false).await?;
         }
-        let (old, new) = (self.folder(self.starts - 1), self.folder(self.starts));
         let power = self.once_in(3);
         self.note(format!("crash; of the machine: {power}"));
         copy(&old, &new);
+        if halfway {
+            before.cut(&new, self.dice.f64());
+        }
         if power {
             let earlier = self.home.path().join(PROGRESS);
             fs::copy(earlier, new.join(PROGRESS)).unwrap();
@@ -130,6 +172,7 @@ impl World {
     pub(super) async fn free_the_disk(&mut self) {
         self.note("the disk has space".into());
         self.store.bound(1_000_000).await;
+        self.store.full_commits.store(0, Ordering::Relaxed);
         assert!(self.store.reserve.retake());
         self.full = false;
     }

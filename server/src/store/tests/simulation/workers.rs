@@ -56,7 +56,7 @@ impl World {
     }
 
     /// One of the jobs that run.
-    fn any_running(&mut self) -> Option<(i64, i32)> {
+    pub(super) fn any_running(&mut self) -> Option<(i64, i32)> {
         let running: Vec<(i64, i32)> = self
             .running
             .iter()
