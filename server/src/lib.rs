@@ -20,6 +20,9 @@ pub mod parameters;
 pub mod transfer;
 pub mod violations;
 
+// Where tests make a job fail.
+mod failpoint;
+
 // Solves one problem and measures it; fingerprints of problem and result; the formats of a result.
 pub mod digest;
 pub mod formats;

@@ -10,6 +10,12 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// started.
 static START: LazyLock<(i64, Duration)> = LazyLock::new(|| (wall_clock(), since_boot()));
 
+#[cfg(test)]
+thread_local! {
+    /// The time that this thread is made to believe in, in microseconds since 1970.
+    static SIMULATED: std::cell::Cell<Option<i64>> = const { std::cell::Cell::new(None) };
+}
+
 /// A point in time, to the microsecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Time(i64);
@@ -19,8 +25,18 @@ impl Time {
     /// counts while the machine sleeps: durations and time limits are right, and times in order, whatever happens to
     /// the clock. It is believed again at the next start.
     pub fn now() -> Self {
+        #[cfg(test)]
+        if let Some(micros) = SIMULATED.get() {
+            return Time(micros);
+        }
         let (wall, boot) = *START;
         Time(wall.saturating_add(micros(since_boot().saturating_sub(boot))))
+    }
+
+    /// From now on it is this time on this thread, until it is set again.
+    #[cfg(test)]
+    pub(crate) fn simulate(self) {
+        SIMULATED.set(Some(self.0));
     }
 
     /// How far the clock of the machine is ahead of [`Time::now`], in seconds, because it was set since.

@@ -11,12 +11,16 @@ use super::{
     worker,
 };
 use crate::{
+    failpoint::{self, Point},
     store::{Accepted, Claim, Result, Submission},
     time::Time,
 };
 
 /// How often the time limits of waiting jobs are checked.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
+
+/// So that a task that panics at once does not occupy a processor.
+const PAUSE_AFTER_PANIC: Duration = Duration::from_millis(100);
 
 impl Queue {
     /// Starts the workers. They run until the service stops.
@@ -25,8 +29,8 @@ impl Queue {
             processes.prepare(self.workers);
         }
         self.slots.add_permits(usize::from(self.workers));
-        tokio::spawn(self.clone().dispatch());
-        tokio::spawn(self.clone().run_periodic_tasks());
+        tokio::spawn(keep_running(self.clone(), Queue::dispatch));
+        tokio::spawn(keep_running(self.clone(), Queue::run_periodic_tasks));
     }
 
     /// Accepts jobs. They are stored on the disk when this returns; a free worker is given the next job of the queue in
@@ -108,6 +112,7 @@ impl Queue {
 
     /// Gives a claimed job to a worker. To be called while `claiming` is held.
     fn start_worker(self: &Arc<Self>, claim: Claim, slot: OwnedSemaphorePermit) {
+        failpoint::pass(Point::Given, claim.job.id);
         let running = Running {
             attempt: claim.job.attempt,
             stop: Arc::default(),
@@ -121,7 +126,38 @@ impl Queue {
         });
     }
 
-    /// Ends jobs that have waited too long, and removes the ids of jobs deleted long ago, until the service stops.
+    /// Jobs that run, as the store has it, but that no worker has.
+    async fn lost(&self) -> Result<Vec<(i64, i32)>> {
+        let mut running = self.store.running().await?;
+        let ours = self.running();
+        running.retain(|(key, _)| !ours.contains_key(key));
+        Ok(running)
+    }
+
+    /// Requeues jobs that were claimed, but never reached a worker: what was to give them to it has panicked.
+    async fn requeue_lost(&self) -> Result<()> {
+        if self.lost().await?.is_empty() {
+            return Ok(()); // nearly always
+        }
+        let _guard = self.claiming.write().await; // no claim is under way
+        if self.stopping.is_cancelled() {
+            return Ok(()); // they are requeued by that
+        }
+        for (key, attempt) in self.lost().await? {
+            error!(
+                job.key = key,
+                attempt, "a job was claimed, and no worker has it: it is requeued"
+            );
+            let how = "it was claimed, but reached no worker";
+            let changed = self.store.requeue_lost(key, attempt, how).await?;
+            self.announce(&changed);
+            self.wake.notify_one();
+        }
+        Ok(())
+    }
+
+    /// Ends jobs that have waited too long, requeues those that were lost, and removes the ids of jobs deleted long ago,
+    /// until the service stops.
     async fn run_periodic_tasks(self: Arc<Self>) {
         loop {
             match self.store.expire_queued(Time::now()).await {
@@ -135,6 +171,9 @@ impl Queue {
                     error!(%cause, "jobs that waited too long could not be ended: {cause}")
                 }
             }
+            if let Err(cause) = self.requeue_lost().await {
+                error!(%cause, "lost jobs could not be requeued: {cause}");
+            }
             if let Err(cause) = self.store.forget_deleted(Time::now()).await {
                 error!(%cause, "ids of deleted jobs could not be removed: {cause}");
             }
@@ -143,5 +182,19 @@ impl Queue {
                 () = self.stopping.cancelled() => return,
             }
         }
+    }
+}
+
+/// Runs a task of the queue until it ends, and once more after each panic.
+async fn keep_running<F>(queue: Arc<Queue>, task: fn(Arc<Queue>) -> F)
+where
+    F: Future<Output = ()> + Send + 'static,
+{
+    while let Err(panic) = tokio::spawn(task(queue.clone())).await {
+        if panic.is_cancelled() {
+            return; // with the whole runtime
+        }
+        error!(%panic, "a task of the queue has panicked, and is started again: {panic}");
+        tokio::time::sleep(PAUSE_AFTER_PANIC).await;
     }
 }

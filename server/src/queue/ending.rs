@@ -168,7 +168,7 @@ pub(super) fn timed_out(job: &Job) -> Ending {
 }
 
 /// Logs the cause under an incident number, and tells the client only that number.
-fn internal(job: &Job, cause: &dyn std::fmt::Display) -> Ending {
+pub(super) fn internal(job: &Job, cause: &dyn std::fmt::Display) -> Ending {
     let incident = Uuid::now_v7();
     error!(job.id = %job.id, %incident, %cause, "job {} failed, incident {incident}: {cause}", job.id);
     let detail = format!("an unexpected error, logged as incident {incident}");
@@ -179,13 +179,13 @@ fn internal(job: &Job, cause: &dyn std::fmt::Display) -> Ending {
     }
 }
 
-/// What a panic says.
-pub(super) fn panicked(panic: &(dyn Any + Send)) -> String {
+/// What a panic of `who` says.
+pub(super) fn panicked(who: &str, panic: &(dyn Any + Send)) -> String {
     let text = |panic: &(dyn Any + Send)| {
         panic
             .downcast_ref::<String>()
             .cloned()
             .or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()))
     };
-    format!("the solver panicked: {}", text(panic).unwrap_or_default())
+    format!("{who} panicked: {}", text(panic).unwrap_or_default())
 }

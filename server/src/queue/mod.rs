@@ -6,6 +6,9 @@
 //! its events in batches and then announces that there are some; watchers read them from the store, together. No event
 //! travels through a channel to a watcher, so none is repeated, missed, or undone by a crash.
 //!
+//! A panic costs one job at most: that of a worker's task ends its job, the tasks of the queue are started again, and a
+//! job that runs without a worker is requeued (`crate::failpoint` names where all this is tried).
+//!
 //! A job may be ended by its worker, by a cancel, by a time limit, or requeued when the service stops. Several of
 //! them may try at once: the store accepts the first, since it checks in the same transaction that the attempt is
 //! still the current one.

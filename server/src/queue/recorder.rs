@@ -16,8 +16,9 @@ use super::{
 };
 use crate::{
     event::{Payload, TimedIteration},
+    failpoint::{self, Point},
     job::{Job, Progress},
-    store::{FinalBatch, Parts, Result},
+    store::{FinalBatch, Parts, Result, StoreError},
     time::Time,
 };
 
@@ -99,11 +100,20 @@ async fn store_batch(
 ) -> Result<bool> {
     let (store, key, attempt) = (&queue.store, job.key, running.attempt);
     if !batch.events.is_empty() {
+        if failpoint::fails(Point::EventsReported, job.id) {
+            return Err(StoreError::Full);
+        }
         let stored = store.append_events(key, attempt, &batch.events, progress);
         match stored.await? {
-            true => queue.announce_events(key),
+            true => {
+                failpoint::pass(Point::EventsStored, job.id);
+                queue.announce_events(key);
+            }
             false => return Ok(false),
         }
+    }
+    if batch.partial.is_some() && failpoint::fails(Point::PartialReported, job.id) {
+        return Err(StoreError::Full);
     }
     match &batch.partial {
         Some(parts) => store.write_partial(key, attempt, parts).await,

@@ -151,9 +151,13 @@ impl Queue {
         Ok(changed.is_some())
     }
 
-    /// Its worker has finished with the job.
+    /// Its worker has finished with the job. If it was requeued, another worker may have it already.
     pub(super) fn release(&self, job: &Job) {
-        self.running().remove(&job.key);
+        let mut running = self.running();
+        let ours = |running: &Running| running.attempt == job.attempt;
+        if running.get(&job.key).is_some_and(ours) {
+            running.remove(&job.key);
+        }
     }
 
     /// Jobs that a worker of this process is solving, by key.

@@ -3,21 +3,24 @@
 use std::{ops::ControlFlow, sync::Arc, time::Duration};
 
 use tokio::sync::mpsc;
+use tokio_util::task::AbortOnDropHandle;
 use tracing::{error, info, warn};
 
 use super::{
     backoff::Backoff,
-    ending::{Unsolved, ending_of_attempt, panicked, timed_out},
+    ending::{Unsolved, ending_of_attempt, internal, panicked, timed_out},
     process::Task,
     recorder,
-    report::Told,
+    report::{Report, Told},
     running::{Running, StopReason},
     solving::{read_mesh, solve_and_report, stored_mesh},
     state::{Queue, Solver},
 };
 use crate::{
-    job::{Job, Status},
-    store::{Claim, Ending, FinalBatch, Parts},
+    event::Payload,
+    failpoint::{self, Point},
+    job::{Job, JobId, Status},
+    store::{Claim, Ending, FinalBatch, Parts, StoreError},
 };
 
 /// Most reports of a solver that are not recorded yet; if there are more, the solver waits.
@@ -26,8 +29,22 @@ const MOST_UNRECORDED: usize = 256;
 /// How long the solver of a job that has reached its time limit may take to return its last state (see `Limits`).
 const TIMEOUT_GRACE: Duration = Duration::from_secs(2);
 
-/// One attempt to solve a job, from claim to end.
+/// One attempt to solve a job, from claim to end. A panic costs this job alone.
 pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Running) {
+    let job = claim.job.clone();
+    let attempt = tokio::spawn(try_attempt(queue.clone(), claim, running.clone()));
+    if let Err(panic) = attempt.await
+        && let Ok(panic) = panic.try_into_panic()
+    {
+        running.stop(StopReason::Unwanted); // the solver may not have noticed yet
+        let ending = internal(&job, &panicked("the worker", &*panic));
+        end_with_retries(queue, &job, ending, FinalBatch::default(), None).await;
+        queue.announce(&[job.key]); // if it had ended before
+    }
+    queue.release(&job);
+}
+
+async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running) {
     let Claim {
         job,
         problem,
@@ -35,14 +52,22 @@ pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Runni
         memory,
     } = claim;
     info!(job.id = %job.id, job.attempt, "job {} started", job.id);
+    let (queue, id) = (&queue, job.id);
+    failpoint::pass(Point::Begun, id);
     let (sender, reports) = mpsc::channel(MOST_UNRECORDED);
     let stop = running.clone();
     let share = memory.share();
     let queue_of_solver = queue.clone();
     let solving = tokio::task::spawn_blocking(move || {
+        // given back when the solver has returned, or panicked: another job may have it then
+        let _memory = memory;
         let Queue { store, solver, .. } = &*queue_of_solver;
         let mesh = mesh.map(|hash| stored_mesh(store, &hash)).transpose()?;
+        if failpoint::fails(Point::MeshRead, id) {
+            return Err(Unsolved::Internal("a test wants it".into()));
+        }
         let tell = |told| {
+            pass_failpoint(&told, id);
             // an error means that the recorder has ended: the result is not needed
             let recording = match told {
                 Told::Report(report) => sender.blocking_send(report).is_ok(),
@@ -74,15 +99,16 @@ pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Runni
         }
     });
     let timer = tokio::spawn(time_out(queue.clone(), job.clone(), running.clone()));
+    let timer = AbortOnDropHandle::new(timer);
     let last = recorder::record(queue, &job, &running, reports).await;
     let solved = solving.await.unwrap_or_else(|panic| {
-        let panic = panic.try_into_panic().map(|panic| panicked(&*panic));
+        let panic = panic
+            .try_into_panic()
+            .map(|panic| panicked("the solver", &*panic));
         let cause = panic.unwrap_or_else(|_| "the solver's thread was lost".into());
         Err(Unsolved::Internal(cause))
     });
-    timer.abort();
-    // the solver has returned: another job may have its memory
-    drop(memory);
+    drop(timer);
     if let Err(Unsolved::Lost(how)) = &solved {
         requeue_with_retries(queue, &job, how).await;
     } else {
@@ -92,7 +118,19 @@ pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Runni
             end_with_retries(queue, &job, ending, last, parts).await;
         }
     }
-    queue.release(&job);
+    failpoint::pass(Point::Done, id);
+}
+
+/// The points of a job at which its solver tells something.
+fn pass_failpoint(told: &Told, id: JobId) {
+    let point = match told {
+        Told::Report(Report::OneLevel) => Some(Point::Parsed),
+        Told::Report(Report::Event(_, Payload::Stage { stage })) => Point::beginning_of(*stage),
+        _ => None,
+    };
+    if let Some(point) = point {
+        failpoint::pass(point, id);
+    }
 }
 
 /// Requeues a job whose process died, or ends it if that was its last attempt; for as long as it takes.
@@ -159,6 +197,9 @@ async fn try_to_end(
     parts: Option<&Parts>,
 ) -> crate::store::Result<()> {
     let (key, attempt) = (job.key, job.attempt);
+    if failpoint::fails(Point::Solved, job.id) {
+        return Err(StoreError::Full);
+    }
     let current = match parts {
         Some(parts) => queue.store.write_before_end(key, attempt, parts).await?,
         None => true,
@@ -166,10 +207,14 @@ async fn try_to_end(
     if !current {
         return Ok(());
     }
+    if failpoint::fails(Point::AlmostStored, job.id) {
+        return Err(StoreError::Full);
+    }
     let changed = queue
         .store
         .finish(key, attempt, ending, last.clone(), parts);
     if let Some(changed) = changed.await? {
+        failpoint::pass(Point::Unannounced, job.id);
         queue.announce(&changed);
     }
     Ok(())

@@ -11,12 +11,11 @@ use super::{
     database::{Store, Writing},
     error::{Result, StoreError},
     intact::{self, WHOLE},
-    lifecycle::Ending,
     rows,
     waiting::Move,
 };
 use crate::{
-    job::{Job, JobId},
+    job::{Job, JobId, Reason, Status},
     memory::Budget,
     time::Time,
 };
@@ -39,7 +38,11 @@ pub(super) struct Change<'a> {
 
 /// What the log tells of a job.
 enum Gone {
-    Ended(Ending),
+    Ended {
+        status: Status,
+        reason: Option<Reason>,
+        detail: String,
+    },
     Deleted,
 }
 
@@ -100,8 +103,19 @@ impl Change<'_> {
     }
 
     /// A job ends: told in the log, once this is committed.
-    pub(super) fn ended(&mut self, id: JobId, ending: &Ending) {
-        self.gone.push((id, Gone::Ended(ending.clone())));
+    pub(super) fn ended(
+        &mut self,
+        id: JobId,
+        status: Status,
+        reason: Option<Reason>,
+        detail: String,
+    ) {
+        let ended = Gone::Ended {
+            status,
+            reason,
+            detail,
+        };
+        self.gone.push((id, ended));
     }
 
     /// A job is deleted: told in the log, once this is committed.
@@ -217,18 +231,16 @@ impl Gone {
     fn log(&self, job: JobId) {
         match self {
             Gone::Deleted => info!(job.id = %job, "job {job} was deleted"),
-            Gone::Ended(Ending {
+            Gone::Ended {
                 status,
                 reason,
-                failure,
-                ..
-            }) => {
+                detail,
+            } => {
                 let (status, reason) = (<&str>::from(*status), reason.map(<&str>::from));
-                let detail = failure.as_ref().map_or("", |failure| &failure.detail);
                 let words = [
                     Some(status),
                     reason,
-                    Some(detail).filter(|detail| !detail.is_empty()),
+                    Some(&**detail).filter(|detail| !detail.is_empty()),
                 ];
                 let words: Vec<&str> = words.into_iter().flatten().collect();
                 info!(job.id = %job, status, reason, "job {job} has ended: {}", words.join(": "));

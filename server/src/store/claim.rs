@@ -11,7 +11,10 @@ use super::{
     rows::read,
     submission::Claim,
 };
-use crate::job::{Cache, Job};
+use crate::{
+    failpoint::{self, Point},
+    job::{Cache, Job},
+};
 
 impl Store {
     /// Starts an attempt of the next job of the queue: highest priority first, then in order of arrival. Jobs
@@ -94,6 +97,9 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
             }
             Err(error) => return Err(error),
         };
+        if failpoint::fails(Point::Claimed, job.id) {
+            return Err(StoreError::Full);
+        }
         return Ok(Some(Claim {
             job,
             problem,

@@ -7,11 +7,15 @@ use crate::{event::Payload, time::Time};
 
 impl Store {
     /// Compares the clock of the machine with the times in the store, when it is opened: it may have been set back since
-    /// then. Jobs are listed in the order of their times, so new ones must not be earlier than those that are there.
+    /// then. Jobs are listed in the order of their times, so new ones must not be earlier than those that are there; and
+    /// the next event of a job that has not ended must not be earlier than its last one.
     pub(super) async fn read_clock(&self) -> Result<()> {
         let latest: Option<i64> = sqlx::query_scalar(
             "select max(t) from (select max(created_at) as t from job
-                                 union all select max(finished_at) from job)",
+                                 union all select max(finished_at) from job
+                                 union all select max(event.t) from job join event
+                                           on event.job_id = job.id and event.seq = job.last_seq
+                                           where job.status in ('queued', 'running'))",
         )
         .fetch_one(&self.reader)
         .await?;

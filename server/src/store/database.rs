@@ -64,6 +64,9 @@ pub struct Store {
     pub(super) progress: Progress,
     /// Space for control when the disk is full.
     pub(super) reserve: Reserve,
+    /// How many of the next commits find the disk full.
+    #[cfg(test)]
+    pub(super) full_commits: Arc<std::sync::atomic::AtomicU32>,
     // last: SQLite's files are closed before
     pub(super) identity: Identity,
     folder: Folder,
@@ -74,6 +77,8 @@ pub(super) struct Writing {
     tx: Transaction<'static, Sqlite>,
     progress: Progress,
     number: i64,
+    #[cfg(test)]
+    full_commits: Arc<std::sync::atomic::AtomicU32>,
 }
 
 impl Deref for Writing {
@@ -93,6 +98,10 @@ impl DerefMut for Writing {
 impl Writing {
     /// Commits: the changes are on the disk when this returns.
     pub(super) async fn commit(self) -> Result<()> {
+        #[cfg(test)]
+        if is_full(&self.full_commits) {
+            return Err(StoreError::Full);
+        }
         self.tx.commit().await?;
         self.progress.reached(self.number);
         Ok(())
@@ -167,6 +176,8 @@ impl Store {
             ahead: AtomicI64::default(),
             progress,
             reserve,
+            #[cfg(test)]
+            full_commits: Arc::default(),
             identity,
             folder,
         };
@@ -208,6 +219,8 @@ impl Store {
             tx,
             progress,
             number,
+            #[cfg(test)]
+            full_commits: self.full_commits.clone(),
         })
     }
 
@@ -290,4 +303,13 @@ fn pool(connections: u32) -> SqlitePoolOptions {
         .idle_timeout(None)
         .max_lifetime(None)
         .test_before_acquire(false)
+}
+
+/// Whether a commit is to find the disk full, as it does where the write-ahead log cannot grow.
+#[cfg(test)]
+fn is_full(commits: &std::sync::atomic::AtomicU32) -> bool {
+    use std::sync::atomic::Ordering::Relaxed;
+    commits
+        .fetch_update(Relaxed, Relaxed, |left| left.checked_sub(1))
+        .is_ok()
 }

@@ -9,7 +9,7 @@ use super::{
     change::Change,
     coalescing,
     database::Store,
-    error::Result,
+    error::{Result, StoreError},
     events::{self, FinalBatch},
     lifecycle::{self, Ending},
     parts::Parts,
@@ -17,6 +17,7 @@ use super::{
     rows::{find, is_current, read},
 };
 use crate::{
+    failpoint::{self, Point},
     job::{Job, Reason, ResultAvailable, Status},
     time::Time,
 };
@@ -124,18 +125,26 @@ impl Store {
             result: ending.result.min(ResultAvailable::Partial),
             ..Ending::canceled()
         };
-        let ending = match job.cancel_requested || self.cancels().contains(&key) {
+        let ending = match self.is_asked_to_stop(&job) {
             true if ending.status == Status::Succeeded => &canceled,
             _ => ending,
         };
         end(&mut change, &job, ending).await?;
+        if failpoint::fails(Point::Ended, job.id) {
+            return Err(StoreError::Full);
+        }
         let changed = change.commit().await?;
         self.cancels().remove(&key);
         Ok(Some(changed))
     }
 
+    /// Whether a client has asked a running job to stop, even if that could not be stored.
+    pub(super) fn is_asked_to_stop(&self, job: &Job) -> bool {
+        job.cancel_requested || self.cancels().contains(&job.key)
+    }
+
     /// Running jobs that a client has canceled.
-    fn cancels(&self) -> MutexGuard<'_, HashSet<i64>> {
+    pub(super) fn cancels(&self) -> MutexGuard<'_, HashSet<i64>> {
         // No code panics while it holds this lock; if one did, the set would still be whole.
         self.cancels.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -114,7 +114,9 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
     };
     events::append(change.sql(), job.key, job.attempt, &[(now, done)]).await?;
     change.changed(job.key);
-    change.ended(job.id, ending);
+    let failure = ending.failure.as_ref();
+    let detail = failure.map_or_else(String::new, |failure| failure.detail.clone());
+    change.ended(job.id, ending.status, ending.reason, detail);
     Ok(())
 }
 

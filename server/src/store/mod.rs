@@ -96,6 +96,14 @@ pub use self::{
 impl Store {
     /// Opens the store in `folder`, which is created if necessary, and brings its tables up to date.
     pub async fn open(folder: &Path) -> Result<Arc<Store>> {
+        let store = Store::open_unwatched(folder).await?;
+        tokio::spawn(health::watch(Arc::downgrade(&store)));
+        tokio::spawn(health::check_indexes(Arc::downgrade(&store)));
+        Ok(store)
+    }
+
+    /// The same, without the tasks that look after it from time to time.
+    async fn open_unwatched(folder: &Path) -> Result<Arc<Store>> {
         let (store, submissions) = Store::connect(folder).await?;
         store.read_waiting_jobs().await?;
         store.read_settings().await?;
@@ -103,8 +111,6 @@ impl Store {
         let store = Arc::new(store);
         let committing = submit::commit_submissions(Arc::downgrade(&store), submissions);
         tokio::spawn(committing);
-        tokio::spawn(health::watch(Arc::downgrade(&store)));
-        tokio::spawn(health::check_indexes(Arc::downgrade(&store)));
         Ok(store)
     }
 }

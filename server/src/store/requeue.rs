@@ -32,7 +32,7 @@ impl Store {
         }
         let job = read(change.sql(), key).await?;
         // the client that asked it to stop does not have to wait for the restart
-        let status = if job.cancel_requested {
+        let status = if self.is_asked_to_stop(&job) {
             end(&mut change, &job, &Ending::canceled()).await?;
             Status::Canceled
         } else {
@@ -40,6 +40,7 @@ impl Store {
             Status::Queued
         };
         change.commit().await?;
+        self.cancels().remove(&key);
         Ok(Some(status))
     }
 
@@ -64,6 +65,12 @@ impl Store {
         Ok(rows.len())
     }
 
+    /// The jobs that run, with the numbers of their attempts.
+    pub async fn running(&self) -> Result<Vec<(i64, i32)>> {
+        let running = sqlx::query_as("select id, attempt from job where status = 'running'");
+        Ok(running.fetch_all(&self.reader).await?)
+    }
+
     /// Requeues a running job whose own process died; ends it if it was asked to stop, or if its attempts are used up.
     /// `how` it died is told to the client then. Returns the jobs that have changed.
     pub async fn requeue_lost(&self, key: i64, attempt: i32, how: &str) -> Result<Vec<i64>> {
@@ -76,9 +83,12 @@ impl Store {
         if !is_current(change.sql(), key, attempt).await? {
             return Ok(vec![]);
         }
-        let job = read(change.sql(), key).await?;
+        let mut job = read(change.sql(), key).await?;
+        job.cancel_requested = self.is_asked_to_stop(&job);
         requeue_after_death(&mut change, &job, how).await?;
-        change.commit().await
+        let changed = change.commit().await?;
+        self.cancels().remove(&key);
+        Ok(changed)
     }
 }
 

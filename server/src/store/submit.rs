@@ -20,6 +20,7 @@ use super::{
 };
 use crate::{
     event::Payload,
+    failpoint::{self, Point},
     job::{Cache, Status},
 };
 
@@ -75,6 +76,8 @@ impl Store {
         let committed = committed.await;
         match committed {
             Ok(_) => {
+                let jobs = answers.iter().flatten().flat_map(|answer| &answer.jobs);
+                jobs.for_each(|job| failpoint::pass(Point::Answered, job.id));
                 for (reply, accepted) in replies.into_iter().zip(answers) {
                     let _ = reply.send(accepted); // the client may have disconnected
                 }
@@ -123,6 +126,12 @@ async fn accept(
     let mut accepted = vec![];
     for key in inserted {
         accepted.push(read(change.sql(), key).await?);
+    }
+    if accepted
+        .iter()
+        .any(|job| failpoint::fails(Point::Accepted, job.id))
+    {
+        return Err(StoreError::Full);
     }
     Ok(Accepted {
         jobs: accepted,

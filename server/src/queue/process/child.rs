@@ -113,7 +113,7 @@ fn solve_task(
     // what a panic leaves behind is not used again
     let solved = catch_unwind(AssertUnwindSafe(solving));
     sent?;
-    match solved.unwrap_or_else(|panic| Err(Unsolved::Internal(panicked(&*panic)))) {
+    match solved.unwrap_or_else(|panic| Err(Unsolved::Internal(panicked("the solver", &*panic)))) {
         Ok(solved) => {
             send_parts(solved.parts, service)?;
             let (ending, iterations) = (solved.ending, solved.iterations);

@@ -4,6 +4,7 @@
 mod attempts;
 mod coalescing;
 mod estimates;
+mod failpoints;
 mod memory;
 mod order;
 mod processes;
@@ -46,9 +47,13 @@ struct Rig {
 }
 
 async fn rig(solve: Solve) -> Rig {
+    rig_of(solve, 1).await
+}
+
+async fn rig_of(solve: Solve, workers: u16) -> Rig {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
-    let queue = Queue::new(store.clone(), Solver::Threads(solve), 1);
+    let queue = Queue::new(store.clone(), Solver::Threads(solve), workers);
     Rig {
         store,
         queue,

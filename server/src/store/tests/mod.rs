@@ -4,6 +4,7 @@
 mod damage;
 mod owners;
 mod plans;
+mod simulation;
 mod starts;
 mod upgrades;
 

@@ -326,3 +326,41 @@ async fn a_clock_that_was_set_back_keeps_the_order_of_jobs() {
     );
     assert!(store.expire_queued(Time::now()).await.unwrap().is_empty());
 }
+
+#[tokio::test]
+async fn a_clock_that_was_set_back_keeps_the_events_of_a_job_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let job = submit(&store, "1").await.unwrap();
+    // it is started an hour later; the next server finds the clock set back by that hour
+    let hour = 3_600_000_000;
+    store
+        .ahead
+        .store(hour, std::sync::atomic::Ordering::Relaxed);
+    store.claim_next().await.unwrap().0.unwrap();
+    store.close().await;
+    drop(store);
+    let store = Store::open(folder.path()).await.unwrap();
+    assert_eq!(store.requeue_interrupted().await.unwrap(), 1);
+    let events = store.events_after(job.key, 0, 10).await.unwrap();
+    assert_eq!(events.len(), 3);
+    assert!(events.is_sorted_by_key(|event| event.t), "{events:?}");
+}
+
+#[tokio::test]
+async fn a_canceled_job_is_not_requeued_even_if_the_cancel_could_not_be_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for (input, stops) in [("1", true), ("2", false)] {
+        submit(&store, input).await.unwrap();
+        let job = store.claim_next().await.unwrap().0.unwrap().job;
+        store.cancels.lock().unwrap().insert(job.key);
+        match stops {
+            true => drop(store.requeue_drained(job.key, 1).await.unwrap()),
+            false => drop(store.requeue_lost(job.key, 1, "killed").await.unwrap()),
+        }
+        let ended = store.job(Owners::All, job.id).await.unwrap().unwrap();
+        assert_eq!(ended.status, Status::Canceled);
+    }
+    assert!(store.cancels.lock().unwrap().is_empty());
+}

@@ -1,0 +1,288 @@
+//! What is true of the store whatever was done to it.
+
+use super::*;
+use crate::{
+    event::Payload,
+    job::{Reason, ResultAvailable},
+};
+
+/// The tables, but for the count of transactions.
+const TABLES: [&str; 9] = [
+    "job",
+    "job_label",
+    "event",
+    "problem",
+    "result_part",
+    "result_info",
+    "request_key",
+    "deleted_job",
+    "setting",
+];
+
+/// Fails unless these rows of the store are the same.
+pub(super) fn same(before: &[String], after: &[String], what: &str) {
+    let missing = |some: &[String], others: &[String]| -> Vec<String> {
+        some.iter()
+            .filter(|row| !others.contains(row))
+            .cloned()
+            .collect()
+    };
+    if before != after {
+        let (lost, new) = (missing(before, after), missing(after, before));
+        panic!("{what} has changed the store\nbefore: {lost:#?}\nafter: {new:#?}");
+    }
+}
+
+impl World {
+    /// All rows of the store, as text.
+    pub(super) async fn rows(&self) -> Vec<String> {
+        static QUERIES: tokio::sync::OnceCell<Vec<String>> = tokio::sync::OnceCell::const_new();
+        let queries = QUERIES.get_or_init(|| async {
+            let mut queries = vec![];
+            for table in TABLES {
+                let names = "select group_concat(case name when 'body' then 'length(body)' else 'quote(' || name || ')' end,
+                                                 ' || '' '' || ') from pragma_table_info(?)";
+                let columns: String = sqlx::query_scalar(names).bind(table).fetch_one(&self.store.reader).await.unwrap();
+                queries.push(format!("select '{table} ' || {columns} from {table} order by 1"));
+            }
+            queries
+        });
+        let mut rows = vec![];
+        for query in queries.await {
+            let query = sqlx::query_scalar::<_, String>(sqlx::AssertSqlSafe(query.as_str()));
+            rows.extend(query.fetch_all(&self.store.reader).await.unwrap());
+        }
+        rows
+    }
+
+    /// All jobs, as they are listed.
+    pub(super) async fn listed(&self) -> Vec<Job> {
+        let order = Order {
+            descending: false,
+            ..Order::NEWEST_FIRST
+        };
+        let all = Filter::default();
+        self.store
+            .jobs(Owners::All, &all, order, None, 10_000)
+            .await
+            .unwrap()
+    }
+
+    /// The status of a job; none if it is deleted.
+    pub(super) async fn status(&self, key: i64) -> Option<Status> {
+        let status: Option<String> = sqlx::query_scalar("select status from job where id = ?")
+            .bind(key)
+            .fetch_optional(&self.store.reader)
+            .await
+            .unwrap();
+        status.map(|word| word.parse().unwrap())
+    }
+
+    /// Checks the jobs, and their new events; `thorough`: all their events.
+    pub(super) async fn check(&mut self, thorough: bool) {
+        let jobs = self.listed().await;
+        let found: Vec<i64> = jobs.iter().map(|job| job.key).collect();
+        let there = self.jobs.iter().filter(|(_, known)| !known.deleted);
+        let accepted: Vec<i64> = there.map(|(key, _)| *key).collect();
+        assert_eq!(found, accepted, "accepted jobs, in order of arrival");
+        let running = jobs.iter().filter(|job| job.status == Status::Running);
+        let running: Vec<(i64, i32)> = running.map(|job| (job.key, job.attempt)).collect();
+        let ours = self.running.iter().map(|(key, work)| (*key, work.attempt));
+        assert_eq!(running, ours.collect::<Vec<_>>(), "attempts that run");
+        self.check_queue(&jobs);
+        for job in &jobs {
+            check_job(job, &jobs);
+            self.check_end(job);
+            self.check_events(job, thorough).await;
+        }
+    }
+
+    /// The mirror in memory agrees with the database.
+    fn check_queue(&self, jobs: &[Job]) {
+        let mut waiting: Vec<&Job> = jobs.iter().filter(|job| job.waits_for_a_worker()).collect();
+        waiting.sort_by_key(|job| (-job.priority, job.key));
+        for (ahead, job) in waiting.iter().enumerate() {
+            let mirrored = self.store.waiting_jobs().ahead(job.priority, job.key);
+            assert_eq!(mirrored, Some(ahead), "position of {}", job.key);
+            assert_eq!(
+                job.queue.as_ref().map(|queue| queue.ahead),
+                Some(ahead as i64)
+            );
+        }
+        let queued = jobs
+            .iter()
+            .filter(|job| job.status == Status::Queued)
+            .count();
+        assert_eq!(self.store.waiting(), queued, "jobs that wait");
+    }
+
+    /// A terminal job stays as it was, but for what may be edited.
+    fn check_end(&mut self, job: &Job) {
+        let known = self.jobs.get_mut(&job.key).unwrap();
+        assert_eq!((job.id, &job.owner), (known.id, &known.owner));
+        known.attempts = known.attempts.max(job.attempt);
+        match &known.ended {
+            Some(ended) => {
+                let as_it_was = Job {
+                    name: ended.name.clone(),
+                    priority: ended.priority,
+                    version: ended.version,
+                    ..job.clone()
+                };
+                assert_eq!(as_it_was, *ended);
+            }
+            None if job.status.is_terminal() => known.ended = Some(job.clone()),
+            None => {}
+        }
+    }
+
+    /// Events that were read once are read again, and new ones follow them without a gap.
+    async fn check_events(&mut self, job: &Job, thorough: bool) {
+        let known = self.jobs.get_mut(&job.key).unwrap();
+        let seen = known.events.len() as i64;
+        if !thorough
+            && known.ended.is_some()
+            && matches!(
+                known.events.last().map(|e| &e.payload),
+                Some(Payload::Done { .. })
+            )
+        {
+            return;
+        }
+        let after = if thorough { 0 } else { seen };
+        let read = self
+            .store
+            .events_after(job.key, after, 100_000)
+            .await
+            .unwrap();
+        let (old, new) = read.split_at(usize::try_from(seen - after).unwrap().min(read.len()));
+        if thorough {
+            assert_eq!(
+                old, known.events,
+                "events of {} that were read before",
+                job.key
+            );
+        }
+        known.events.extend_from_slice(new);
+        let events = &known.events;
+        let numbers = events.iter().map(|event| event.seq);
+        assert!(numbers.eq(1..=events.len() as i64), "{events:?}");
+        assert!(
+            events.is_sorted_by_key(|event| event.t),
+            "times of {}: {events:#?}",
+            job.key
+        );
+        assert!(
+            events.is_sorted_by_key(|event| event.attempt),
+            "{events:#?}"
+        );
+        let done = |event: &Event| matches!(event.payload, Payload::Done { .. });
+        let ends = events.iter().filter(|event| done(event)).count();
+        assert_eq!(ends, usize::from(job.status.is_terminal()), "{events:#?}");
+        assert!(ends == 0 || events.last().is_some_and(done), "{events:#?}");
+        if let Some(Payload::Done { job: last }) = events.last().map(|event| &event.payload) {
+            assert_eq!(
+                (last.status, last.reason, last.finished_at),
+                (job.status, job.reason, job.finished_at)
+            );
+        }
+        let starts = events
+            .iter()
+            .filter(|event| event.payload == Payload::status(Status::Running));
+        assert_eq!(starts.count() as i32, job.attempt, "{events:#?}");
+        if job.reason == Some(Reason::WorkerLost) && job.cached_from.is_none() {
+            assert_eq!(jobs::losses(events), 2);
+        }
+        if thorough {
+            let (after, limit) = (
+                self.dice.i64(0..events.len() as i64 + 2),
+                self.dice.i64(1..5),
+            );
+            let piece = self
+                .store
+                .events_after(job.key, after, limit)
+                .await
+                .unwrap();
+            let known = &self.jobs[&job.key];
+            let expected = known
+                .events
+                .iter()
+                .skip(after as usize)
+                .take(limit as usize);
+            assert!(piece.iter().eq(expected), "{} events after {after}", limit);
+        }
+    }
+
+    /// Every job has ended, every result can be read, every key is answered, and nothing else is left.
+    pub(super) async fn check_the_end(&mut self) {
+        self.check(true).await;
+        for job in self.listed().await {
+            assert!(job.status.is_terminal(), "{job:?}");
+            if job.result_available == ResultAvailable::Final {
+                let found = self
+                    .store
+                    .piece(job.result_key, "summary", 0)
+                    .await
+                    .unwrap();
+                let text = String::from_utf8(found.expect("a result")).unwrap();
+                assert!(text.contains(&job.input_hash), "{text}");
+            }
+        }
+        for ((owner, key), (payload, jobs)) in &self.keys {
+            let (key, payload) = (key.clone(), payload.clone());
+            let found = self.store.replay(owner, &RequestKey { key, payload }).await;
+            let left: Vec<i64> = jobs
+                .iter()
+                .copied()
+                .filter(|key| !self.jobs[key].deleted)
+                .collect();
+            match found {
+                Ok(Some(found)) => assert!(found.iter().map(|job| job.key).eq(left)),
+                Ok(None) | Err(StoreError::Deleted(_)) => assert!(left.is_empty()),
+                Err(error) => panic!("{error}"),
+            }
+        }
+        for orphans in [
+            "select count(*) from result_part where not exists
+                 (select 1 from job where result_available <> 'none' and coalesce(result_job, id) = result_part.job_id)",
+            "select count(*) from result_info where not exists
+                 (select 1 from job where result_available <> 'none' and coalesce(result_job, id) = result_info.job_id)",
+            "select count(*) from event where not exists (select 1 from job where id = job_id)",
+            "select count(*) from problem where not exists
+                 (select 1 from job where job.input_hash = problem.input_hash)",
+            "select count(*) from job where checksum is null",
+            "select count(*) from pragma_foreign_key_check",
+        ] {
+            let count: i64 = sqlx::query_scalar(orphans).fetch_one(&self.store.reader).await.unwrap();
+            assert_eq!(count, 0, "{orphans}");
+        }
+        let whole: String = sqlx::query_scalar("pragma integrity_check")
+            .fetch_one(&self.store.reader)
+            .await
+            .unwrap();
+        assert_eq!(whole, "ok");
+        assert_eq!(self.store.health().await.unwrap().damaged, 0);
+    }
+}
+
+/// A job is consistent in itself, and with the one that it waits for.
+fn check_job(job: &Job, jobs: &[Job]) {
+    let times = [Some(job.created_at), job.started_at, job.finished_at];
+    assert!(times.iter().flatten().is_sorted(), "{job:?}");
+    assert_eq!(
+        job.status.is_terminal(),
+        job.finished_at.is_some(),
+        "{job:?}"
+    );
+    let Some(primary) = job.coalesced_into else {
+        return;
+    };
+    assert_eq!(job.status, Status::Queued, "{job:?}");
+    let primary = jobs.iter().find(|other| other.key == primary);
+    let primary = primary.expect("the job that it is coalesced into");
+    assert!(!primary.status.is_terminal(), "{job:?} waits for ever");
+    assert_eq!(primary.coalesced_into, None);
+    assert_eq!(primary.input_hash, job.input_hash);
+    let outranked = primary.status == Status::Queued && primary.priority < job.priority;
+    assert!(!outranked, "{job:?} waits for one of lower priority");
+}
