@@ -27,8 +27,8 @@ use fastrand::Rng;
 use super::*;
 use crate::{event::Event, job::JobId, memory::Reservation, time::Time};
 
-/// How many seeds are run unless the environment says otherwise.
-const SEEDS: u64 = 1000;
+/// How many seeds are run unless the environment says otherwise; `tests/reliability/unit.py` runs a thousand.
+const SEEDS: u64 = 100;
 /// How many things are done in one, at least and at most.
 const STEPS: std::ops::Range<usize> = 30..60;
 /// No seed takes nearly as long, unless the store waits for ever.
