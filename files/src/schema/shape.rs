@@ -101,6 +101,13 @@ impl Shape {
         types.is_empty() || types.iter().any(same)
     }
 
+    /// Whether it is a list of any length of numbers, or of lists of them.
+    pub(super) fn is_long_list_of_numbers(&self) -> bool {
+        let number = |shape: &Shape| matches!(shape.types(), [Type::Number | Type::Integer]);
+        let within = |items: &Shape| items.items.as_deref().map_or(number(items), number);
+        self.max_items.is_none() && self.items.as_deref().is_some_and(within)
+    }
+
     pub(super) fn branches(&self) -> &[Shape] {
         match self.any_of.is_empty() {
             true => &self.one_of,
