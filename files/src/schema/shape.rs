@@ -101,10 +101,15 @@ impl Shape {
         types.is_empty() || types.iter().any(same)
     }
 
-    /// Whether it is a list of any length of numbers, or of lists of them.
+    /// Whether it is a list of any length of numbers, or of short lists of them.
     pub(super) fn is_long_list_of_numbers(&self) -> bool {
         let number = |shape: &Shape| matches!(shape.types(), [Type::Number | Type::Integer]);
-        let within = |items: &Shape| items.items.as_deref().map_or(number(items), number);
+        // the lengths of inner lists are not compared with the limits of a walk
+        let short = |items: &Shape| items.max_items.is_some();
+        let within = |items: &Shape| match items.items.as_deref() {
+            Some(inner) => short(items) && number(inner),
+            None => number(items),
+        };
         self.max_items.is_none() && self.items.as_deref().is_some_and(within)
     }
 
