@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-/// Asks whether to go on whenever another [`PORTION`] of work has been done. Work is counted in operations and not in
+/// Asks whether to go on whenever another portion of work has been done. Work is counted in operations and not in
 /// seconds, since the solver has no clock.
 pub struct Breaks<'a> {
     ask: &'a mut dyn FnMut() -> ControlFlow<()>,
