@@ -13,7 +13,7 @@ import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 
-from outside import Server, check, equal, example
+from outside import Server, check, equal, example, long_contact
 
 SOAK = "--soak" in sys.argv[1:]
 # elements along the contact
@@ -23,22 +23,9 @@ MOST_S = 1.0
 TIMEOUT_S = 3.0
 
 
-def strip(elements):
-    return {
-        "analysis": {"kind": "plane_strain"},
-        "mesh": {"grid": {"x": [0, 1], "y": list(range(elements + 1))}, "boundaries": {"wall": {"normal": [1, 0]}}},
-        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
-        "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
-        "contacts": [{
-            "boundary": "wall", "obstacle": {"kind": "flat", "from": 0, "to": elements}, "indentation": 0.01,
-            "friction": {"coefficient": 0.3, "nonlocal_radius": 2, "elastic_slip": 1e-4},
-        }],
-    }
-
-
 def seconds(text):
     """The seconds of an RFC 3339 time within its day, and its day."""
-    date, clock = text.rstrip("Z").split("T")
+    date, clock = text.rlong_contact("Z").split("T")
     hours, minutes, rest = clock.split(":")
     return time.mktime(time.strptime(date, "%Y-%m-%d")) + 3600 * int(hours) + 60 * int(minutes) + float(rest)
 
@@ -60,7 +47,7 @@ def gap(server, stopped, following):
 
 def attack(server, elements, stop_after):
     """One job stopped by its time limit, one canceled at `stop_after` seconds: the two gaps."""
-    large, small = strip(elements), example()
+    large, small = long_contact(elements), example()
     slow = server.submit(large, limits={"timeout_s": TIMEOUT_S})
     ended, by_time = gap(server, slow, server.submit(small))
     equal((ended["status"], ended["reason"]), ("failed", "timed_out"), "a job at its time limit")
