@@ -25,7 +25,7 @@ TIMEOUT_S = 3.0
 
 def seconds(text):
     """The seconds of an RFC 3339 time within its day, and its day."""
-    date, clock = text.rlong_contact("Z").split("T")
+    date, clock = text.rstrip("Z").split("T")
     hours, minutes, rest = clock.split(":")
     return time.mktime(time.strptime(date, "%Y-%m-%d")) + 3600 * int(hours) + 60 * int(minutes) + float(rest)
 
