@@ -47,6 +47,20 @@ def talkative(increments, **mesh):
     return dict(example(**mesh), steps=[{"name": "press", "increments": increments}])
 
 
+def long_contact(elements):
+    """A strip one element wide that touches with all of its long side: nearly all the work is dense."""
+    return {
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [0, 1], "y": list(range(elements + 1))}, "boundaries": {"wall": {"normal": [1, 0]}}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
+        "contacts": [{
+            "boundary": "wall", "obstacle": {"kind": "flat", "from": 0, "to": elements}, "indentation": 0.01,
+            "friction": {"coefficient": 0.3, "nonlocal_radius": 2, "elastic_slip": 1e-4},
+        }],
+    }
+
+
 def submission(problem, **envelope):
     """The body of a submission. No job is answered from the cache, so that every counted job has run."""
     return json.dumps({"cache": "off", **envelope, "problem": problem}).encode()

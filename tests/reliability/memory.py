@@ -16,26 +16,13 @@ import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 
-from outside import Server, check, equal, example
+from outside import Server, check, equal, example, long_contact
 
 SOAK = "--soak" in sys.argv[1:]
 MIB = 1 << 20
 BUDGET = 512 * MIB
 MOST = BUDGET + 256 * MIB
 STEPS = 1_000 if SOAK else 200
-
-
-def strip(elements):
-    return {
-        "analysis": {"kind": "plane_strain"},
-        "mesh": {"grid": {"x": [0, 1], "y": list(range(elements + 1))}, "boundaries": {"wall": {"normal": [1, 0]}}},
-        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
-        "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
-        "contacts": [{
-            "boundary": "wall", "obstacle": {"kind": "flat", "from": 0, "to": elements}, "indentation": 0.01,
-            "friction": {"coefficient": 0.3, "nonlocal_radius": 2, "elastic_slip": 1e-4},
-        }],
-    }
 
 
 class Watch(threading.Thread):
@@ -92,7 +79,7 @@ def attack(isolation):
         check(any(v["pointer"] == "/problem/mesh/refine" for v in answer.json()["errors"]), "its place: %r" % answer)
 
         # the 35 KB job, which was told to need 103 MiB
-        large = strip(6_000)
+        large = long_contact(6_000)
         estimate = told(server, large)["estimate"]["memory_bytes"]
         check(estimate > 3 * 8 * 24_000 ** 2 / 2, "a contact of 12,001 nodes is told to need %d bytes" % estimate)
         equal(offer(server, large), None, "the 35 KB job")
@@ -101,7 +88,7 @@ def attack(isolation):
         sizes = (100, 300, 600, 800, 1_000, 1_500, 2_000, 4_000, 8_000) if SOAK else (50, 100, 300, 450, 2_000, 8_000)
         jobs, refused, waited = [], 0, False
         for elements in sizes:
-            job = offer(server, strip(elements))
+            job = offer(server, long_contact(elements))
             refused += job is None
             jobs += [job] if job else []
         jobs += [server.submit(example(refine=3 if SOAK else 2)) for _ in range(3)]

@@ -13,7 +13,7 @@ import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 
-from outside import Server, check, equal, example
+from outside import Server, check, equal, example, long_contact
 
 SOAK = "--soak" in sys.argv[1:]
 # elements along the contact
@@ -21,19 +21,6 @@ SIZES = (1_000, 2_000, 3_000) if SOAK else (1_000,)
 # seconds from the end of a job to the start of the next; the machine may be at work for others
 MOST_S = 1.0
 TIMEOUT_S = 3.0
-
-
-def strip(elements):
-    return {
-        "analysis": {"kind": "plane_strain"},
-        "mesh": {"grid": {"x": [0, 1], "y": list(range(elements + 1))}, "boundaries": {"wall": {"normal": [1, 0]}}},
-        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
-        "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
-        "contacts": [{
-            "boundary": "wall", "obstacle": {"kind": "flat", "from": 0, "to": elements}, "indentation": 0.01,
-            "friction": {"coefficient": 0.3, "nonlocal_radius": 2, "elastic_slip": 1e-4},
-        }],
-    }
 
 
 def seconds(text):
@@ -60,7 +47,7 @@ def gap(server, stopped, following):
 
 def attack(server, elements, stop_after):
     """One job stopped by its time limit, one canceled at `stop_after` seconds: the two gaps."""
-    large, small = strip(elements), example()
+    large, small = long_contact(elements), example()
     slow = server.submit(large, limits={"timeout_s": TIMEOUT_S})
     ended, by_time = gap(server, slow, server.submit(small))
     equal((ended["status"], ended["reason"]), ("failed", "timed_out"), "a job at its time limit")

@@ -48,6 +48,7 @@ ROWS = [
         "connections.py", "connections.py --soak"),
     Row("R16", "Floods of HTTP/2 frames end their connection", "floods.py", "floods.py --soak"),
     Row("R17", "Jobs that need more memory than there is are refused, or fail alone", "memory.py", "memory.py --soak"),
+    Row("R17b", "Estimates of long contacts lie between what they take and three times that", soak="unit.py long_contacts"),
     Row("R17a", "A worker is free a second after its job has ended by time or was canceled", "stuck.py", "stuck.py --soak"),
     Row("R18", "Stopped again and again under load: nothing is lost, streams resume", "stops.py", "stops.py --soak"),
     Row("R18a", "A log that nobody reads, and signals that would end a process: work goes on", "logs.py", "logs.py --soak"),

@@ -160,12 +160,15 @@ fn estimates_lie_between_what_is_taken_and_three_times_that() {
     compare(problems);
 }
 
-/// Minutes, and up to 1 GiB: `cargo test --release --workspace --lib long_contacts -- --ignored --nocapture`.
+/// With `SIGNORINI_SOAK` set (`tests/reliability/unit.py long_contacts`) also those that take minutes, and up to 1 GiB.
 #[test]
-#[ignore = "minutes, and up to 1 GiB"]
 fn estimates_of_long_contacts_do_too() {
-    let walls = [500, 1000, 1500].map(|lines| (format!("wall of {lines} lines"), wall(lines, 2.0)));
-    compare(walls.into());
+    let lines: &[u32] = match std::env::var_os("SIGNORINI_SOAK") {
+        Some(_) => &[300, 500, 1000, 1500],
+        None => &[300],
+    };
+    let named = |lines: &u32| (format!("wall of {lines} lines"), wall(*lines, 2.0));
+    compare(lines.iter().map(named).collect());
 }
 
 /// A job that outgrows its share ends at the next question: its solver sees a stop, and the worker why.
