@@ -120,10 +120,16 @@ class Server:
 
     def note_peak(self):
         """Notes the most memory that the process has used, and the budget of its jobs, if somebody wants to know."""
-        noted, status = os.environ.get("SIGNORINI_PEAKS"), pathlib.Path("/proc/%d/status" % self.process.pid)
-        if not noted or not status.exists() or "VmHWM" not in (text := status.read_text()):
+        noted = os.environ.get("SIGNORINI_PEAKS")
+        if not noted:
             return
-        peak = int(text.split("VmHWM:")[1].split()[0]) * 1024
+        # with its worker processes
+        children = pathlib.Path("/proc/%d/task" % self.process.pid).glob("*/children")
+        pids = [self.process.pid, *(int(pid) for task in children for pid in task.read_text().split())]
+        statuses = [path.read_text() for pid in pids if (path := pathlib.Path("/proc/%d/status" % pid)).exists()]
+        peak = sum(int(text.split("VmHWM:")[1].split()[0]) * 1024 for text in statuses if "VmHWM:" in text)
+        if not peak:
+            return
         chosen = dict(zip(self.options, self.options[1:])).get("--memory-budget-bytes")
         budget = chosen or os.environ["SIGNORINI_MEMORY_BUDGET_BYTES"]
         with open(noted, "a", encoding="utf-8") as file:

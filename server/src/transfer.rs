@@ -1,8 +1,8 @@
 //! Bytes of requests and of answers in memory: how many at the same time, over all connections.
 //!
 //! One request is limited by its own size; this is the limit on all of them together. What finds no room is refused
-//! with `overloaded`, and not kept waiting, since waiting requests need memory, too. Small ones are not counted, so that
-//! a job can be read, canceled and submitted while others transfer large files.
+//! with `overloaded`, and not kept waiting, since waiting requests need memory, too. Small ones have room of their own, so
+//! that a job can be read, canceled and submitted while others transfer large files.
 
 use std::{
     error::Error,
@@ -13,6 +13,7 @@ use std::{
 };
 
 use axum::body::{Body, Bytes, HttpBody};
+use futures_util::FutureExt;
 use http_body::{Frame, SizeHint};
 use http_body_util::BodyExt;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -20,16 +21,24 @@ use tower_http::timeout::{TimeoutBody, TimeoutError};
 
 use crate::error::{ApiError, LONGEST_PAUSE};
 
-/// The first bytes of each request are not counted.
-const UNCOUNTED_RECEIVED: usize = 16 << 10;
-/// Answers of at most this size are not counted.
-const UNCOUNTED_SENT: usize = 64 << 10;
+/// The first bytes of each request are small.
+const SMALL_RECEIVED: usize = 16 << 10;
+/// Answers of at most this size are small.
+const SMALL_SENT: usize = 64 << 10;
+/// The room for small requests, and that for small answers: some thousand at the same time.
+const SMALL_BYTES: usize = 64 << 20;
 /// Budgets are counted in units of this many bytes, since a semaphore has a limited number of permits.
 const UNIT: usize = 1 << 10;
 
 /// A limit on bytes over all requests.
 #[derive(Clone, Debug)]
 pub struct Budget {
+    large: Room,
+    small: Room,
+}
+
+#[derive(Clone, Debug)]
+struct Room {
     free: Arc<Semaphore>,
     units: u32,
 }
@@ -39,30 +48,59 @@ pub struct Budget {
 pub struct Share(#[allow(dead_code)] OwnedSemaphorePermit);
 
 impl Budget {
-    /// A budget of so many bytes.
+    /// A budget of so many bytes, beside the room for small ones.
     pub fn new(bytes: usize) -> Budget {
-        let units = u32::try_from(bytes.div_ceil(UNIT)).unwrap_or(u32::MAX);
-        let permits = (units as usize).min(Semaphore::MAX_PERMITS);
         Budget {
-            free: Arc::new(Semaphore::new(permits)),
-            units: permits as u32,
+            large: Room::new(bytes),
+            small: Room::new(SMALL_BYTES),
         }
     }
 
     /// A share of so many bytes, if they are free. One that is larger than the budget takes all of it.
     pub fn take(&self, bytes: usize) -> Result<Share, ApiError> {
-        let permits = self.free.clone().try_acquire_many_owned(self.units(bytes));
-        permits.map(Share).map_err(|_| ApiError::Overloaded)
+        self.large.take(self.large.units(bytes))
     }
 
     /// Waits for a share; for callers that hold no memory meanwhile.
     pub async fn wait_for(&self, bytes: usize) -> Result<Share, ApiError> {
-        let permits = self.free.clone().acquire_many_owned(self.units(bytes));
+        let units = self.large.units(bytes);
+        let permits = self.large.free.clone().acquire_many_owned(units);
         permits.await.map(Share).map_err(ApiError::internal)
+    }
+}
+
+impl Room {
+    fn new(bytes: usize) -> Room {
+        let units = u32::try_from(bytes.div_ceil(UNIT)).unwrap_or(u32::MAX);
+        let permits = (units as usize).min(Semaphore::MAX_PERMITS);
+        Room {
+            free: Arc::new(Semaphore::new(permits)),
+            units: permits as u32,
+        }
+    }
+
+    fn take(&self, units: u32) -> Result<Share, ApiError> {
+        let permits = self.free.clone().try_acquire_many_owned(units);
+        permits.map(Share).map_err(|_| ApiError::Overloaded)
     }
 
     fn units(&self, bytes: usize) -> u32 {
         u32::try_from(bytes.div_ceil(UNIT)).map_or(self.units, |units| units.min(self.units))
+    }
+
+    /// Enlarges a share to so many bytes.
+    fn enlarge(&self, share: &mut Option<Share>, bytes: usize) -> Result<(), ApiError> {
+        let held = share.as_ref().map_or(0, |share| share.0.num_permits());
+        let more = (self.units(bytes) as usize).saturating_sub(held);
+        if more == 0 {
+            return Ok(());
+        }
+        let more = self.take(more as u32)?;
+        match share {
+            Some(share) => share.0.merge(more.0),
+            None => *share = Some(more),
+        }
+        Ok(())
     }
 }
 
@@ -76,7 +114,8 @@ pub struct Received {
 #[derive(Debug, Default)]
 struct Counted {
     bytes: usize,
-    shares: Vec<Share>,
+    small: Option<Share>,
+    large: Option<Share>,
 }
 
 impl Received {
@@ -91,14 +130,11 @@ impl Received {
     /// Counts some more bytes.
     pub fn count(&self, bytes: usize) -> Result<(), ApiError> {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
-        let before = counted.bytes.max(UNCOUNTED_RECEIVED);
         counted.bytes = counted.bytes.saturating_add(bytes);
-        let more = counted.bytes.saturating_sub(before);
-        if more > 0 {
-            let share = self.budget.take(more)?;
-            counted.shares.push(share);
-        }
-        Ok(())
+        let small = counted.bytes.min(SMALL_RECEIVED);
+        let large = counted.bytes - small;
+        self.budget.small.enlarge(&mut counted.small, small)?;
+        self.budget.large.enlarge(&mut counted.large, large)
     }
 
     /// Gives the share back, when nothing of the request is needed any more.
@@ -202,21 +238,40 @@ impl HttpBody for CountedBody {
     }
 }
 
-/// The body of an answer whose bytes have their share of the budget until they are sent. `Err`: there is no room.
-pub fn with_share(body: Body, budget: &Budget) -> Result<Body, ApiError> {
-    // the length of a stream is not known; what produces large ones takes shares for its pieces
-    let bytes = body.size_hint().exact().unwrap_or(0);
-    let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
-    if bytes <= UNCOUNTED_SENT {
-        return Ok(body);
-    }
-    let share = Arc::new(budget.take(bytes)?);
-    Ok(Body::new(Shared { body, share }))
+/// The body of an answer whose bytes have their share of the budget until they are sent. `Err`: there is no room. Of a
+/// stream, that is what is ready at once, such as the whole of an answer over gRPC, which does not tell its length; what
+/// produces large streams takes shares for their pieces.
+pub fn with_share(mut body: Body, budget: &Budget) -> Result<Body, ApiError> {
+    let exact = body.size_hint().exact();
+    let mut first = None;
+    let bytes = match exact {
+        Some(bytes) => usize::try_from(bytes).unwrap_or(usize::MAX),
+        None => {
+            match body.frame().now_or_never() {
+                None => return Ok(body),
+                Some(None) => return Ok(Body::empty()),
+                Some(Some(frame)) => first = Some(frame),
+            }
+            let data = first
+                .as_ref()
+                .and_then(|frame| frame.as_ref().ok()?.data_ref());
+            data.map_or(0, Bytes::len)
+        }
+    };
+    let share = match bytes {
+        0 => None,
+        bytes if bytes <= SMALL_SENT => Some(budget.small.take(budget.small.units(bytes))?),
+        bytes => Some(budget.take(bytes)?),
+    };
+    let share = share.map(Arc::new);
+    Ok(Body::new(Shared { first, body, share }))
 }
 
 struct Shared {
+    /// What a stream had ready; the share is for this alone.
+    first: Option<Result<Frame<Bytes>, axum::Error>>,
     body: Body,
-    share: Arc<Share>,
+    share: Option<Arc<Share>>,
 }
 
 /// Bytes with their share of a budget, which they keep as long as any part of them is in memory.
@@ -239,20 +294,29 @@ impl HttpBody for Shared {
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        let frame = ready!(Pin::new(&mut self.body).poll_frame(context));
-        let owned = |bytes| {
-            let _share = self.share.clone();
-            Bytes::from_owner(Owner { bytes, _share })
+        let (frame, share) = match self.first.take() {
+            Some(first) => (Some(first), self.share.take()),
+            None => {
+                let frame = ready!(Pin::new(&mut self.body).poll_frame(context));
+                (frame, self.share.clone())
+            }
+        };
+        let owned = |bytes| match share {
+            Some(_share) => Bytes::from_owner(Owner { bytes, _share }),
+            None => bytes,
         };
         Poll::Ready(frame.map(|frame| frame.map(|frame| frame.map_data(owned))))
     }
 
     fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
+        self.first.is_none() && self.body.is_end_stream()
     }
 
     fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
+        match self.first {
+            Some(_) => SizeHint::default(),
+            None => self.body.size_hint(),
+        }
     }
 }
 
@@ -267,14 +331,14 @@ mod tests {
     fn requests_share_a_budget_until_they_end() {
         let budget = Budget::new(100 << 10);
         let (one, other) = (Received::new(&budget), Received::new(&budget));
-        one.count(UNCOUNTED_RECEIVED).unwrap();
+        one.count(SMALL_RECEIVED).unwrap();
         for _ in 0..60 {
             one.clone().count(1 << 10).unwrap();
         }
-        other.count(UNCOUNTED_RECEIVED + (30 << 10)).unwrap();
+        other.count(SMALL_RECEIVED + (30 << 10)).unwrap();
         assert!(matches!(other.count(20 << 10), Err(ApiError::Overloaded)));
         // small requests are received whatever others do
-        Received::new(&budget).count(UNCOUNTED_RECEIVED).unwrap();
+        Received::new(&budget).count(SMALL_RECEIVED).unwrap();
         drop(one);
         other.count(20 << 10).unwrap();
         other.release();

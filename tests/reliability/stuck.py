@@ -1,4 +1,4 @@
-"""How soon a worker is free after its job has ended by time or was canceled, in the middle of dense work (R7).
+"""How soon a worker is free after its job has ended by time or was canceled, in the middle of dense work (R17a).
 
     stuck.py [--soak]
 

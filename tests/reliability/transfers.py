@@ -197,7 +197,6 @@ def slow_readers(server, job, small):
     for connection in stalled:
         connection.close()
     bystander.check()
-    print("%d of %.1f MiB, %d refused, grown %.0f" % (READERS, size/MIB, refused, grown / MIB), [server.memory()/MIB])
     check(grown < SENT + 2 * 4 * size + 32 * MIB, "memory grew by %.0f MiB" % (grown / MIB))
     return "%d connections and 100 streams that do not read %.0f MiB each: memory %+.0f MiB, %d refused, bystander %.0f ms (p99)" % (
         READERS, size / MIB, grown / MIB, refused, 1000 * bystander.p99_s)

@@ -6,6 +6,7 @@
 //! instead of naming the intended alternative and its faults.
 
 mod alternatives;
+mod numbers;
 mod shape;
 mod walk;
 mod words;

@@ -101,6 +101,18 @@ impl Shape {
         types.is_empty() || types.iter().any(same)
     }
 
+    /// Whether it is a list of any length of numbers, or of short lists of them.
+    pub(super) fn is_long_list_of_numbers(&self) -> bool {
+        let number = |shape: &Shape| matches!(shape.types(), [Type::Number | Type::Integer]);
+        // the lengths of inner lists are not compared with the limits of a walk
+        let short = |items: &Shape| items.max_items.is_some();
+        let within = |items: &Shape| match items.items.as_deref() {
+            Some(inner) => short(items) && number(inner),
+            None => number(items),
+        };
+        self.max_items.is_none() && self.items.as_deref().is_some_and(within)
+    }
+
     pub(super) fn branches(&self) -> &[Shape] {
         match self.any_of.is_empty() {
             true => &self.one_of,

@@ -11,6 +11,7 @@ use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, Seq
 use serde_json::value::RawValue;
 
 use super::alternatives::Outline;
+use super::numbers;
 use super::shape::{Shape, Type};
 use super::words;
 use solver::error::{Findings, Reason, Violation, escape};
@@ -252,6 +253,18 @@ impl<'de> DeserializeSeed<'de> for Value<'_, '_> {
             let got = || words::value(value.get());
             let not_used = |at| Violation::new(at, Reason::NotUsed, got(), expected, hint);
             return self.walk.report(not_used);
+        }
+        if let Some(items) = &self.shape.items
+            && self.shape.is_long_list_of_numbers()
+        {
+            let value = <&RawValue>::deserialize(reader)?;
+            let most = self.walk.most_items(items);
+            let count = numbers::count(self.shape, value.get());
+            if count.is_some_and(|count| count <= most) {
+                return Ok(());
+            }
+            let checked = self.walk.check_base(self.shape, value);
+            return checked.map_err(D::Error::custom);
         }
         if !self.shape.has_alternatives() {
             return reader.deserialize_any(self);

@@ -17,7 +17,7 @@ use clap::{Parser, Subcommand};
 use tracing::level_filters::LevelFilter;
 
 use self::exit::Exit;
-use crate::{app::WORKER, config::Config, queue, rest};
+use crate::{app::WORKER, config::Config, rest};
 
 /// Solves frictional contact problems, one at a time or as jobs of a service
 #[derive(Debug, Parser)]
@@ -80,8 +80,7 @@ pub fn main() -> ExitCode {
         }
         Command::Worker => {
             let _lines = log::start(LevelFilter::WARN);
-            let served = queue::run_worker_process(solver::solve_on);
-            served.map(|()| Exit::Ok).map_err(Into::into)
+            with_runtime(serve::work())
         }
         Command::Demo => {
             let _lines = log::start(LevelFilter::WARN);

@@ -9,7 +9,7 @@ use tracing::{info, warn};
 use tracing_appender::non_blocking::ErrorCounter;
 
 use super::{exit::Exit, log};
-use crate::{app::App, config::Config};
+use crate::{app::App, config::Config, queue};
 
 /// Serves until SIGTERM or SIGINT. `lost` counts the lines of the log that were lost.
 pub(super) async fn run(config: Config, lost: ErrorCounter) -> anyhow::Result<Exit> {
@@ -29,6 +29,22 @@ pub(super) async fn run(config: Config, lost: ErrorCounter) -> anyhow::Result<Ex
         _ = interrupt.recv() => info!("SIGINT: stopping"),
     }
     app.stop().await;
+    Ok(Exit::Ok)
+}
+
+/// Solves what the service sends, as a worker process. A signal to stop that reaches the service and its processes
+/// alike is for the service: it decides about its jobs, and its end is that of this process.
+pub(super) async fn work() -> anyhow::Result<Exit> {
+    for kind in [
+        SignalKind::terminate(),
+        SignalKind::interrupt(),
+        SignalKind::hangup(),
+    ] {
+        // from now on it has no effect, also when this is dropped
+        let _caught = signal(kind).context("a signal cannot be caught")?;
+    }
+    let solve = || queue::run_worker_process(solver::solve_on);
+    tokio::task::spawn_blocking(solve).await??;
     Ok(Exit::Ok)
 }
 

@@ -275,7 +275,9 @@ impl JobService for Grpc {
             let total = bytes.len() as u64;
             check_offset(offset, total)?;
             let digest = Sha256::digest(&bytes).to_vec();
+            let share = self.service.sent.take(bytes.len())?;
             let pieces = async_stream::stream! {
+                let _share = share; // as long as the file is in memory
                 for piece in bytes[offset as usize..].chunks(PIECE_BYTES) {
                     yield Ok(piece.to_vec());
                 }

@@ -117,7 +117,7 @@ fn answer(
 ) -> impl Future<Output = Result<Response<Sent>, Infallible>> + use<> {
     let under_way = activity.begin();
     async move {
-        let response = match reserved && !rest::is_probe(&request) {
+        let response = match reserved && !rest::is_probe(request.uri().path()) {
             true => rest::refuse(&request, ApiError::Overloaded),
             false => match router.oneshot(request).await {
                 Ok(response) => response,

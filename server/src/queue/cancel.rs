@@ -82,7 +82,7 @@ impl Queue {
                         "job canceled, and its solver has not stopped yet: its worker stays busy"
                     );
                 }
-                Ok(false) => return,
+                Ok(false) | Err(StoreError::Damaged(_)) => return,
                 Err(cause) => {
                     error!(job.key = key, %cause, "job could not be canceled yet: {cause}")
                 }

@@ -7,12 +7,12 @@ use tracing::error;
 
 use super::{
     running::Running,
-    state::{Queue, Solver},
+    state::{Queue, Slot, Solver},
     worker,
 };
 use crate::{
     failpoint::{self, Point},
-    store::{Accepted, Claim, Result, Submission},
+    store::{Accepted, Claim, Result, StoreError, Submission},
     time::Time,
 };
 
@@ -119,11 +119,11 @@ impl Queue {
         };
         self.running().insert(claim.job.key, running.clone());
         let queue = self.clone();
-        tokio::spawn(async move {
-            worker::run_attempt(&queue, claim, running).await;
-            drop(slot);
-            queue.wake.notify_one();
+        let slot = Arc::new(Slot {
+            permit: Some(slot),
+            queue: self.clone(),
         });
+        tokio::spawn(async move { worker::run_attempt(&queue, claim, running, slot).await });
     }
 
     /// Jobs that run, as the store has it, but that no worker has.
@@ -144,12 +144,16 @@ impl Queue {
             return Ok(()); // they are requeued by that
         }
         for (key, attempt) in self.lost().await? {
+            let how = "it was claimed, but reached no worker";
+            let changed = match self.store.requeue_lost(key, attempt, how).await {
+                Ok(changed) => changed,
+                Err(StoreError::Damaged(_)) => continue, // logged, once; `doctor` names it
+                Err(cause) => return Err(cause),
+            };
             error!(
                 job.key = key,
-                attempt, "a job was claimed, and no worker has it: it is requeued"
+                attempt, "a job was claimed, and reached no worker: it waits again, or has ended"
             );
-            let how = "it was claimed, but reached no worker";
-            let changed = self.store.requeue_lost(key, attempt, how).await?;
             self.announce(&changed);
             self.wake.notify_one();
         }

@@ -81,6 +81,8 @@ async fn store_with_retries(
     loop {
         let cause = match store_batch(queue, job, running, batch, progress).await {
             Ok(stored) => return stored,
+            // it is logged, under an incident; another attempt would find the same
+            Err(StoreError::Damaged(_)) => return false,
             Err(cause) => cause,
         };
         warn!(job.id = %job.id, %cause, "events of job {} could not be stored yet: {cause}", job.id);

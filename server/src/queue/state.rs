@@ -5,7 +5,7 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-use tokio::sync::{Notify, RwLock, Semaphore, SemaphorePermit};
+use tokio::sync::{Notify, OwnedSemaphorePermit, RwLock, Semaphore, SemaphorePermit};
 use tokio_util::sync::CancellationToken;
 
 use super::{
@@ -51,6 +51,20 @@ pub struct Queue {
     pub(super) claiming: RwLock<()>,
     /// Canceled when the service is about to stop.
     pub(super) stopping: CancellationToken,
+}
+
+/// A worker that is busy, until the last clone of this is dropped; then the next job is claimed.
+#[derive(Debug)]
+pub(super) struct Slot {
+    pub(super) permit: Option<OwnedSemaphorePermit>,
+    pub(super) queue: Arc<Queue>,
+}
+
+impl Drop for Slot {
+    fn drop(&mut self) {
+        drop(self.permit.take());
+        self.queue.wake.notify_one();
+    }
 }
 
 /// The state of the queue.

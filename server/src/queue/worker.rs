@@ -14,7 +14,7 @@ use super::{
     report::{Report, Told},
     running::{Running, StopReason},
     solving::{read_mesh, solve_and_report, stored_mesh},
-    state::{Queue, Solver},
+    state::{Queue, Slot, Solver},
 };
 use crate::{
     event::Payload,
@@ -30,9 +30,15 @@ const MOST_UNRECORDED: usize = 256;
 const TIMEOUT_GRACE: Duration = Duration::from_secs(2);
 
 /// One attempt to solve a job, from claim to end. A panic costs this job alone.
-pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Running) {
+pub(super) async fn run_attempt(
+    queue: &Arc<Queue>,
+    claim: Claim,
+    running: Running,
+    slot: Arc<Slot>,
+) {
     let job = claim.job.clone();
-    let attempt = tokio::spawn(try_attempt(queue.clone(), claim, running.clone()));
+    let attempt = try_attempt(queue.clone(), claim, running.clone(), slot.clone());
+    let attempt = tokio::spawn(attempt);
     if let Err(panic) = attempt.await
         && let Ok(panic) = panic.try_into_panic()
     {
@@ -44,7 +50,7 @@ pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Runni
     queue.release(&job);
 }
 
-async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running) {
+async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Arc<Slot>) {
     let Claim {
         job,
         problem,
@@ -59,7 +65,8 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running) {
     let share = memory.share();
     let queue_of_solver = queue.clone();
     let solving = tokio::task::spawn_blocking(move || {
-        // given back when the solver has returned, or panicked: another job may have it then
+        // given back when the solver has returned, or panicked, in this order: another job may have them then
+        let _slot = slot;
         let _memory = memory;
         let Queue { store, solver, .. } = &*queue_of_solver;
         let mesh = mesh.map(|hash| stored_mesh(store, &hash)).transpose()?;
@@ -140,6 +147,7 @@ async fn requeue_with_retries(queue: &Queue, job: &Job, how: &str) {
     loop {
         match queue.store.requeue_lost(job.key, job.attempt, how).await {
             Ok(changed) => return queue.announce(&changed),
+            Err(StoreError::Damaged(_)) => return, // nothing can end it; the worker is free for others
             Err(cause) => {
                 warn!(job.id = %job.id, %cause, "job {} could not be requeued yet: {cause}", job.id);
             }
@@ -182,6 +190,9 @@ async fn end_with_retries(
 ) {
     let mut backoff = Backoff::default();
     while let Err(cause) = try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
+        if let StoreError::Damaged(_) = cause {
+            return; // nothing can end it; the worker is free for others
+        }
         warn!(job.id = %job.id, %cause, "job {} could not be ended yet: {cause}", job.id);
         if !backoff.wait(&queue.stopping).await {
             return;

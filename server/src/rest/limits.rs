@@ -15,6 +15,7 @@ use tonic_types::StatusExt;
 use super::{
     refused,
     reply::{is_grpc, refusal},
+    service::is_probe,
 };
 use crate::{
     error::ApiError,
@@ -49,6 +50,9 @@ pub(super) async fn limits(
         note_status(&status, &path);
     }
     let (parts, body) = response.into_parts();
+    if is_probe(&path) {
+        return Response::from_parts(parts, body); // also when nothing else finds room
+    }
     match with_share(body, &service.sent) {
         Ok(body) => Response::from_parts(parts, body),
         Err(error) => refusal(grpc, &path, error),

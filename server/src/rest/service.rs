@@ -2,7 +2,6 @@
 
 use axum::{
     Json,
-    extract::Request,
     http::header,
     response::{IntoResponse, Response},
 };
@@ -104,8 +103,8 @@ pub(super) async fn proto(_: Call) -> Result<impl IntoResponse, ApiError> {
 }
 
 /// Whether a request asks for one of the probes, which are answered even if all connections are busy.
-pub fn is_probe(request: &Request) -> bool {
-    matches!(request.uri().path(), "/livez" | "/readyz")
+pub fn is_probe(path: &str) -> bool {
+    matches!(path, "/livez" | "/readyz")
 }
 
 /// The process is alive.

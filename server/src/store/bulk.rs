@@ -38,7 +38,9 @@ impl Store {
         let mut change = self.control_change().await?;
         let (mut batch, start) = (Batch::default(), Instant::now());
         for key in keys {
-            match find(change.sql(), *key).await? {
+            let found = find(change.sql(), *key).await;
+            // a damaged one stays as it is
+            match change.unless_damaged(found).await?.flatten() {
                 Some(job) if job.status == Status::Queued => {
                     end(&mut change, &job, &Ending::canceled()).await?;
                     batch.done += 1;
@@ -65,8 +67,9 @@ impl Store {
         let mut change = self.control_change().await?;
         let (mut batch, start) = (Batch::default(), Instant::now());
         for key in keys {
-            let deletion = delete(&mut change, owners, *key).await?;
-            batch.done += usize::from(deletion == Deletion::Deleted);
+            let deletion = delete(&mut change, owners, *key).await;
+            let deletion = change.unless_damaged(deletion).await?;
+            batch.done += usize::from(deletion == Some(Deletion::Deleted));
             batch.seen += 1;
             if start.elapsed() >= LONGEST {
                 break;

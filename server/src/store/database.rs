@@ -230,7 +230,11 @@ impl Store {
         work: impl Fn() -> F,
     ) -> Result<T> {
         let done = match work().await {
-            Err(StoreError::Full) if self.reserve.release() => work().await,
+            Err(StoreError::Full) => {
+                // it may have been released a moment ago, for another
+                self.reserve.release();
+                work().await
+            }
             other => other,
         };
         self.damages.noting(async { done }).await

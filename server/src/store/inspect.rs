@@ -34,8 +34,9 @@ pub struct Report {
 
 /// Jobs that are written to the new store in one transaction.
 const JOBS_PER_COMMIT: u64 = 100;
-/// A number of jobs that no store has: a larger one was read from a damaged record.
-const MOST_JOBS: i64 = 10_000_000;
+/// Every number up to this is looked for, whether or not a list has it. Beyond it only those that are listed: to look for
+/// all takes minutes, and the highest may have been read from a damaged record.
+const MOST_NUMBERS: i64 = 10_000_000;
 /// Events that are read at once.
 const EVENTS_PER_READ: i64 = 1000;
 
@@ -100,12 +101,21 @@ impl Report {
             }
             Err(error) => self.finding("database", &error.into()),
         }
-        let last = last_key(source).await;
+        let mut last = last_key(source).await;
+        let mut listed = vec![];
+        if last > MOST_NUMBERS {
+            last = MOST_NUMBERS;
+            match keys_after(source, last).await {
+                Ok(keys) => listed = keys,
+                Err(error) => self.finding("jobs", &error),
+            }
+        }
         let mut writing: Option<Writing> = None;
-        for key in 1..=last {
+        for key in (1..=last).chain(listed) {
             let Some(job) = self.check_job(source, key).await else {
                 continue;
             };
+            last = last.max(key);
             let Some(target) = target else { continue };
             let mut tx = match writing.take() {
                 Some(tx) => tx,
@@ -230,6 +240,14 @@ impl Report {
     }
 }
 
+/// The numbers of jobs after this one of which there is a trace, in order.
+async fn keys_after(source: &mut SqliteConnection, key: i64) -> Result<Vec<i64>> {
+    let keys = sqlx::query_scalar(
+        "select id from job where id > ?1 union select distinct job_id from event where job_id > ?1 order by 1",
+    );
+    Ok(keys.bind(key).fetch_all(source).await?)
+}
+
 /// The highest number of a job that is found anywhere.
 async fn last_key(source: &mut SqliteConnection) -> i64 {
     let mut last = 0;
@@ -243,7 +261,7 @@ async fn last_key(source: &mut SqliteConnection) -> i64 {
             .await
             .ok()
             .flatten();
-        last = last.max(found.flatten().filter(|key| *key <= MOST_JOBS).unwrap_or(0));
+        last = last.max(found.flatten().unwrap_or(0));
     }
     last
 }

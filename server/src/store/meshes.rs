@@ -150,12 +150,22 @@ impl Store {
 
     /// Removes the pieces of uploads that were interrupted.
     pub async fn remove_orphaned_mesh_pieces(&self) -> Result<u64> {
-        let mut tx = self.begin().await?;
-        let done = sqlx::query("delete from mesh_piece where hash not in (select hash from mesh)")
-            .execute(&mut *tx)
-            .await?;
-        tx.commit().await?;
-        Ok(done.rows_affected())
+        let some: bool = sqlx::query_scalar(
+            "select exists (select 1 from mesh_piece where hash not in (select hash from mesh))",
+        )
+        .fetch_one(&self.reader)
+        .await?;
+        if !some {
+            return Ok(0); // nothing is written: the disk may be full
+        }
+        self.control(|| async {
+            let mut tx = self.begin_control().await?;
+            let delete = "delete from mesh_piece where hash not in (select hash from mesh)";
+            let done = sqlx::query(delete).execute(&mut *tx).await?;
+            tx.commit().await?;
+            Ok(done.rows_affected())
+        })
+        .await
     }
 }
 

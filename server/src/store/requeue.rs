@@ -55,14 +55,19 @@ impl Store {
         let rows = sqlx::query("select * from job where status = 'running'")
             .fetch_all(change.sql())
             .await?;
+        if rows.is_empty() {
+            return Ok(0); // nothing is written: the disk may be full
+        }
+        let mut requeued = 0;
         for row in &rows {
             let Ok(job) = self.damages.noting(async { from_row(row) }).await else {
                 continue; // damaged: the service starts with the others
             };
             requeue_after_death(&mut change, &job, "the service died with it").await?;
+            requeued += 1;
         }
         change.commit().await?;
-        Ok(rows.len())
+        Ok(requeued)
     }
 
     /// The jobs that run, with the numbers of their attempts.

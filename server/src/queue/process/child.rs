@@ -128,9 +128,7 @@ fn pass_on(told: Told, service: &mut UnixStream) -> io::Result<()> {
         Told::Nothing => Ok(()),
         Told::OutOfMemory(outgrown) => send(service, &Reply::OutOfMemory(outgrown), &[]),
         Told::Report(Report::OneLevel) => send(service, &Reply::OneLevel, &[]),
-        Told::Report(Report::Event(time, payload)) => {
-            send(service, &Reply::Event(time, payload), &[])
-        }
+        Told::Report(Report::Event(_, payload)) => send(service, &Reply::Event(payload), &[]),
         Told::Report(Report::Partial(parts)) => {
             send_parts(*parts, service)?;
             send(service, &Reply::Partial, &[])

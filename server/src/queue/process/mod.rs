@@ -13,7 +13,7 @@ use std::io::{self, Write};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::ending::Unsolved;
-use crate::{event::Payload, memory::Outgrown, store::Ending, time::Time};
+use crate::{event::Payload, memory::Outgrown, store::Ending};
 
 pub use child::run as run_worker_process;
 pub use parent::Processes;
@@ -36,8 +36,8 @@ enum Order {
 /// From a worker process.
 #[derive(Debug, Serialize, Deserialize)]
 enum Reply {
-    /// An event, with the time when it happened.
-    Event(Time, Payload),
+    /// An event. The service notes the time: clocks of processes may differ.
+    Event(Payload),
     /// There is one load level on one grid.
     OneLevel,
     /// It needs more memory than its share, and stops.

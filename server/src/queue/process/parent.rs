@@ -23,13 +23,15 @@ use super::{
     },
     Order, Reply, send, take,
 };
-use crate::store::Parts;
+use crate::{store::Parts, time::Time};
 
 /// How often it is asked whether to stop while a process reports nothing.
 const PULSE: Duration = Duration::from_millis(20);
 /// How long a process may take to stop when it is asked to; then it is killed. A solver takes less (see `Breaks` in
 /// `solver`), and its worker is free a second after the end of the job.
 const STOP_GRACE: Duration = Duration::from_millis(750);
+/// How long to wait before one that could not be started is tried again.
+const START_PAUSE: Duration = Duration::from_secs(1);
 /// How long it may leave an order unread.
 const UNREAD: Duration = Duration::from_secs(10);
 
@@ -76,9 +78,9 @@ impl Processes {
     pub(in crate::queue) fn solve(
         &self,
         task: Task,
-        tell: impl FnMut(Told) -> ControlFlow<()>,
+        mut tell: impl FnMut(Told) -> ControlFlow<()>,
     ) -> Result<Solved, Unsolved> {
-        let mut process = self.take()?;
+        let mut process = self.take(&mut tell)?;
         match process.solve(task, tell) {
             Ok(solved) => {
                 self.idle().push(process);
@@ -93,8 +95,9 @@ impl Processes {
         }
     }
 
-    /// One that waits, or a new one.
-    fn take(&self) -> Result<Process, Unsolved> {
+    /// One that waits, or a new one. The machine may have no process, file or memory left for a while: it is tried again
+    /// until the job is to stop.
+    fn take(&self, tell: &mut impl FnMut(Told) -> ControlFlow<()>) -> Result<Process, Unsolved> {
         loop {
             let idle = self.idle().pop();
             let process = match idle {
@@ -104,9 +107,17 @@ impl Processes {
                 },
                 None => Process::start(self.start),
             };
-            return process.map_err(|error| {
-                Unsolved::Internal(format!("a worker process cannot be started: {error}"))
-            });
+            match process {
+                Ok(process) => return Ok(process),
+                Err(error) => warn!(%error, "a worker process cannot be started yet: {error}"),
+            }
+            let end = Instant::now() + START_PAUSE;
+            while Instant::now() < end {
+                if tell(Told::Nothing).is_break() {
+                    return Err(Unsolved::Stopped);
+                }
+                std::thread::sleep(PULSE);
+            }
         }
     }
 
@@ -188,7 +199,7 @@ impl Process {
             let told = match self.next() {
                 Ok(None) => Told::Nothing,
                 Ok(Some((reply, content))) => match reply {
-                    Reply::Event(time, payload) => Told::Report(Report::Event(time, payload)),
+                    Reply::Event(payload) => Told::Report(Report::Event(Time::now(), payload)),
                     Reply::OneLevel => Told::Report(Report::OneLevel),
                     Reply::OutOfMemory(outgrown) => Told::OutOfMemory(outgrown),
                     Reply::Part { name, digest } => {
@@ -214,7 +225,8 @@ impl Process {
             };
             if tell(told).is_break() && asked.is_none() {
                 asked = Some(Instant::now());
-                send(&mut self.socket, &Order::Stop, &[])?;
+                // if that fails, it is dead: so the next reply says
+                let _ = send(&mut self.socket, &Order::Stop, &[]);
             }
             if asked.is_some_and(|asked| asked.elapsed() > STOP_GRACE) {
                 return Err(Gone::Unwilling);
@@ -244,15 +256,19 @@ impl Process {
 
     /// Why there is no result of a process that died.
     fn cause_of_death(mut self, error: &io::Error) -> Unsolved {
-        let _ = self.child.kill(); // if it is alive, it does not keep to the protocol
+        use io::ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
+        let dead = matches!(error.kind(), UnexpectedEof | ConnectionReset | BrokenPipe);
+        if !dead {
+            let _ = self.child.kill(); // it does not keep to the protocol
+        }
         let status = self.child.wait();
         let refused = self.words.take().and_then(|words| words.join().ok());
         if let Some(bytes) = refused.flatten() {
             return SolveError::ResourceExhausted { bytes }.into();
         }
         Unsolved::Lost(match status {
-            Ok(status) => how_it_ended(status),
-            Err(_) => error.to_string(),
+            Ok(status) if dead => how_it_ended(status),
+            _ => format!("it was killed, since it could not be understood: {error}"),
         })
     }
 }

@@ -39,7 +39,8 @@ fn poisoned(
         Some("overflow") => assert!(overflow(1) > 0),
         Some("exit") => std::process::exit(42),
         Some("panic") => panic!("on purpose"),
-        Some("allocate") => assert!(std::hint::black_box(vec![1u8; 1 << 40]).len() > 1),
+        // more than its share, and less than any machine has
+        Some("allocate") => assert!(std::hint::black_box(vec![1u8; 1 << 30]).len() > 1),
         Some("loop") => loop {
             std::hint::spin_loop();
         },
@@ -57,6 +58,7 @@ fn overflow(depth: u64) -> u64 {
 async fn processes() -> Rig {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
+    store.set_budget(256 << 20);
     let solver = Solver::Processes(Processes::new(worker_process));
     let queue = Queue::new(store.clone(), solver, 1);
     queue.start();
