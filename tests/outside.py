@@ -3,11 +3,13 @@ knows more of the service than its clients do.
 """
 
 import asyncio
+import contextlib
 import http.client
 import json
 import math
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -84,6 +86,42 @@ class Answer:
         return "%d %r %r" % (self.status, self.headers, self.body[:600])
 
 
+def children(pid):
+    """The ids of the processes that a process has started: the worker processes of a service."""
+    found = []
+    for task in pathlib.Path("/proc/%d/task" % pid).glob("*"):
+        with contextlib.suppress(OSError):  # a thread that has ended meanwhile
+            found += map(int, (task / "children").read_text().split())
+    return found
+
+
+def memory(pid, field="VmRSS"):
+    """Bytes of memory of a process: resident now (VmRSS), or at most (VmHWM); 0 of one that has ended."""
+    try:
+        text = pathlib.Path("/proc/%d/status" % pid).read_text()
+    except OSError:
+        return 0
+    found = re.search(field + r":\s+(\d+) kB", text)
+    return int(found[1]) * 1024 if found else 0
+
+
+def cpu_s(pid):
+    """Seconds of processor time of a process; 0 of one that has ended."""
+    try:
+        fields = pathlib.Path("/proc/%d/stat" % pid).read_text().rsplit(")", 1)[1].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def note(**figures):
+    """Notes what every script measures, if `run.py` wants to know: see peaks.py."""
+    notes = os.environ.get("SIGNORINI_NOTES")
+    if notes:
+        with open(notes, "a", encoding="utf-8") as file:
+            file.write(json.dumps({"script": pathlib.Path(sys.argv[0]).name, **figures}) + "\n")
+
+
 class Server:
     """The real binary on a free port with a store of its own, which outlives a kill."""
 
@@ -109,7 +147,7 @@ class Server:
         """Starts it, and returns the seconds until it is ready."""
         began = time.monotonic()
         command = [*self.wrapper, BINARY, "serve", "--listen", "127.0.0.1:0", "--data", self.data, *self.options]
-        with self.log.open("a") as log:
+        with self.open_log() as log:
             self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log)
         self.url = self.process.stdout.readline().decode().strip()
         check(self.url.startswith("http://127.0.0.1:"), "serve began with %r, not with its URL" % self.url)
@@ -118,22 +156,15 @@ class Server:
             check(time.monotonic() < began + 60, "the server was not ready within a minute")
         return time.monotonic() - began
 
+    def open_log(self):
+        return self.log.open("a")
+
     def note_peak(self):
-        """Notes the most memory that the process has used, and the budget of its jobs, if somebody wants to know."""
-        noted = os.environ.get("SIGNORINI_PEAKS")
-        if not noted:
-            return
-        # with its worker processes
-        children = pathlib.Path("/proc/%d/task" % self.process.pid).glob("*/children")
-        pids = [self.process.pid, *(int(pid) for task in children for pid in task.read_text().split())]
-        statuses = [path.read_text() for pid in pids if (path := pathlib.Path("/proc/%d/status" % pid)).exists()]
-        peak = sum(int(text.split("VmHWM:")[1].split()[0]) * 1024 for text in statuses if "VmHWM:" in text)
-        if not peak:
-            return
+        """Notes the most memory that the processes have used, and the budget of their jobs."""
+        peak = sum(memory(pid, "VmHWM") for pid in (self.process.pid, *children(self.process.pid)))
         chosen = dict(zip(self.options, self.options[1:])).get("--memory-budget-bytes")
-        budget = chosen or os.environ["SIGNORINI_MEMORY_BUDGET_BYTES"]
-        with open(noted, "a", encoding="utf-8") as file:
-            file.write("%d %s %s\n" % (peak, budget, pathlib.Path(sys.argv[0]).name))
+        if peak:
+            note(peak=peak, budget=int(chosen or os.environ.get("SIGNORINI_MEMORY_BUDGET_BYTES", 0)))
 
     def kill(self):
         """As a crash would."""

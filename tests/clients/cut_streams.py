@@ -205,10 +205,10 @@ def main():
     dice = random.Random(SEED)
     with Server() as server:
         cuts, kills, jobs = asyncio.run(cut_server_sent_events(server, dice))
-        print("server-sent events: %d cuts, %d kills of the server, %d jobs with %s events, each once"
-              % (cuts, kills, len(jobs), " + ".join(map(str, jobs.values()))))
-        cuts = cut_grpc(server, list(jobs)[:3], dice)
-        print("WatchJob: %d cuts, 1 kill, each event once; %d checks in all" % (cuts, outside.checks))
+        grpc_cuts = cut_grpc(server, list(jobs)[:3], dice)
+    print("%d checks" % outside.checks)
+    print("figure: server-sent events: %d cuts, %d kills of the server, %d jobs with %s events, each once; WatchJob: %d cuts, "
+          "1 kill, each event once" % (cuts, kills, len(jobs), " + ".join(map(str, jobs.values())), grpc_cuts))
 
 
 main()

@@ -11,17 +11,9 @@ count instead. With it they have 16 MiB and may take one CPU second each.
 import concurrent.futures
 import json
 import os
-import pathlib
-import sys
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-
-import outside
-from outside import Server, check
-
-SOAK = "--soak" in sys.argv
-MIB = 1 << 20
+from attack import MIB, SOAK, Attacked, Bystander, check
 # a little less than the limit of a body
 SIZE = 16 * MIB - 4096 if SOAK else MIB
 MOST_CPU_S, MOST_S = (1.0, None) if SOAK else (0.1, 0.1)
@@ -128,27 +120,13 @@ def bodies():
     yield "jobs of one field", around('{"jobs":[§]}', '{"problem":0}')
 
 
-def cpu_s(pid):
-    fields = open("/proc/%d/stat" % pid).read().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / 100
-
-
-def memory(pid, name):
-    for line in open("/proc/%d/status" % pid):
-        if line.startswith(name):
-            return int(line.split()[1]) << 10
-    raise AssertionError("no %s" % name)
-
-
 def send(server, path, text):
-    """One body; returns status, bytes of growth, CPU seconds, seconds, and the answer."""
-    pid = server.process.pid
-    # the highest mark of its memory begins anew
-    pathlib.Path("/proc/%d/clear_refs" % pid).write_text("5")
-    memory_before, cpu_before, began = memory(pid, "VmRSS"), cpu_s(pid), time.monotonic()
+    """One body: the answer, bytes of growth, CPU seconds and seconds."""
+    server.forget_peak()  # the highest mark of its memory begins anew
+    memory, cpu, began = server.memory(), server.cpu_s(), time.monotonic()
     answer = server.call("POST", path, text.encode())
     took = time.monotonic() - began
-    return answer, memory(pid, "VmHWM") - memory_before, cpu_s(pid) - cpu_before, took
+    return answer, server.peak() - memory, server.cpu_s() - cpu, took
 
 
 def attack(server, name, text):
@@ -198,22 +176,20 @@ def check_words(server):
 def four_at_once(server):
     """Bytes of growth for four of the same body at the same time."""
     text = around(problem(mesh='"mesh":{"grid":{"x":[§],"y":[0,1]}}'), "[]").encode()
-    pid = server.process.pid
-    pathlib.Path("/proc/%d/clear_refs" % pid).write_text("5")
-    before = memory(pid, "VmRSS")
+    server.forget_peak()
+    before = server.memory()
     with concurrent.futures.ThreadPoolExecutor(4) as clients:
         answers = list(clients.map(lambda _: server.call("POST", "/v1/jobs", text), range(4)))
     for answer in answers:
         check(answer.status == 422, "one of four: %r" % answer)
-    grown = memory(pid, "VmHWM") - before
+    grown = server.peak() - before
     check(grown <= 4 * 10 * len(text) + FLOOR, "four at once take %.0f MiB" % (grown / MIB))
     return grown
 
 
 def main():
     worst, count, largest = [0.0, 0.0, 0.0], 0, 0
-    server = Server()
-    with server:
+    with Attacked() as server, Bystander(server):
         check_words(server)
         for name, text in bodies():
             check(len(text) <= 16 * MIB, "%s has %d bytes" % (name, len(text)))
@@ -222,8 +198,7 @@ def main():
             count, largest = count + 1, max(largest, len(text))
         grown = four_at_once(server)
         check(server.call("GET", "/readyz").status == 200, "the server is ready")
-        peak = memory(server.process.pid, "VmRSS")
-    print("%d checks" % outside.checks)
+        peak = server.memory()
     print("figure: %d hostile bodies of up to %.0f MiB refused in words; the large ones took at most %.1f times their size in memory, "
           "%.2f CPU s and %.0f ms; four at once of empty arrays took %.0f MiB; %.0f MiB held afterwards" % (
               count, largest / MIB, worst[0], worst[1], 1e3 * worst[2], grown / MIB, peak / MIB))

@@ -9,16 +9,13 @@ and events agree on how. Then jobs of about 20,000 unknowns, canceled at random 
 import asyncio
 import collections
 import json
-import pathlib
 import random
 import re
 import sys
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-
-import outside
-from outside import Connection, Server, check, each, equal, example, percentile, submission
+from attack import Attacked, Bystander, check, equal, example
+from outside import Connection, each, percentile, submission
 
 CANCELS = int(sys.argv[1]) if len(sys.argv) > 1 else 10_000
 SEED = int(sys.argv[2]) if len(sys.argv) > 2 else random.randrange(1 << 32)
@@ -129,18 +126,19 @@ async def run(server, dice):
     began = time.monotonic()
     outcomes = await race(server, dice)
     took = time.monotonic() - began
-    print("%d cancels of small jobs in %.0f s, each job ended once: %s" % (CANCELS, took, told(outcomes)), flush=True)
+    small = "%d cancels of small jobs in %.0f s, each job ended once: %s" % (CANCELS, took, told(outcomes))
+    print(small, flush=True)
     dofs, usual, outcomes, answered, ended = await cancel_large(server, dice)
-    print("%d cancels of a job of %d unknowns (%.0f ms alone): %s" % (
-        sum(outcomes.values()), dofs, 1e3 * usual, told(outcomes)))
     ms = lambda values, share: 1e3 * percentile(values, share)
-    print("answered p50 %.1f ms, p99 %.1f ms; terminal p50 %.1f ms, p99 %.1f ms; %d checks" % (
-        ms(answered, 0.5), ms(answered, 0.99), ms(ended, 0.5), ms(ended, 0.99), outside.checks))
+    print("figure: %s; %d cancels of a job of %d unknowns (%.0f ms alone): %s; answered p50 %.1f ms, p99 %.1f ms; terminal p50 "
+          "%.1f ms, p99 %.1f ms" % (
+              small, sum(outcomes.values()), dofs, 1e3 * usual, told(outcomes), ms(answered, 0.5), ms(answered, 0.99),
+              ms(ended, 0.5), ms(ended, 0.99)))
 
 
 def main():
     print("seed %d" % SEED, flush=True)
-    with Server() as server:
+    with Attacked() as server, Bystander(server):
         asyncio.run(run(server, random.Random(SEED)))
 
 

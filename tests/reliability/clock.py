@@ -4,11 +4,10 @@
 
 The server's clock is set by an hour, by a day, to 1970 and back, while a job runs, another waits for its time limit and
 a third runs into its own. No duration is negative or wrong by more than a second, no limit is early or late by more than
-that, and jobs stay in the order in which they arrived. Needs Debian's `faketime`.
+that, and jobs stay in the order in which they arrived; the same with worker processes. Needs Debian's `faketime`.
 """
 
 import glob
-import os
 import pathlib
 import sys
 import tempfile
@@ -21,7 +20,8 @@ from outside import Server, check, equal, example, talkative
 LIBRARY = glob.glob("/usr/lib/*/faketime/libfaketime.so.1")
 HOUR, DAY = 3600, 86400
 TO_1970 = -int(time.time()) + 1000
-JUMPS = [HOUR, -HOUR, DAY, -DAY, TO_1970] if "--soak" in sys.argv else [HOUR, -HOUR, TO_1970]
+ALL = [HOUR, -HOUR, DAY, -DAY, TO_1970]
+JUMPS = {"thread": ALL, "process": ALL} if "--soak" in sys.argv else {"thread": [HOUR, -HOUR, TO_1970], "process": [-HOUR]}
 LONG = talkative(1000, refine=4)  # some seconds, and its solver asks often whether to stop
 # the queue looks once a second for jobs that have waited too long, and this machine may be busy
 TOLERANCE_S = 1.3
@@ -72,8 +72,8 @@ def jump(server, clock, seconds):
     return order
 
 
-def main():
-    check(LIBRARY, "Debian's faketime is needed")
+def attack(isolation, jumps):
+    """Jumps of the clock of a server, and of its worker processes."""
     order = []
     with tempfile.TemporaryDirectory() as folder:
         clock = pathlib.Path(folder) / "clock"
@@ -81,8 +81,8 @@ def main():
         faked = {"LD_PRELOAD": LIBRARY[0], "FAKETIME_TIMESTAMP_FILE": str(clock), "FAKETIME_NO_CACHE": "1",
                  "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
         wrapper = ["env", *("%s=%s" % pair for pair in faked.items())]
-        with Server("--workers", "2", wrapper=wrapper) as server:
-            for seconds in JUMPS:
+        with Server("--workers", "2", "--isolation", isolation, wrapper=wrapper) as server:
+            for seconds in jumps:
                 order += jump(server, clock, seconds)
                 check("the clock of the machine was set" in server.log.read_text(), "the log tells of it")
                 equal([job["id"] for job in server.every_job()], order[::-1], "the list, newest first")
@@ -98,8 +98,15 @@ def main():
                 ended = server.finished(order[-1])
                 near(ended["queue_wait_s"] + ended["run_s"], 0.2, "the time of a small job")
                 equal([job["id"] for job in server.every_job()], order[::-1], "the list, newest first")
-    print("figure: %d jumps of the clock (%s s): limits and durations right within %.2f s, none negative, jobs in "
-          "order, also after restarts" % (len(JUMPS), ", ".join("%+d" % seconds for seconds in JUMPS), worst))
+
+
+def main():
+    check(LIBRARY, "Debian's faketime is needed")
+    for isolation, jumps in JUMPS.items():
+        attack(isolation, jumps)
+    print("figure: jumps of the clock by %s: limits and durations right within %.2f s, none negative, jobs in order, also after "
+          "restarts" % ("; ".join("%s s (isolation %s)" % (", ".join("%+d" % one for one in jumps), isolation)
+                                  for isolation, jumps in JUMPS.items()), worst))
 
 
 main()

@@ -14,7 +14,7 @@ import zlib
 
 import grpc
 
-from attack import DATA, END_STREAM, HEADERS, MIB, PREFACE, SOAK, Attacked, check, equal, frame, frames_of, head, settings
+from attack import DATA, END_STREAM, HEADERS, MIB, PREFACE, SOAK, Attacked, Bystander, check, equal, frame, frames_of, head, settings
 from outside import Answer
 
 UNPACKED = 10 << 30
@@ -205,10 +205,11 @@ def main():
     assert zlib.decompressobj(31).decompress(gzip, 100) == b" " * 100
     with Attacked() as server:
         job = server.finished_job()
-        for _ in range(ROUNDS):
-            bodies(server, packed)
-            meshes(server, packed)
-            messages(server, packed)
+        with Bystander(server):
+            for _ in range(ROUNDS):
+                bodies(server, packed)
+                meshes(server, packed)
+                messages(server, packed)
         equal([one["id"] for one in server.every_job()], [job], "the jobs there are")
         server.stop()
     print("figure: %d compressed bodies, files and messages, of which the smallest (%d bytes) would become 10 GiB: all refused, "

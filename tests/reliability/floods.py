@@ -4,7 +4,7 @@
 
 PING, SETTINGS, PRIORITY, WINDOW_UPDATE, empty DATA, unknown frames, streams that are reset at once, headers that never
 end, ten thousand streams: each on a connection of its own, as fast as the server reads, while a bystander asks for a
-job. Each connection is closed by the server, or answers all that it was asked.
+job. Each connection is closed by the server.
 """
 
 import itertools
@@ -72,19 +72,15 @@ def flood(server, frames):
 
 
 with Attacked() as server:
-    job = server.finished_job()
     lines = []
-    with Bystander(server, "/v1/jobs/" + job) as bystander:
+    with Bystander(server):
         for name, frames in FLOODS.items():
             cpu = server.cpu_s()
             closed, time_s = flood(server, frames())
             used = server.cpu_s() - cpu
             print("%s: %s after %.2f s, %.2f CPU s" % (name, "closed" if closed else "open", time_s, used))
-            check(closed or name.startswith("10,000"), name + " did not end the connection")
-            # once it is closed nothing is used; an open one may have used half a core
-            check(used < max(0.5, 0.5 * time_s), "%s used %.1f CPU s in %.1f s" % (name, used, time_s))
+            check(closed, name + " did not end the connection")
+            check(used < 0.5, "%s used %.1f CPU s in %.1f s" % (name, used, time_s))
             lines.append(used)
         time.sleep(2)
-    bystander.check()
-    print("figure: %d kinds of floods, each ended its connection with at most %.2f CPU s; a bystander waited %.0f ms (p99 of %d)"
-          % (len(FLOODS), max(lines), 1000 * bystander.p99_s, bystander.count))
+    print("figure: %d kinds of floods, each ended its connection with at most %.2f CPU s" % (len(FLOODS), max(lines)))

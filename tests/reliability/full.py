@@ -3,28 +3,24 @@
     full.py [--soak]
 
 The store is on a volume of 64 MiB of its own, which is filled. Submissions are refused within a second; reading,
-canceling, deleting and pausing work; a canceled job does not succeed. When there is space again jobs are accepted within
-ten seconds, without a restart, and nothing is damaged. Needs `unshare`, and leave to mount.
+canceling, deleting and pausing work; a canceled job does not succeed. A restart on the full disk works. When there is
+space again jobs are accepted within ten seconds, without a restart, and nothing is damaged. Needs `unshare`, and leave to mount.
 """
 
-import json
-import os
 import pathlib
 import subprocess
-import sys
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+from attack import SOAK, Attacked, Bystander, check, equal, example
+from outside import BINARY, submission, talkative
 
-from outside import BINARY, Server, check, equal, example, submission, talkative
-
-ROUNDS = 10 if "--soak" in sys.argv else 2
+ROUNDS = 10 if SOAK else 2
 MOST_REFUSED_S, MOST_BACK_S = 1, 10
 LONG = talkative(400, refine=2)
 slowest = {"refused": 0.0, "control": 0.0, "back": 0.0}
 
 
-class Volume(Server):
+class Volume(Attacked):
     """A server in a mount namespace with a small volume of its own for the store."""
 
     def __init__(self):
@@ -32,6 +28,13 @@ class Volume(Server):
         self.data.mkdir()
         mount = 'mount -t tmpfs -o size=64m none "%s" && exec "$@"' % self.data
         self.wrapper = ("unshare", "--map-root-user", "--mount", "sh", "-c", mount, "sh")
+
+    def keep(self):
+        """A process that keeps the volume while the server is stopped, or the rest of the script for `doctor`."""
+        enter = ["nsenter", "--user", "--mount", "--preserve-credentials", "--target"]
+        self.keeper = subprocess.Popen([*enter, str(self.process.pid), "sleep", "3600"])
+        time.sleep(0.5)
+        self.wrapper = [*enter, str(self.keeper.pid)]
 
     def inside(self):
         return pathlib.Path("/proc/%d/root%s" % (self.process.pid, self.data))
@@ -70,6 +73,7 @@ def refuse(server):
 
 
 def one_round(server):
+    server.finished_job()
     ended = server.submit(example())
     equal(server.finished(ended)["status"], "succeeded", "a job before")
     running = [server.submit(LONG, limits={"timeout_s": 600}) for _ in range(2)]
@@ -77,7 +81,30 @@ def one_round(server):
         time.sleep(0.02)
     queued = [server.submit(example()) for _ in range(2)]
     refuse(server)
-    # everything that control needs
+    with Bystander(server):
+        control(server, ended, running, queued)
+    server.fill()
+    time.sleep(1)
+    server.stop()
+    server.start()
+    equal(server.call("GET", "/readyz").body.startswith(b"degraded"), True, "readiness of a start on a full disk")
+    equal(server.json("/v1/jobs/" + queued[1])["status"], "queued", "a job that waits, after a start on a full disk")
+    equal(server.call("POST", "/v1/jobs", submission(example())).status, 507, "submit after a start on a full disk")
+    # space again
+    server.free()
+    began = time.monotonic()
+    body = submission(example())
+    until(lambda: server.call("POST", "/v1/jobs", body).status == 202, MOST_BACK_S, "jobs are accepted again")
+    slowest["back"] = max(slowest["back"], time.monotonic() - began)
+    equal(server.call("POST", "/v1/queue/resume").status, 200, "resume")
+    equal(server.call("POST", "/v1/jobs/%s/cancel" % running[1]).status, 200, "cancel")
+    equal(server.finished(running[0])["status"], "canceled", "the job that was canceled on a full disk")
+    equal(server.finished(queued[1])["status"], "succeeded", "the job that waited on a full disk")
+    server.call("DELETE", "/v1/jobs?status=canceled,failed")
+
+
+def control(server, ended, running, queued):
+    """What works on a full disk: reads, and everything that control needs."""
     equal(server.timed("control", "GET", "/v1/jobs/%s/result" % ended).status, 200, "a result")
     equal(server.timed("control", "GET", "/v1/jobs").status, 200, "the list")
     answer = server.timed("control", "POST", "/v1/queue/pause")
@@ -92,19 +119,6 @@ def one_round(server):
     ready = server.call("GET", "/readyz")
     equal((ready.status, ready.body.startswith(b"degraded")), (200, True), "readiness, %r" % ready)
     until(lambda: server.json("/v1/jobs/" + running[0])["status"] == "canceled", 5, "the canceled job ends")
-    server.fill()
-    time.sleep(1)
-    # space again
-    server.free()
-    began = time.monotonic()
-    body = submission(example())
-    until(lambda: server.call("POST", "/v1/jobs", body).status == 202, MOST_BACK_S, "jobs are accepted again")
-    slowest["back"] = max(slowest["back"], time.monotonic() - began)
-    equal(server.call("POST", "/v1/queue/resume").status, 200, "resume")
-    equal(server.call("POST", "/v1/jobs/%s/cancel" % running[1]).status, 200, "cancel")
-    equal(server.finished(running[0])["status"], "canceled", "the job that was canceled on a full disk")
-    equal(server.finished(queued[1])["status"], "succeeded", "the job that waited on a full disk")
-    server.call("DELETE", "/v1/jobs?status=succeeded,canceled,failed")
 
 
 def until(holds, most_s, what):
@@ -116,21 +130,18 @@ def until(holds, most_s, what):
 
 def main():
     with Volume() as server:
-        for _ in range(ROUNDS):
-            one_round(server)
-        check("panicked" not in server.log.read_text(), "no panic")
-        # the volume ends with its last process: a second one keeps it, and looks at it from inside
-        enter = ["nsenter", "--user", "--mount", "--preserve-credentials", "--target"]
-        keeper = subprocess.Popen([*enter, str(server.process.pid), "sleep", "60"])
-        time.sleep(0.5)
+        # the volume ends with its last process
+        server.keep()
         try:
+            for _ in range(ROUNDS):
+                one_round(server)
+            check("panicked" not in server.log.read_text(), "no panic")
             server.stop()
-            doctor = [*enter, str(keeper.pid), BINARY, "doctor", "--data", server.data]
-            done = subprocess.run(doctor, capture_output=True, text=True)
+            done = subprocess.run([*server.wrapper, BINARY, "doctor", "--data", server.data], capture_output=True, text=True)
             equal(done.returncode, 0, "doctor: %s%s" % (done.stdout, done.stderr))
         finally:
-            keeper.kill()
-            keeper.wait()
+            server.keeper.kill()
+            server.keeper.wait()
     check(slowest["refused"] <= MOST_REFUSED_S, "a refusal took %.2f s" % slowest["refused"])
     print("figure: %d times a full volume of 64 MiB: refused with 507 within %.2f s, control and reads within %.2f s, "
           "jobs accepted again %.1f s after space was freed, nothing damaged" % (

@@ -16,7 +16,8 @@ import random
 import sys
 import time
 
-from attack import SOAK, check, equal, example, submission
+from attack import SOAK, check, equal, example
+from outside import submission
 from faults import FOREVER, HALF, Faulty, check_database
 
 SEED = next((int(word) for word in sys.argv[1:] if word.isdigit()), random.randrange(1 << 32))

@@ -141,10 +141,12 @@ def main():
         check_database(server)
     statuses = [job["status"] for job in jobs.values()]
     restarted = sum(job["attempt"] > 1 for job in jobs.values())
-    print("%d kills, %d submits, %d acknowledged, %d jobs, all terminal (%s), %d of them started more than once,"
-          % (KILLS, load.sent, len(load.acknowledged), len(jobs),
-             ", ".join("%d %s" % (statuses.count(s), s) for s in TERMINAL if s in statuses), restarted))
-    print("%d events watched; ready after at most %.2f s; %d checks" % (sum(map(len, load.told.values())), worst, outside.checks))
+    print("%d checks" % outside.checks)
+    print("figure: %d kills, %d submits, %d acknowledged, %d jobs, all terminal (%s), %d of them started more than once; %d "
+          "events watched; ready after at most %.2f s" % (
+              KILLS, load.sent, len(load.acknowledged), len(jobs),
+              ", ".join("%d %s" % (statuses.count(s), s) for s in TERMINAL if s in statuses), restarted,
+              sum(map(len, load.told.values())), worst))
 
 
 main()

@@ -8,18 +8,12 @@ whose estimates run from 1 MiB to beyond 10 GiB: each is refused with figures, w
 them, and the large ones to their ends.
 """
 
-import pathlib
-import re
-import sys
 import threading
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+from attack import MIB, SOAK, Attacked, Bystander, check, equal, example
+from outside import children, long_contact, memory
 
-from outside import Server, check, equal, example, long_contact
-
-SOAK = "--soak" in sys.argv[1:]
-MIB = 1 << 20
 BUDGET = 512 * MIB
 MOST = BUDGET + 256 * MIB
 STEPS = 1_000 if SOAK else 200
@@ -34,18 +28,8 @@ class Watch(threading.Thread):
 
     def run(self):
         while not self.ended:
-            children = pathlib.Path("/proc/%d/task" % self.pid).glob("*/children")
-            try:
-                pids = [self.pid, *(int(pid) for task in children for pid in task.read_text().split())]
-                self.highest = max(self.highest, sum(map(resident, pids)))
-            except OSError:
-                pass  # one has ended meanwhile
+            self.highest = max(self.highest, sum(map(memory, (self.pid, *children(self.pid)))))
             time.sleep(0.01)
-
-
-def resident(pid):
-    found = re.search(r"VmRSS:\s+(\d+) kB", pathlib.Path("/proc/%d/status" % pid).read_text())
-    return int(found[1]) * 1024 if found else 0
 
 
 def told(server, problem):
@@ -68,7 +52,7 @@ def offer(server, problem):
 
 
 def attack(isolation):
-    with Server("--workers", "2", "--memory-budget-bytes", str(BUDGET), "--isolation", isolation) as server:
+    with Attacked("--workers", "2", "--memory-budget-bytes", str(BUDGET), "--isolation", isolation) as server, Bystander(server):
         watch = Watch(server.process.pid)
         watch.start()
         healthy = server.submit(example(refine=2))

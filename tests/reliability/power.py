@@ -15,9 +15,9 @@ import random
 import sys
 import time
 
-from attack import SOAK, check, equal, example, submission
+from attack import SOAK, check, equal, example
 from faults import DIE, Faulty, check_database
-from outside import TERMINAL, Connection, Lost, each
+from outside import TERMINAL, Connection, Lost, each, submission
 
 CUTS = 500 if SOAK else 30
 SEED = next((int(word) for word in sys.argv[1:] if word.isdigit()), random.randrange(1 << 32))

@@ -23,15 +23,17 @@ HERE = pathlib.Path(__file__).resolve().parent
 TOP = HERE.parent.parent
 FIGURES = HERE / "figures.json"
 PAGE = TOP / "docs/reliability.md"
-# of every server that does not choose another; its peak is noted for peaks.py
+# of every server that does not choose another
 BUDGET_BYTES = 512 << 20
-PEAKS = tempfile.NamedTemporaryFile()
+# what every server and bystander notes, for the figures and for peaks.py
+NOTES = tempfile.NamedTemporaryFile()
 
 
 def run(command):
     """Runs a command of the table; its figure."""
     words = command.split()
-    noted = {"SIGNORINI_PEAKS": PEAKS.name, "SIGNORINI_MEMORY_BUDGET_BYTES": str(BUDGET_BYTES)}
+    noted = {"SIGNORINI_NOTES": NOTES.name, "SIGNORINI_MEMORY_BUDGET_BYTES": str(BUDGET_BYTES)}
+    before = os.stat(NOTES.name).st_size
     if words[0].endswith(".py"):
         words = [sys.executable, str(HERE / words[0]), *words[1:]]
     print("\n-- " + command, flush=True)
@@ -43,8 +45,22 @@ def run(command):
         last = line.strip() or last
     if process.wait() != 0:
         sys.exit("%s failed" % command)
-    print("   %.0f s" % (time.monotonic() - began))
-    return last.removeprefix("figure: ")
+    noted = measured(before)
+    print("   %.0f s%s" % (time.monotonic() - began, noted))
+    return last.removeprefix("figure: ") + noted
+
+
+def measured(before):
+    """What the servers and bystanders of the last command noted, in words."""
+    with open(NOTES.name, "rb") as file:
+        file.seek(before)
+        notes = [json.loads(line) for line in file]
+    told = ""
+    if peaks := [one["peak"] for one in notes if "peak" in one]:
+        told += "; a server took at most %d MiB" % (max(peaks) >> 20)
+    if times := [one["p99_s"] for one in notes if "p99_s" in one]:
+        told += "; a bystander was answered within %.0f ms (p99)" % (1e3 * max(times))
+    return told
 
 
 def page(figures):
@@ -54,11 +70,14 @@ def page(figures):
         "",
         "What the service promises under faults and attacks, and the command that shows it. `tests/run` runs the small",
         "form of each; `tests/soak` the large one, by hand. Both are listed in `tests/reliability/table.py`, from which",
-        "`tests/reliability/run.py` writes this page. Scripts lie in `tests/reliability`.",
+        "`tests/reliability/run.py` writes this page. Scripts lie in `tests/reliability`. *Before* is what an attack on an",
+        "earlier version found.",
         "",
     ]
     for row in ROWS:
         lines += ["## %s. %s" % (row.name, row.promise), ""]
+        if row.before:
+            lines += ["- Before: " + row.before]
         for command in dict.fromkeys([row.small, row.soak]):
             if command:
                 found = figures.get(command)

@@ -4,11 +4,15 @@
 
 SIGTERM at random moments, sometimes twice or with a SIGHUP before it, while jobs are submitted, run and are watched.
 Each time it ends with 0 within its grace time; whoever waits is answered; server-sent events end without `done`, gRPC
-streams with UNAVAILABLE, and both resume after the restart without a gap. No acknowledged job is lost or fails.
+streams with UNAVAILABLE, and both resume after the restart without a gap. No acknowledged job is lost or fails. Then
+the same with worker processes, which receive each signal as well, as when a terminal or systemd stops all of a group:
+no job counts that as a death.
 """
 
 import asyncio
+import contextlib
 import json
+import os
 import random
 import signal
 import sys
@@ -18,12 +22,12 @@ import time
 sys.path.insert(0, __file__.rsplit("/", 2)[0] + "/clients")
 
 import grpc
-from attack import SOAK, Attacked, check, equal, example, submission
+from attack import SOAK, Attacked, check, equal, example
 from faults import check_database
-from outside import TERMINAL, Connection, Lost, each, percentile, talkative
+from outside import TERMINAL, Connection, Lost, children, each, percentile, submission, talkative
 from reflected import Client
 
-STOPS = 100 if SOAK else 20
+STOPS = {"thread": 100, "process": 100} if SOAK else {"thread": 12, "process": 8}
 SEED = next((int(word) for word in sys.argv[1:] if word.isdigit()), random.randrange(1 << 32))
 GRACE_S = 3
 SUBMITTERS, PER_S, FOLLOWERS = 4, 40, 4
@@ -128,28 +132,34 @@ class Load:
             self.failure = error
 
 
+def send(server, number):
+    """A signal to the service and its worker processes, those first."""
+    for pid in (*children(server.process.pid), server.process.pid):
+        with contextlib.suppress(ProcessLookupError):  # it has ended
+            os.kill(pid, number)
+
+
 def stop(server, load, dice):
     """Seconds until it had ended."""
     began = time.monotonic()
     load.stopping_until = began + GRACE_S + 10
     kind = dice.choice(("once", "once", "twice", "at once twice", "hangup"))
     if kind == "hangup":
-        server.process.send_signal(signal.SIGHUP)
+        send(server, signal.SIGHUP)
         time.sleep(0.02)
         check(server.process.poll() is None, "SIGHUP ended it")
-    server.process.send_signal(signal.SIGTERM)
+    send(server, signal.SIGTERM)
     if kind.endswith("twice"):
         if kind == "twice":
             time.sleep(dice.uniform(0, 0.05))
-        if server.process.poll() is None:
-            server.process.send_signal(signal.SIGTERM)
+        send(server, signal.SIGTERM)
     equal(server.process.wait(timeout=GRACE_S + 20), 0, "exit code after SIGTERM (%s)" % kind)
     took = time.monotonic() - began
     check(took <= GRACE_S + 1, "it ended only %.2f s after SIGTERM (%s)" % (took, kind))
     return took
 
 
-async def stop_under_load(server, dice):
+async def stop_under_load(server, dice, stops):
     load, loop = Load(server), asyncio.get_running_loop()
     long = [server.submit(talkative(**LONG), priority=5) for _ in range(2)]
     threads = [threading.Thread(target=load.follow_grpc, args=(job,), daemon=True) for job in long]
@@ -158,7 +168,7 @@ async def stop_under_load(server, dice):
     clients = [asyncio.ensure_future(each(range(SUBMITTERS), load.submit)),
                asyncio.ensure_future(each(long * (FOLLOWERS // 2), load.follow))]
     times = []
-    for _ in range(STOPS):
+    for _ in range(stops):
         ended, _ = await asyncio.wait(clients, timeout=dice.uniform(0.05, 1), return_when=asyncio.FIRST_EXCEPTION)
         for client in ended:
             client.result()
@@ -175,11 +185,10 @@ async def stop_under_load(server, dice):
     return load, times
 
 
-def main():
-    print("seed %d" % SEED, flush=True)
-    dice = random.Random(SEED)
-    with Attacked("--workers", "2", "--grace-s", str(GRACE_S)) as server:
-        load, times = asyncio.run(stop_under_load(server, dice))
+def attack(isolation, stops, dice):
+    """Stops of a server; what was seen."""
+    with Attacked("--workers", "2", "--grace-s", str(GRACE_S), "--isolation", isolation) as server:
+        load, times = asyncio.run(stop_under_load(server, dice, stops))
         end = time.monotonic() + 120
         while any(job["status"] not in TERMINAL for job in server.every_job()):
             check(time.monotonic() < end, "jobs that never end")
@@ -194,14 +203,22 @@ def main():
             events = server.events(job)
             equal([event["seq"] for event in events], list(range(1, len(events) + 1)), "the numbers of " + job)
             equal([event["type"] for event in events].count("done"), 1, "the ends of " + job)
+            lost = [event for event in events if event.get("reason") == "worker_lost"]
+            equal(lost, [], "events of deaths of " + job)
         server.stop()
         check_database(server)
     check(load.cut_sse and load.cut_grpc, "no stream was cut by a stop")
-    print("figure: %d stops under load, some by two SIGTERMs or after a SIGHUP: exit 0 after %.0f ms (median), %.0f ms at most "
-          "(grace %d s); %d jobs acknowledged, 0 lost, all succeeded; %d submits refused as draining; server-sent events ended "
-          "%d times without done, WatchJob %d times with UNAVAILABLE, all %d events heard in order" % (
-              STOPS, 1e3 * percentile(times, 0.5), 1e3 * max(times), GRACE_S, len(load.acknowledged), load.refused,
-              load.cut_sse, load.cut_grpc, load.events))
+    return ("isolation %s: %d stops under load, some by two SIGTERMs or after a SIGHUP: exit 0 after %.0f ms (median), %.0f ms at "
+            "most (grace %d s); %d jobs acknowledged, 0 lost, all succeeded; %d submits refused as draining; server-sent events "
+            "ended %d times without done, WatchJob %d times with UNAVAILABLE, all %d events heard in order" % (
+                isolation, stops, 1e3 * percentile(times, 0.5), 1e3 * max(times), GRACE_S, len(load.acknowledged), load.refused,
+                load.cut_sse, load.cut_grpc, load.events))
+
+
+def main():
+    print("seed %d" % SEED, flush=True)
+    dice = random.Random(SEED)
+    print("figure: " + "; ".join(attack(isolation, stops, dice) for isolation, stops in STOPS.items()))
 
 
 main()

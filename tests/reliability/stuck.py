@@ -7,15 +7,11 @@ unknowns for each contact node. One is stopped by its time limit, another by a c
 the only worker. --soak takes up to 3,000 elements along the contact (6,001 nodes, 12,000 unknowns).
 """
 
-import pathlib
-import sys
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+from attack import SOAK, Attacked, Bystander, check, equal, example
+from outside import long_contact
 
-from outside import Server, check, equal, example, long_contact
-
-SOAK = "--soak" in sys.argv[1:]
 # elements along the contact
 SIZES = (1_000, 2_000, 3_000) if SOAK else (1_000,)
 # seconds from the end of a job to the start of the next; the machine may be at work for others
@@ -63,7 +59,7 @@ def attack(server, elements, stop_after):
 
 def main():
     told = []
-    with Server("--workers", "1", "--memory-budget-bytes", str(6 << 30)) as server:
+    with Attacked("--workers", "1", "--memory-budget-bytes", str(6 << 30)) as server, Bystander(server):
         for elements in SIZES:
             gaps = []
             # in the factorisation of the body, and later, in that of the contact's matrix
