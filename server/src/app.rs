@@ -72,7 +72,7 @@ impl App {
                 "{orphans} pieces of meshes from interrupted uploads were removed"
             );
         }
-        store.set_budget(config.memory.bytes());
+        store.set_budget(config.memory.bytes(), config.workers);
         let solver = match config.isolation {
             Isolation::Thread => Solver::Threads(solver::solve_on),
             Isolation::Process => Solver::Processes(Processes::new(worker_process)),

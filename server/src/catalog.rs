@@ -148,7 +148,7 @@ catalog! {
     NotAcceptable: of_request("Format not available", 406, Grpc::Unimplemented, None,
         "None of the formats requested by `format` or `Accept` is available here. `detail` lists those that are."),
     RequestTimeout: of_request("The request took too long to arrive", 408, Grpc::DeadlineExceeded, Some(1),
-        "Nothing of the body arrived for a minute. Send it again; a slow connection is no problem as long as something arrives."),
+        "The body arrived too slowly: nothing of it for a minute, or less than 16 KiB a second on average. Send it again."),
     JobActive: of_request("The job is queued or running", 409, Grpc::FailedPrecondition, None,
         "Only a job that has ended can be deleted or retried, and only a mesh that no queued or running job uses can be deleted. Cancel the job, or wait for its end."),
     ResultNotReady: of_request("The result is not ready", 409, Grpc::FailedPrecondition, Some(1),

@@ -92,7 +92,7 @@ pub enum Isolation {
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct MemoryBudget {
     /// Memory that running jobs share: a job is refused if it is estimated to need more, waits until its estimate fits
-    /// beside those of the running jobs, and is ended if it uses twice its estimate, or 64 MiB beyond it if that is more
+    /// beside those of the running jobs, and is ended if it uses more than its estimate and its part of 128 MiB
     /// [default: half of the machine's memory]
     #[arg(long, env = "SIGNORINI_MEMORY_BUDGET_BYTES", value_name = "BYTES")]
     memory_budget_bytes: Option<u64>,

@@ -1,8 +1,6 @@
 //! Why a request failed, with the details of the case; `catalog` has, for each kind, what clients may rely on. Here
 //! an error becomes the HTTP document, and the gRPC status with its details.
 
-use std::time::Duration;
-
 use axum::http::StatusCode;
 use serde_json::{Value, json};
 use solver::{
@@ -16,10 +14,8 @@ use uuid::Uuid;
 use crate::{
     catalog::{Code, Kind},
     job::{JobId, Status as JobStatus},
+    pace::{LEAST_RATE, LONGEST_PAUSE},
 };
-
-/// How long to wait for the next piece of a request's body.
-pub const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
 /// Why a request failed.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -55,7 +51,7 @@ pub enum ApiError {
     #[error("{0}")]
     BadRequest(String),
     /// Nothing more of the body arrived.
-    #[error("nothing more of the body arrived for {} s", LONGEST_PAUSE.as_secs())]
+    #[error("the body arrived too slowly: nothing for {} s, or less than {} KiB a second", LONGEST_PAUSE.as_secs(), LEAST_RATE >> 10)]
     RequestTimeout,
     /// The address is too long.
     #[error("the path and the query are too long")]

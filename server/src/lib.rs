@@ -16,6 +16,7 @@ pub mod codec;
 // Errors of requests, their parameters, the bytes that they may occupy, and the configuration.
 pub mod config;
 pub mod error;
+pub mod pace;
 pub mod parameters;
 pub mod transfer;
 pub mod violations;

@@ -11,10 +11,15 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
+/// What all jobs together may use beyond the budget (bytes), since an estimate is one.
+const MARGINS: u64 = 128 << 20;
+
 /// The budget of all running jobs together (bytes).
 #[derive(Debug)]
 pub struct Budget {
     bytes: u64,
+    /// What a job may use beyond its estimate.
+    margin: u64,
     /// Reserved by the jobs whose solvers are at work.
     reserved: Mutex<u64>,
     /// The next job of the queue waits for memory.
@@ -22,10 +27,11 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// A budget of so many bytes.
-    pub fn new(bytes: u64) -> Arc<Budget> {
+    /// A budget of so many bytes, for so many jobs at the same time.
+    pub fn new(bytes: u64, jobs: u16) -> Arc<Budget> {
         Arc::new(Budget {
             bytes,
+            margin: MARGINS / u64::from(jobs.max(1)),
             reserved: Mutex::new(0),
             short: AtomicBool::new(false),
         })
@@ -71,12 +77,10 @@ pub struct Reservation {
 }
 
 impl Reservation {
-    /// What the job may use: twice its estimate, or 64 MiB more than it, and never more than the whole budget. The
-    /// estimate is meant to be an upper bound; the margin is for what it does not foresee.
+    /// What the job may use: its estimate, which is meant to be an upper bound, and a margin for what that does not
+    /// foresee. All jobs together use no more than the budget and [`MARGINS`].
     pub fn share(&self) -> u64 {
-        const LEAST_MARGIN: u64 = 64 << 20;
-        let margin = self.bytes.max(LEAST_MARGIN);
-        self.bytes.saturating_add(margin).min(self.budget.bytes)
+        self.bytes.saturating_add(self.budget.margin)
     }
 }
 
@@ -144,7 +148,7 @@ mod tests {
 
     #[test]
     fn jobs_fit_as_long_as_their_sum_does() {
-        let budget = Budget::new(100 * MIB);
+        let budget = Budget::new(100 * MIB, 2);
         let first = budget.reserve(Some(60 * MIB)).unwrap();
         assert!(budget.reserve(Some(41 * MIB)).is_none() && budget.is_short());
         let second = budget.reserve(Some(40 * MIB)).unwrap();
@@ -157,15 +161,19 @@ mod tests {
         assert!(budget.reserve(Some(1)).is_none(), "it runs alone");
         drop(unknown);
         let too_large = budget.reserve(Some(u64::MAX)).unwrap();
-        assert_eq!(too_large.share(), 100 * MIB);
+        assert_eq!(too_large.share(), 164 * MIB);
     }
 
     #[test]
-    fn a_share_has_a_margin_within_the_budget() {
-        let budget = Budget::new(1000 * MIB);
-        for (estimate, share) in [(1, 65), (64, 128), (300, 600), (700, 1000)] {
-            let reserved = budget.reserve(Some(estimate * MIB)).unwrap();
-            assert_eq!(reserved.share(), share * MIB);
+    fn shares_have_margins_and_a_limit_together() {
+        for jobs in [1, 2, 16] {
+            let budget = Budget::new(1000 * MIB, jobs);
+            let estimate = Some(1000 * MIB / u64::from(jobs));
+            let reserve = || budget.reserve(estimate);
+            let reserved: Vec<Reservation> = std::iter::from_fn(reserve).collect();
+            assert_eq!(reserved.len(), usize::from(jobs));
+            let together: u64 = reserved.iter().map(Reservation::share).sum();
+            assert!((1127 * MIB..=1128 * MIB).contains(&together), "{together}");
         }
     }
 

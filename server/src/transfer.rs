@@ -19,7 +19,10 @@ use http_body_util::BodyExt;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tower_http::timeout::{TimeoutBody, TimeoutError};
 
-use crate::error::{ApiError, LONGEST_PAUSE};
+use crate::{
+    error::ApiError,
+    pace::{LONGEST_PAUSE, Pace},
+};
 
 /// The first bytes of each request are small.
 const SMALL_RECEIVED: usize = 16 << 10;
@@ -32,7 +35,7 @@ const UNIT: usize = 1 << 10;
 
 /// A limit on bytes over all requests.
 #[derive(Clone, Debug)]
-pub struct Budget {
+pub struct Limit {
     large: Room,
     small: Room,
 }
@@ -47,10 +50,10 @@ struct Room {
 #[derive(Debug)]
 pub struct Share(#[allow(dead_code)] OwnedSemaphorePermit);
 
-impl Budget {
+impl Limit {
     /// A budget of so many bytes, beside the room for small ones.
-    pub fn new(bytes: usize) -> Budget {
-        Budget {
+    pub fn new(bytes: usize) -> Limit {
+        Limit {
             large: Room::new(bytes),
             small: Room::new(SMALL_BYTES),
         }
@@ -107,7 +110,7 @@ impl Room {
 /// What was received of one request and is still in memory. The clones of one request count together.
 #[derive(Clone, Debug)]
 pub struct Received {
-    budget: Budget,
+    budget: Limit,
     counted: Arc<Mutex<Counted>>,
 }
 
@@ -120,7 +123,7 @@ struct Counted {
 
 impl Received {
     /// Nothing yet.
-    pub fn new(budget: &Budget) -> Received {
+    pub fn new(budget: &Limit) -> Received {
         Received {
             budget: budget.clone(),
             counted: Arc::default(),
@@ -189,16 +192,58 @@ pub fn cause(mut error: axum::Error) -> Result<ApiError, axum::Error> {
     }
 }
 
-/// The body of a request, which fails when nothing of it arrives for [`LONGEST_PAUSE`].
-pub fn with_longest_pause(body: Body) -> Body {
+/// The body of a request, which fails when it arrives too slowly.
+pub fn with_least_pace(body: Body) -> Body {
     if body.is_end_stream() {
         return body;
     }
-    let body = TimeoutBody::new(LONGEST_PAUSE, body);
+    let pace = Pace::default();
+    let body = TimeoutBody::new(LONGEST_PAUSE, PacedBody { body, pace });
     Body::new(body.map_err(|error| match error.is::<TimeoutError>() {
-        true => BodyError::from(ApiError::RequestTimeout).into(),
+        true => too_slow().into_inner(),
         false => error,
     }))
+}
+
+fn too_slow() -> axum::Error {
+    axum::Error::new(BodyError::from(ApiError::RequestTimeout))
+}
+
+struct PacedBody {
+    body: Body,
+    pace: Pace,
+}
+
+impl HttpBody for PacedBody {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        let Poll::Ready(frame) = Pin::new(&mut self.body).poll_frame(context) else {
+            self.pace.wait();
+            return Poll::Pending;
+        };
+        let data = frame
+            .as_ref()
+            .and_then(|frame| frame.as_ref().ok()?.data_ref());
+        let bytes = data.map_or(0, Bytes::len);
+        self.pace.advance(bytes);
+        match self.pace.is_too_slow() {
+            true => Poll::Ready(Some(Err(too_slow()))),
+            false => Poll::Ready(frame),
+        }
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
 }
 
 /// The body of a request whose bytes are counted as they arrive.
@@ -241,7 +286,7 @@ impl HttpBody for CountedBody {
 /// The body of an answer whose bytes have their share of the budget until they are sent. `Err`: there is no room. Of a
 /// stream, that is what is ready at once, such as the whole of an answer over gRPC, which does not tell its length; what
 /// produces large streams takes shares for their pieces.
-pub fn with_share(mut body: Body, budget: &Budget) -> Result<Body, ApiError> {
+pub fn with_share(mut body: Body, budget: &Limit) -> Result<Body, ApiError> {
     let exact = body.size_hint().exact();
     let mut first = None;
     let bytes = match exact {
@@ -323,13 +368,15 @@ impl HttpBody for Shared {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::time::Duration;
+
     use futures_util::StreamExt;
 
     use super::*;
 
     #[test]
     fn requests_share_a_budget_until_they_end() {
-        let budget = Budget::new(100 << 10);
+        let budget = Limit::new(100 << 10);
         let (one, other) = (Received::new(&budget), Received::new(&budget));
         one.count(SMALL_RECEIVED).unwrap();
         for _ in 0..60 {
@@ -347,7 +394,7 @@ mod tests {
 
     #[test]
     fn what_is_larger_than_the_budget_takes_all_of_it() {
-        let budget = Budget::new(10 << 10);
+        let budget = Limit::new(10 << 10);
         let share = budget.take(usize::MAX).unwrap();
         assert!(budget.take(1).is_err());
         drop(share);
@@ -356,7 +403,7 @@ mod tests {
 
     #[tokio::test]
     async fn an_answer_has_its_share_as_long_as_any_of_its_bytes_is_in_memory() {
-        let budget = Budget::new(200 << 10);
+        let budget = Limit::new(200 << 10);
         let large = || Body::from(vec![7; 150 << 10]);
         let first = with_share(large(), &budget).unwrap();
         assert!(matches!(
@@ -372,11 +419,32 @@ mod tests {
         assert!(with_share(large(), &budget).is_ok());
     }
 
+    #[tokio::test]
+    async fn what_a_stream_has_ready_is_counted_and_small_answers_have_room_of_their_own() {
+        let limit = Limit::new(200 << 10);
+        let ready = || {
+            let frame = Ok::<_, axum::Error>(Bytes::from(vec![7; 150 << 10]));
+            with_share(
+                Body::from_stream(futures_util::stream::iter([frame])),
+                &limit,
+            )
+        };
+        let first = ready().unwrap();
+        assert!(matches!(ready(), Err(ApiError::Overloaded)));
+        let small = || with_share(Body::from(vec![7; SMALL_SENT]), &limit);
+        let held: Vec<Body> = std::iter::from_fn(|| small().ok()).collect();
+        assert_eq!(held.len(), SMALL_BYTES / SMALL_SENT);
+        assert_eq!(first.collect().await.unwrap().to_bytes().len(), 150 << 10);
+        assert!(ready().is_ok());
+        drop(held);
+        assert!(small().is_ok());
+    }
+
     #[tokio::test(start_paused = true)]
     async fn a_body_that_stops_arriving_ends_as_a_request_timeout() {
         let never = futures_util::stream::pending::<Result<Bytes, axum::Error>>();
-        let budget = Budget::new(1 << 20);
-        let body = with_longest_pause(Body::from_stream(never));
+        let budget = Limit::new(1 << 20);
+        let body = with_least_pace(Body::from_stream(never));
         let body = counted(body, Received::new(&budget));
         let error = body.into_data_stream().next().await.unwrap().unwrap_err();
         // as tonic looks for a status
@@ -388,5 +456,17 @@ mod tests {
         }
         assert_eq!(status.unwrap().code(), tonic::Code::DeadlineExceeded);
         assert!(matches!(cause(error), Ok(ApiError::RequestTimeout)));
+        // a byte a second
+        let bytes = futures_util::stream::unfold((), |()| async {
+            tokio::time::sleep(Duration::from_secs(1)).await;
+            Some((Ok::<_, axum::Error>(Bytes::from_static(b"x")), ()))
+        });
+        let slow = with_least_pace(Body::from_stream(bytes)).into_data_stream();
+        let received: Vec<_> = slow
+            .take(100)
+            .take_while(|piece| std::future::ready(piece.is_ok()))
+            .collect()
+            .await;
+        assert!((55..65).contains(&received.len()), "{}", received.len());
     }
 }

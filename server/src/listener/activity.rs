@@ -2,22 +2,19 @@
 
 use std::{
     collections::HashMap,
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicU64, Ordering::Relaxed},
-    },
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
 
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
+use crate::pace::Pace;
+
 /// How long the head of a request may take, from its first byte or from the opening of the connection.
 const LONGEST_HEAD: Duration = Duration::from_secs(30);
 /// How long a connection is kept open for a further request.
 const LONGEST_IDLE: Duration = Duration::from_secs(75);
-/// How long a client may take to read the next piece of an answer.
-const LONGEST_STALL: Duration = Duration::from_secs(60);
 /// How often a connection is looked at.
 const INTERVAL: Duration = Duration::from_secs(5);
 
@@ -31,9 +28,8 @@ pub(super) struct Activity {
 
 #[derive(Debug)]
 struct State {
-    opened: Instant,
-    /// The requests that are not answered completely.
-    under_way: HashMap<u64, Arc<Sending>>,
+    /// The requests that are not answered completely, and how fast their answers are read.
+    under_way: HashMap<u64, Arc<Mutex<Pace>>>,
     last: u64,
     /// Since when no request has been under way.
     idle_since: Instant,
@@ -46,21 +42,16 @@ struct State {
 pub(super) struct UnderWay {
     activity: Arc<Activity>,
     number: u64,
-    sending: Arc<Sending>,
-    opened: Instant,
+    pace: Arc<Mutex<Pace>>,
+    /// Bytes of the piece of the answer that waits to be sent.
+    waiting: usize,
 }
-
-/// Since when a piece of an answer has waited to be sent, in milliseconds after the opening of the connection; 0: none
-/// waits.
-#[derive(Debug, Default)]
-struct Sending(AtomicU64);
 
 impl Activity {
     pub(super) fn new() -> Arc<Activity> {
         let now = Instant::now();
         Arc::new(Activity {
             state: Mutex::new(State {
-                opened: now,
                 under_way: HashMap::new(),
                 last: 0,
                 idle_since: now,
@@ -74,13 +65,13 @@ impl Activity {
     pub(super) fn begin(self: &Arc<Self>) -> UnderWay {
         let mut state = self.state();
         state.last += 1;
-        let (number, sending) = (state.last, Arc::<Sending>::default());
-        state.under_way.insert(number, sending.clone());
+        let (number, pace) = (state.last, Arc::<Mutex<Pace>>::default());
+        state.under_way.insert(number, pace.clone());
         UnderWay {
             activity: self.clone(),
             number,
-            sending,
-            opened: state.opened,
+            pace,
+            waiting: 0,
         }
     }
 
@@ -104,16 +95,11 @@ impl Activity {
             .await;
     }
 
-    /// Returns when the client has not read the next piece of an answer for too long.
-    pub(super) async fn stalled_too_long(&self) {
-        let stalled = |state: &State, now: Instant| {
-            let now_ms = now.duration_since(state.opened).as_millis() as u64;
-            state.under_way.values().any(|sending| {
-                let since = sending.0.load(Relaxed);
-                since > 0 && now_ms.saturating_sub(since) > LONGEST_STALL.as_millis() as u64
-            })
-        };
-        self.until(stalled).await;
+    /// Returns when the client reads an answer too slowly.
+    pub(super) async fn is_read_too_slowly(&self) {
+        let slow = |pace: &Arc<Mutex<Pace>>| locked(pace).is_too_slow();
+        self.until(|state, _| state.under_way.values().any(slow))
+            .await;
     }
 
     async fn until(&self, reached: impl Fn(&State, Instant) -> bool) {
@@ -133,20 +119,27 @@ impl Activity {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.state)
     }
+}
+
+// No code panics while it holds one of these locks.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl UnderWay {
     /// A piece of the answer waits to be sent.
-    pub(super) fn delivers(&self) {
-        let since = self.opened.elapsed().as_millis() as u64;
-        self.sending.0.store(since.max(1), Relaxed);
+    pub(super) fn delivers(&mut self, bytes: usize) {
+        self.waiting = bytes;
+        locked(&self.pace).wait();
     }
 
     /// All pieces so far are sent, or soon will be: the next one is asked for.
-    pub(super) fn is_asked(&self) {
-        self.sending.0.store(0, Relaxed);
+    pub(super) fn is_asked(&mut self) {
+        if self.waiting > 0 {
+            locked(&self.pace).advance(std::mem::take(&mut self.waiting));
+        }
     }
 }
 
@@ -191,19 +184,19 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn an_answer_that_nobody_reads_ends_the_connection() {
         let activity = Activity::new();
-        let request = activity.begin();
-        assert!(timeout(LONG, activity.stalled_too_long()).await.is_err());
-        request.delivers();
+        let mut request = activity.begin();
+        assert!(timeout(LONG, activity.is_read_too_slowly()).await.is_err());
+        request.delivers(1 << 10);
         request.is_asked();
-        assert!(timeout(LONG, activity.stalled_too_long()).await.is_err());
-        request.delivers();
+        assert!(timeout(LONG, activity.is_read_too_slowly()).await.is_err());
+        request.delivers(1 << 10);
         assert!(
-            timeout(2 * SHORT, activity.stalled_too_long())
+            timeout(2 * SHORT, activity.is_read_too_slowly())
                 .await
                 .is_err()
         );
         assert!(
-            timeout(2 * SHORT, activity.stalled_too_long())
+            timeout(2 * SHORT, activity.is_read_too_slowly())
                 .await
                 .is_ok()
         );

@@ -73,8 +73,8 @@ pub(super) async fn serve(
     let ended = tokio::select! {
         ended = connection.as_mut() => ended,
         () = activity.is_cut() => return,
-        () = activity.stalled_too_long() => {
-            debug!("a connection was closed: its client does not read");
+        () = activity.is_read_too_slowly() => {
+            debug!("a connection was closed: its client reads too slowly, or not at all");
             return;
         }
         () = activity.idle_too_long() => {
@@ -90,7 +90,7 @@ pub(super) async fn serve(
                 ended = connection.as_mut() => ended,
                 // an open connection on which nothing is asked
                 () = idle_for(&activity, FAREWELL) => return,
-                () = activity.stalled_too_long() => return,
+                () = activity.is_read_too_slowly() => return,
             }
         }
     };
@@ -160,7 +160,7 @@ impl HttpBody for Sent {
         }
         let length = self.rest.len().min(PIECE_BYTES);
         let piece = self.rest.split_to(length);
-        self.under_way.delivers();
+        self.under_way.delivers(length);
         Poll::Ready(Some(Ok(Frame::data(piece))))
     }
 

@@ -21,7 +21,7 @@ const END_STREAM: u8 = 1;
 /// The control frames of one connection.
 #[derive(Debug)]
 pub(super) struct ControlFrames {
-    place: Place,
+    position: Position,
     /// How many more the client may send now.
     credit: f64,
     counted: Instant,
@@ -29,7 +29,7 @@ pub(super) struct ControlFrames {
 
 /// What the next byte belongs to.
 #[derive(Debug)]
-enum Place {
+enum Position {
     /// The preface, of which so many bytes have arrived.
     Preface(usize),
     /// The head of a frame: so many of its bytes have arrived.
@@ -43,7 +43,7 @@ enum Place {
 impl ControlFrames {
     pub(super) fn new() -> Self {
         ControlFrames {
-            place: Place::Preface(0),
+            position: Position::Preface(0),
             credit: MOST,
             counted: Instant::now(),
         }
@@ -61,17 +61,17 @@ impl ControlFrames {
         self.credit = (self.credit + time * PER_SECOND).min(MOST);
         self.counted = now;
         while let Some((&first, rest)) = bytes.split_first() {
-            match &mut self.place {
-                Place::NotHttp2 => return true,
-                Place::Preface(seen) => {
-                    self.place = match PREFACE.get(*seen) {
-                        Some(expected) if *expected != first => Place::NotHttp2,
-                        _ if *seen + 1 == PREFACE.len() => Place::Head([0; 9], 0),
-                        _ => Place::Preface(*seen + 1),
+            match &mut self.position {
+                Position::NotHttp2 => return true,
+                Position::Preface(seen) => {
+                    self.position = match PREFACE.get(*seen) {
+                        Some(expected) if *expected != first => Position::NotHttp2,
+                        _ if *seen + 1 == PREFACE.len() => Position::Head([0; 9], 0),
+                        _ => Position::Preface(*seen + 1),
                     };
                     bytes = rest;
                 }
-                Place::Head(head, seen) => {
+                Position::Head(head, seen) => {
                     head[*seen] = first;
                     *seen += 1;
                     bytes = rest;
@@ -82,17 +82,17 @@ impl ControlFrames {
                         if !matches!(kind, DATA | HEADERS) || (kind == DATA && empty) {
                             self.credit -= 1.0;
                         }
-                        self.place = Place::Content(length);
+                        self.position = Position::Content(length);
                     }
                 }
-                Place::Content(left) => {
+                Position::Content(left) => {
                     let here = bytes.len().min(*left);
                     *left -= here;
                     bytes = bytes.split_at(here).1;
                 }
             }
-            if let Place::Content(0) = self.place {
-                self.place = Place::Head([0; 9], 0);
+            if let Position::Content(0) = self.position {
+                self.position = Position::Head([0; 9], 0);
             }
         }
         self.credit >= 0.0

@@ -34,7 +34,7 @@ impl<V: Values> Parameter<V> {
     /// Describes it as a query parameter with one value.
     pub fn describe(&self) -> Description {
         Description {
-            place: Place::Query,
+            location: Location::Query,
             name: self.name,
             schema: self.values.schema(),
             meaning: self.meaning,
@@ -99,7 +99,7 @@ impl<V: Values> Variable<V> {
     /// Describes it as a variable of a path.
     pub fn describe(&self) -> Description {
         Description {
-            place: Place::Path,
+            location: Location::Path,
             name: self.name,
             schema: self.values.schema(),
             meaning: self.meaning,
@@ -108,10 +108,10 @@ impl<V: Values> Variable<V> {
     }
 }
 
-/// The place of a parameter in a request over REST.
+/// Where a parameter is in a request over REST.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
-pub enum Place {
+pub enum Location {
     /// A segment of the path.
     Path,
     /// The query.
@@ -124,7 +124,7 @@ pub enum Place {
 #[derive(Clone, Debug)]
 pub struct Description {
     /// Its place in the request.
-    pub place: Place,
+    pub location: Location,
     /// Its name; with `{key}` at its end it is a name for each key.
     pub name: &'static str,
     /// Its values, as JSON Schema.

@@ -25,7 +25,7 @@ pub(super) struct Solved {
 
 /// Why there is no solution.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) enum Unsolved {
+pub(super) enum NoSolution {
     /// The solver was asked to stop before it had a state to return.
     Stopped,
     /// The job fails, with this detail.
@@ -36,20 +36,20 @@ pub(super) enum Unsolved {
     Lost(String),
 }
 
-impl From<SolveError> for Unsolved {
+impl From<SolveError> for NoSolution {
     fn from(error: SolveError) -> Self {
         let detail = error.to_string();
         match error {
-            SolveError::Stopped => Unsolved::Stopped,
+            SolveError::Stopped => NoSolution::Stopped,
             SolveError::SingularSystem { .. } | SolveError::Unheld { .. } => {
-                Unsolved::Failed(Reason::SingularSystem, detail)
+                NoSolution::Failed(Reason::SingularSystem, detail)
             }
-            SolveError::NonFinite { .. } => Unsolved::Failed(Reason::NonFinite, detail),
+            SolveError::NonFinite { .. } => NoSolution::Failed(Reason::NonFinite, detail),
             SolveError::ResourceExhausted { .. } => {
-                Unsolved::Failed(Reason::ResourceExhausted, detail)
+                NoSolution::Failed(Reason::ResourceExhausted, detail)
             }
             // it was checked before it was accepted
-            SolveError::Invalid(_) => Unsolved::Internal(detail),
+            SolveError::Invalid(_) => NoSolution::Internal(detail),
         }
     }
 }
@@ -101,10 +101,10 @@ pub(super) fn ending_of_solution(document: &Document) -> Ending {
 /// How the job ends, by what its solver has returned; with the result that is to be stored.
 pub(super) fn ending_of_attempt(
     job: &Job,
-    solved: Result<Solved, Unsolved>,
+    solved: Result<Solved, NoSolution>,
     stopped: Option<StopReason>,
 ) -> (Ending, Option<Parts>) {
-    let unsolved = match solved {
+    let no_solution = match solved {
         Ok(Solved {
             ending,
             iterations,
@@ -120,13 +120,13 @@ pub(super) fn ending_of_attempt(
             debug!(job.id = %job.id, iterations, "job {}: its solver returned after {iterations} iterations", job.id);
             return (ending, Some(parts));
         }
-        Err(unsolved) => unsolved,
+        Err(no_solution) => no_solution,
     };
-    let ending = match unsolved {
-        Unsolved::Stopped => stopped_for(job, stopped),
-        Unsolved::Failed(reason, detail) => Ending::failed(reason, detail),
+    let ending = match no_solution {
+        NoSolution::Stopped => stopped_for(job, stopped),
+        NoSolution::Failed(reason, detail) => Ending::failed(reason, detail),
         // (the worker requeues a job whose process was lost)
-        Unsolved::Internal(cause) | Unsolved::Lost(cause) => internal(job, &cause),
+        NoSolution::Internal(cause) | NoSolution::Lost(cause) => internal(job, &cause),
     };
     (ending, None)
 }

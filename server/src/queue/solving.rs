@@ -10,7 +10,7 @@ use solver::{
 };
 
 use super::{
-    ending::{Solved, Unsolved, ending_of_solution},
+    ending::{NoSolution, Solved, ending_of_solution},
     report::{Report, Told},
 };
 use crate::{
@@ -22,18 +22,18 @@ use crate::{
 };
 
 /// The stored form of a mesh, which was there when the job was accepted. On a blocking thread.
-pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Vec<u8>, Unsolved> {
+pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Vec<u8>, NoSolution> {
     let failed =
-        |cause: &dyn std::fmt::Display| Unsolved::Internal(format!("mesh {hash}: {cause}"));
+        |cause: &dyn std::fmt::Display| NoSolution::Internal(format!("mesh {hash}: {cause}"));
     let body = tokio::runtime::Handle::current().block_on(store.mesh_body(hash));
     let body = body.map_err(|error| failed(&error))?;
     body.ok_or_else(|| failed(&"it is not stored"))
 }
 
 /// A mesh from its stored form.
-pub(super) fn read_mesh(body: &[u8]) -> Result<Mesh, Unsolved> {
+pub(super) fn read_mesh(body: &[u8]) -> Result<Mesh, NoSolution> {
     postcard::from_bytes(body)
-        .map_err(|error| Unsolved::Internal(format!("a stored mesh cannot be read: {error}")))
+        .map_err(|error| NoSolution::Internal(format!("a stored mesh cannot be read: {error}")))
 }
 
 /// Reads the problem and solves it, within a share of memory (bytes). On a blocking thread.

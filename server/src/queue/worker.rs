@@ -8,7 +8,7 @@ use tracing::{error, info, warn};
 
 use super::{
     backoff::Backoff,
-    ending::{Unsolved, ending_of_attempt, internal, panicked, timed_out},
+    ending::{NoSolution, ending_of_attempt, internal, panicked, timed_out},
     process::Task,
     recorder,
     report::{Report, Told},
@@ -71,7 +71,7 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
         let Queue { store, solver, .. } = &*queue_of_solver;
         let mesh = mesh.map(|hash| stored_mesh(store, &hash)).transpose()?;
         if failpoint::fails(Point::MeshRead, id) {
-            return Err(Unsolved::Internal("a test wants it".into()));
+            return Err(NoSolution::Internal("a test wants it".into()));
         }
         let tell = |told| {
             pass_failpoint(&told, id);
@@ -93,7 +93,7 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
         match solver {
             Solver::Threads(solve) => {
                 let mesh = mesh.as_deref().map(read_mesh).transpose()?;
-                solve_and_report(&problem, mesh, *solve, share, tell).map_err(Unsolved::from)
+                solve_and_report(&problem, mesh, *solve, share, tell).map_err(NoSolution::from)
             }
             Solver::Processes(processes) => {
                 let task = Task {
@@ -113,10 +113,10 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
             .try_into_panic()
             .map(|panic| panicked("the solver", &*panic));
         let cause = panic.unwrap_or_else(|_| "the solver's thread was lost".into());
-        Err(Unsolved::Internal(cause))
+        Err(NoSolution::Internal(cause))
     });
     drop(timer);
-    if let Err(Unsolved::Lost(how)) = &solved {
+    if let Err(NoSolution::Lost(how)) = &solved {
         requeue_with_retries(queue, &job, how).await;
     } else {
         let (ending, parts) = ending_of_attempt(&job, solved, running.stop.get().copied());

@@ -7,7 +7,7 @@ use super::input::{Input, RawInput};
 use crate::{
     error::ApiError,
     formats::Format,
-    parameters::{Description, Place},
+    parameters::{Description, Location},
     violations,
 };
 
@@ -24,7 +24,7 @@ impl Input for FormatOf {
     fn descriptions(&self) -> Vec<Description> {
         let names: Vec<&str> = self.0.iter().map(|format| format.name()).collect();
         vec![Description {
-            place: Place::Query,
+            location: Location::Query,
             name: FORMAT,
             schema: json!({ "type": "string", "enum": names }),
             meaning: "Format of the data; takes precedence over Accept",

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::input::{Input, RawInput};
 use crate::{
     error::ApiError,
-    parameters::{Description, Parameter, Place, Values},
+    parameters::{Description, Location, Parameter, Values},
     verbs::watch::MAX_WAIT_S,
     violations,
 };
@@ -45,7 +45,7 @@ impl<V: Values> Input for Header<V> {
 /// The description of a header, of a request or of an answer.
 pub(super) fn header(name: &'static str, schema: Value, meaning: &'static str) -> Description {
     Description {
-        place: Place::Header,
+        location: Location::Header,
         name,
         schema,
         meaning,

@@ -9,7 +9,7 @@ use axum::{
 
 use crate::{
     error::ApiError,
-    parameters::{Description, Parameter, Place, Values, Variable},
+    parameters::{Description, Location, Parameter, Values, Variable},
 };
 
 /// An input of an operation.
@@ -61,7 +61,9 @@ impl<'a> RawInput<'a> {
     /// Refuses an unknown parameter, and a second value of a parameter that is not repeatable: they would have no
     /// effect, and the client expects one.
     pub(super) fn check(&self, described: &[Description]) -> Result<(), ApiError> {
-        let known = described.iter().filter(|one| one.place == Place::Query);
+        let known = described
+            .iter()
+            .filter(|one| one.location == Location::Query);
         for (n, (name, value)) in self.query.iter().enumerate() {
             let Some(parameter) = known.clone().find(|one| matches(one.name, name)) else {
                 let known: Vec<&str> = known.map(|one| one.name).collect();

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     error::ApiError,
-    transfer::{Received, counted, with_longest_pause, with_share},
+    transfer::{Received, counted, with_least_pace, with_share},
     verbs::Service,
 };
 
@@ -37,7 +37,7 @@ pub(super) async fn limits(
     }
     let received = Received::new(&service.received);
     let (mut parts, body) = request.into_parts();
-    let mut body = with_longest_pause(body);
+    let mut body = with_least_pace(body);
     // over REST, they are counted where they are collected
     if grpc && path != UPLOAD {
         body = counted(body, received.clone());

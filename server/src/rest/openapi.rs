@@ -13,7 +13,7 @@ use solver::error::Violation;
 use super::operations::{self, Answer, Content, Operation};
 use crate::{
     catalog::{Code, Kind},
-    parameters::{Description, Place},
+    parameters::{Description, Location},
 };
 
 /// The document; it does not change while the service runs.
@@ -151,14 +151,14 @@ impl Schemas {
 }
 
 fn parameter(parameter: &Description) -> Value {
-    let place: &str = parameter.place.into();
+    let location: &str = parameter.location.into();
     let mut described = json!({
         "name": parameter.name,
-        "in": place,
+        "in": location,
         "schema": parameter.schema,
         "description": parameter.meaning,
     });
-    if parameter.place == Place::Path {
+    if parameter.location == Location::Path {
         described["required"] = json!(true);
     }
     described

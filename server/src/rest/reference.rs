@@ -7,7 +7,7 @@ use strum::VariantArray;
 use super::operations::{self, Operation};
 use crate::{
     catalog::{Code, grpc_code_name},
-    parameters::{Description, Place},
+    parameters::{Description, Location},
 };
 
 /// The whole page.
@@ -54,16 +54,16 @@ fn section(out: &mut String, operation: &Operation) {
     if !operation.rpcs.is_empty() {
         let _ = writeln!(out, "- gRPC: {}", rpcs(operation));
     }
-    let named = |parameter: &&Description| parameter.place != Place::Path;
+    let named = |parameter: &&Description| parameter.location != Location::Path;
     for Description {
-        place,
+        location,
         name,
         meaning,
         ..
     } in operation.parameters.iter().filter(named)
     {
-        let place: &str = place.into();
-        let _ = writeln!(out, "- {place} `{name}`: {meaning}");
+        let location: &str = location.into();
+        let _ = writeln!(out, "- {location} `{name}`: {meaning}");
     }
     for answer in &operation.answers {
         let media: Vec<String> = answer

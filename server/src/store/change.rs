@@ -29,15 +29,15 @@ pub(super) struct Change<'a> {
     changed: Vec<i64>,
     /// Rows of jobs that need a new checksum.
     touched: BTreeSet<i64>,
-    /// Jobs that end or are deleted, for the log.
-    gone: Vec<(JobId, Gone)>,
+    /// What the log will tell of jobs that end or are deleted.
+    log_lines: Vec<(JobId, LogLine)>,
     /// Held until the moves are applied: no other change begins before, so that moves are applied in the order of
     /// commits.
     _lock: MutexGuard<'a, ()>,
 }
 
 /// What the log tells of a job.
-enum Gone {
+enum LogLine {
     Ended {
         status: Status,
         reason: Option<Reason>,
@@ -51,7 +51,7 @@ enum Gone {
 pub(super) struct Savepoint {
     moves: usize,
     changed: usize,
-    gone: usize,
+    log_lines: usize,
 }
 
 impl Store {
@@ -71,7 +71,7 @@ impl Store {
             moves: vec![],
             changed: vec![],
             touched: BTreeSet::new(),
-            gone: vec![],
+            log_lines: vec![],
         })
     }
 }
@@ -110,17 +110,17 @@ impl Change<'_> {
         reason: Option<Reason>,
         detail: String,
     ) {
-        let ended = Gone::Ended {
+        let ended = LogLine::Ended {
             status,
             reason,
             detail,
         };
-        self.gone.push((id, ended));
+        self.log_lines.push((id, ended));
     }
 
     /// A job is deleted: told in the log, once this is committed.
     pub(super) fn deleted(&mut self, id: JobId) {
-        self.gone.push((id, Gone::Deleted));
+        self.log_lines.push((id, LogLine::Deleted));
     }
 
     /// What was read, unless it is damaged, which is noted.
@@ -186,7 +186,7 @@ impl Change<'_> {
         Ok(Savepoint {
             moves: self.moves.len(),
             changed: self.changed.len(),
-            gone: self.gone.len(),
+            log_lines: self.log_lines.len(),
         })
     }
 
@@ -206,7 +206,7 @@ impl Change<'_> {
         self.release().await?;
         self.moves.truncate(savepoint.moves);
         self.changed.truncate(savepoint.changed);
-        self.gone.truncate(savepoint.gone);
+        self.log_lines.truncate(savepoint.log_lines);
         Ok(())
     }
 
@@ -222,16 +222,16 @@ impl Change<'_> {
             .into_iter()
             .for_each(|change| waiting.apply(change));
         drop(waiting);
-        self.gone.iter().for_each(|(id, gone)| gone.log(*id));
+        self.log_lines.iter().for_each(|(id, line)| line.log(*id));
         Ok(self.changed)
     }
 }
 
-impl Gone {
+impl LogLine {
     fn log(&self, job: JobId) {
         match self {
-            Gone::Deleted => info!(job.id = %job, "job {job} was deleted"),
-            Gone::Ended {
+            LogLine::Deleted => info!(job.id = %job, "job {job} was deleted"),
+            LogLine::Ended {
                 status,
                 reason,
                 detail,

@@ -6,7 +6,7 @@
 
 use sqlx::{Column, Decode, Row, Sqlite, TypeInfo, ValueRef, sqlite::SqliteRow};
 
-use super::error::{Part, Result, StoreError};
+use super::error::{Record, Result, StoreError};
 
 /// The column that holds it.
 const COLUMN: &str = "checksum";
@@ -73,7 +73,7 @@ impl Checksum {
 
     /// Compares it with the one in the row; `what` names the row in the error. A row of an earlier version has none,
     /// and is accepted.
-    pub(super) fn verify(self, stored: Option<i64>, what: impl FnOnce() -> Part) -> Result<()> {
+    pub(super) fn verify(self, stored: Option<i64>, what: impl FnOnce() -> Record) -> Result<()> {
         match stored {
             Some(stored) if stored != self.stored() => {
                 Err(what().damaged("its checksum is not that of its content"))

@@ -11,7 +11,7 @@ use std::{
 use sqlx::SqlitePool;
 use uuid::Uuid;
 
-use super::error::{Damage, Part, Result, StoreError};
+use super::error::{Damage, Record, Result, StoreError};
 use crate::job::JobId;
 
 /// Most parts that are remembered; the log has all of them.
@@ -20,7 +20,7 @@ const MOST: usize = 1000;
 /// The parts that were found damaged since the store was opened.
 #[derive(Debug)]
 pub(super) struct Damages {
-    found: Mutex<BTreeMap<Part, (Uuid, Option<JobId>)>>,
+    found: Mutex<BTreeMap<Record, (Uuid, Option<JobId>)>>,
     /// The indexes of the jobs cannot be trusted: a job that is not found may exist.
     indexes: AtomicBool,
     /// Finds the public id of a job.
@@ -51,24 +51,24 @@ impl Damages {
         if damage.incident.is_some() {
             return damage;
         }
-        if let Some((incident, job)) = self.found().get(&damage.part) {
+        if let Some((incident, job)) = self.found().get(&damage.record) {
             damage.incident = Some(*incident);
             damage.job = damage.job.or(*job);
             return damage;
         }
         if damage.job.is_none() {
-            damage.job = self.public_id(damage.part.job).await;
+            damage.job = self.public_id(damage.record.job).await;
         }
         let incident = Uuid::now_v7();
         damage.incident = Some(incident);
         let job = damage.job.map(|id| id.to_string()).unwrap_or_default();
         tracing::error!(
-            job.id = job, part = damage.part.name, %incident, cause = damage.cause,
+            job.id = job, record = damage.record.name, %incident, cause = damage.cause,
             "incident {incident}: {damage}: {}; stop the service and run `signorini doctor`", damage.cause
         );
         let mut found = self.found();
         if found.len() < MOST {
-            found.insert(damage.part.clone(), (incident, damage.job));
+            found.insert(damage.record.clone(), (incident, damage.job));
         }
         damage
     }
@@ -103,7 +103,7 @@ impl Damages {
         }
     }
 
-    fn found(&self) -> std::sync::MutexGuard<'_, BTreeMap<Part, (Uuid, Option<JobId>)>> {
+    fn found(&self) -> std::sync::MutexGuard<'_, BTreeMap<Record, (Uuid, Option<JobId>)>> {
         // No code panics while it holds this lock; if one did, the map would still be whole.
         self.found.lock().unwrap_or_else(PoisonError::into_inner)
     }

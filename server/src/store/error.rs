@@ -62,7 +62,7 @@ pub enum StoreError {
 
 /// A stored record, as errors name it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Part {
+pub struct Record {
     /// The job that it belongs to, by its key.
     pub job: Option<i64>,
     /// Its name, like "event 12".
@@ -73,7 +73,7 @@ pub struct Part {
 #[derive(Clone, Debug)]
 pub struct Damage {
     /// Which one.
-    pub part: Part,
+    pub record: Record,
     /// The job that it belongs to.
     pub job: Option<JobId>,
     /// How that was found.
@@ -85,16 +85,16 @@ pub struct Damage {
 impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.job {
-            Some(id) => write!(f, "the stored {} of {id} is damaged", self.part.name),
-            None => write!(f, "the stored {} is damaged", self.part.name),
+            Some(id) => write!(f, "the stored {} of {id} is damaged", self.record.name),
+            None => write!(f, "the stored {} is damaged", self.record.name),
         }
     }
 }
 
-impl Part {
-    /// A part of a job.
-    pub(super) fn of_job(key: i64, name: impl Into<String>) -> Part {
-        Part {
+impl Record {
+    /// A record of a job.
+    pub(super) fn of_job(key: i64, name: impl Into<String>) -> Record {
+        Record {
             // a partial result is stored under the negative
             job: Some(key.abs()),
             name: name.into(),
@@ -102,8 +102,8 @@ impl Part {
     }
 
     /// Something that belongs to no job.
-    pub(super) fn named(name: impl Into<String>) -> Part {
-        Part {
+    pub(super) fn named(name: impl Into<String>) -> Record {
+        Record {
             job: None,
             name: name.into(),
         }
@@ -112,7 +112,7 @@ impl Part {
     /// The error that it is damaged.
     pub(super) fn damaged(self, cause: impl ToString) -> StoreError {
         StoreError::Damaged(Box::new(Damage {
-            part: self,
+            record: self,
             job: None,
             cause: cause.to_string(),
             incident: None,
@@ -124,7 +124,7 @@ impl Damage {
     /// Indexes of the table of jobs that differ from it.
     pub(super) fn of_indexes(cause: &str) -> Damage {
         Damage {
-            part: Part::named("index of the jobs"),
+            record: Record::named("index of the jobs"),
             job: None,
             cause: cause.to_owned(),
             incident: None,
@@ -157,7 +157,7 @@ impl From<sqlx::Error> for StoreError {
             _ if matches!(number & 0xff, code::CORRUPT | code::NOT_A_DATABASE)
                 || matches!(number, code::IOERR_READ | code::IOERR_SHORT_READ) =>
             {
-                Part::named("database").damaged(error)
+                Record::named("database").damaged(error)
             }
             _ if matches!(number, code::FULL | code::IOERR_WRITE) => StoreError::Full,
             _ if matches!(number & 0xff, code::READ_ONLY | code::CANNOT_OPEN) => {
@@ -165,7 +165,7 @@ impl From<sqlx::Error> for StoreError {
             }
             sqlx::Error::PoolTimedOut => StoreError::Busy,
             sqlx::Error::Decode(_) | sqlx::Error::ColumnDecode { .. } => {
-                Part::named("record").damaged(error)
+                Record::named("record").damaged(error)
             }
             _ => StoreError::Database(error),
         }
@@ -186,10 +186,10 @@ impl StoreError {
     }
 
     /// The same, with the record that was being read if nothing more is known of it.
-    pub(super) fn reading(self, part: impl FnOnce() -> Part) -> StoreError {
+    pub(super) fn reading(self, record: impl FnOnce() -> Record) -> StoreError {
         match self {
-            StoreError::Damaged(damage) if damage.part.job.is_none() => {
-                part().damaged(damage.cause)
+            StoreError::Damaged(damage) if damage.record.job.is_none() => {
+                record().damaged(damage.cause)
             }
             other => other,
         }
@@ -198,7 +198,7 @@ impl StoreError {
 
 impl From<serde_json::Error> for StoreError {
     fn from(error: serde_json::Error) -> Self {
-        Part::named("record").damaged(error)
+        Record::named("record").damaged(error)
     }
 }
 

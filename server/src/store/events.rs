@@ -5,7 +5,7 @@ use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use super::{
     checksum::Checksum,
     database::Store,
-    error::{Part, Result, StoreError},
+    error::{Record, Result, StoreError},
     rows::{find, seal},
 };
 use crate::{
@@ -91,7 +91,7 @@ pub(super) async fn read(
     .bind(limit)
     .fetch_all(connection)
     .await
-    .map_err(|error| StoreError::from(error).reading(|| Part::of_job(key, "events")))?;
+    .map_err(|error| StoreError::from(error).reading(|| Record::of_job(key, "events")))?;
     let Some((end, rows)) = rows.split_last() else {
         return Ok(vec![]); // the job was deleted
     };
@@ -105,7 +105,7 @@ pub(super) async fn read(
                 attempt: row.try_get("attempt")?,
                 t: Time::from_micros(row.try_get("t")?),
                 payload: serde_json::from_str(body)
-                    .map_err(|error| part(key, seq).damaged(error))?,
+                    .map_err(|error| record(key, seq).damaged(error))?,
             })
         })
         .collect::<Result<_>>()?;
@@ -116,7 +116,7 @@ pub(super) async fn read(
         .all(|(place, event)| event.seq - 1 - place == after);
     match dense && events.len() as i64 == expected {
         true => Ok(events),
-        false => Err(Part::of_job(key, "events").damaged("some are missing")),
+        false => Err(Record::of_job(key, "events").damaged("some are missing")),
     }
 }
 
@@ -130,10 +130,10 @@ fn checked(key: i64, row: &SqliteRow) -> Result<(i64, &str)> {
             row.try_get("type")?,
         );
         checksum(key, seq, attempt, t, kind, body)
-            .verify(row.try_get("checksum")?, || part(key, seq))?;
+            .verify(row.try_get("checksum")?, || record(key, seq))?;
         Ok((seq, body))
     };
-    read().map_err(|error: StoreError| error.reading(|| Part::of_job(key, "events")))
+    read().map_err(|error: StoreError| error.reading(|| Record::of_job(key, "events")))
 }
 
 fn checksum(key: i64, seq: i64, attempt: i32, t: i64, kind: &str, body: &str) -> Checksum {
@@ -141,8 +141,8 @@ fn checksum(key: i64, seq: i64, attempt: i32, t: i64, kind: &str, body: &str) ->
     row.int(t).text(kind).text(body)
 }
 
-fn part(key: i64, seq: i64) -> Part {
-    Part::of_job(key, format!("event {seq}"))
+fn record(key: i64, seq: i64) -> Record {
+    Record::of_job(key, format!("event {seq}"))
 }
 
 /// Appends events, with the progress after them.

@@ -9,7 +9,7 @@ use crate::time::Time;
 
 use super::{
     database::Store,
-    error::{Part, Result, StoreError},
+    error::{Record, Result, StoreError},
     rows::from_row,
 };
 
@@ -70,7 +70,7 @@ impl Store {
             };
             match self.damages.noting(read).await {
                 // of a job: the others can be read
-                Err(StoreError::Damaged(damage)) if damage.part.job.is_some() => {}
+                Err(StoreError::Damaged(damage)) if damage.record.job.is_some() => {}
                 // lists use all connections, which shows that they are answered
                 Ok(_) | Err(StoreError::Busy) => {}
                 Err(error) => return Err(error),
@@ -137,7 +137,7 @@ pub(super) async fn check_indexes(store: Weak<Store>) {
         connection.close().await?;
         match found.as_str() {
             "ok" => Ok(()),
-            _ => Err(Part::named("index").damaged(found)),
+            _ => Err(Record::named("index").damaged(found)),
         }
     };
     if let Err(StoreError::Damaged(damage)) = checked.await

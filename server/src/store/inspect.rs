@@ -9,7 +9,7 @@ use sqlx::{ConnectOptions, Connection, Row, SqliteConnection, sqlite::SqliteConn
 
 use super::{
     database::{Store, Writing, compare_with_the_past},
-    error::{Part, Result, StoreError},
+    error::{Record, Result, StoreError},
     events,
     folder::{DATABASE, Folder},
     intact, keys, meshes, migrations, problems, progress,
@@ -78,8 +78,8 @@ pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
 impl Report {
     fn finding(&mut self, what: &str, error: &StoreError) {
         let text = match error {
-            StoreError::Damaged(damage) if damage.part.name == what => damage.cause.clone(),
-            StoreError::Damaged(damage) => format!("{}: {}", damage.part.name, damage.cause),
+            StoreError::Damaged(damage) if damage.record.name == what => damage.cause.clone(),
+            StoreError::Damaged(damage) => format!("{}: {}", damage.record.name, damage.cause),
             other => other.to_string(),
         };
         self.findings.push(format!("{what}: {text}"));
@@ -300,7 +300,9 @@ async fn check_parts(source: &mut SqliteConnection, job: &Job) -> Result<()> {
         after = last.seq;
     }
     if ended != job.status.is_terminal() {
-        return Err(Part::of_job(job.key, "events").damaged("the last one is not that of its end"));
+        return Err(
+            Record::of_job(job.key, "events").damaged("the last one is not that of its end")
+        );
     }
     match job.result_available {
         ResultAvailable::None => Ok(()),

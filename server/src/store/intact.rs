@@ -10,7 +10,7 @@ use sqlx::SqliteConnection;
 
 use super::{
     checksum::Checksum,
-    error::{Part, Result},
+    error::{Record, Result},
 };
 
 /// Size and hash of a part.
@@ -50,8 +50,8 @@ impl Intact {
 }
 
 /// The name of a part in errors.
-pub(super) fn part_of(key: i64, name: &str) -> Part {
-    Part::of_job(key, format!("result part {name}"))
+pub(super) fn part_of(key: i64, name: &str) -> Record {
+    Record::of_job(key, format!("result part {name}"))
 }
 
 /// Size and hash of a part; `None` if there is no such part, or if it was written by a version that did not store

@@ -9,7 +9,7 @@ use super::{
     checksum::Checksum,
     database::Store,
     delete::{deleted_id, owner_of_deleted},
-    error::{Part, Result, StoreError},
+    error::{Record, Result, StoreError},
     rows::{find, read},
     submission::{NewJob, RequestKey},
 };
@@ -139,7 +139,7 @@ async fn jobs_of_key(
         payload,
     };
     checksum(owner, &written, first, jobs)
-        .verify(stored, || Part::named("record of a request key"))?;
+        .verify(stored, || Record::named("record of a request key"))?;
     match written.payload == key.payload {
         true => Ok(Some(first..first.saturating_add(jobs))),
         false => Err(StoreError::KeyReuse),
@@ -159,7 +159,7 @@ pub(super) fn check(row: &SqliteRow) -> Result<()> {
         row.try_get("jobs")?,
     )
     .verify(row.try_get("checksum")?, || {
-        Part::named("record of a request key")
+        Record::named("record of a request key")
     })
 }
 

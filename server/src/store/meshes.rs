@@ -5,7 +5,7 @@ use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use super::{
     checksum::{self, Checksum},
     database::Store,
-    error::{Part, Result, StoreError},
+    error::{Record, Result, StoreError},
 };
 use crate::mesh::MeshInfo;
 
@@ -185,11 +185,11 @@ pub(super) async fn read_body(
     .bind(hash)
     .fetch_all(&mut *connection)
     .await
-    .map_err(|error| StoreError::from(error).reading(|| part(hash)))?;
+    .map_err(|error| StoreError::from(error).reading(|| record(hash)))?;
     if pieces.is_empty() {
         let row = sqlx::query("select 1 from mesh where hash = ?").bind(hash);
         return match row.fetch_optional(connection).await? {
-            Some(_) => Err(part(hash).damaged("it has no pieces")),
+            Some(_) => Err(record(hash).damaged("it has no pieces")),
             None => Ok(None),
         };
     }
@@ -197,9 +197,9 @@ pub(super) async fn read_body(
     let mut whole = vec![];
     for (number, (all, piece, body, checksum)) in (0..).zip(pieces) {
         if piece != number || all.is_some_and(|all| all != count) {
-            return Err(part(hash).damaged("a piece is missing"));
+            return Err(record(hash).damaged("a piece is missing"));
         }
-        piece_checksum(hash, piece, &body).verify(checksum, || part(hash))?;
+        piece_checksum(hash, piece, &body).verify(checksum, || record(hash))?;
         whole.extend(body);
     }
     Ok(Some(whole))
@@ -208,11 +208,12 @@ pub(super) async fn read_body(
 /// A row of the table as the description of a mesh.
 pub(super) fn described(row: &SqliteRow) -> Result<StoredMesh> {
     let hash: String = row.try_get("hash")?;
-    let part = || Part::named(format!("description of mesh {hash}"));
+    let record = || Record::named(format!("description of mesh {hash}"));
     if !checksum::row_is_intact(row)? {
-        return Err(part().damaged("its checksum is not that of its content"));
+        return Err(record().damaged("its checksum is not that of its content"));
     }
-    let info = serde_json::from_str(row.try_get("info")?).map_err(|error| part().damaged(error))?;
+    let info =
+        serde_json::from_str(row.try_get("info")?).map_err(|error| record().damaged(error))?;
     let key = row.try_get("id")?;
     Ok(StoredMesh { key, info })
 }
@@ -221,8 +222,8 @@ fn piece_checksum(hash: &str, piece: i64, body: &[u8]) -> Checksum {
     Checksum::new().text(hash).int(piece).bytes(body)
 }
 
-fn part(hash: &str) -> Part {
-    Part::named(format!("mesh {hash}"))
+fn record(hash: &str) -> Record {
+    Record::named(format!("mesh {hash}"))
 }
 
 /// A job's mesh must be stored when the job is accepted.

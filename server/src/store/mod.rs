@@ -79,7 +79,7 @@ pub use self::{
     delete::Deletion,
     edit::Edit,
     end::CancelOutcome,
-    error::{Damage, Part, Result, StoreError},
+    error::{Damage, Record, Result, StoreError},
     events::FinalBatch,
     filter::{Cursor, Filter, GroupBy, Order, OrderBy},
     health::Health,

@@ -4,7 +4,7 @@ use sqlx::SqliteConnection;
 
 use super::{
     checksum::Checksum,
-    error::{Part, Result},
+    error::{Record, Result},
     submission::NewJob,
 };
 use crate::job::Job;
@@ -49,16 +49,16 @@ type Columns = (String, Option<String>, Option<i64>, Option<i64>);
 
 /// The problem of a job.
 pub(super) async fn read(tx: &mut SqliteConnection, job: &Job) -> Result<StoredProblem> {
-    let part = || Part::of_job(job.key, "problem");
+    let record = || Record::of_job(job.key, "problem");
     let found: sqlx::Result<Option<Columns>> = sqlx::query_as(
         "select body, mesh, memory_bytes, checksum from problem where input_hash = ?",
     )
     .bind(&job.input_hash)
     .fetch_optional(tx)
     .await;
-    let found = found.map_err(|error| crate::store::StoreError::from(error).reading(part))?;
-    let (body, mesh, memory, stored) = found.ok_or_else(|| part().damaged("it is missing"))?;
-    checksum(&job.input_hash, &body, mesh.as_deref(), memory).verify(stored, part)?;
+    let found = found.map_err(|error| crate::store::StoreError::from(error).reading(record))?;
+    let (body, mesh, memory, stored) = found.ok_or_else(|| record().damaged("it is missing"))?;
+    checksum(&job.input_hash, &body, mesh.as_deref(), memory).verify(stored, record)?;
     Ok(StoredProblem {
         body,
         mesh,

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use super::{
     checksum,
-    error::{Part, Result, StoreError},
+    error::{Record, Result, StoreError},
 };
 use crate::{
     caller::Owners,
@@ -18,7 +18,7 @@ use crate::{
 /// The job with this key, which must exist.
 pub(super) async fn read(tx: &mut SqliteConnection, key: i64) -> Result<Job> {
     let found = find(tx, key).await?;
-    found.ok_or_else(|| Part::of_job(key, "record").damaged("it is missing"))
+    found.ok_or_else(|| Record::of_job(key, "record").damaged("it is missing"))
 }
 
 /// Gives the row of a job that this transaction has changed its checksum. Every statement that changes a job sets it
@@ -83,11 +83,11 @@ pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
         true => parse(row),
         false => Err(corrupt("checksum")),
     };
-    let part = || Part {
+    let record = || Record {
         job: row.try_get("id").ok(),
         name: "record".into(),
     };
-    read().map_err(|error| error.reading(part))
+    read().map_err(|error| error.reading(record))
 }
 
 fn parse(row: &SqliteRow) -> Result<Job> {
@@ -158,7 +158,7 @@ fn word<T: FromStr>(column: &str, text: &str) -> Result<T> {
 }
 
 fn corrupt(column: &str) -> StoreError {
-    Part::named("record").damaged(format!("job.{column}"))
+    Record::named("record").damaged(format!("job.{column}"))
 }
 
 fn links(id: JobId) -> BTreeMap<String, String> {

@@ -9,7 +9,7 @@ use crate::{
     error::ApiError,
     queue::Queue,
     store::{Health, Store, StoreError},
-    transfer::Budget,
+    transfer::Limit,
 };
 
 /// How long a probe waits for the store.
@@ -33,9 +33,9 @@ pub struct Service {
     /// Largest mesh file.
     pub max_mesh_bytes: usize,
     /// Bytes of bodies in memory, over all requests.
-    pub received: Budget,
+    pub received: Limit,
     /// Bytes of answers in memory, over all requests.
-    pub sent: Budget,
+    pub sent: Limit,
     /// The folder for uploads until they are read.
     pub(super) data: PathBuf,
 }
@@ -51,8 +51,8 @@ impl Service {
             memory_budget_bytes: config.memory.bytes(),
             max_body_bytes: config.max_body_bytes,
             max_mesh_bytes: config.max_mesh_bytes,
-            received: Budget::new(config.max_received_bytes),
-            sent: Budget::new(config.max_sent_bytes),
+            received: Limit::new(config.max_received_bytes),
+            sent: Limit::new(config.max_sent_bytes),
             data: config.data.clone(),
         }
     }

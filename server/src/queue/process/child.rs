@@ -18,24 +18,17 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use super::{
     super::{
-        ending::{Unsolved, panicked},
+        ending::{NoSolution, panicked},
         report::{Report, Told},
         solving::{read_mesh, solve_and_report},
     },
-    Order, Reply, send, take,
+    Order, Reply, Task, send, take,
 };
 use crate::{run::Solve, store::Parts};
 
 /// What a solver may use beyond its share before the system refuses it memory: its program, buffers, and what the
 /// allocator keeps. The share itself is watched by the solver's own thread, which can say what it needed.
 const MARGIN_BYTES: u64 = 64 << 20;
-
-/// A task of the input.
-struct Task {
-    problem: String,
-    mesh: Option<Vec<u8>>,
-    share: u64,
-}
 
 /// Solves tasks until the input ends.
 pub fn run(solve: Solve) -> io::Result<()> {
@@ -64,22 +57,13 @@ fn read_orders(
 ) -> io::Result<()> {
     let (mut received, mut some) = (vec![], vec![0; 64 << 10]);
     loop {
-        while let Some((order, content)) = take(&mut received)? {
+        while let Some((order, content)) = take(&mut received, u64::MAX)? {
             match order {
                 Order::Stop => stop.store(true, Relaxed),
-                Order::Solve {
-                    problem,
-                    on_mesh,
-                    share,
-                } => {
+                Order::Solve { mut task, on_mesh } => {
                     // an order to stop that came too late was meant for the task before
                     stop.store(false, Relaxed);
-                    let mesh = on_mesh.then_some(content);
-                    let task = Task {
-                        problem,
-                        mesh,
-                        share,
-                    };
+                    task.mesh = on_mesh.then_some(content);
                     tasks.send(task).map_err(io::Error::other)?;
                 }
             }
@@ -108,18 +92,20 @@ fn solve_task(
     };
     let solving = || {
         let mesh = task.mesh.as_deref().map(read_mesh).transpose()?;
-        solve_and_report(&task.problem, mesh, solve, task.share, &mut tell).map_err(Unsolved::from)
+        solve_and_report(&task.problem, mesh, solve, task.share, &mut tell)
+            .map_err(NoSolution::from)
     };
     // what a panic leaves behind is not used again
     let solved = catch_unwind(AssertUnwindSafe(solving));
     sent?;
-    match solved.unwrap_or_else(|panic| Err(Unsolved::Internal(panicked("the solver", &*panic)))) {
+    match solved.unwrap_or_else(|panic| Err(NoSolution::Internal(panicked("the solver", &*panic))))
+    {
         Ok(solved) => {
             send_parts(solved.parts, service)?;
             let (ending, iterations) = (solved.ending, solved.iterations);
             send(service, &Reply::Solved { ending, iterations }, &[])
         }
-        Err(unsolved) => send(service, &Reply::Unsolved(unsolved), &[]),
+        Err(no_solution) => send(service, &Reply::NoSolution(no_solution), &[]),
     }
 }
 

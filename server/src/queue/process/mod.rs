@@ -12,25 +12,30 @@ use std::io::{self, Write};
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use super::ending::Unsolved;
+use super::ending::NoSolution;
 use crate::{event::Payload, memory::Outgrown, store::Ending};
 
 pub use child::run as run_worker_process;
 pub use parent::Processes;
-pub(super) use parent::Task;
 
 /// To a worker process.
 #[derive(Debug, Serialize, Deserialize)]
 enum Order {
-    /// Solve a problem, on this mesh if it refers to a stored one: its content follows.
-    Solve {
-        problem: String,
-        on_mesh: bool,
-        /// Bytes that it may use.
-        share: u64,
-    },
+    /// Solve a problem; if it is on a stored mesh, that follows.
+    Solve { task: Task, on_mesh: bool },
     /// Stop solving, and report the last state.
     Stop,
+}
+
+/// What a worker process is to solve.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Task {
+    pub(super) problem: String,
+    /// The stored mesh that the problem refers to; it follows the order.
+    #[serde(skip)]
+    pub(super) mesh: Option<Vec<u8>>,
+    /// Bytes that it may use.
+    pub(super) share: u64,
 }
 
 /// From a worker process.
@@ -49,7 +54,7 @@ enum Reply {
     /// The parts so far are the result.
     Solved { ending: Ending, iterations: usize },
     /// There is no result.
-    Unsolved(Unsolved),
+    NoSolution(NoSolution),
 }
 
 /// A message begins with its length, and that of the bytes that follow it.
@@ -67,8 +72,12 @@ fn send(out: &mut impl Write, message: &impl Serialize, content: &[u8]) -> io::R
     out.write_all(content)
 }
 
-/// Removes the first message and the bytes that follow it from what was received; none if it is not complete yet.
-fn take<T: DeserializeOwned>(received: &mut Vec<u8>) -> io::Result<Option<(T, Vec<u8>)>> {
+/// Removes the first message and the bytes that follow it from what was received; none if it is not complete yet. One
+/// of more than `longest` bytes is an error: nothing of it is waited for.
+fn take<T: DeserializeOwned>(
+    received: &mut Vec<u8>,
+    longest: u64,
+) -> io::Result<Option<(T, Vec<u8>)>> {
     let length = |header: &[u8]| header.try_into().map(u64::from_le_bytes).ok();
     let lengths = received
         .get(..HEADER)
@@ -78,6 +87,10 @@ fn take<T: DeserializeOwned>(received: &mut Vec<u8>) -> io::Result<Option<(T, Ve
     };
     let begin = (HEADER as u64).saturating_add(message);
     let end = begin.saturating_add(content);
+    if end > longest {
+        let too_long = format!("a message of {end} bytes");
+        return Err(io::Error::new(io::ErrorKind::InvalidData, too_long));
+    }
     if (received.len() as u64) < end {
         return Ok(None);
     }
@@ -102,7 +115,7 @@ mod tests {
         let (mut received, mut messages) = (vec![], vec![]);
         for byte in sent {
             received.push(byte);
-            messages.extend(take::<Reply>(&mut received).unwrap());
+            messages.extend(take::<Reply>(&mut received, 1000).unwrap());
         }
         assert!(received.is_empty());
         let [
@@ -123,9 +136,9 @@ mod tests {
     fn what_is_no_message_is_an_error() {
         let mut received = vec![];
         send(&mut received, &"Nonsense", b"").unwrap();
-        assert!(take::<Reply>(&mut received).is_err());
-        // one of that length never becomes complete
+        assert!(take::<Reply>(&mut received, 1000).is_err());
+        // one of that length would never become complete
         let mut received = vec![0xff; 40];
-        assert!(take::<Reply>(&mut received).unwrap().is_none());
+        assert!(take::<Reply>(&mut received, 1 << 30).is_err());
     }
 }

@@ -18,10 +18,10 @@ use tracing::{info, warn};
 
 use super::{
     super::{
-        ending::{Solved, Unsolved},
+        ending::{NoSolution, Solved},
         report::{Report, Told},
     },
-    Order, Reply, send, take,
+    Order, Reply, Task, send, take,
 };
 use crate::{store::Parts, time::Time};
 
@@ -32,6 +32,8 @@ const PULSE: Duration = Duration::from_millis(20);
 const STOP_GRACE: Duration = Duration::from_millis(750);
 /// How long to wait before one that could not be started is tried again.
 const START_PAUSE: Duration = Duration::from_secs(1);
+/// The longest message beside what follows it: the row of an iteration, a warning, the end of a job.
+const LONGEST_MESSAGE: u64 = 16 << 20;
 /// How long it may leave an order unread.
 const UNREAD: Duration = Duration::from_secs(10);
 
@@ -43,15 +45,6 @@ pub(super) type Start = fn() -> Command;
 pub struct Processes {
     start: Start,
     idle: Mutex<Vec<Process>>,
-}
-
-/// What a worker process is to solve.
-pub(in crate::queue) struct Task {
-    pub(in crate::queue) problem: String,
-    /// The stored mesh that the problem refers to.
-    pub(in crate::queue) mesh: Option<Vec<u8>>,
-    /// Bytes that it may use.
-    pub(in crate::queue) share: u64,
 }
 
 impl Processes {
@@ -79,7 +72,7 @@ impl Processes {
         &self,
         task: Task,
         mut tell: impl FnMut(Told) -> ControlFlow<()>,
-    ) -> Result<Solved, Unsolved> {
+    ) -> Result<Solved, NoSolution> {
         let mut process = self.take(&mut tell)?;
         match process.solve(task, tell) {
             Ok(solved) => {
@@ -87,17 +80,17 @@ impl Processes {
                 solved
             }
             // dropped, and with that killed: the next task gets another one
-            Err(Gone::Unwilling) => {
+            Err(Unusable::Unwilling) => {
                 info!("a worker process did not stop, and was killed");
-                Err(Unsolved::Stopped)
+                Err(NoSolution::Stopped)
             }
-            Err(Gone::Dead(error)) => Err(process.cause_of_death(&error)),
+            Err(Unusable::Dead(error)) => Err(process.cause_of_death(&error)),
         }
     }
 
     /// One that waits, or a new one. The machine may have no process, file or memory left for a while: it is tried again
     /// until the job is to stop.
-    fn take(&self, tell: &mut impl FnMut(Told) -> ControlFlow<()>) -> Result<Process, Unsolved> {
+    fn take(&self, tell: &mut impl FnMut(Told) -> ControlFlow<()>) -> Result<Process, NoSolution> {
         loop {
             let idle = self.idle().pop();
             let process = match idle {
@@ -114,7 +107,7 @@ impl Processes {
             let end = Instant::now() + START_PAUSE;
             while Instant::now() < end {
                 if tell(Told::Nothing).is_break() {
-                    return Err(Unsolved::Stopped);
+                    return Err(NoSolution::Stopped);
                 }
                 std::thread::sleep(PULSE);
             }
@@ -135,20 +128,20 @@ struct Process {
     /// What was received and not used yet.
     received: Vec<u8>,
     /// Reads its standard error; returns how many bytes the system refused, if it died of that.
-    words: Option<JoinHandle<Option<u64>>>,
+    stderr: Option<JoinHandle<Option<u64>>>,
 }
 
 /// Why a process is of no use any more.
-enum Gone {
+enum Unusable {
     /// It did not stop when it was asked to.
     Unwilling,
     /// It died.
     Dead(io::Error),
 }
 
-impl From<io::Error> for Gone {
+impl From<io::Error> for Unusable {
     fn from(error: io::Error) -> Self {
-        Gone::Dead(error)
+        Unusable::Dead(error)
     }
 }
 
@@ -164,39 +157,31 @@ impl Process {
             // Ctrl-C in a terminal is for the service, which then decides about its jobs
             .process_group(0)
             .spawn()?;
-        let words = child
-            .stderr
-            .take()
-            .map(|words| std::thread::spawn(move || log_lines(words)));
+        let stderr = child.stderr.take();
+        let stderr = stderr.map(|stderr| std::thread::spawn(move || log_lines(stderr)));
         Ok(Process {
             child,
             socket,
             received: vec![],
-            words,
+            stderr,
         })
     }
 
     fn solve(
         &mut self,
-        task: Task,
+        mut task: Task,
         mut tell: impl FnMut(Told) -> ControlFlow<()>,
-    ) -> Result<Result<Solved, Unsolved>, Gone> {
-        let Task {
-            problem,
-            mesh,
-            share,
-        } = task;
+    ) -> Result<Result<Solved, NoSolution>, Unusable> {
+        // no part of its result is larger than what it may use
+        let longest = task.share.saturating_add(LONGEST_MESSAGE);
+        let mesh = task.mesh.take();
         let on_mesh = mesh.is_some();
-        let order = Order::Solve {
-            problem,
-            on_mesh,
-            share,
-        };
+        let order = Order::Solve { task, on_mesh };
         send(&mut self.socket, &order, &mesh.unwrap_or_default())?;
         let mut asked: Option<Instant> = None;
         let mut parts = vec![];
         loop {
-            let told = match self.next() {
+            let told = match self.next(longest) {
                 Ok(None) => Told::Nothing,
                 Ok(Some((reply, content))) => match reply {
                     Reply::Event(payload) => Told::Report(Report::Event(Time::now(), payload)),
@@ -217,11 +202,11 @@ impl Process {
                             parts: Parts::from_parts(parts),
                         }));
                     }
-                    Reply::Unsolved(unsolved) => return Ok(Err(unsolved)),
+                    Reply::NoSolution(no_solution) => return Ok(Err(no_solution)),
                 },
                 // its end is known, whatever it died of
-                Err(_) if asked.is_some() => return Err(Gone::Unwilling),
-                Err(error) => return Err(Gone::Dead(error)),
+                Err(_) if asked.is_some() => return Err(Unusable::Unwilling),
+                Err(error) => return Err(Unusable::Dead(error)),
             };
             if tell(told).is_break() && asked.is_none() {
                 asked = Some(Instant::now());
@@ -229,16 +214,16 @@ impl Process {
                 let _ = send(&mut self.socket, &Order::Stop, &[]);
             }
             if asked.is_some_and(|asked| asked.elapsed() > STOP_GRACE) {
-                return Err(Gone::Unwilling);
+                return Err(Unusable::Unwilling);
             }
         }
     }
 
-    /// The next reply; `None`: there has been none for a while.
-    fn next(&mut self) -> io::Result<Option<(Reply, Vec<u8>)>> {
+    /// The next reply, of so many bytes at most; `None`: there has been none for a while.
+    fn next(&mut self, longest: u64) -> io::Result<Option<(Reply, Vec<u8>)>> {
         let mut some = [0; 64 << 10];
         loop {
-            if let Some(reply) = take(&mut self.received)? {
+            if let Some(reply) = take(&mut self.received, longest)? {
                 return Ok(Some(reply));
             }
             match self.socket.read(&mut some) {
@@ -255,18 +240,18 @@ impl Process {
     }
 
     /// Why there is no result of a process that died.
-    fn cause_of_death(mut self, error: &io::Error) -> Unsolved {
+    fn cause_of_death(mut self, error: &io::Error) -> NoSolution {
         use io::ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
         let dead = matches!(error.kind(), UnexpectedEof | ConnectionReset | BrokenPipe);
         if !dead {
             let _ = self.child.kill(); // it does not keep to the protocol
         }
         let status = self.child.wait();
-        let refused = self.words.take().and_then(|words| words.join().ok());
+        let refused = self.stderr.take().and_then(|thread| thread.join().ok());
         if let Some(bytes) = refused.flatten() {
             return SolveError::ResourceExhausted { bytes }.into();
         }
-        Unsolved::Lost(match status {
+        NoSolution::Lost(match status {
             Ok(status) if dead => how_it_ended(status),
             _ => format!("it was killed, since it could not be understood: {error}"),
         })
@@ -283,13 +268,13 @@ impl Drop for Process {
 
 /// Logs what a process prints; returns how many bytes the system refused, which the standard library says before it
 /// aborts.
-fn log_lines(words: ChildStderr) -> Option<u64> {
+fn log_lines(stderr: ChildStderr) -> Option<u64> {
     const LONGEST: u64 = 1 << 10;
-    let mut words = BufReader::new(words);
+    let mut stderr = BufReader::new(stderr);
     let mut refused = None;
     loop {
         let mut line = vec![];
-        match words.by_ref().take(LONGEST).read_until(b'\n', &mut line) {
+        match stderr.by_ref().take(LONGEST).read_until(b'\n', &mut line) {
             Ok(0) | Err(_) => return refused,
             Ok(_) => {
                 let line = String::from_utf8_lossy(&line);

@@ -48,6 +48,28 @@ async fn a_panicking_solver_fails_its_job_and_not_its_worker() {
 }
 
 #[tokio::test]
+async fn a_running_job_whose_record_is_damaged_stops_and_frees_its_worker() {
+    for canceled in [false, true] {
+        let rig = rig(fake::solve_until_stopped).await;
+        rig.queue.start();
+        let damaged = rig.submit().await;
+        rig.until_at_work(&damaged).await;
+        rig.store.damage_job(damaged.key).await;
+        if canceled {
+            let refused = rig.queue.cancel(damaged.key).await;
+            assert!(
+                matches!(refused, Err(StoreError::Damaged(_))),
+                "{refused:?}"
+            );
+        }
+        let next = rig.submit().await;
+        rig.until_at_work(&next).await;
+        let unreadable = rig.store.job(Owners::All, damaged.id).await;
+        assert!(matches!(unreadable, Err(StoreError::Damaged(_))));
+    }
+}
+
+#[tokio::test]
 async fn a_canceled_running_job_keeps_its_last_state() {
     let rig = rig(fake::solve_until_stopped).await;
     rig.queue.start();

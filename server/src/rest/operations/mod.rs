@@ -65,7 +65,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        parameters::{Description, Place},
+        parameters::{Description, Location},
         pb,
     };
 
@@ -154,12 +154,14 @@ mod tests {
         {
             let parts = path.split('/');
             let variables = parts.filter_map(|part| part.strip_prefix('{')?.strip_suffix('}'));
-            let taken = parameters.iter().filter(|one| one.place == Place::Path);
+            let taken = parameters
+                .iter()
+                .filter(|one| one.location == Location::Path);
             assert!(variables.eq(taken.map(|one| one.name)), "{path}");
             let mut names = BTreeSet::new();
-            for Description { place, name, .. } in &parameters {
-                let place: &str = place.into();
-                assert!(names.insert((place, *name)), "{path}: {place} {name}");
+            for Description { location, name, .. } in &parameters {
+                let location: &str = location.into();
+                assert!(names.insert((location, *name)), "{path}: {location} {name}");
             }
         }
     }

@@ -7,7 +7,7 @@ use strum::VariantArray;
 
 use crate::{
     catalog::Code,
-    parameters::{Description, Place},
+    parameters::{Description, Location},
     rest::{
         call::{AppState, Handler, route},
         input::Input,
@@ -213,7 +213,7 @@ impl Operation {
         if self.strict {
             codes.push(Code::UnknownParameter);
         }
-        let in_path = |parameter: &Description| parameter.place == Place::Path;
+        let in_path = |parameter: &Description| parameter.location == Location::Path;
         if !self.parameters.iter().all(in_path) {
             codes.push(Code::BadParameter);
         }

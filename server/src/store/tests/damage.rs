@@ -78,6 +78,13 @@ async fn set(store: &Store, table: &str, row: i64, column: &str, value: &str) {
         .unwrap();
 }
 
+impl Store {
+    /// Changes the record of a job, as a disk may.
+    pub(crate) async fn damage_job(&self, key: i64) {
+        set(self, "job", key, "priority", "0.0 + 1").await;
+    }
+}
+
 #[tokio::test]
 async fn no_column_can_change_unnoticed() {
     let folder = tempfile::tempdir().unwrap();
@@ -235,10 +242,7 @@ async fn a_damaged_result_answers_no_other_job() {
     assert_eq!(accepted.jobs[0].input_hash, "sha256:2");
 }
 
-#[tokio::test]
-async fn a_damaged_job_does_not_stop_the_queue() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = Store::open(folder.path()).await.unwrap();
+async fn submit_three(store: &Store) {
     for input in ["1", "2", "3"] {
         let job = NewJob {
             problem: format!("{{\"n\":{input}}}"),
@@ -249,7 +253,26 @@ async fn a_damaged_job_does_not_stop_the_queue() {
             .await
             .unwrap();
     }
-    set(&store, "job", 1, "priority", "0.0 + 1").await;
+}
+
+#[tokio::test]
+async fn a_damaged_job_does_not_stop_a_change_of_many() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    submit_three(&store).await;
+    store.damage_job(2).await;
+    let canceled = store.cancel_queued(&[1, 2, 3]).await.unwrap();
+    assert_eq!((canceled.seen, canceled.done), (3, 2));
+    let deleted = store.delete_ended(Owners::All, &[1, 2, 3]).await.unwrap();
+    assert_eq!((deleted.seen, deleted.done), (3, 2));
+}
+
+#[tokio::test]
+async fn a_damaged_job_does_not_stop_the_queue() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    submit_three(&store).await;
+    store.damage_job(1).await;
     set(&store, "problem", 2, "body", "'{}'").await;
     let claim = store.claim_next().await.unwrap().0.unwrap();
     assert_eq!(claim.job.key, 3);

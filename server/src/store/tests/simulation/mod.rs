@@ -124,7 +124,7 @@ impl World {
         restarts::copy(empty, &folder);
         restarts::keep_progress(&folder, home.path());
         let store = Store::open_unwatched(&folder).await.unwrap();
-        store.set_budget(BUDGET);
+        store.set_budget(BUDGET, 2);
         World {
             dice: Rng::with_seed(seed),
             store,
