@@ -15,7 +15,7 @@ use crate::{
     listener::{self, Listener},
     queue::{Processes, Queue, Solver},
     rest,
-    store::Store,
+    store::{self, Store, StoreError},
     verbs::Service,
 };
 
@@ -53,24 +53,37 @@ fn worker_process() -> Command {
     command
 }
 
+/// Requeues the jobs, and removes the uploads, that were interrupted when the service last ended. What is left of the
+/// jobs the queue requeues later.
+async fn clean_up(store: &Store) -> store::Result<()> {
+    let interrupted = store.requeue_interrupted().await?;
+    if interrupted > 0 {
+        info!(
+            interrupted,
+            "{interrupted} jobs were interrupted when the service last ended"
+        );
+    }
+    let orphans = store.remove_orphaned_mesh_pieces().await?;
+    if orphans > 0 {
+        info!(
+            orphans,
+            "{orphans} pieces of meshes from interrupted uploads were removed"
+        );
+    }
+    Ok(())
+}
+
 impl App {
     /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
         let store = Store::open(&config.data).await?;
         // Before the listener opens: no client sees a job as running that no worker solves.
-        let interrupted = store.requeue_interrupted().await?;
-        if interrupted > 0 {
-            info!(
-                interrupted,
-                "{interrupted} jobs were interrupted when the service last ended"
-            );
-        }
-        let orphans = store.remove_orphaned_mesh_pieces().await?;
-        if orphans > 0 {
-            info!(
-                orphans,
-                "{orphans} pieces of meshes from interrupted uploads were removed"
-            );
+        match clean_up(&store).await {
+            Ok(()) => {}
+            Err(StoreError::Full) => warn!(
+                "the disk is full: jobs that were interrupted wait again as soon as that can be written"
+            ),
+            Err(error) => return Err(error.into()),
         }
         store.set_budget(config.memory.bytes(), config.workers);
         let solver = match config.isolation {

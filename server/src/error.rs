@@ -50,7 +50,7 @@ pub enum ApiError {
     /// It is not HTTP, or not a message of the contract.
     #[error("{0}")]
     BadRequest(String),
-    /// Nothing more of the body arrived.
+    /// The body arrived too slowly.
     #[error("the body arrived too slowly: nothing for {} s, or less than {} KiB a second", LONGEST_PAUSE.as_secs(), LEAST_RATE >> 10)]
     RequestTimeout,
     /// The address is too long.

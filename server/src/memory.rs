@@ -11,8 +11,10 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-/// What all jobs together may use beyond the budget (bytes), since an estimate is one.
+/// What all jobs together may use beyond the budget (bytes), since an estimate is one; unless they are so many that each
+/// has the least margin.
 const MARGINS: u64 = 128 << 20;
+const LEAST_MARGIN: u64 = 4 << 20;
 
 /// The budget of all running jobs together (bytes).
 #[derive(Debug)]
@@ -31,7 +33,7 @@ impl Budget {
     pub fn new(bytes: u64, jobs: u16) -> Arc<Budget> {
         Arc::new(Budget {
             bytes,
-            margin: MARGINS / u64::from(jobs.max(1)),
+            margin: (MARGINS / u64::from(jobs.max(1))).max(LEAST_MARGIN),
             reserved: Mutex::new(0),
             short: AtomicBool::new(false),
         })

@@ -7,7 +7,7 @@ use tokio::time::Instant;
 /// How long a client may send or read nothing.
 pub const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 /// What a client has to send or read on average (bytes per second), beside one longest pause.
-pub const LEAST_RATE: u64 = 16 << 10;
+pub const LEAST_RATE: u64 = 4 << 10;
 
 /// The progress of one body or answer. Only the time that the client takes counts, and not that of the service.
 #[derive(Debug, Default)]
@@ -68,8 +68,8 @@ mod tests {
         assert!(is_too_slow(1, 1).await);
         assert!(is_too_slow(61, 1 << 30).await);
         assert!(!is_too_slow(59, 1 << 20).await);
-        assert!(!is_too_slow(1, 16 << 10).await);
-        assert!(is_too_slow(2, 16 << 10).await);
+        assert!(!is_too_slow(1, 4 << 10).await);
+        assert!(is_too_slow(2, 4 << 10).await);
     }
 
     #[tokio::test(start_paused = true)]

@@ -66,9 +66,12 @@ impl Limit {
 
     /// Waits for a share; for callers that hold no memory meanwhile.
     pub async fn wait_for(&self, bytes: usize) -> Result<Share, ApiError> {
-        let units = self.large.units(bytes);
-        let permits = self.large.free.clone().acquire_many_owned(units);
-        permits.await.map(Share).map_err(ApiError::internal)
+        self.large.wait_for(self.large.units(bytes)).await
+    }
+
+    /// Whether there is room for one more small answer, before the work for it is done.
+    pub fn has_room(&self) -> bool {
+        self.small.free.available_permits() > 0
     }
 }
 
@@ -85,6 +88,11 @@ impl Room {
     fn take(&self, units: u32) -> Result<Share, ApiError> {
         let permits = self.free.clone().try_acquire_many_owned(units);
         permits.map(Share).map_err(|_| ApiError::Overloaded)
+    }
+
+    async fn wait_for(&self, units: u32) -> Result<Share, ApiError> {
+        let permits = self.free.clone().acquire_many_owned(units);
+        permits.await.map(Share).map_err(ApiError::internal)
     }
 
     fn units(&self, bytes: usize) -> u32 {
@@ -283,10 +291,23 @@ impl HttpBody for CountedBody {
     }
 }
 
-/// The body of an answer whose bytes have their share of the budget until they are sent. `Err`: there is no room. Of a
-/// stream, that is what is ready at once, such as the whole of an answer over gRPC, which does not tell its length; what
-/// produces large streams takes shares for their pieces.
-pub fn with_share(mut body: Body, budget: &Limit) -> Result<Body, ApiError> {
+/// In the extensions of a response: its body has its share already.
+#[derive(Clone, Copy, Debug)]
+pub struct HasShare;
+
+/// What happens to an answer for which there is no room.
+#[derive(Clone, Copy, Debug)]
+pub enum NoRoom {
+    /// It is refused: the client may ask again.
+    Refuse,
+    /// It waits: what it answers was done, and should not be done again.
+    Wait,
+}
+
+/// The body of an answer whose bytes have their share of the limit until they are sent. Of a stream, that is what is
+/// ready at once, such as the whole of an answer over gRPC, which does not tell its length; what produces large streams
+/// takes shares for their pieces.
+pub async fn with_share(mut body: Body, limit: &Limit, no_room: NoRoom) -> Result<Body, ApiError> {
     let exact = body.size_hint().exact();
     let mut first = None;
     let bytes = match exact {
@@ -303,10 +324,14 @@ pub fn with_share(mut body: Body, budget: &Limit) -> Result<Body, ApiError> {
             data.map_or(0, Bytes::len)
         }
     };
-    let share = match bytes {
-        0 => None,
-        bytes if bytes <= SMALL_SENT => Some(budget.small.take(budget.small.units(bytes))?),
-        bytes => Some(budget.take(bytes)?),
+    let room = match bytes {
+        ..=SMALL_SENT => &limit.small,
+        _ => &limit.large,
+    };
+    let share = match no_room {
+        _ if bytes == 0 => None,
+        NoRoom::Refuse => Some(room.take(room.units(bytes))?),
+        NoRoom::Wait => Some(room.wait_for(room.units(bytes)).await?),
     };
     let share = share.map(Arc::new);
     Ok(Body::new(Shared { first, body, share }))
@@ -405,18 +430,22 @@ mod tests {
     async fn an_answer_has_its_share_as_long_as_any_of_its_bytes_is_in_memory() {
         let budget = Limit::new(200 << 10);
         let large = || Body::from(vec![7; 150 << 10]);
-        let first = with_share(large(), &budget).unwrap();
+        let first = with_share(large(), &budget, NoRoom::Refuse).await.unwrap();
         assert!(matches!(
-            with_share(large(), &budget),
+            with_share(large(), &budget, NoRoom::Refuse).await,
             Err(ApiError::Overloaded)
         ));
-        assert!(with_share(Body::from(vec![7; 10 << 10]), &budget).is_ok());
+        assert!(
+            with_share(Body::from(vec![7; 10 << 10]), &budget, NoRoom::Refuse)
+                .await
+                .is_ok()
+        );
         let mut pieces = first.into_data_stream();
         let last = pieces.next().await.unwrap().unwrap().slice(1..2);
         drop(pieces);
-        assert!(with_share(large(), &budget).is_err());
+        assert!(with_share(large(), &budget, NoRoom::Refuse).await.is_err());
         drop(last);
-        assert!(with_share(large(), &budget).is_ok());
+        assert!(with_share(large(), &budget, NoRoom::Refuse).await.is_ok());
     }
 
     #[tokio::test]
@@ -424,20 +453,25 @@ mod tests {
         let limit = Limit::new(200 << 10);
         let ready = || {
             let frame = Ok::<_, axum::Error>(Bytes::from(vec![7; 150 << 10]));
-            with_share(
-                Body::from_stream(futures_util::stream::iter([frame])),
-                &limit,
-            )
+            Body::from_stream(futures_util::stream::iter([frame]))
         };
-        let first = ready().unwrap();
-        assert!(matches!(ready(), Err(ApiError::Overloaded)));
-        let small = || with_share(Body::from(vec![7; SMALL_SENT]), &limit);
-        let held: Vec<Body> = std::iter::from_fn(|| small().ok()).collect();
+        let refuse = |body| with_share(body, &limit, NoRoom::Refuse);
+        let first = refuse(ready()).await.unwrap();
+        assert!(matches!(refuse(ready()).await, Err(ApiError::Overloaded)));
+        let small = || Body::from(vec![7; SMALL_SENT]);
+        let mut held = vec![];
+        while let Ok(body) = refuse(small()).await {
+            held.push(body);
+        }
         assert_eq!(held.len(), SMALL_BYTES / SMALL_SENT);
+        assert!(!limit.has_room());
         assert_eq!(first.collect().await.unwrap().to_bytes().len(), 150 << 10);
-        assert!(ready().is_ok());
+        assert!(refuse(ready()).await.is_ok());
+        // what was done is answered, as soon as there is room
+        let mut waits = std::pin::pin!(with_share(small(), &limit, NoRoom::Wait));
+        assert!((&mut waits).now_or_never().is_none());
         drop(held);
-        assert!(small().is_ok());
+        assert!(waits.await.is_ok() && limit.has_room());
     }
 
     #[tokio::test(start_paused = true)]

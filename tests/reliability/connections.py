@@ -2,7 +2,7 @@
 
     connections.py [--soak]
 
-A server that may open 300 files is given more idle connections than that; a bystander opens new ones meanwhile and is
+A server that may open 300 files (--soak: 1,700) is given three times as many idle connections; a bystander opens new ones meanwhile and is
 answered at once. Heads and bodies of requests that stop half-way are closed after 30 s and 60 s, idle connections after
 75 s. Clients that vanish in the middle of anything leave nothing behind, and cancel nothing.
 """
@@ -14,7 +14,7 @@ import time
 from attack import MIB, PREFACE, SOAK, Attacked, Bystander, check, equal, example, get, settings
 from outside import submission
 
-FILES = 300
+FILES = 1700 if SOAK else 300
 HALF = 2000 if SOAK else 100
 VANISHING = 10000 if SOAK else 1000
 HEAD_S, BODY_S, IDLE_S = 30, 60, 75
@@ -56,7 +56,10 @@ def half_requests(server):
         "HTTP/2 without a request": (PREFACE + settings(), HEAD_S),
     }
     if SOAK:
+        waiting = server.submit(example())  # the queue is paused
+        unread = get("/v1/jobs/" + server.finished_job(), 1) + get("/v1/jobs/%s/events" % waiting, 3)
         kinds.update({
+            "an answer of which one byte is read, beside a stream": (PREFACE + settings(window=1) + unread, BODY_S),
             "half a body": (HEAD, BODY_S),
             "idle after an answer": (b"GET /livez HTTP/1.1\r\nhost: x\r\n\r\n", IDLE_S),
             "idle after an answer over HTTP/2": (PREFACE + settings() + get("/livez", 1), IDLE_S),

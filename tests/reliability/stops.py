@@ -132,34 +132,36 @@ class Load:
             self.failure = error
 
 
-def send(server, number):
+def send(server, number, workers):
     """A signal to the service and its worker processes, those first."""
-    for pid in (*children(server.process.pid), server.process.pid):
+    pids = children(server.process.pid)
+    check(len(pids) >= workers or server.process.poll() is not None, "%d worker processes" % len(pids))
+    for pid in (*pids, server.process.pid):
         with contextlib.suppress(ProcessLookupError):  # it has ended
             os.kill(pid, number)
 
 
-def stop(server, load, dice):
+def stop(server, load, dice, workers):
     """Seconds until it had ended."""
     began = time.monotonic()
     load.stopping_until = began + GRACE_S + 10
     kind = dice.choice(("once", "once", "twice", "at once twice", "hangup"))
     if kind == "hangup":
-        send(server, signal.SIGHUP)
+        send(server, signal.SIGHUP, workers)
         time.sleep(0.02)
         check(server.process.poll() is None, "SIGHUP ended it")
-    send(server, signal.SIGTERM)
+    send(server, signal.SIGTERM, workers)
     if kind.endswith("twice"):
         if kind == "twice":
             time.sleep(dice.uniform(0, 0.05))
-        send(server, signal.SIGTERM)
+        send(server, signal.SIGTERM, 0)
     equal(server.process.wait(timeout=GRACE_S + 20), 0, "exit code after SIGTERM (%s)" % kind)
     took = time.monotonic() - began
     check(took <= GRACE_S + 1, "it ended only %.2f s after SIGTERM (%s)" % (took, kind))
     return took
 
 
-async def stop_under_load(server, dice, stops):
+async def stop_under_load(server, dice, stops, workers):
     load, loop = Load(server), asyncio.get_running_loop()
     long = [server.submit(talkative(**LONG), priority=5) for _ in range(2)]
     threads = [threading.Thread(target=load.follow_grpc, args=(job,), daemon=True) for job in long]
@@ -173,7 +175,7 @@ async def stop_under_load(server, dice, stops):
         for client in ended:
             client.result()
         check(load.failure is None, "gRPC: %r" % load.failure)
-        times.append(await loop.run_in_executor(None, stop, server, load, dice))
+        times.append(await loop.run_in_executor(None, stop, server, load, dice, workers))
         check_database(server)
         await loop.run_in_executor(None, server.start)
         load.stopping_until = time.monotonic() + 0.3  # whoever asked the old one hears of it a little later
@@ -188,7 +190,7 @@ async def stop_under_load(server, dice, stops):
 def attack(isolation, stops, dice):
     """Stops of a server; what was seen."""
     with Attacked("--workers", "2", "--grace-s", str(GRACE_S), "--isolation", isolation) as server:
-        load, times = asyncio.run(stop_under_load(server, dice, stops))
+        load, times = asyncio.run(stop_under_load(server, dice, stops, 2 if isolation == "process" else 0))
         end = time.monotonic() + 120
         while any(job["status"] not in TERMINAL for job in server.every_job()):
             check(time.monotonic() < end, "jobs that never end")

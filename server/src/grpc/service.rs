@@ -20,6 +20,7 @@ use crate::{
     job::Job,
     pb::{self, job_service_server::JobService},
     store::PIECE_BYTES,
+    transfer::HasShare,
     verbs::{
         Service,
         bulk::{self, BulkResult},
@@ -264,6 +265,7 @@ impl JobService for Grpc {
                 );
             }
         };
+        let mut has_share = false;
         let (pieces, total_bytes, sha256) = if format == Format::Json {
             let fields = fields::fields(&self.service, &caller, id).await?;
             let info = fields.info.clone();
@@ -276,6 +278,7 @@ impl JobService for Grpc {
             check_offset(offset, total)?;
             let digest = Sha256::digest(&bytes).to_vec();
             let share = self.service.sent.take(bytes.len())?;
+            has_share = true;
             let pieces = async_stream::stream! {
                 let _share = share; // as long as the file is in memory
                 for piece in bytes[offset as usize..].chunks(PIECE_BYTES) {
@@ -296,7 +299,11 @@ impl JobService for Grpc {
                 sha256: sha256.clone(),
             })
         });
-        Ok(Response::new(chunks.boxed()))
+        let mut response: Response<Self::StreamResultStream> = Response::new(chunks.boxed());
+        if has_share {
+            response.extensions_mut().insert(HasShare);
+        }
+        Ok(response)
     }
 
     async fn cancel_jobs(

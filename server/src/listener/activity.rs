@@ -6,6 +6,7 @@ use std::{
     time::Duration,
 };
 
+use axum::body::Bytes;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
@@ -29,7 +30,7 @@ pub(super) struct Activity {
 #[derive(Debug)]
 struct State {
     /// The requests that are not answered completely, and how fast their answers are read.
-    under_way: HashMap<u64, Arc<Mutex<Pace>>>,
+    under_way: HashMap<u64, Arc<Mutex<Delivery>>>,
     last: u64,
     /// Since when no request has been under way.
     idle_since: Instant,
@@ -37,14 +38,26 @@ struct State {
     deadline: Instant,
 }
 
-/// A request under way, until its answer is sent or given up.
+/// A request under way, until its answer is sent to the last byte or given up.
 #[derive(Debug)]
 pub(super) struct UnderWay {
     activity: Arc<Activity>,
     number: u64,
-    pace: Arc<Mutex<Pace>>,
-    /// Bytes of the piece of the answer that waits to be sent.
+    delivery: Arc<Mutex<Delivery>>,
+}
+
+/// How an answer is read.
+#[derive(Debug, Default)]
+struct Delivery {
+    pace: Pace,
+    /// Pieces that wait to be sent.
     waiting: usize,
+}
+
+/// A piece of an answer. It is dropped when it is sent, or nobody wants it any more.
+struct Piece {
+    bytes: Bytes,
+    under_way: Arc<UnderWay>,
 }
 
 impl Activity {
@@ -65,13 +78,12 @@ impl Activity {
     pub(super) fn begin(self: &Arc<Self>) -> UnderWay {
         let mut state = self.state();
         state.last += 1;
-        let (number, pace) = (state.last, Arc::<Mutex<Pace>>::default());
-        state.under_way.insert(number, pace.clone());
+        let (number, delivery) = (state.last, Arc::<Mutex<Delivery>>::default());
+        state.under_way.insert(number, delivery.clone());
         UnderWay {
             activity: self.clone(),
             number,
-            pace,
-            waiting: 0,
+            delivery,
         }
     }
 
@@ -97,7 +109,7 @@ impl Activity {
 
     /// Returns when the client reads an answer too slowly.
     pub(super) async fn is_read_too_slowly(&self) {
-        let slow = |pace: &Arc<Mutex<Pace>>| locked(pace).is_too_slow();
+        let slow = |delivery: &Arc<Mutex<Delivery>>| locked(delivery).pace.is_too_slow();
         self.until(|state, _| state.under_way.values().any(slow))
             .await;
     }
@@ -129,16 +141,30 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl UnderWay {
-    /// A piece of the answer waits to be sent.
-    pub(super) fn delivers(&mut self, bytes: usize) {
-        self.waiting = bytes;
-        locked(&self.pace).wait();
+    /// Bytes of the answer that wait to be sent from now on: until then the request is under way, though hyper may have
+    /// dropped the body.
+    pub(super) fn deliver(self: &Arc<Self>, bytes: Bytes) -> Bytes {
+        let mut delivery = locked(&self.delivery);
+        delivery.waiting += 1;
+        delivery.pace.wait();
+        let under_way = self.clone();
+        Bytes::from_owner(Piece { bytes, under_way })
     }
+}
 
-    /// All pieces so far are sent, or soon will be: the next one is asked for.
-    pub(super) fn is_asked(&mut self) {
-        if self.waiting > 0 {
-            locked(&self.pace).advance(std::mem::take(&mut self.waiting));
+impl AsRef<[u8]> for Piece {
+    fn as_ref(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+impl Drop for Piece {
+    fn drop(&mut self) {
+        let mut delivery = locked(&self.under_way.delivery);
+        delivery.pace.advance(self.bytes.len());
+        delivery.waiting -= 1;
+        if delivery.waiting > 0 {
+            delivery.pace.wait();
         }
     }
 }
@@ -184,12 +210,13 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn an_answer_that_nobody_reads_ends_the_connection() {
         let activity = Activity::new();
-        let mut request = activity.begin();
+        let request = Arc::new(activity.begin());
         assert!(timeout(LONG, activity.is_read_too_slowly()).await.is_err());
-        request.delivers(1 << 10);
-        request.is_asked();
+        drop(request.deliver(Bytes::from_static(b"sent")));
         assert!(timeout(LONG, activity.is_read_too_slowly()).await.is_err());
-        request.delivers(1 << 10);
+        let piece = request.deliver(Bytes::from_static(b"waits"));
+        // hyper drops the body when it has taken the last piece
+        drop(request);
         assert!(
             timeout(2 * SHORT, activity.is_read_too_slowly())
                 .await
@@ -200,5 +227,7 @@ mod tests {
                 .await
                 .is_ok()
         );
+        drop(piece);
+        assert!(activity.idle_since().is_some());
     }
 }

@@ -115,7 +115,7 @@ fn answer(
     reserved: bool,
     activity: &Arc<Activity>,
 ) -> impl Future<Output = Result<Response<Sent>, Infallible>> + use<> {
-    let under_way = activity.begin();
+    let under_way = Arc::new(activity.begin());
     async move {
         let response = match reserved && !rest::is_probe(request.uri().path()) {
             true => rest::refuse(&request, ApiError::Overloaded),
@@ -132,12 +132,12 @@ fn answer(
     }
 }
 
-/// The body of an answer, in pieces whose progress can be seen; with its end the request is no longer under way.
+/// The body of an answer, in pieces whose progress can be seen.
 struct Sent {
     body: Body,
     /// What was taken from `body` and not sent yet.
     rest: Bytes,
-    under_way: UnderWay,
+    under_way: Arc<UnderWay>,
 }
 
 impl HttpBody for Sent {
@@ -148,7 +148,6 @@ impl HttpBody for Sent {
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        self.under_way.is_asked();
         if self.rest.is_empty() {
             match Pin::new(&mut self.body).poll_frame(context) {
                 Poll::Ready(Some(Ok(frame))) => match frame.into_data() {
@@ -159,8 +158,10 @@ impl HttpBody for Sent {
             }
         }
         let length = self.rest.len().min(PIECE_BYTES);
-        let piece = self.rest.split_to(length);
-        self.under_way.delivers(length);
+        let mut piece = self.rest.split_to(length);
+        if length > 0 {
+            piece = self.under_way.deliver(piece);
+        }
         Poll::Ready(Some(Ok(Frame::data(piece))))
     }
 

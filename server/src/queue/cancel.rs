@@ -29,6 +29,11 @@ impl Queue {
             (Err(StoreError::Full), Some(running)) => CancelOutcome::Requested {
                 attempt: running.attempt,
             },
+            // nothing can end it, but its solver need not go on
+            (Err(error), Some(running)) if error.is_damage_of(key) => {
+                running.stop(StopReason::Unwanted);
+                return Err(error);
+            }
             (requested, _) => requested?,
         };
         if let CancelOutcome::Requested { attempt } = outcome {
@@ -82,7 +87,8 @@ impl Queue {
                         "job canceled, and its solver has not stopped yet: its worker stays busy"
                     );
                 }
-                Ok(false) | Err(StoreError::Damaged(_)) => return,
+                Ok(false) => return,
+                Err(cause) if cause.is_damage_of(key) => return,
                 Err(cause) => {
                     error!(job.key = key, %cause, "job could not be canceled yet: {cause}")
                 }

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     failpoint::{self, Point},
-    store::{Accepted, Claim, Result, StoreError, Submission},
+    store::{Accepted, Claim, Result, Submission},
     time::Time,
 };
 
@@ -134,7 +134,8 @@ impl Queue {
         Ok(running)
     }
 
-    /// Requeues jobs that were claimed, but never reached a worker: what was to give them to it has panicked.
+    /// Requeues jobs that have no worker: what was to give them to one has panicked, or the disk was full when the
+    /// service that solved them ended, and when this one began.
     async fn requeue_lost(&self) -> Result<()> {
         if self.lost().await?.is_empty() {
             return Ok(()); // nearly always
@@ -144,15 +145,15 @@ impl Queue {
             return Ok(()); // they are requeued by that
         }
         for (key, attempt) in self.lost().await? {
-            let how = "it was claimed, but reached no worker";
+            let how = "it was left without a worker";
             let changed = match self.store.requeue_lost(key, attempt, how).await {
                 Ok(changed) => changed,
-                Err(StoreError::Damaged(_)) => continue, // logged, once; `doctor` names it
+                Err(cause) if cause.is_damage_of(key) => continue, // logged, once; `doctor` names it
                 Err(cause) => return Err(cause),
             };
             error!(
                 job.key = key,
-                attempt, "a job was claimed, and reached no worker: it waits again, or has ended"
+                attempt, "a job was left without a worker: it waits again, or has ended"
             );
             self.announce(&changed);
             self.wake.notify_one();

@@ -81,8 +81,8 @@ async fn store_with_retries(
     loop {
         let cause = match store_batch(queue, job, running, batch, progress).await {
             Ok(stored) => return stored,
-            // it is logged, under an incident; another attempt would find the same
-            Err(StoreError::Damaged(_)) => return false,
+            // another attempt would find the same
+            Err(cause) if cause.is_damage_of(job.key) => return false,
             Err(cause) => cause,
         };
         warn!(job.id = %job.id, %cause, "events of job {} could not be stored yet: {cause}", job.id);

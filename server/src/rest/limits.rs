@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use axum::{
     extract::{Request, State},
-    http::{Version, header},
+    http::{Method, Version, header},
     middleware::Next,
     response::Response,
 };
@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     error::ApiError,
-    transfer::{Received, counted, with_least_pace, with_share},
+    transfer::{HasShare, NoRoom, Received, counted, with_least_pace, with_share},
     verbs::Service,
 };
 
@@ -35,6 +35,14 @@ pub(super) async fn limits(
     if let Err(error) = check_host(&request) {
         return refusal(grpc, &path, error);
     }
+    // its answer would be refused when the work is done
+    if !is_probe(&path) && !service.sent.has_room() {
+        return refusal(grpc, &path, ApiError::Overloaded);
+    }
+    let no_room = match only_reads(grpc, request.method(), &path) {
+        true => NoRoom::Refuse,
+        false => NoRoom::Wait,
+    };
     let received = Received::new(&service.received);
     let (mut parts, body) = request.into_parts();
     let mut body = with_least_pace(body);
@@ -50,12 +58,23 @@ pub(super) async fn limits(
         note_status(&status, &path);
     }
     let (parts, body) = response.into_parts();
-    if is_probe(&path) {
-        return Response::from_parts(parts, body); // also when nothing else finds room
+    if is_probe(&path) || parts.extensions.get::<HasShare>().is_some() {
+        return Response::from_parts(parts, body);
     }
-    match with_share(body, &service.sent) {
+    match with_share(body, &service.sent, no_room).await {
         Ok(body) => Response::from_parts(parts, body),
         Err(error) => refusal(grpc, &path, error),
+    }
+}
+
+/// Whether a request changes nothing, so that it may be made again.
+fn only_reads(grpc: bool, method: &Method, path: &str) -> bool {
+    const READING: [&str; 7] = [
+        "Get", "List", "Count", "Wait", "Watch", "Stream", "Validate",
+    ];
+    match path.strip_prefix("/signorini.v1.JobService/") {
+        Some(name) => READING.iter().any(|prefix| name.starts_with(prefix)),
+        None => grpc || method.is_safe() || path == "/v1/problems/validate",
     }
 }
 

@@ -104,7 +104,7 @@ pub(super) async fn proto(_: Call) -> Result<impl IntoResponse, ApiError> {
 
 /// Whether a request asks for one of the probes, which are answered even if all connections are busy.
 pub fn is_probe(path: &str) -> bool {
-    matches!(path, "/livez" | "/readyz")
+    matches!(path, "/livez" | "/readyz" | "/grpc.health.v1.Health/Check")
 }
 
 /// The process is alive.

@@ -40,7 +40,7 @@ impl Store {
         for key in keys {
             let found = find(change.sql(), *key).await;
             // a damaged one stays as it is
-            match change.unless_damaged(found).await?.flatten() {
+            match change.unless_damage_of(*key, found).await?.flatten() {
                 Some(job) if job.status == Status::Queued => {
                     end(&mut change, &job, &Ending::canceled()).await?;
                     batch.done += 1;
@@ -68,7 +68,7 @@ impl Store {
         let (mut batch, start) = (Batch::default(), Instant::now());
         for key in keys {
             let deletion = delete(&mut change, owners, *key).await;
-            let deletion = change.unless_damaged(deletion).await?;
+            let deletion = change.unless_damage_of(*key, deletion).await?;
             batch.done += usize::from(deletion == Some(Deletion::Deleted));
             batch.seen += 1;
             if start.elapsed() >= LONGEST {

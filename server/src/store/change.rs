@@ -132,6 +132,15 @@ impl Change<'_> {
         }
     }
 
+    /// What was read of this job, unless a record of it is damaged, which is noted. If it is the database, it is an error:
+    /// the change may be half done.
+    pub(super) async fn unless_damage_of<T>(&self, key: i64, read: Result<T>) -> Result<Option<T>> {
+        match read {
+            Err(error) if !error.is_damage_of(key) => Err(error),
+            read => self.unless_damaged(read).await,
+        }
+    }
+
     /// How many parts were found damaged so far.
     pub(super) fn damaged_parts(&self) -> usize {
         self.store.damages.summary().0

@@ -115,14 +115,8 @@ pub(super) async fn coalesce_into_running(change: &mut Change<'_>, job: &Job) ->
     if there + more >= MOST_COALESCED {
         return Ok(false);
     }
-    let moved: Vec<i64> = sqlx::query_scalar(
-        "update job set coalesced_into = ?1, checksum = null where id = ?2 or coalesced_into = ?2 returning id",
-    )
-    .bind(primary)
-    .bind(job.key)
-    .fetch_all(change.sql())
-    .await?;
-    moved.into_iter().for_each(|key| change.touched(key));
+    let coalesced = coalesced_jobs(change, job.key).await?;
+    coalesce(change, coalesced.iter().chain([job]), primary).await?;
     let (priority, key) = (job.priority, job.key);
     change.move_job(Move::Leave { priority, key });
     change.move_job(Move::Attach);
@@ -130,7 +124,7 @@ pub(super) async fn coalesce_into_running(change: &mut Change<'_>, job: &Job) ->
 }
 
 /// The jobs coalesced into this one, in the order in which they would be started, but for damaged ones.
-async fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Vec<Job>> {
+pub(super) async fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Vec<Job>> {
     let rows = sqlx::query("select * from job where coalesced_into = ? order by priority desc, id")
         .bind(primary)
         .fetch_all(change.sql())
@@ -174,14 +168,24 @@ pub(super) async fn replace_if_outranked(
 /// Lets a job wait for a worker in place of its primary, and coalesces the other jobs of that primary into it.
 async fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
     detach(change, job, job.priority).await?;
-    let moved: Vec<i64> = sqlx::query_scalar(
-        "update job set coalesced_into = ?, checksum = null where coalesced_into = ? returning id",
-    )
-    .bind(job.key)
-    .bind(primary)
-    .fetch_all(change.sql())
-    .await?;
-    moved.into_iter().for_each(|key| change.touched(key));
+    let others = coalesced_jobs(change, primary).await?;
+    coalesce(change, others.iter(), job.key).await
+}
+
+/// Coalesces these jobs, which are not damaged, into this primary.
+async fn coalesce(
+    change: &mut Change<'_>,
+    jobs: impl Iterator<Item = &Job>,
+    primary: i64,
+) -> Result<()> {
+    for job in jobs {
+        sqlx::query("update job set coalesced_into = ?, checksum = null where id = ?")
+            .bind(primary)
+            .bind(job.key)
+            .execute(change.sql())
+            .await?;
+        change.touched(job.key);
+    }
     Ok(())
 }
 

@@ -173,6 +173,12 @@ impl From<sqlx::Error> for StoreError {
 }
 
 impl StoreError {
+    /// Whether a record of this job is damaged, so that reading it once more would find the same; not so if a disk or the
+    /// database has failed, of which nobody knows what it concerns.
+    pub fn is_damage_of(&self, key: i64) -> bool {
+        matches!(self, StoreError::Damaged(damage) if damage.record.job == Some(key))
+    }
+
     /// The same error for another submission of the same transaction.
     pub(super) fn for_another(&self) -> StoreError {
         match self {

@@ -35,7 +35,7 @@ impl Store {
     ) -> Result<bool> {
         let mut tx = self.begin().await?;
         // the row is read whole, so that a damaged one is not given a new checksum below
-        let job = find(&mut tx, key).await?;
+        let job = self.damages.noting(find(&mut tx, key)).await?;
         if !job.is_some_and(|job| job.status == Status::Running && job.attempt == attempt) {
             return Ok(false);
         }

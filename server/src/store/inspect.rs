@@ -102,14 +102,11 @@ impl Report {
             Err(error) => self.finding("database", &error.into()),
         }
         let mut last = last_key(source).await;
-        let mut listed = vec![];
-        if last > MOST_NUMBERS {
-            last = MOST_NUMBERS;
-            match keys_after(source, last).await {
-                Ok(keys) => listed = keys,
-                Err(error) => self.finding("jobs", &error),
-            }
-        }
+        let listed = keys_after(source, MOST_NUMBERS).await;
+        let listed = listed.unwrap_or_else(|error| {
+            self.finding("jobs", &error);
+            vec![]
+        });
         let mut writing: Option<Writing> = None;
         for key in (1..=last).chain(listed) {
             let Some(job) = self.check_job(source, key).await else {
@@ -248,15 +245,16 @@ async fn keys_after(source: &mut SqliteConnection, key: i64) -> Result<Vec<i64>>
     Ok(keys.bind(key).fetch_all(source).await?)
 }
 
-/// The highest number of a job that is found anywhere.
+/// The highest number of a job up to [`MOST_NUMBERS`] that is found anywhere.
 async fn last_key(source: &mut SqliteConnection) -> i64 {
     let mut last = 0;
     for statement in [
-        "select seq from sqlite_sequence where name = 'job'",
-        "select max(id) from job",
-        "select max(job_id) from event",
+        "select seq from sqlite_sequence where name = 'job' and seq <= ?",
+        "select max(id) from job where id <= ?",
+        "select max(job_id) from event where job_id <= ?",
     ] {
         let found: Option<Option<i64>> = sqlx::query_scalar(statement)
+            .bind(MOST_NUMBERS)
             .fetch_optional(&mut *source)
             .await
             .ok()

@@ -131,17 +131,18 @@ async fn requeue(change: &mut Change<'_>, job: &Job, reason: Requeue) -> Result<
         .execute(change.sql())
         .await?;
     // its time in the queue begins again, and that of the jobs coalesced into it
-    let waiting_again: Vec<i64> = sqlx::query_scalar(
-        "update job set expires_at = ?1 + cast(queue_ttl_s * 1e6 as integer), checksum = null
-         where id = ?2 or coalesced_into = ?2 returning id",
-    )
-    .bind(change.now().micros())
-    .bind(job.key)
-    .fetch_all(change.sql())
-    .await?;
-    waiting_again
-        .into_iter()
-        .for_each(|key| change.touched(key));
+    let coalesced = coalescing::coalesced_jobs(change, job.key).await?;
+    let now = change.now().micros();
+    for key in coalesced.iter().map(|job| job.key).chain([job.key]) {
+        sqlx::query(
+            "update job set expires_at = ? + cast(queue_ttl_s * 1e6 as integer), checksum = null where id = ?",
+        )
+        .bind(now)
+        .bind(key)
+        .execute(change.sql())
+        .await?;
+        change.touched(key);
+    }
     // it no longer runs: a coalesced job of higher priority does not have to wait for it
     coalescing::replace_if_outranked(change, job.key, job.priority).await?;
     let requeued = [(change.now(), Payload::requeued(reason))];

@@ -33,6 +33,7 @@ const MARGIN_BYTES: u64 = 64 << 20;
 /// Solves tasks until the input ends.
 pub fn run(solve: Solve) -> io::Result<()> {
     let mut service = UnixStream::from(io::stdin().as_fd().try_clone_to_owned()?);
+    send(&mut service, &Reply::Ready, &[])?;
     let orders = service.try_clone()?;
     let stop = Arc::new(AtomicBool::new(false));
     let (sender, tasks) = mpsc::channel();

@@ -41,6 +41,8 @@ pub(super) struct Task {
 /// From a worker process.
 #[derive(Debug, Serialize, Deserialize)]
 enum Reply {
+    /// It has begun, and waits for a task.
+    Ready,
     /// An event. The service notes the time: clocks of processes may differ.
     Event(Payload),
     /// There is one load level on one grid.

@@ -9,7 +9,7 @@ use std::{
     },
     process::{Child, ChildStderr, Command, ExitStatus, Stdio},
     sync::{Mutex, MutexGuard, PoisonError},
-    thread::JoinHandle,
+    thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
@@ -30,6 +30,8 @@ const PULSE: Duration = Duration::from_millis(20);
 /// How long a process may take to stop when it is asked to; then it is killed. A solver takes less (see `Breaks` in
 /// `solver`), and its worker is free a second after the end of the job.
 const STOP_GRACE: Duration = Duration::from_millis(750);
+/// How long one may take to start; on a busy machine it takes some ten milliseconds.
+const LONGEST_START: Duration = Duration::from_secs(10);
 /// How long to wait before one that could not be started is tried again.
 const START_PAUSE: Duration = Duration::from_secs(1);
 /// The longest message beside what follows it: the row of an iteration, a warning, the end of a job.
@@ -58,8 +60,10 @@ impl Processes {
 
     /// Starts some, so that the first tasks need not wait for them.
     pub(in crate::queue) fn prepare(&self, count: u16) {
-        for _ in 0..count {
-            match Process::start(self.start) {
+        // they start at the same time
+        let spawned: Vec<_> = (0..count).map(|_| Process::spawn(self.start)).collect();
+        for process in spawned {
+            match process.and_then(Process::ready) {
                 Ok(process) => self.idle().push(process),
                 // the first job tries again, and tells it
                 Err(error) => return warn!(%error, "a worker process cannot be started: {error}"),
@@ -98,7 +102,7 @@ impl Processes {
                     Ok(None) => Ok(process),
                     _ => continue, // it was killed meanwhile
                 },
-                None => Process::start(self.start),
+                None => Process::spawn(self.start).and_then(Process::ready),
             };
             match process {
                 Ok(process) => return Ok(process),
@@ -109,7 +113,7 @@ impl Processes {
                 if tell(Told::Nothing).is_break() {
                     return Err(NoSolution::Stopped);
                 }
-                std::thread::sleep(PULSE);
+                thread::sleep(PULSE);
             }
         }
     }
@@ -146,7 +150,7 @@ impl From<io::Error> for Unusable {
 }
 
 impl Process {
-    fn start(start: Start) -> io::Result<Process> {
+    fn spawn(start: Start) -> io::Result<Process> {
         let (socket, other) = UnixStream::pair()?;
         socket.set_read_timeout(Some(PULSE))?;
         socket.set_write_timeout(Some(UNREAD))?;
@@ -158,13 +162,31 @@ impl Process {
             .process_group(0)
             .spawn()?;
         let stderr = child.stderr.take();
-        let stderr = stderr.map(|stderr| std::thread::spawn(move || log_lines(stderr)));
-        Ok(Process {
+        // whatever fails from here on, the child is killed
+        let mut process = Process {
             child,
             socket,
             received: vec![],
-            stderr,
-        })
+            stderr: None,
+        };
+        if let Some(stderr) = stderr {
+            let thread = thread::Builder::new().spawn(move || log_lines(stderr))?;
+            process.stderr = Some(thread);
+        }
+        Ok(process)
+    }
+
+    /// Waits until it is ready: before, a signal that is meant for the service would end it.
+    fn ready(mut self) -> io::Result<Process> {
+        let began = Instant::now();
+        while began.elapsed() < LONGEST_START {
+            match self.next(LONGEST_MESSAGE)? {
+                Some((Reply::Ready, _)) => return Ok(self),
+                Some(_) => return Err(io::Error::other("it does not say that it is ready")),
+                None => {}
+            }
+        }
+        Err(io::ErrorKind::TimedOut.into())
     }
 
     fn solve(
@@ -202,6 +224,7 @@ impl Process {
                             parts: Parts::from_parts(parts),
                         }));
                     }
+                    Reply::Ready => continue,
                     Reply::NoSolution(no_solution) => return Ok(Err(no_solution)),
                 },
                 // its end is known, whatever it died of
