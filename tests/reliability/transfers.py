@@ -213,7 +213,7 @@ def slow_readers(server, job):
 def larger_than_the_limit():
     """An answer that is larger than what all may take is sent alone."""
     with Attacked("--max-sent-bytes", str(1 << 16)) as server:
-        job = server.finished_job()
+        job = server.finished(server.submit(example(refine=3)))["id"]
         equal(server.call("GET", "/v1/jobs/%s/fields?format=vtu" % job).status, 200, "a large answer")
         with grpc.insecure_channel(server.address) as channel:
             stream = channel.unary_stream("/signorini.v1.JobService/StreamResult")
