@@ -23,7 +23,7 @@ use super::{
     folder::{Folder, Identity, JOURNAL, LOG},
     intact::Intact,
     migrations,
-    progress::{self, Progress, Record},
+    progress::{self, LastCommit, Progress},
     reserve::Reserve,
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
@@ -244,7 +244,7 @@ impl Store {
 /// Compares the database with what is known of it before anything is written to it.
 pub(super) async fn compare_with_the_past(
     path: &Path,
-    known: Option<&Record>,
+    known: Option<&LastCommit>,
     options: SqliteConnectOptions,
 ) -> Result<()> {
     if !progress::has_content(&path.join(super::folder::DATABASE)) {

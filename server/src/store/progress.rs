@@ -22,7 +22,7 @@ pub(super) const FILE: &str = "signorini.progress";
 
 /// What the file says.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Record {
+pub(super) struct LastCommit {
     /// The name of the store.
     pub(super) store: String,
     /// The number of its last transaction.
@@ -36,24 +36,24 @@ pub(super) struct Progress(Arc<Mutex<Open>>);
 #[derive(Debug)]
 struct Open {
     file: File,
-    record: Record,
+    last: LastCommit,
     /// A failure was logged.
     failed: bool,
 }
 
 /// Reads the file; `None` if there is none, or none that can be read.
-pub(super) fn read(folder: &Path) -> io::Result<Option<Record>> {
+pub(super) fn read(folder: &Path) -> io::Result<Option<LastCommit>> {
     let path = folder.join(FILE);
     match std::fs::read(&path) {
         Ok(bytes) => {
-            let record = Record::parse(&bytes);
-            if record.is_none() {
+            let last = LastCommit::parse(&bytes);
+            if last.is_none() {
                 tracing::warn!(
                     "{} cannot be read: whether the store is whole is not known; it is written anew",
                     path.display()
                 );
             }
-            Ok(record)
+            Ok(last)
         }
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error),
@@ -61,7 +61,7 @@ pub(super) fn read(folder: &Path) -> io::Result<Option<Record>> {
 }
 
 /// What the database says; `None` if it is of a version that did not count.
-pub(super) async fn in_database(connection: &mut SqliteConnection) -> Result<Option<Record>> {
+pub(super) async fn in_database(connection: &mut SqliteConnection) -> Result<Option<LastCommit>> {
     let counted = "select exists (select 1 from sqlite_schema where name = 'progress')";
     if !sqlx::query_scalar::<_, bool>(counted)
         .fetch_one(&mut *connection)
@@ -71,11 +71,11 @@ pub(super) async fn in_database(connection: &mut SqliteConnection) -> Result<Opt
     }
     let row = sqlx::query_as("select store, commits from progress").fetch_one(connection);
     let (store, commits) = row.await?;
-    Ok(Some(Record { store, commits }))
+    Ok(Some(LastCommit { store, commits }))
 }
 
 /// An error if the database is not the one that the file tells of, or has not come as far.
-pub(super) fn compare(file: &Record, database: Option<&Record>) -> Result<()> {
+pub(super) fn compare(file: &LastCommit, database: Option<&LastCommit>) -> Result<()> {
     let lost = |what: String| Err(StoreError::Lost(what));
     match database {
         None => lost("it is of an older version than the store that was here last".into()),
@@ -90,35 +90,31 @@ pub(super) fn compare(file: &Record, database: Option<&Record>) -> Result<()> {
 
 impl Progress {
     /// Writes the file, on the disk when this returns, and keeps it open.
-    pub(super) fn start(folder: &Path, record: Record) -> io::Result<Progress> {
+    pub(super) fn start(folder: &Path, last: LastCommit) -> io::Result<Progress> {
         let file = OpenOptions::new()
             .write(true)
             .create(true)
             .truncate(false)
             .mode(0o600)
             .open(folder.join(FILE))?;
-        let text = record.text();
+        let text = last.text();
         file.set_len(text.len() as u64)?;
         file.write_all_at(text.as_bytes(), 0)?;
         file.sync_all()?;
         File::open(folder)?.sync_all()?;
         let failed = false;
-        let open = Open {
-            file,
-            record,
-            failed,
-        };
+        let open = Open { file, last, failed };
         Ok(Progress(Arc::new(Mutex::new(open))))
     }
 
     /// The transaction with this number is on the disk.
     pub(super) fn reached(&self, number: i64) {
         let mut open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if number <= open.record.commits {
+        if number <= open.last.commits {
             return; // a later one was faster
         }
-        open.record.commits = number;
-        let written = open.file.write_all_at(open.record.text().as_bytes(), 0);
+        open.last.commits = number;
+        let written = open.file.write_all_at(open.last.text().as_bytes(), 0);
         if let (Err(error), false) = (&written, open.failed) {
             tracing::warn!(%error, "{FILE} cannot be written: {error}");
         }
@@ -135,23 +131,23 @@ impl Progress {
     }
 }
 
-impl Record {
+impl LastCommit {
     /// Always of the same length, so that it is replaced in place, and within one sector.
     fn text(&self) -> String {
-        let Record { store, commits } = self;
+        let LastCommit { store, commits } = self;
         let line = format!("signorini {store} {commits:020}");
         format!("{line} {:08x}\n", crc32fast::hash(line.as_bytes()))
     }
 
-    fn parse(bytes: &[u8]) -> Option<Record> {
+    fn parse(bytes: &[u8]) -> Option<LastCommit> {
         let text = std::str::from_utf8(bytes).ok()?;
         let mut words = text.split_whitespace();
         let (_, store, commits) = (words.next()?, words.next()?, words.next()?);
-        let record = Record {
+        let last = LastCommit {
             store: store.to_owned(),
             commits: commits.parse().ok()?,
         };
-        (record.text() == text).then_some(record)
+        (last.text() == text).then_some(last)
     }
 }
 
@@ -186,18 +182,18 @@ mod tests {
 
     #[test]
     fn a_record_is_read_back_and_a_changed_one_is_not() {
-        let record = Record {
+        let last = LastCommit {
             store: "0123456789abcdef0123456789abcdef".into(),
             commits: 12,
         };
-        let text = record.text().into_bytes();
+        let text = last.text().into_bytes();
         assert_eq!(text.len(), 73);
-        assert_eq!(Record::parse(&text), Some(record));
+        assert_eq!(LastCommit::parse(&text), Some(last));
         for place in 0..text.len() {
             let mut other = text.clone();
             other[place] ^= 1;
-            assert_eq!(Record::parse(&other), None, "{place}");
+            assert_eq!(LastCommit::parse(&other), None, "{place}");
         }
-        assert_eq!(Record::parse(b""), None);
+        assert_eq!(LastCommit::parse(b""), None);
     }
 }
