@@ -80,7 +80,7 @@ pub struct Reservation {
 
 impl Reservation {
     /// What the job may use: its estimate, which is meant to be an upper bound, and a margin for what that does not
-    /// foresee. All jobs together use no more than the budget and [`MARGINS`].
+    /// foresee. All jobs together use no more than the budget and 128 MiB, or 4 MiB for each.
     pub fn share(&self) -> u64 {
         self.bytes.saturating_add(self.budget.margin)
     }
