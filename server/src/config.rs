@@ -92,9 +92,10 @@ pub enum Isolation {
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct MemoryBudget {
     /// Memory that running jobs share: a job is refused if it is estimated to need more, waits until its estimate fits
-    /// beside those of the running jobs, and is ended if it uses more than its estimate and its part of 128 MiB
-    /// [default: half of the machine's memory]
-    #[arg(long, env = "SIGNORINI_MEMORY_BUDGET_BYTES", value_name = "BYTES")]
+    /// beside those of the running jobs, and is ended if it uses more than its estimate and a margin (128 MiB divided by
+    /// the number of workers) [default: half of the machine's memory]
+    #[arg(long, env = "SIGNORINI_MEMORY_BUDGET_BYTES", value_name = "BYTES",
+          value_parser = clap::value_parser!(u64).range(1 << 20..))]
     memory_budget_bytes: Option<u64>,
 }
 

@@ -42,7 +42,7 @@ impl Queue {
                 Some(running) => {
                     self.announce(&[key]); // the request has changed its version
                     running.stop(StopReason::Unwanted);
-                    tokio::spawn(self.clone().force_cancel(key, running.attempt));
+                    tokio::spawn(self.clone().force_cancel(key, running));
                 }
                 // its worker has released it because the service stops: nothing else would end it
                 None => {
@@ -76,21 +76,22 @@ impl Queue {
 
     /// Cancels a job whose solver does not stop in time; does nothing if it has stopped. This is retried for as long as
     /// it takes, since the client was told that the job ends.
-    async fn force_cancel(self: Arc<Self>, key: i64, attempt: i32) {
+    async fn force_cancel(self: Arc<Self>, key: i64, running: Running) {
+        let Running { id, attempt, .. } = running;
         tokio::time::sleep(CANCEL_GRACE).await;
         let mut backoff = Backoff::default();
         loop {
             match self.end_attempt(key, attempt, &Ending::canceled()).await {
                 Ok(true) => {
                     return warn!(
-                        job.key = key,
-                        "job canceled, and its solver has not stopped yet: its worker stays busy"
+                        job.id = %id,
+                        "job {id} was canceled, and its worker is not free yet"
                     );
                 }
                 Ok(false) => return,
                 Err(cause) if cause.is_damage_of(key) => return,
                 Err(cause) => {
-                    error!(job.key = key, %cause, "job could not be canceled yet: {cause}")
+                    error!(job.id = %id, %cause, "job {id} could not be canceled yet: {cause}")
                 }
             }
             if !backoff.wait(&self.stopping).await {
@@ -111,21 +112,23 @@ impl Queue {
             .collect();
         for (key, running) in running {
             running.stop(StopReason::Unwanted);
-            let attempt = running.attempt;
+            let Running { id, attempt, .. } = running;
             match self.store.requeue_drained(key, attempt).await {
                 Ok(Some(Status::Canceled)) => {
                     info!(
-                        job.key = key,
-                        attempt, "job canceled, as requested before the service stopped"
+                        job.id = %id,
+                        attempt, "job {id} was canceled, as requested before the service stopped"
                     );
                 }
                 Ok(Some(_)) => info!(
-                    job.key = key,
-                    attempt, "job requeued for the next start of the service"
+                    job.id = %id,
+                    attempt, "job {id} is requeued for the next start of the service"
                 ),
                 Ok(None) => {}
                 // the next start of the service finds it running, and requeues it
-                Err(cause) => error!(job.key = key, %cause, "job could not be requeued: {cause}"),
+                Err(cause) => {
+                    error!(job.id = %id, %cause, "job {id} could not be requeued: {cause}")
+                }
             }
         }
     }

@@ -67,14 +67,19 @@ impl Queue {
 
     /// Claims whenever a slot is free and a job waits, until the service stops.
     async fn dispatch(self: Arc<Self>) {
+        let mut logged = String::new();
         loop {
             // a notification from here on is kept for the wait below, so that none is missed
             while let Some(slot) = self.free_slot() {
                 match self.claim(slot).await {
-                    Ok(true) => {}
+                    Ok(true) => logged.clear(),
                     Ok(false) => break,
                     Err(cause) => {
-                        error!(%cause, "no job could be claimed: {cause}");
+                        // once, and not every second
+                        if logged != cause.to_string() {
+                            logged = cause.to_string();
+                            error!(%cause, "no job can be started: {cause}");
+                        }
                         tokio::time::sleep(Duration::from_secs(1)).await; // the disk may be full for a while
                     }
                 }
@@ -114,6 +119,7 @@ impl Queue {
     fn start_worker(self: &Arc<Self>, claim: Claim, slot: OwnedSemaphorePermit) {
         failpoint::pass(Point::Given, claim.job.id);
         let running = Running {
+            id: claim.job.id,
             attempt: claim.job.attempt,
             stop: Arc::default(),
         };

@@ -2,11 +2,13 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::memory::Outgrown;
+use crate::{job::JobId, memory::Outgrown};
 
 /// The handle on a running solver.
 #[derive(Clone, Debug)]
 pub(super) struct Running {
+    /// The job, for the log.
+    pub(super) id: JobId,
     /// The number of the attempt.
     pub(super) attempt: i32,
     /// Set to ask the solver to stop; it checks this in every iteration.

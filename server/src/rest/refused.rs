@@ -27,11 +27,16 @@ pub(super) fn note(kind: &str, path: &str) {
         return;
     };
     let path: String = path.chars().take(LONGEST_PATH).collect();
-    info!(
-        error = kind,
-        count,
-        "refused as {kind}: {count} requests since this was last logged, the latest to {path:?}"
-    );
+    match count {
+        1 => info!(
+            error = kind,
+            count, "refused as {kind}: a request to {path:?}"
+        ),
+        _ => info!(
+            error = kind,
+            count, "refused as {kind}: {count} more requests, the latest to {path:?}"
+        ),
+    }
 }
 
 /// How many requests a line is due for.

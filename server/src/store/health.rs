@@ -78,7 +78,7 @@ impl Store {
         }
         let (damaged, incidents) = self.damages.summary();
         Ok(Health {
-            full: self.reserve.has_room().is_err(),
+            full: self.reserve.is_disk_full(),
             damaged,
             incidents,
         })
@@ -95,7 +95,7 @@ impl Store {
 /// Looks at the files of the store, flushes the record of its progress, and takes its reserve again, until the store is
 /// dropped or closed.
 pub(super) async fn watch(store: Weak<Store>) {
-    let mut set_by_s = 0.0;
+    let (mut set_by_s, mut was_full) = (0.0, false);
     loop {
         tokio::time::sleep(INTERVAL).await;
         let now_s = Time::clock_was_set_by_s();
@@ -112,14 +112,26 @@ pub(super) async fn watch(store: Weak<Store>) {
         }
         let watched = tokio::task::spawn_blocking(move || {
             let _ = store.identity.check(); // logs what is wrong
-            if store.reserve.has_room().is_err() && store.reserve.retake() {
-                tracing::info!("there is space on the disk again: jobs are accepted");
-            }
-            store.progress.sync()
+            store.reserve.retake();
+            (store.reserve.is_disk_full(), store.progress.sync())
         });
-        if let Ok(Err(error)) = watched.await {
+        let Ok((full, synced)) = watched.await else {
+            continue;
+        };
+        if let Err(error) = synced {
             tracing::debug!(%error, "the progress could not be flushed: {error}");
         }
+        match (was_full, full) {
+            (false, true) => tracing::warn!(
+                "the disk is full: no job is accepted and no result is stored until there is space; \
+                 canceling, deleting, pausing and reading work"
+            ),
+            (true, false) => {
+                tracing::info!("there is space on the disk again: jobs are accepted");
+            }
+            _ => {}
+        }
+        was_full = full;
     }
 }
 

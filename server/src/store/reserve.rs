@@ -17,6 +17,9 @@ pub(super) const FILE: &str = "signorini.reserve";
 /// Four times what the write-ahead log grows by before SQLite reuses it: a thousand pages of 4 KiB.
 const BYTES: u64 = 16 << 20;
 
+/// With less than this the disk is full: a submit takes some ten kilobytes.
+const LEAST: u64 = 256 << 10;
+
 /// The file, if it is there.
 #[derive(Debug)]
 pub(super) struct Reserve {
@@ -31,12 +34,7 @@ impl Reserve {
             path: folder.join(FILE),
             held: AtomicBool::new(false),
         };
-        if !reserve.retake() {
-            tracing::warn!(
-                "the disk has less than {} MiB free: only canceling, deleting, pausing and reading work",
-                BYTES >> 20
-            );
-        }
+        reserve.retake(); // if not, the watch tells
         reserve
     }
 
@@ -48,15 +46,19 @@ impl Reserve {
         }
     }
 
+    /// Whether the disk is full, also if the space is not needed yet.
+    pub(super) fn is_disk_full(&self) -> bool {
+        let folder = self.path.parent();
+        let free = folder.and_then(|folder| rustix::fs::statvfs(folder).ok());
+        self.has_room().is_err()
+            || free.is_some_and(|free| free.f_bavail.saturating_mul(free.f_frsize) < LEAST)
+    }
+
     /// Frees the space; false if that was done before.
     pub(super) fn release(&self) -> bool {
         if !self.held.swap(false, Ordering::AcqRel) {
             return false;
         }
-        tracing::warn!(
-            "the disk is full: no job is accepted and no result is stored until there is space; \
-             canceling, deleting, pausing and reading work"
-        );
         match fs::remove_file(&self.path) {
             Ok(()) => true,
             Err(error) => {

@@ -312,7 +312,9 @@ fn log_lines(stderr: ChildStderr) -> Option<u64> {
 fn how_it_ended(status: ExitStatus) -> String {
     const KILL: i32 = 9;
     match (status.signal(), status.code()) {
-        (Some(KILL), _) => "it was killed, as the system does when memory runs out".into(),
+        (Some(KILL), _) => {
+            "it was killed by signal 9, as the system does when memory runs out".into()
+        }
         (Some(signal), _) => format!("it was ended by signal {signal}"),
         (None, code) => format!("it ended with exit code {}", code.unwrap_or_default()),
     }
