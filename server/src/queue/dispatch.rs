@@ -70,7 +70,9 @@ impl Queue {
         let mut logged = String::new();
         loop {
             // a notification from here on is kept for the wait below, so that none is missed
-            while let Some(slot) = self.free_slot() {
+            while self.store.waiting() > 0
+                && let Some(slot) = self.free_slot()
+            {
                 match self.claim(slot).await {
                     Ok(true) => logged.clear(),
                     Ok(false) => break,
