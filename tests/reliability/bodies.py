@@ -3,9 +3,9 @@
     bodies.py [--soak]
 
 Every body must be answered by 400, 413 or 422 (or by the violations, where a problem is only validated) in a short
-document, and its peak of memory be at most ten times the body and 16 MiB. Without --soak the bodies have 1 MiB and are
-answered in less than 100 ms; the bound is 300 ms and 200 ms of CPU time, the best of six, since others may use the
-machine. With it they have 16 MiB and may take one CPU second each.
+document, and its peak of memory be at most ten times the body and 16 MiB. Without --soak the bodies have 1 MiB and
+must be answered in 100 ms, the best of some times; where other programs keep all processors busy, 100 ms of CPU time
+count instead. With it they have 16 MiB and may take one CPU second each.
 """
 
 import concurrent.futures
@@ -16,7 +16,7 @@ import time
 from attack import MIB, SOAK, Attacked, Bystander, check
 # a little less than the limit of a body
 SIZE = 16 * MIB - 4096 if SOAK else MIB
-MOST_CPU_S, MOST_S = (1.0, None) if SOAK else (0.2, 0.3)
+MOST_CPU_S, MOST_S = (1.0, None) if SOAK else (0.1, 0.1)
 # beside ten times the body: what the process takes for its first request of a kind
 FLOOR = 16 * MIB
 LONGEST_ANSWER = 256 << 10
@@ -134,8 +134,9 @@ def attack(server, name, text):
     worst = [0.0, 0.0, 0.0]
     for path in paths[: None if SOAK else 1]:
         answer, grown, cpu, took = send(server, path, text)
-        for _ in range(5):
+        for _ in range(20):
             if cpu > MOST_CPU_S or MOST_S and took > MOST_S:
+                time.sleep(0.2)  # another machine on the same hardware may be busy for a while
                 answer, again, *times = send(server, path, text)
                 grown, cpu, took = max(grown, again), min(cpu, times[0]), min(took, times[1])
         share = max(0, grown - FLOOR) / len(text)

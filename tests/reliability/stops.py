@@ -27,7 +27,7 @@ from faults import check_database
 from outside import TERMINAL, Connection, Lost, children, each, percentile, submission, talkative
 from reflected import Client
 
-STOPS = {"thread": 100, "process": 100} if SOAK else {"thread": 12, "process": 8}
+STOPS = {"thread": 100, "process": 100} if SOAK else {"thread": 20, "process": 8}
 SEED = next((int(word) for word in sys.argv[1:] if word.isdigit()), random.randrange(1 << 32))
 GRACE_S = 3
 SUBMITTERS, PER_S, FOLLOWERS = 4, 40, 4
