@@ -30,7 +30,7 @@ const SMALL_RECEIVED: usize = 16 << 10;
 const SMALL_SENT: usize = 64 << 10;
 /// The room for small requests, and that for small answers: some thousand at the same time.
 const SMALL_BYTES: usize = 64 << 20;
-/// Budgets are counted in units of this many bytes, since a semaphore has a limited number of permits.
+/// Limits are counted in units of this many bytes, since a semaphore has a limited number of permits.
 const UNIT: usize = 1 << 10;
 
 /// A limit on bytes over all requests.
@@ -46,12 +46,12 @@ struct Room {
     units: u32,
 }
 
-/// A part of a budget, given back when it is dropped.
+/// A part of a limit, given back when it is dropped.
 #[derive(Debug)]
 pub struct Share(#[allow(dead_code)] OwnedSemaphorePermit);
 
 impl Limit {
-    /// A budget of so many bytes, beside the room for small ones.
+    /// A limit of so many bytes, beside the room for small ones.
     pub fn new(bytes: usize) -> Limit {
         Limit {
             large: Room::new(bytes),
@@ -59,7 +59,7 @@ impl Limit {
         }
     }
 
-    /// A share of so many bytes, if they are free. One that is larger than the budget takes all of it.
+    /// A share of so many bytes, if they are free. One that is larger than the limit takes all of it.
     pub fn take(&self, bytes: usize) -> Result<Share, ApiError> {
         self.large.take(self.large.units(bytes))
     }
@@ -118,7 +118,7 @@ impl Room {
 /// What was received of one request and is still in memory. The clones of one request count together.
 #[derive(Clone, Debug)]
 pub struct Received {
-    budget: Limit,
+    limit: Limit,
     counted: Arc<Mutex<Counted>>,
 }
 
@@ -131,9 +131,9 @@ struct Counted {
 
 impl Received {
     /// Nothing yet.
-    pub fn new(budget: &Limit) -> Received {
+    pub fn new(limit: &Limit) -> Received {
         Received {
-            budget: budget.clone(),
+            limit: limit.clone(),
             counted: Arc::default(),
         }
     }
@@ -144,8 +144,8 @@ impl Received {
         counted.bytes = counted.bytes.saturating_add(bytes);
         let small = counted.bytes.min(SMALL_RECEIVED);
         let large = counted.bytes - small;
-        self.budget.small.enlarge(&mut counted.small, small)?;
-        self.budget.large.enlarge(&mut counted.large, large)
+        self.limit.small.enlarge(&mut counted.small, small)?;
+        self.limit.large.enlarge(&mut counted.large, large)
     }
 
     /// Gives the share back, when nothing of the request is needed any more.
@@ -200,29 +200,45 @@ pub fn cause(mut error: axum::Error) -> Result<ApiError, axum::Error> {
     }
 }
 
-/// The body of a request, which fails when it arrives too slowly.
-pub fn with_least_pace(body: Body) -> Body {
+/// The body of a request, which fails when it arrives too slowly, and whose bytes are counted as they arrive if they
+/// are kept in memory.
+pub fn arriving(body: Body, received: Option<Received>) -> Body {
     if body.is_end_stream() {
         return body;
     }
-    let pace = Pace::default();
-    let body = TimeoutBody::new(LONGEST_PAUSE, PacedBody { body, pace });
+    let arriving = Arriving {
+        body,
+        pace: Pace::default(),
+        received,
+    };
+    let body = TimeoutBody::new(LONGEST_PAUSE, arriving);
     Body::new(body.map_err(|error| match error.is::<TimeoutError>() {
-        true => too_slow().into_inner(),
+        true => BodyError::from(ApiError::RequestTimeout).into(),
         false => error,
     }))
 }
 
-fn too_slow() -> axum::Error {
-    axum::Error::new(BodyError::from(ApiError::RequestTimeout))
-}
-
-struct PacedBody {
+struct Arriving {
     body: Body,
     pace: Pace,
+    received: Option<Received>,
 }
 
-impl HttpBody for PacedBody {
+impl Arriving {
+    /// Some more bytes have arrived.
+    fn check(&mut self, bytes: usize) -> Result<(), ApiError> {
+        self.pace.advance(bytes);
+        if self.pace.is_too_slow() {
+            return Err(ApiError::RequestTimeout);
+        }
+        match &self.received {
+            Some(received) => received.count(bytes),
+            None => Ok(()),
+        }
+    }
+}
+
+impl HttpBody for Arriving {
     type Data = Bytes;
     type Error = axum::Error;
 
@@ -234,15 +250,10 @@ impl HttpBody for PacedBody {
             self.pace.wait();
             return Poll::Pending;
         };
-        let data = frame
-            .as_ref()
-            .and_then(|frame| frame.as_ref().ok()?.data_ref());
-        let bytes = data.map_or(0, Bytes::len);
-        self.pace.advance(bytes);
-        match self.pace.is_too_slow() {
-            true => Poll::Ready(Some(Err(too_slow()))),
-            false => Poll::Ready(frame),
-        }
+        Poll::Ready(match self.check(length(frame.as_ref())) {
+            Ok(()) => frame,
+            Err(error) => Some(Err(axum::Error::new(BodyError::from(error)))),
+        })
     }
 
     fn is_end_stream(&self) -> bool {
@@ -254,41 +265,10 @@ impl HttpBody for PacedBody {
     }
 }
 
-/// The body of a request whose bytes are counted as they arrive.
-pub fn counted(body: Body, received: Received) -> Body {
-    Body::new(CountedBody { body, received })
-}
-
-struct CountedBody {
-    body: Body,
-    received: Received,
-}
-
-impl HttpBody for CountedBody {
-    type Data = Bytes;
-    type Error = axum::Error;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        let frame = ready!(Pin::new(&mut self.body).poll_frame(context));
-        if let Some(Ok(frame)) = &frame
-            && let Some(bytes) = frame.data_ref()
-            && let Err(error) = self.received.count(bytes.len())
-        {
-            return Poll::Ready(Some(Err(axum::Error::new(BodyError::from(error)))));
-        }
-        Poll::Ready(frame)
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
-    }
+/// The bytes of content in a frame.
+fn length(frame: Option<&Result<Frame<Bytes>, axum::Error>>) -> usize {
+    let data = frame.and_then(|frame| frame.as_ref().ok()?.data_ref());
+    data.map_or(0, Bytes::len)
 }
 
 /// In the extensions of a response: its body has its share already.
@@ -318,10 +298,7 @@ pub async fn with_share(mut body: Body, limit: &Limit, no_room: NoRoom) -> Resul
                 Some(None) => return Ok(Body::empty()),
                 Some(Some(frame)) => first = Some(frame),
             }
-            let data = first
-                .as_ref()
-                .and_then(|frame| frame.as_ref().ok()?.data_ref());
-            data.map_or(0, Bytes::len)
+            length(first.as_ref())
         }
     };
     let room = match bytes {
@@ -344,7 +321,7 @@ struct Shared {
     share: Option<Arc<Share>>,
 }
 
-/// Bytes with their share of a budget, which they keep as long as any part of them is in memory.
+/// Bytes with their share of a limit, which they keep as long as any part of them is in memory.
 struct Owner {
     bytes: Bytes,
     _share: Arc<Share>,
@@ -401,8 +378,8 @@ mod tests {
 
     #[test]
     fn requests_share_a_budget_until_they_end() {
-        let budget = Limit::new(100 << 10);
-        let (one, other) = (Received::new(&budget), Received::new(&budget));
+        let limit = Limit::new(100 << 10);
+        let (one, other) = (Received::new(&limit), Received::new(&limit));
         one.count(SMALL_RECEIVED).unwrap();
         for _ in 0..60 {
             one.clone().count(1 << 10).unwrap();
@@ -410,42 +387,42 @@ mod tests {
         other.count(SMALL_RECEIVED + (30 << 10)).unwrap();
         assert!(matches!(other.count(20 << 10), Err(ApiError::Overloaded)));
         // small requests are received whatever others do
-        Received::new(&budget).count(SMALL_RECEIVED).unwrap();
+        Received::new(&limit).count(SMALL_RECEIVED).unwrap();
         drop(one);
         other.count(20 << 10).unwrap();
         other.release();
-        assert!(budget.take(100 << 10).is_ok());
+        assert!(limit.take(100 << 10).is_ok());
     }
 
     #[test]
     fn what_is_larger_than_the_budget_takes_all_of_it() {
-        let budget = Limit::new(10 << 10);
-        let share = budget.take(usize::MAX).unwrap();
-        assert!(budget.take(1).is_err());
+        let limit = Limit::new(10 << 10);
+        let share = limit.take(usize::MAX).unwrap();
+        assert!(limit.take(1).is_err());
         drop(share);
-        assert!(budget.take(1).is_ok());
+        assert!(limit.take(1).is_ok());
     }
 
     #[tokio::test]
     async fn an_answer_has_its_share_as_long_as_any_of_its_bytes_is_in_memory() {
-        let budget = Limit::new(200 << 10);
+        let limit = Limit::new(200 << 10);
         let large = || Body::from(vec![7; 150 << 10]);
-        let first = with_share(large(), &budget, NoRoom::Refuse).await.unwrap();
+        let first = with_share(large(), &limit, NoRoom::Refuse).await.unwrap();
         assert!(matches!(
-            with_share(large(), &budget, NoRoom::Refuse).await,
+            with_share(large(), &limit, NoRoom::Refuse).await,
             Err(ApiError::Overloaded)
         ));
         assert!(
-            with_share(Body::from(vec![7; 10 << 10]), &budget, NoRoom::Refuse)
+            with_share(Body::from(vec![7; 10 << 10]), &limit, NoRoom::Refuse)
                 .await
                 .is_ok()
         );
         let mut pieces = first.into_data_stream();
         let last = pieces.next().await.unwrap().unwrap().slice(1..2);
         drop(pieces);
-        assert!(with_share(large(), &budget, NoRoom::Refuse).await.is_err());
+        assert!(with_share(large(), &limit, NoRoom::Refuse).await.is_err());
         drop(last);
-        assert!(with_share(large(), &budget, NoRoom::Refuse).await.is_ok());
+        assert!(with_share(large(), &limit, NoRoom::Refuse).await.is_ok());
     }
 
     #[tokio::test]
@@ -477,9 +454,8 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_body_that_stops_arriving_ends_as_a_request_timeout() {
         let never = futures_util::stream::pending::<Result<Bytes, axum::Error>>();
-        let budget = Limit::new(1 << 20);
-        let body = with_least_pace(Body::from_stream(never));
-        let body = counted(body, Received::new(&budget));
+        let limit = Limit::new(1 << 20);
+        let body = arriving(Body::from_stream(never), Some(Received::new(&limit)));
         let error = body.into_data_stream().next().await.unwrap().unwrap_err();
         // as tonic looks for a status
         let mut source: Option<&dyn Error> = Some(&error);
@@ -495,7 +471,7 @@ mod tests {
             tokio::time::sleep(Duration::from_secs(1)).await;
             Some((Ok::<_, axum::Error>(Bytes::from_static(b"x")), ()))
         });
-        let slow = with_least_pace(Body::from_stream(bytes)).into_data_stream();
+        let slow = arriving(Body::from_stream(bytes), None).into_data_stream();
         let received: Vec<_> = slow
             .take(100)
             .take_while(|piece| std::future::ready(piece.is_ok()))

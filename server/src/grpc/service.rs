@@ -265,7 +265,6 @@ impl JobService for Grpc {
                 );
             }
         };
-        let mut has_share = false;
         let (pieces, total_bytes, sha256) = if format == Format::Json {
             let fields = fields::fields(&self.service, &caller, id).await?;
             let info = fields.info.clone();
@@ -278,7 +277,6 @@ impl JobService for Grpc {
             check_offset(offset, total)?;
             let digest = Sha256::digest(&bytes).to_vec();
             let share = self.service.sent.take(bytes.len())?;
-            has_share = true;
             let pieces = async_stream::stream! {
                 let _share = share; // as long as the file is in memory
                 for piece in bytes[offset as usize..].chunks(PIECE_BYTES) {
@@ -300,7 +298,7 @@ impl JobService for Grpc {
             })
         });
         let mut response: Response<Self::StreamResultStream> = Response::new(chunks.boxed());
-        if has_share {
+        if format != Format::Json {
             response.extensions_mut().insert(HasShare);
         }
         Ok(response)

@@ -5,5 +5,4 @@ mod parameter;
 mod values;
 
 pub use parameter::{Description, Location, Parameter, Variable};
-// `Whole` is the earlier name, which `verbs::envelope` still uses.
 pub use values::{Integers, Seconds, Text, Times, Values, Words};

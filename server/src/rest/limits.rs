@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     error::ApiError,
-    transfer::{HasShare, NoRoom, Received, counted, with_least_pace, with_share},
+    transfer::{HasShare, NoRoom, Received, arriving, with_share},
     verbs::Service,
 };
 
@@ -45,11 +45,9 @@ pub(super) async fn limits(
     };
     let received = Received::new(&service.received);
     let (mut parts, body) = request.into_parts();
-    let mut body = with_least_pace(body);
     // over REST, they are counted where they are collected
-    if grpc && path != UPLOAD {
-        body = counted(body, received.clone());
-    }
+    let kept = grpc && path != UPLOAD;
+    let body = arriving(body, kept.then(|| received.clone()));
     parts.extensions.insert(received.clone());
     let response = next.run(Request::from_parts(parts, body)).await;
     // the bytes, and what was made of them, were needed until here
