@@ -129,6 +129,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
 
     // the service
     fields("ServerInfo", "info::Info").answer(),
+    names("Isolation", "Isolation").answer(),
     fields("ServiceLimits", "info::ServiceLimits").answer(),
     fields("QueueState", "queue::QueueState").answer(),
 

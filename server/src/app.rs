@@ -1,7 +1,10 @@
 //! The running service: opens the store, requeues the jobs that a crash interrupted, starts the queue, listens,
 //! and stops in reverse order.
 
-use std::{env, net::SocketAddr, path::Path, process::Command, sync::Arc, time::Duration};
+use std::{
+    env, net::SocketAddr, os::unix::process::CommandExt, path::Path, process::Command, sync::Arc,
+    time::Duration,
+};
 
 use anyhow::Context;
 use tokio::{task::JoinHandle, time::timeout};
@@ -11,6 +14,7 @@ use tracing::{info, warn};
 
 use crate::{
     config::{Config, Isolation},
+    error::{number_of, size},
     grpc,
     listener::{self, Listener},
     queue::{Processes, Queue, Solver},
@@ -49,20 +53,14 @@ fn worker_process() -> Command {
         false => env::current_exe().unwrap_or_else(|_| env!("CARGO_PKG_NAME").into()),
     };
     let mut command = Command::new(program);
-    command.arg(WORKER);
+    command.arg0(env!("CARGO_PKG_NAME")).arg(WORKER); // as `ps` shows it
     command
 }
 
 /// Requeues the jobs, and removes the uploads, that were interrupted when the service last ended. What is left of the
 /// jobs the queue requeues later.
 async fn clean_up(store: &Store) -> store::Result<()> {
-    let interrupted = store.requeue_interrupted().await?;
-    if interrupted > 0 {
-        info!(
-            interrupted,
-            "{interrupted} jobs were interrupted when the service last ended"
-        );
-    }
+    store.requeue_interrupted().await?;
     let orphans = store.remove_orphaned_mesh_pieces().await?;
     if orphans > 0 {
         info!(
@@ -83,7 +81,10 @@ impl App {
             Err(StoreError::Full) => warn!(
                 "the disk is full: jobs that were interrupted wait again as soon as that can be written"
             ),
-            Err(error) => return Err(error.into()),
+            Err(error) => {
+                let store = format!("the store in {}", config.data.display());
+                return Err(anyhow::Error::new(error).context(store));
+            }
         }
         store.set_budget(config.memory.bytes(), config.workers);
         let solver = match config.isolation {
@@ -102,7 +103,15 @@ impl App {
         let closing = CancellationToken::new();
         let server = tokio::spawn(listener.serve(router, closing.clone()));
         queue.start();
-        info!(%address, workers = config.workers, "listening on {address}");
+        let Config {
+            workers, isolation, ..
+        } = config;
+        let (data, budget) = (config.data.display(), size(config.memory.bytes()));
+        info!(
+            %address, version = env!("CARGO_PKG_VERSION"), %data, workers, %isolation, budget,
+            "listening on {address}: version {}, store in {data}, {} of isolation {isolation}, {budget} of memory for jobs",
+            env!("CARGO_PKG_VERSION"), number_of((*workers).into(), "worker"),
+        );
         if !address.ip().is_loopback() {
             warn!(%address, "anyone who can reach {address} can do everything: there is no authentication");
         }

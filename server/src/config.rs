@@ -1,8 +1,14 @@
 //! The configuration: one struct, whose doc comments are the help text, in the order of the help.
 
-use std::{net::SocketAddr, path::PathBuf};
+use std::{
+    net::{SocketAddr, ToSocketAddrs},
+    path::PathBuf,
+};
 
 use clap::{Args, ValueEnum};
+use schemars::JsonSchema;
+use serde::Serialize;
+use strum::Display;
 
 /// Settings of the service. A flag takes precedence over its environment variable.
 #[derive(Clone, Debug, Args)]
@@ -12,7 +18,8 @@ pub struct Config {
         long,
         env = "SIGNORINI_LISTEN",
         default_value = "127.0.0.1:8080",
-        value_name = "ADDRESS"
+        value_name = "ADDRESS",
+        value_parser = address
     )]
     pub listen: SocketAddr,
 
@@ -79,8 +86,20 @@ pub struct Config {
     pub grace_s: u64,
 }
 
+/// An address and a port, by number or by name; of several addresses, the first.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    const EXPECTED: &str =
+        "expected an address and a port, such as 127.0.0.1:8080 or localhost:8080";
+    let found = text
+        .to_socket_addrs()
+        .map_err(|error| format!("{EXPECTED} ({error})"))?;
+    found.into_iter().next().ok_or_else(|| EXPECTED.into())
+}
+
 /// Where jobs are solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Display, Serialize, JsonSchema)]
+#[strum(serialize_all = "lowercase")]
+#[serde(rename_all = "lowercase")]
 pub enum Isolation {
     /// On threads of the service
     Thread,

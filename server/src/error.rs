@@ -171,8 +171,10 @@ pub enum ApiError {
     /// The service is about to stop.
     #[error("the service is stopping; try again when it has been restarted")]
     Draining,
-    /// The database was removed or replaced while the service runs.
-    #[error("the store was removed or replaced while the service was running; nothing is stored")]
+    /// The database was removed, replaced or damaged while the service runs.
+    #[error(
+        "the database was removed, replaced or damaged while the service was running; nothing is stored"
+    )]
     StorageLost,
     /// The disk is full.
     #[error("the disk is full, or cannot be written")]
@@ -346,6 +348,14 @@ pub fn size(bytes: u64) -> String {
     }
 }
 
+/// How many there are of something, as text for people: "1 job", "2 jobs".
+pub fn number_of(count: usize, what: &str) -> String {
+    match count {
+        1 => format!("1 {what}"),
+        count => format!("{count} {what}s"),
+    }
+}
+
 /// A number of unknowns as text for people; `u64::MAX` stands for any larger number.
 pub fn count(unknowns: u64) -> String {
     match unknowns {
@@ -363,11 +373,8 @@ fn summed_up(violations: &[Violation]) -> String {
         .map(|violation| shortened(&violation.to_string(), 120))
         .collect();
     let more = if violations.len() > SHOWN { " …" } else { "" };
-    format!(
-        "{} violation(s): {}{more}",
-        violations.len(),
-        shown.join(" | ")
-    )
+    let count = number_of(violations.len(), "violation");
+    format!("{count}: {}{more}", shown.join(" | "))
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@
 
 What cannot be served is refused within a second, with one line and an exit code of its own: two servers in one folder,
 also when files are removed from it; a folder that cannot be written; a port in use; a store that has lost its log or
-its database, or has tables of another version. A server whose database is removed accepts nothing more and says so.
+its database, or has tables of another version. A server whose database is removed, or found damaged when something is
+stored, accepts nothing more and says so. The doctor says what cannot be read, and when it cannot read at all.
 """
 
 import os
@@ -177,6 +178,69 @@ def taken_away():
     return told
 
 
+def damaged_table(server, folder):
+    """The database is damaged where results are stored: a job is solved, and its end cannot be stored."""
+    data = crash(server, folder)
+    with sqlite3.connect(data / "signorini.db") as connection:
+        connection.execute("pragma wal_checkpoint(truncate)")
+        place = "select rootpage - 1, page_size from sqlite_schema, pragma_page_size where name = 'result_part'"
+        (page, size), = connection.execute(place)
+    connection.close()
+    with (data / "signorini.db").open("r+b") as file:
+        file.seek(page * size)
+        file.write(bytes(size))
+    server = Server()
+    data.rename(server.data)
+    with server:
+        job = server.submit(example(), cache="off", limits={"timeout_s": 5})
+        wait_until(lambda: server.call("GET", "/readyz").status == 503, "readyz tells of the damage")
+        for method, path, body in (("GET", "/readyz", None), ("POST", "/v1/jobs", submission(example()))):
+            answer = server.call(method, path, body)
+            equal((answer.status, answer.json()["code"]), (503, "storage-lost"), "%s: %r" % (path, answer))
+        wait_until(lambda: server.call("GET", "/v1/queue").json()["idle"] == 2, "its worker is free")
+        equal(server.call("GET", "/v1/jobs/" + job).status, 200, "reading")
+        time.sleep(2.2)
+        lines = [line for line in server.log.read_text().splitlines() if "no job is started any more" in line]
+        check(1 <= len(lines) <= 4, "told once by each that met it: %r" % lines)
+        server.stop()
+
+
+def wait_until(done, what, most_s=10):
+    end = time.monotonic() + most_s
+    while not done():
+        check(time.monotonic() < end, what)
+        time.sleep(0.02)
+
+
+def doctor(data, code, last, program=BINARY, **how):
+    """What the doctor finds; its last line ends like this."""
+    done = subprocess.run([program, "doctor", "--data", data], capture_output=True, text=True, timeout=30, **how)
+    equal(done.returncode, code, "doctor %s: %r" % (data, done))
+    lines = (done.stdout or done.stderr).splitlines()
+    check(lines and lines[-1].endswith(last), "doctor %s: %r" % (data, done))
+    return lines[:-1]
+
+
+def doctors(server, folder):
+    data = crash(server, folder)
+    (data / "signorini.db-wal").unlink()
+    with (data / "signorini.db").open("r+b") as file:
+        file.write(bytes(100))
+    equal(len(doctor(data, DAMAGED, "no job can be read: restore the store from a backup")), 1, "findings, each once")
+    doctor(folder / "missing", FOLDER, "there is no signorini.db in it")
+    data = crash(server, folder)
+    doctor(data, 0, "3 of 3 jobs are intact")
+    if os.geteuid() == 0:
+        for path in [*data.iterdir(), data]:
+            os.chown(path, 65534, 65534)
+            path.chmod(0o500 if path == data else 0o400)
+        data.parent.chmod(0o755)
+        nobody = dict(program=folder / "signorini", user=65534, group=65534, extra_groups=[])
+        doctor(data, FOLDER, "copy the folder to where that is allowed, and check the copy", **nobody)
+        os.chown(data, 0, 0)
+        doctor(data, FOLDER, "Permission denied (os error 13)", **nobody)
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -192,6 +256,8 @@ def main():
                 modes(server.data)
                 if not folder.joinpath("closed").exists():
                     folders(folder, server)
+                    doctors(server, folder)
+                damaged_table(server, folder)
     told = taken_away()
     check(slowest <= MOST_S, "a refusal took %.2f s" % slowest)
     print("figure: %d starts refused within %.2f s, each with one line and its exit code; a store taken away under a "

@@ -287,6 +287,8 @@ async fn both_protocols_return_the_same_about_the_service() {
     );
     assert_eq!(info["limits"]["max_wait_s"], limits.max_wait_s);
     assert_eq!(info["field_formats"], json!(over_grpc.field_formats));
+    assert_eq!(info["isolation"], "thread");
+    assert_eq!(over_grpc.isolation(), pb::Isolation::Thread);
     let caller = grpc
         .get_caller(pb::GetCallerRequest {})
         .await

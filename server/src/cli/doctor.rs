@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{exit::Exit, output};
-use crate::store::{self, StoreError};
+use crate::store::{self, Report, StoreError};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -52,9 +52,18 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         text += finding;
         text.push('\n');
     }
-    text += &format!("{} of {} jobs are intact", report.intact, report.jobs);
+    text += &summed_up(&report);
     if let Some(new) = &salvage {
-        text += &format!("; they were copied to {}", new.display());
+        text += &match report.intact {
+            0 => format!("; the new store in {} has none", new.display()),
+            _ => format!("; they were copied to {}", new.display()),
+        };
+        if report.intact < report.jobs {
+            text += &format!(
+                "; of the others, what is intact can be read as long as {} is kept: start the service in it",
+                data.display()
+            );
+        }
     }
     text.push('\n');
     output::print(&text)?;
@@ -62,4 +71,14 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         true => Exit::Ok,
         false => Exit::Damaged,
     })
+}
+
+/// How many jobs are intact.
+fn summed_up(report: &Report) -> String {
+    let Report { intact, jobs, .. } = report;
+    match (report.incomplete, jobs) {
+        (true, 0) => "no job can be read: restore the store from a backup".into(),
+        (true, _) => format!("{intact} jobs are intact, of at least {jobs}"),
+        (false, _) => format!("{intact} of {jobs} jobs are intact"),
+    }
 }

@@ -32,7 +32,9 @@ impl Exit {
             Some(StoreError::Folder(_)) => Exit::Folder,
             Some(StoreError::Locked(_)) => Exit::Locked,
             Some(StoreError::Schema(_)) => Exit::Schema,
-            Some(StoreError::Lost(_) | StoreError::Damaged(_)) => Exit::Damaged,
+            Some(StoreError::Lost(_) | StoreError::Damaged(_) | StoreError::Broken(_)) => {
+                Exit::Damaged
+            }
             _ if error.is::<CannotListen>() => Exit::Listen,
             _ => Exit::Failed,
         }

@@ -32,7 +32,8 @@ enum Command {
     /// Start the service: REST and gRPC on one port. Exit code: 0 stopped, 3 cannot listen, 4 the folder cannot be used,
     /// 5 another server uses it, 6 its tables are of another program or version, 7 stored data is missing or damaged
     Serve(Config),
-    /// Check a store that no server is using, and save what is intact. Exit code: 0 all is intact, 7 something is damaged
+    /// Check a store that no server is using, and save what is intact. Exit code: 0 all is intact, 4 the folder cannot be
+    /// used, 5 a server uses it, 6 its tables are of another program or version, 7 something is missing or damaged
     Doctor(doctor::Arguments),
     /// Solve one problem without a service. Exit code: 0 converged, 9 not converged, 2 invalid input
     Solve(solve::Arguments),

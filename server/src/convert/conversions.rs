@@ -8,6 +8,7 @@ use solver::{element::Element, problem, solution};
 
 use super::{FromMessage, IntoMessage, Reader};
 use crate::{
+    config::Isolation,
     job, mesh, pb,
     run::Summary,
     verbs::{bulk, info, jobs, lists, problems, queue, results},

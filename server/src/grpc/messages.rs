@@ -10,14 +10,13 @@ use crate::{
     parameters::{Parameter, Values},
     pb,
     verbs::{
+        MAX_MESSAGE_BYTES,
         key::{IDEMPOTENCY_KEY, Key},
         page::{PAGE_SIZE, Paging},
         profiles::{POINTS, Points},
     },
 };
 
-/// Largest message in either direction, as the contract promises.
-pub(super) const MAX_MESSAGE_BYTES: usize = 1 << 20;
 /// Most rows of a history in one answer, some 200 bytes each, so that it fits into a message.
 pub(super) const MAX_ROWS: usize = 4000;
 /// Most points of a profile in one answer, some 90 bytes each.

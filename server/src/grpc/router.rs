@@ -6,11 +6,11 @@ use axum::{Router, middleware::map_response};
 use tonic::{Code, Status, server::NamedService, service::Routes};
 use tonic_health::server::HealthReporter;
 
-use super::{messages::MAX_MESSAGE_BYTES, service::Grpc};
+use super::service::Grpc;
 use crate::{
     error::ApiError,
     pb::{self, job_service_server::JobServiceServer},
-    verbs::Service,
+    verbs::{MAX_MESSAGE_BYTES, Service},
 };
 
 /// The gRPC routes, which share a port with REST, and the handle that sets the reported health.

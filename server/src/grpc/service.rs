@@ -8,8 +8,8 @@ use sha2::{Digest, Sha256};
 use tonic::{Request, Response, Status, Streaming};
 
 use super::messages::{
-    MAX_MESSAGE_BYTES, MAX_ROWS, caller_and_message, check_offset, jobs_that_fit, key,
-    noting_replay, paging, points, read_if_set,
+    MAX_ROWS, caller_and_message, check_offset, jobs_that_fit, key, noting_replay, paging, points,
+    read_if_set,
 };
 use crate::{
     caller::Caller,
@@ -22,7 +22,7 @@ use crate::{
     store::PIECE_BYTES,
     transfer::HasShare,
     verbs::{
-        Service,
+        MAX_MESSAGE_BYTES, Service,
         bulk::{self, BulkResult},
         envelope::JobRequest,
         fields,

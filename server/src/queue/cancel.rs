@@ -30,7 +30,7 @@ impl Queue {
                 attempt: running.attempt,
             },
             // nothing can end it, but its solver need not go on
-            (Err(error), Some(running)) if error.is_damage_of(key) => {
+            (Err(error), Some(running)) if error.is_lasting(key) => {
                 running.stop(StopReason::Unwanted);
                 return Err(error);
             }
@@ -89,7 +89,7 @@ impl Queue {
                     );
                 }
                 Ok(false) => return,
-                Err(cause) if cause.is_damage_of(key) => return,
+                Err(cause) if cause.is_lasting(key) => return,
                 Err(cause) => {
                     error!(job.id = %id, %cause, "job {id} could not be canceled yet: {cause}")
                 }

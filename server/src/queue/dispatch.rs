@@ -67,23 +67,16 @@ impl Queue {
 
     /// Claims whenever a slot is free and a job waits, until the service stops.
     async fn dispatch(self: Arc<Self>) {
-        let mut logged = String::new();
+        let mut starting = Complaint::new("no job can be started");
         loop {
             // a notification from here on is kept for the wait below, so that none is missed
             while self.store.waiting() > 0
                 && let Some(slot) = self.free_slot()
             {
-                match self.claim(slot).await {
-                    Ok(true) => logged.clear(),
-                    Ok(false) => break,
-                    Err(cause) => {
-                        // once, and not every second
-                        if logged != cause.to_string() {
-                            logged = cause.to_string();
-                            error!(%cause, "no job can be started: {cause}");
-                        }
-                        tokio::time::sleep(Duration::from_secs(1)).await; // the disk may be full for a while
-                    }
+                match starting.unless(self.claim(slot).await) {
+                    Some(true) => {}
+                    Some(false) => break,
+                    None => tokio::time::sleep(CHECK_INTERVAL).await, // the disk may be full for a while
                 }
             }
             tokio::select! {
@@ -156,7 +149,7 @@ impl Queue {
             let how = "it was left without a worker";
             let changed = match self.store.requeue_lost(key, attempt, how).await {
                 Ok(changed) => changed,
-                Err(cause) if cause.is_damage_of(key) => continue, // logged, once; `doctor` names it
+                Err(cause) if cause.is_lasting(key) => continue, // logged, once; `doctor` names it
                 Err(cause) => return Err(cause),
             };
             error!(
@@ -172,29 +165,54 @@ impl Queue {
     /// Ends jobs that have waited too long, requeues those that were lost, and removes the ids of jobs deleted long ago,
     /// until the service stops.
     async fn run_periodic_tasks(self: Arc<Self>) {
+        let mut expiring = Complaint::new("jobs that waited too long could not be ended");
+        let mut requeuing = Complaint::new("lost jobs could not be requeued");
+        let mut forgetting = Complaint::new("ids of deleted jobs could not be removed");
         loop {
-            match self.store.expire_queued(Time::now()).await {
-                Ok(changed) if changed.is_empty() => {}
-                Ok(changed) => {
+            match expiring.unless(self.store.expire_queued(Time::now()).await) {
+                Some(changed) if !changed.is_empty() => {
                     self.announce(&changed);
                     self.wake.notify_one();
                     continue; // there may be more
                 }
-                Err(cause) => {
-                    error!(%cause, "jobs that waited too long could not be ended: {cause}")
-                }
+                Some(_) | None => {}
             }
-            if let Err(cause) = self.requeue_lost().await {
-                error!(%cause, "lost jobs could not be requeued: {cause}");
-            }
-            if let Err(cause) = self.store.forget_deleted(Time::now()).await {
-                error!(%cause, "ids of deleted jobs could not be removed: {cause}");
-            }
+            requeuing.unless(self.requeue_lost().await);
+            forgetting.unless(self.store.forget_deleted(Time::now()).await);
             tokio::select! {
                 () = tokio::time::sleep(CHECK_INTERVAL) => {}
                 () = self.stopping.cancelled() => return,
             }
         }
+    }
+}
+
+/// An error of what is tried again and again: told in the log once, and not each time.
+struct Complaint {
+    what: &'static str,
+    told: String,
+}
+
+impl Complaint {
+    fn new(what: &'static str) -> Complaint {
+        let told = String::new();
+        Complaint { what, told }
+    }
+
+    /// What was done, unless it failed.
+    fn unless<T>(&mut self, done: Result<T>) -> Option<T> {
+        let cause = match done {
+            Ok(done) => {
+                self.told.clear();
+                return Some(done);
+            }
+            Err(cause) => cause.to_string(),
+        };
+        if self.told != cause {
+            error!(cause, "{}: {cause}", self.what);
+            self.told = cause;
+        }
+        None
     }
 }
 

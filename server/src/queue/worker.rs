@@ -147,7 +147,7 @@ async fn requeue_with_retries(queue: &Queue, job: &Job, how: &str) {
     loop {
         match queue.store.requeue_lost(job.key, job.attempt, how).await {
             Ok(changed) => return queue.announce(&changed),
-            Err(cause) if cause.is_damage_of(job.key) => return, // nothing can end it; the worker is free for others
+            Err(cause) if cause.is_lasting(job.key) => return, // nothing can end it; the worker is free for others
             Err(cause) => {
                 warn!(job.id = %job.id, %cause, "job {} could not be requeued yet: {cause}", job.id);
             }
@@ -190,7 +190,7 @@ async fn end_with_retries(
 ) {
     let mut backoff = Backoff::default();
     while let Err(cause) = try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
-        if cause.is_damage_of(job.key) {
+        if cause.is_lasting(job.key) {
             return; // nothing can end it; the worker is free for others
         }
         warn!(job.id = %job.id, %cause, "job {} could not be ended yet: {cause}", job.id);

@@ -2,8 +2,9 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{LazyLock, Mutex, PoisonError},
-    time::{Duration, Instant},
+    mem::take,
+    sync::{LazyLock, Mutex, MutexGuard, PoisonError},
+    time::Duration,
 };
 
 use tracing::info;
@@ -13,50 +14,72 @@ const INTERVAL: Duration = Duration::from_secs(10);
 /// A client chooses the path.
 const LONGEST_PATH: usize = 100;
 
-/// By kind: when it was last logged, and how many requests were refused since. There are as many kinds as errors.
-static KINDS: LazyLock<Mutex<BTreeMap<String, Kind>>> = LazyLock::new(Mutex::default);
+/// By kind, what was refused since its last line. There are as many kinds as errors.
+static KINDS: LazyLock<Mutex<BTreeMap<String, Since>>> = LazyLock::new(Mutex::default);
 
-struct Kind {
-    logged: Instant,
-    since: u64,
+/// How many requests were refused since the last line, and the path of the latest.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Since {
+    count: u64,
+    latest: String,
 }
 
 /// A request was refused for this kind of error.
 pub(super) fn note(kind: &str, path: &str) {
-    let Some(count) = due(kind, Instant::now()) else {
-        return;
-    };
     let path: String = path.chars().take(LONGEST_PATH).collect();
-    match count {
-        1 => info!(
-            error = kind,
-            count, "refused as {kind}: a request to {path:?}"
-        ),
-        _ => info!(
-            error = kind,
-            count, "refused as {kind}: {count} more requests, the latest to {path:?}"
-        ),
+    if is_counted(kind, &path) {
+        return;
+    }
+    info!(
+        error = kind,
+        count = 1,
+        "refused as {kind}: a request to {path:?}"
+    );
+    let kind = kind.to_owned();
+    tokio::spawn(async move {
+        loop {
+            tokio::time::sleep(INTERVAL).await;
+            let Some(Since { count, latest }) = counted(&kind) else {
+                return;
+            };
+            info!(
+                error = kind,
+                count, "refused as {kind}: {count} more, the latest a request to {latest:?}"
+            );
+        }
+    });
+}
+
+/// Counts a request for the next line; false if there is none to come, since nothing of this kind was refused lately.
+fn is_counted(kind: &str, path: &str) -> bool {
+    let mut kinds = kinds();
+    match kinds.get_mut(kind) {
+        Some(since) => {
+            since.count += 1;
+            since.latest = path.to_owned();
+            true
+        }
+        None => {
+            kinds.insert(kind.to_owned(), Since::default());
+            false
+        }
     }
 }
 
-/// How many requests a line is due for.
-fn due(kind: &str, now: Instant) -> Option<u64> {
-    let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
-    match kinds.get_mut(kind) {
-        Some(known) => {
-            known.since += 1;
-            let due = now.saturating_duration_since(known.logged) >= INTERVAL;
-            due.then(|| {
-                known.logged = now;
-                std::mem::take(&mut known.since)
-            })
-        }
-        None => {
-            let (logged, since) = (now, 0);
-            kinds.insert(kind.to_owned(), Kind { logged, since });
-            Some(1)
-        }
+/// What was refused since the last line; `None` if there was nothing, and then no line is to come.
+fn counted(kind: &str) -> Option<Since> {
+    let mut kinds = kinds();
+    let since = take(kinds.get_mut(kind)?);
+    if since.count == 0 {
+        kinds.remove(kind);
+        return None;
     }
+    Some(since)
+}
+
+fn kinds() -> MutexGuard<'static, BTreeMap<String, Since>> {
+    // No code panics while it holds this lock; if one did, the counts would still be whole.
+    KINDS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
@@ -64,13 +87,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_kind_is_logged_at_once_and_then_every_ten_seconds_with_its_number() {
-        let start = Instant::now();
-        let after = |seconds| due("a kind of this test", start + Duration::from_secs(seconds));
-        assert_eq!(after(0), Some(1));
-        assert_eq!((after(1), after(9)), (None, None));
-        assert_eq!(after(10), Some(3));
-        assert_eq!(after(11), None);
-        assert_eq!(due("another one", start), Some(1));
+    fn what_is_refused_after_the_first_is_counted_for_the_next_line_until_there_is_none() {
+        let kind = "a kind of this test";
+        assert!(!is_counted(kind, "/1"), "the first has its own line");
+        assert!(is_counted(kind, "/2") && is_counted(kind, "/3"));
+        assert!(!is_counted("another one", "/1"));
+        let (count, latest) = (2, "/3".to_owned());
+        assert_eq!(counted(kind), Some(Since { count, latest }));
+        assert_eq!(counted(kind), None);
+        assert!(!is_counted(kind, "/4"));
     }
 }

@@ -20,8 +20,12 @@ impl Store {
     /// Starts an attempt of the next job of the queue: highest priority first, then in order of arrival. Jobs
     /// before it for which there is a result by now are answered. Also returns all jobs that have changed.
     pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
+        self.damages.writing(self.try_to_claim_next()).await
+    }
+
+    async fn try_to_claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
         let mut change = self.change().await?;
-        let claim = self.damages.noting(claim(&mut change)).await?;
+        let claim = claim(&mut change).await?;
         let changed = change.commit().await?;
         Ok((claim, changed))
     }

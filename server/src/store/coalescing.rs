@@ -11,6 +11,7 @@ use super::{
     error::Result,
     intact::{self, WHOLE},
     lifecycle::{self, Ending},
+    results,
     rows::{from_row, read},
     submission::NewJob,
     waiting::Move,
@@ -230,6 +231,10 @@ fn is_shared(status: Status, reason: Option<Reason>) -> bool {
 /// Starts a queued job and ends it at once, with the result of another one of the same input.
 pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> Result<()> {
     let job = lifecycle::start_attempt(change, job).await?;
+    if job.attempt > 1 {
+        // pieces that an earlier attempt had written when it was interrupted
+        results::remove(change.sql(), job.key).await?;
+    }
     sqlx::query(
         "update job set cached_from = ?, coalesced_into = null, checksum = null,
                         result_job = (select coalesce(result_job, id) from job where id = ?) where id = ?",

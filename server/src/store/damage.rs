@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     sync::{
-        Mutex, PoisonError,
+        Mutex, OnceLock, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
 };
@@ -23,6 +23,8 @@ pub(super) struct Damages {
     found: Mutex<BTreeMap<Record, (Uuid, Option<JobId>)>>,
     /// The indexes of the jobs cannot be trusted: a job that is not found may exist.
     indexes: AtomicBool,
+    /// Why nothing is written any more: damage to the database itself, and more could be damaged by writing.
+    broken: OnceLock<String>,
     /// Finds the public id of a job.
     reader: SqlitePool,
 }
@@ -32,6 +34,7 @@ impl Damages {
         Damages {
             found: Mutex::default(),
             indexes: AtomicBool::default(),
+            broken: OnceLock::new(),
             reader,
         }
     }
@@ -43,6 +46,32 @@ impl Damages {
                 Err(StoreError::Damaged(Box::new(self.note(*damage).await)))
             }
             other => other,
+        }
+    }
+
+    /// Runs what writes, and takes note of damage that it finds; if that is of the database itself, nothing is written any
+    /// more.
+    pub(super) async fn writing<T>(&self, work: impl Future<Output = Result<T>>) -> Result<T> {
+        match self.noting(work).await {
+            Err(StoreError::Damaged(damage)) if damage.record.is_database() => {
+                let text = format!(
+                    "{damage}: nothing is stored and no job is started any more; stop the service and run \
+                     `signorini doctor`"
+                );
+                if self.broken.set(text.clone()).is_ok() {
+                    tracing::error!("{text}");
+                }
+                Err(StoreError::Broken(text))
+            }
+            other => other,
+        }
+    }
+
+    /// An error if nothing is written any more.
+    pub(super) fn can_write(&self) -> Result<()> {
+        match self.broken.get() {
+            Some(text) => Err(StoreError::Broken(text.clone())),
+            None => Ok(()),
         }
     }
 

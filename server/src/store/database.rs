@@ -119,7 +119,8 @@ impl Store {
     async fn try_to_connect(path: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
         let folder = Folder::lock(path)?;
         let known = progress::read(path).map_err(|error| {
-            StoreError::Folder(format!("cannot read {}: {error}", progress::FILE))
+            let file = path.join(progress::FILE);
+            StoreError::Folder(format!("cannot read {}: {error}", file.display()))
         })?;
         let database = folder.database();
         let options = SqliteConnectOptions::new()
@@ -151,7 +152,8 @@ impl Store {
         let record = progress::in_database(&mut *writer.acquire().await?).await?;
         let record = record.ok_or_else(|| StoreError::Unexpected("no progress".into()))?;
         let progress = Progress::start(path, record).map_err(|error| {
-            StoreError::Folder(format!("cannot write {}: {error}", progress::FILE))
+            let file = path.join(progress::FILE);
+            StoreError::Folder(format!("cannot write {}: {error}", file.display()))
         })?;
         let reading = options.read_only(true);
         let reader = pool(4).connect_with(reading.clone()).await?;
@@ -209,6 +211,7 @@ impl Store {
 
     /// The same for what must work even if the disk is full.
     pub(super) async fn begin_control(&self) -> Result<Writing> {
+        self.damages.can_write()?;
         self.identity.check()?;
         let begun = self.writer.begin_with("begin immediate").await;
         let mut tx = begun.inspect_err(|_| self.cannot_begin.store(true, Relaxed))?;
@@ -237,7 +240,7 @@ impl Store {
             }
             other => other,
         };
-        self.damages.noting(async { done }).await
+        self.damages.writing(async { done }).await
     }
 }
 
@@ -261,12 +264,19 @@ pub(super) async fn compare_with_the_past(
     let mut connection = options.read_only(!half_created).connect().await?;
     let compared = async {
         migrations::check(&mut connection).await?;
+        let found = progress::in_database(&mut connection).await?;
         match known {
-            Some(known) => {
-                let found = progress::in_database(&mut connection).await?;
-                progress::compare(known, found.as_ref())
+            Some(known) => progress::compare(known, found.as_ref()),
+            None => {
+                let file = path.join(progress::FILE);
+                if found.is_some() && !file.exists() {
+                    tracing::warn!(
+                        "{} is missing: whether all that was stored is still there is not known; it is written anew",
+                        file.display()
+                    );
+                }
+                Ok(())
             }
-            None => Ok(()),
         }
     };
     let compared = compared.await;

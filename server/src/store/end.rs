@@ -87,7 +87,7 @@ impl Store {
         match result {
             Some(_) => {
                 let finishing = self.try_to_finish(key, attempt, ending, &last, result);
-                self.damages.noting(finishing).await
+                self.damages.writing(finishing).await
             }
             None => {
                 self.control(|| self.try_to_finish(key, attempt, ending, &last, None))
@@ -109,7 +109,7 @@ impl Store {
             None => self.control_change().await?,
         };
         // the row is read whole, so that a damaged one is not given a new checksum below
-        let found = self.damages.noting(find(change.sql(), key)).await?;
+        let found = find(change.sql(), key).await?;
         if !found.is_some_and(|job| job.status == Status::Running && job.attempt == attempt) {
             return Ok(None);
         }
@@ -155,7 +155,6 @@ impl Store {
     /// not wait for a worker, and is left alone.
     pub async fn expire_queued(&self, now: Time) -> Result<Vec<i64>> {
         let now = self.by_our_clock(now);
-        const AT_ONCE: i64 = 100;
         // nearly always there is none, which a reader finds without occupying the writer
         let some = sqlx::query(EXPIRED)
             .bind(now.micros())
@@ -165,6 +164,11 @@ impl Store {
         if some.is_none() {
             return Ok(vec![]);
         }
+        self.damages.writing(self.end_expired(now)).await
+    }
+
+    async fn end_expired(&self, now: Time) -> Result<Vec<i64>> {
+        const AT_ONCE: i64 = 100;
         let mut change = self.change().await?;
         let expired: Vec<i64> = sqlx::query_scalar(EXPIRED)
             .bind(now.micros())

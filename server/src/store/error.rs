@@ -46,6 +46,9 @@ pub enum StoreError {
     /// The database was removed or replaced while the store is open.
     #[error("{0}")]
     Replaced(String),
+    /// The database itself was found damaged when something was stored: nothing is stored any more.
+    #[error("{0}")]
+    Broken(String),
     /// A record that is not as it was written.
     #[error("{0}: {cause}", cause = .0.cause)]
     Damaged(Box<Damage>),
@@ -109,6 +112,16 @@ impl Record {
         }
     }
 
+    /// The database itself, or a part of it of which nobody knows whose it is.
+    fn database() -> Record {
+        Record::named("database")
+    }
+
+    /// Whether it is the database itself.
+    pub(super) fn is_database(&self) -> bool {
+        *self == Record::database()
+    }
+
     /// The error that it is damaged.
     pub(super) fn damaged(self, cause: impl ToString) -> StoreError {
         StoreError::Damaged(Box::new(Damage {
@@ -153,15 +166,21 @@ impl From<sqlx::Error> for StoreError {
             _ => None,
         };
         let number: u32 = number.unwrap_or_default();
+        let told = match &error {
+            sqlx::Error::Database(cause) => format!("SQLite: {} (error {number})", cause.message()),
+            other => other.to_string(),
+        };
         match &error {
-            _ if matches!(number & 0xff, code::CORRUPT | code::NOT_A_DATABASE)
-                || matches!(number, code::IOERR_READ | code::IOERR_SHORT_READ) =>
-            {
-                Record::named("database").damaged(error)
+            _ if matches!(number & 0xff, code::CORRUPT | code::NOT_A_DATABASE) => {
+                Record::database().damaged(told)
+            }
+            // the disk may give it when it is asked again
+            _ if matches!(number, code::IOERR_READ | code::IOERR_SHORT_READ) => {
+                Record::named("page of the database").damaged(told)
             }
             _ if matches!(number, code::FULL | code::IOERR_WRITE) => StoreError::Full,
             _ if matches!(number & 0xff, code::READ_ONLY | code::CANNOT_OPEN) => {
-                StoreError::Folder(format!("the database cannot be written: {error}"))
+                StoreError::Folder(format!("the database cannot be written: {told}"))
             }
             sqlx::Error::PoolTimedOut => StoreError::Busy,
             sqlx::Error::Decode(_) | sqlx::Error::ColumnDecode { .. } => {
@@ -179,6 +198,11 @@ impl StoreError {
         matches!(self, StoreError::Damaged(damage) if damage.record.job == Some(key))
     }
 
+    /// Whether nothing of this job can be stored, now or later, before the operator has repaired the store.
+    pub fn is_lasting(&self, key: i64) -> bool {
+        matches!(self, StoreError::Broken(_)) || self.is_damage_of(key)
+    }
+
     /// The same error for another submission of the same transaction.
     pub(super) fn for_another(&self) -> StoreError {
         match self {
@@ -186,6 +210,7 @@ impl StoreError {
             StoreError::Busy => StoreError::Busy,
             StoreError::Folder(why) => StoreError::Folder(why.clone()),
             StoreError::Replaced(how) => StoreError::Replaced(how.clone()),
+            StoreError::Broken(how) => StoreError::Broken(how.clone()),
             StoreError::Damaged(damage) => StoreError::Damaged(damage.clone()),
             other => StoreError::Unexpected(other.to_string()),
         }

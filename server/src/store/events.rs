@@ -33,17 +33,20 @@ impl Store {
         payloads: &[(Time, Payload)],
         progress: &Progress,
     ) -> Result<bool> {
-        let mut tx = self.begin().await?;
-        // the row is read whole, so that a damaged one is not given a new checksum below
-        let job = self.damages.noting(find(&mut tx, key)).await?;
-        if !job.is_some_and(|job| job.status == Status::Running && job.attempt == attempt) {
-            return Ok(false);
-        }
-        let payloads = self.events_by_our_clock(payloads);
-        append_with_progress(&mut tx, key, attempt, &payloads, progress).await?;
-        seal(&mut tx, key).await?;
-        tx.commit().await?;
-        Ok(true)
+        let write = async {
+            let mut tx = self.begin().await?;
+            // the row is read whole, so that a damaged one is not given a new checksum below
+            let job = find(&mut tx, key).await?;
+            if !job.is_some_and(|job| job.status == Status::Running && job.attempt == attempt) {
+                return Ok(false);
+            }
+            let payloads = self.events_by_our_clock(payloads);
+            append_with_progress(&mut tx, key, attempt, &payloads, progress).await?;
+            seal(&mut tx, key).await?;
+            tx.commit().await?;
+            Ok(true)
+        };
+        self.damages.writing(write).await
     }
 
     /// At most `limit` events after number `after`, in order.

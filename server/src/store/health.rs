@@ -5,7 +5,7 @@ use std::{sync::Weak, time::Duration};
 use sqlx::{ConnectOptions, Connection};
 use uuid::Uuid;
 
-use crate::time::Time;
+use crate::{error::number_of, time::Time};
 
 use super::{
     database::Store,
@@ -44,9 +44,9 @@ impl Health {
         if self.damaged > 0 {
             let incidents: Vec<String> = self.incidents.iter().map(Uuid::to_string).collect();
             lines.push(format!(
-                "{} damaged records were found, see the log for incidents {}; the others can be read; \
+                "{} found damaged since the start, see the log for incident {}; the others can be read; \
                  stop the service and run `signorini doctor`",
-                self.damaged,
+                number_of(self.damaged, "record"),
                 incidents.join(", ")
             ));
         }
@@ -60,6 +60,7 @@ impl Store {
     pub async fn health(&self) -> Result<Health> {
         self.identity.check()?;
         self.identity.check_header()?;
+        self.damages.can_write()?;
         for (pool, job) in [
             (&self.reader, "select * from job order by id desc limit 1"),
             (&self.lists, "select * from job order by id limit 1"),

@@ -30,6 +30,8 @@ pub struct Report {
     pub jobs: u64,
     /// Those that are intact, with their problem, events and result.
     pub intact: u64,
+    /// The tables cannot be read: there may be more jobs.
+    pub incomplete: bool,
 }
 
 /// Jobs that are written to the new store in one transaction.
@@ -42,21 +44,38 @@ const EVENTS_PER_READ: i64 = 1000;
 
 /// Checks everything in the store of this folder; with `new`, which must be empty or missing, copies what is intact.
 pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
-    if !folder.join(DATABASE).exists() {
-        let missing = format!("there is no {DATABASE} in {}", folder.display());
-        return Err(StoreError::Folder(missing));
+    let unusable = |why: String| {
+        StoreError::Folder(format!(
+            "the folder {} cannot be used: {why}",
+            folder.display()
+        ))
+    };
+    match folder.join(DATABASE).try_exists() {
+        Ok(true) => {}
+        Ok(false) => return Err(unusable(format!("there is no {DATABASE} in it"))),
+        Err(error) => return Err(unusable(error.to_string())),
     }
     let _locked = Folder::lock(folder)?;
     let mut report = Report::default();
+    let options = SqliteConnectOptions::new().filename(folder.join(DATABASE));
+    let known = progress::read(folder).unwrap_or_else(|error| {
+        report.findings.push(format!("{}: {error}", progress::FILE));
+        None
+    });
+    match compare_with_the_past(folder, known.as_ref(), options.clone()).await {
+        Ok(()) => {}
+        Err(StoreError::Folder(why)) => {
+            return Err(unusable(format!(
+                "{why}; to read a database, SQLite writes beside it: copy the folder to where that is allowed, and \
+                 check the copy"
+            )));
+        }
+        Err(error) => report.finding("database", &error),
+    }
     let target = match new {
         Some(new) => Some(new_store(new).await?),
         None => None,
     };
-    let options = SqliteConnectOptions::new().filename(folder.join(DATABASE));
-    let known = progress::read(folder).unwrap_or_default();
-    if let Err(error) = compare_with_the_past(folder, known.as_ref(), options.clone()).await {
-        report.finding("database", &error);
-    }
     match options.read_only(true).connect().await {
         Ok(mut source) => {
             // damage to the list of steps is found below, as damage
@@ -82,7 +101,13 @@ impl Report {
             StoreError::Damaged(damage) => format!("{}: {}", damage.record.name, damage.cause),
             other => other.to_string(),
         };
-        self.findings.push(format!("{what}: {text}"));
+        // of the database itself every table tells the same
+        let of_all = matches!(error, StoreError::Damaged(damage) if damage.record.is_database());
+        let known =
+            |finding: &String| finding.starts_with("database: ") && finding.ends_with(&text);
+        if !(of_all && self.findings.iter().any(known)) {
+            self.findings.push(format!("{what}: {text}"));
+        }
     }
 
     /// Checks one table after the other; an error only if the new store cannot be written.
@@ -105,6 +130,7 @@ impl Report {
         let listed = keys_after(source, MOST_NUMBERS).await;
         let listed = listed.unwrap_or_else(|error| {
             self.finding("jobs", &error);
+            self.incomplete = true;
             vec![]
         });
         let mut writing: Option<Writing> = None;

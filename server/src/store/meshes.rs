@@ -62,56 +62,62 @@ impl Store {
         first: i64,
         pieces: &[Vec<u8>],
     ) -> Result<()> {
-        let mut tx = self.begin().await?;
-        for (piece, body) in (first..).zip(pieces) {
-            // the same file may be uploaded twice at once, or again after an interruption: its pieces are the same
-            sqlx::query(
-                "insert or replace into mesh_piece (hash, piece, body, checksum) values (?, ?, ?, ?)",
-            )
-            .bind(hash)
-            .bind(piece)
-            .bind(body)
-            .bind(piece_checksum(hash, piece, body).stored())
-            .execute(&mut *tx)
-            .await?;
-        }
-        tx.commit().await?;
-        Ok(())
+        let write = async {
+            let mut tx = self.begin().await?;
+            for (piece, body) in (first..).zip(pieces) {
+                // the same file may be uploaded twice at once, or again after an interruption: its pieces are the same
+                sqlx::query(
+                    "insert or replace into mesh_piece (hash, piece, body, checksum) values (?, ?, ?, ?)",
+                )
+                .bind(hash)
+                .bind(piece)
+                .bind(body)
+                .bind(piece_checksum(hash, piece, body).stored())
+                .execute(&mut *tx)
+                .await?;
+            }
+            tx.commit().await?;
+            Ok(())
+        };
+        self.damages.writing(write).await
     }
 
     /// Completes a mesh with this number of pieces; false if it was stored already. `None`: some pieces were removed
     /// meanwhile, with an earlier mesh of the same file, and must be written again.
     pub async fn insert_mesh(&self, info: &MeshInfo, pieces: i64) -> Result<Option<bool>> {
-        let mut tx = self.begin().await?;
-        let there: i64 = sqlx::query_scalar("select count(*) from mesh_piece where hash = ?")
-            .bind(&info.hash)
-            .fetch_one(&mut *tx)
-            .await?;
-        if there != pieces {
-            return Ok(None);
-        }
-        let key: Option<i64> = sqlx::query_scalar(
-            "insert into mesh (hash, info, created_at, pieces) values (?, ?, ?, ?) on conflict do nothing returning id",
-        )
-        .bind(&info.hash)
-        .bind(serde_json::to_string(info)?)
-        .bind(info.created_at.micros())
-        .bind(pieces)
-        .fetch_optional(&mut *tx)
-        .await?;
-        if let Some(key) = key {
-            let row = sqlx::query("select * from mesh where id = ?")
-                .bind(key)
+        let write = async {
+            let mut tx = self.begin().await?;
+            let there: i64 = sqlx::query_scalar("select count(*) from mesh_piece where hash = ?")
+                .bind(&info.hash)
                 .fetch_one(&mut *tx)
                 .await?;
-            sqlx::query("update mesh set checksum = ? where id = ?")
-                .bind(checksum::of_row(&row)?)
-                .bind(key)
-                .execute(&mut *tx)
-                .await?;
-        }
-        tx.commit().await?;
-        Ok(Some(key.is_some()))
+            if there != pieces {
+                return Ok(None);
+            }
+            let key: Option<i64> = sqlx::query_scalar(
+                "insert into mesh (hash, info, created_at, pieces) values (?, ?, ?, ?) on conflict do nothing returning id",
+            )
+            .bind(&info.hash)
+            .bind(serde_json::to_string(info)?)
+            .bind(info.created_at.micros())
+            .bind(pieces)
+            .fetch_optional(&mut *tx)
+            .await?;
+            if let Some(key) = key {
+                let row = sqlx::query("select * from mesh where id = ?")
+                    .bind(key)
+                    .fetch_one(&mut *tx)
+                    .await?;
+                sqlx::query("update mesh set checksum = ? where id = ?")
+                    .bind(checksum::of_row(&row)?)
+                    .bind(key)
+                    .execute(&mut *tx)
+                    .await?;
+            }
+            tx.commit().await?;
+            Ok(Some(key.is_some()))
+        };
+        self.damages.writing(write).await
     }
 
     /// The parsed mesh as it was written.
@@ -122,30 +128,33 @@ impl Store {
 
     /// Removes a mesh, unless a job that waits or runs needs it.
     pub async fn remove_mesh(&self, hash: &str) -> Result<Removal> {
-        let mut tx = self.begin().await?;
-        let needed: bool = sqlx::query_scalar(
-            "select exists (select 1 from problem join job using (input_hash)
-             where problem.mesh = ? and job.status in ('queued', 'running'))",
-        )
-        .bind(hash)
-        .fetch_one(&mut *tx)
-        .await?;
-        if needed {
-            return Ok(Removal::InUse);
-        }
-        let done = sqlx::query("delete from mesh where hash = ?")
+        let write = async {
+            let mut tx = self.begin().await?;
+            let needed: bool = sqlx::query_scalar(
+                "select exists (select 1 from problem join job using (input_hash)
+                 where problem.mesh = ? and job.status in ('queued', 'running'))",
+            )
             .bind(hash)
-            .execute(&mut *tx)
+            .fetch_one(&mut *tx)
             .await?;
-        if done.rows_affected() == 0 {
-            return Ok(Removal::Unknown);
-        }
-        sqlx::query("delete from mesh_piece where hash = ?")
-            .bind(hash)
-            .execute(&mut *tx)
-            .await?;
-        tx.commit().await?;
-        Ok(Removal::Removed)
+            if needed {
+                return Ok(Removal::InUse);
+            }
+            let done = sqlx::query("delete from mesh where hash = ?")
+                .bind(hash)
+                .execute(&mut *tx)
+                .await?;
+            if done.rows_affected() == 0 {
+                return Ok(Removal::Unknown);
+            }
+            sqlx::query("delete from mesh_piece where hash = ?")
+                .bind(hash)
+                .execute(&mut *tx)
+                .await?;
+            tx.commit().await?;
+            Ok(Removal::Removed)
+        };
+        self.damages.writing(write).await
     }
 
     /// Removes the pieces of uploads that were interrupted.

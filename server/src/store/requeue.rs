@@ -1,6 +1,7 @@
 //! Running jobs back in the queue: when the service stops, and after it has crashed.
 
 use sqlx::SqliteConnection;
+use tracing::info;
 
 use super::{
     change::Change,
@@ -58,16 +59,19 @@ impl Store {
         if rows.is_empty() {
             return Ok(0); // nothing is written: the disk may be full
         }
-        let mut requeued = 0;
+        let mut interrupted = vec![];
         for row in &rows {
             let Ok(job) = self.damages.noting(async { from_row(row) }).await else {
                 continue; // damaged: the service starts with the others
             };
             requeue_after_death(&mut change, &job, "the service died with it").await?;
-            requeued += 1;
+            interrupted.push(job);
         }
         change.commit().await?;
-        Ok(requeued)
+        for Job { id, attempt, .. } in &interrupted {
+            info!(job.id = %id, attempt, "job {id} was interrupted when the service last ended");
+        }
+        Ok(interrupted.len())
     }
 
     /// The jobs that run, with the numbers of their attempts.

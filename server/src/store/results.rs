@@ -18,44 +18,52 @@ impl Store {
     /// Writes the result of an attempt in several short transactions, all but its last megabyte, which is
     /// written when the job ends; false when the attempt is no longer the current one.
     pub async fn write_before_end(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
-        let groups = parts.groups();
-        let Some((_, all_but_last)) = groups.split_last() else {
-            return Ok(true);
+        let write = async {
+            let groups = parts.groups();
+            let Some((_, all_but_last)) = groups.split_last() else {
+                return Ok(true);
+            };
+            for (n, group) in all_but_last.iter().enumerate() {
+                let mut tx = self.begin().await?;
+                if !is_current(&mut tx, key, attempt).await? {
+                    return Ok(false);
+                }
+                if n == 0 {
+                    // removes the pieces of an earlier attempt that was interrupted while it wrote them
+                    remove(&mut tx, key).await?;
+                }
+                insert(&mut tx, key, group).await?;
+                tx.commit().await?;
+            }
+            Ok(true)
         };
-        for (n, group) in all_but_last.iter().enumerate() {
-            let mut tx = self.begin().await?;
-            if !is_current(&mut tx, key, attempt).await? {
-                return Ok(false);
-            }
-            if n == 0 {
-                // removes the pieces of an earlier attempt that was interrupted while it wrote them
-                remove(&mut tx, key).await?;
-            }
-            insert(&mut tx, key, group).await?;
-            tx.commit().await?;
-        }
-        Ok(true)
+        self.damages.writing(write).await
     }
 
     /// Stores the partial result of a running job in place of an earlier one; false when the attempt is no longer
     /// the current one.
     pub async fn write_partial(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
-        let mut tx = self.begin().await?;
-        if !is_current(&mut tx, key, attempt).await? {
-            return Ok(false);
-        }
-        remove(&mut tx, partial_key(key)).await?;
-        for group in parts.groups() {
-            insert(&mut tx, partial_key(key), &group).await?;
-        }
-        write_info(&mut tx, partial_key(key), parts).await?;
-        sqlx::query("update job set result_available = 'partial', checksum = null where id = ?")
+        let write = async {
+            let mut tx = self.begin().await?;
+            if !is_current(&mut tx, key, attempt).await? {
+                return Ok(false);
+            }
+            remove(&mut tx, partial_key(key)).await?;
+            for group in parts.groups() {
+                insert(&mut tx, partial_key(key), &group).await?;
+            }
+            write_info(&mut tx, partial_key(key), parts).await?;
+            sqlx::query(
+                "update job set result_available = 'partial', checksum = null where id = ?",
+            )
             .bind(key)
             .execute(&mut *tx)
             .await?;
-        seal(&mut tx, key).await?;
-        tx.commit().await?;
-        Ok(true)
+            seal(&mut tx, key).await?;
+            tx.commit().await?;
+            Ok(true)
+        };
+        self.damages.writing(write).await
     }
 }
 

@@ -55,7 +55,7 @@ impl Store {
             replies.push(one.reply);
         }
         let mut answers = vec![];
-        let committed = self.damages.noting(async {
+        let committed = self.damages.writing(async {
             let mut change = self.change().await?;
             for (submission, claim) in submissions {
                 let savepoint = change.savepoint().await?;

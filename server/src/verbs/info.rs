@@ -3,8 +3,13 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{page::MAX_PAGE_SIZE, service::Service, submit::MAX_BATCH, watch::MAX_WAIT_S};
-use crate::{caller::Caller, formats::Format};
+use super::{
+    page::MAX_PAGE_SIZE,
+    service::{MAX_MESSAGE_BYTES, Service},
+    submit::MAX_BATCH,
+    watch::MAX_WAIT_S,
+};
+use crate::{caller::Caller, config::Isolation, formats::Format};
 
 /// Version and limits of a service.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -17,6 +22,8 @@ pub struct Info {
     pub api_version: String,
     /// Jobs that can run at the same time.
     pub workers: u32,
+    /// Where they run: on threads of the service, or in processes of their own.
+    pub isolation: Isolation,
     /// Its limits.
     pub limits: ServiceLimits,
     /// Formats of rows (profiles, history), the default first.
@@ -30,6 +37,8 @@ pub struct Info {
 pub struct ServiceLimits {
     /// Bytes of a request over REST.
     pub max_body_bytes: u64,
+    /// Bytes of a message over gRPC, in either direction.
+    pub max_message_bytes: u64,
     /// Bytes of a mesh file.
     pub max_mesh_bytes: u64,
     /// Bytes of memory that one job may need, by the estimate.
@@ -52,8 +61,10 @@ pub fn info(service: &Service, _caller: &Caller) -> Info {
         version: env!("CARGO_PKG_VERSION").into(),
         api_version: "v1".into(),
         workers: service.queue.state().workers.into(),
+        isolation: service.isolation,
         limits: ServiceLimits {
             max_body_bytes: service.max_body_bytes as u64,
+            max_message_bytes: MAX_MESSAGE_BYTES as u64,
             max_mesh_bytes: service.max_mesh_bytes as u64,
             memory_budget_bytes: service.memory_budget_bytes,
             max_queued: service.max_queued,

@@ -36,7 +36,7 @@ pub mod results;
 pub mod info;
 pub mod queue;
 
-pub use service::Service;
+pub use service::{MAX_MESSAGE_BYTES, Service};
 
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::{sync::Semaphore, time::timeout};
 
 use crate::{
-    config::Config,
+    config::{Config, Isolation},
     error::ApiError,
     queue::Queue,
     store::{Health, Store, StoreError},
@@ -14,6 +14,9 @@ use crate::{
 
 /// How long a probe waits for the store.
 const HEALTH_PATIENCE: Duration = Duration::from_secs(2);
+
+/// Largest message over gRPC in either direction, as the contract promises.
+pub const MAX_MESSAGE_BYTES: usize = 1 << 20;
 
 /// The service, which every verb receives.
 #[derive(Debug)]
@@ -28,6 +31,7 @@ pub struct Service {
     pub(super) max_queued: u32,
     /// Memory that one job may need, by the estimate.
     pub(super) memory_budget_bytes: u64,
+    pub(super) isolation: Isolation,
     /// Largest body of a request over REST.
     pub max_body_bytes: usize,
     /// Largest mesh file.
@@ -49,6 +53,7 @@ impl Service {
             checks: Arc::new(Semaphore::new(2)),
             max_queued: config.max_queued,
             memory_budget_bytes: config.memory.bytes(),
+            isolation: config.isolation,
             max_body_bytes: config.max_body_bytes,
             max_mesh_bytes: config.max_mesh_bytes,
             received: Limit::new(config.max_received_bytes),
@@ -118,7 +123,7 @@ impl From<StoreError> for ApiError {
             StoreError::KeyReuse => ApiError::KeyReuse,
             StoreError::IdConflict(id) => ApiError::IdConflict(id),
             StoreError::Deleted(id) => ApiError::Deleted(id),
-            StoreError::Replaced(_) => ApiError::StorageLost,
+            StoreError::Replaced(_) | StoreError::Broken(_) => ApiError::StorageLost,
             // it is logged already, once
             StoreError::Damaged(damage) => match damage.incident {
                 Some(incident) => ApiError::CorruptData {

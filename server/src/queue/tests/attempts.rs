@@ -70,6 +70,35 @@ async fn a_running_job_whose_record_is_damaged_stops_and_frees_its_worker() {
 }
 
 #[tokio::test]
+async fn a_job_whose_end_a_damaged_database_cannot_store_frees_its_worker() {
+    let folder = tempfile::tempdir().unwrap();
+    Store::open(folder.path()).await.unwrap().close().await;
+    Store::erase_table(folder.path(), "result_part").await;
+    let store = Store::open(folder.path()).await.unwrap();
+    let queue = Queue::new(store.clone(), Solver::Threads(fake::solve), 1);
+    queue.start();
+    let rig = Rig {
+        store,
+        queue,
+        folder,
+    };
+    let job = rig.submit().await;
+    let broken = async {
+        while rig.store.health().await.is_ok() || rig.queue.state().idle == 0 {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(10), broken)
+        .await
+        .unwrap();
+    let refused = rig.queue.submit(submission(vec![new(0)], None)).await;
+    assert!(matches!(refused, Err(StoreError::Broken(_))));
+    // the next start requeues it, once the store is repaired
+    let job = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
+    assert_eq!(job.status, Status::Running);
+}
+
+#[tokio::test]
 async fn a_canceled_running_job_keeps_its_last_state() {
     let rig = rig(fake::solve_until_stopped).await;
     rig.queue.start();

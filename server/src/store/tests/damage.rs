@@ -1,6 +1,8 @@
 //! Nothing that a disk has changed is served.
 
-use sqlx::{AssertSqlSafe, Row};
+use std::{fs, os::unix::fs::FileExt, path::Path};
+
+use sqlx::{AssertSqlSafe, ConnectOptions, Connection, Row};
 
 use super::*;
 use crate::{
@@ -82,6 +84,24 @@ impl Store {
     /// Changes the record of a job, as a disk may.
     pub(crate) async fn damage_job(&self, key: i64) {
         set(self, "job", key, "priority", "0.0 + 1").await;
+    }
+
+    /// Overwrites the first page of a table, as a disk may; nobody has the store open.
+    pub(crate) async fn erase_table(folder: &Path, table: &str) {
+        let database = folder.join("signorini.db");
+        let options = sqlx::sqlite::SqliteConnectOptions::new().filename(&database);
+        let mut connection = options.connect().await.unwrap();
+        let place =
+            "select rootpage - 1, page_size from sqlite_schema, pragma_page_size where name = ?";
+        let (page, bytes): (u64, u64) = sqlx::query_as(place)
+            .bind(table)
+            .fetch_one(&mut connection)
+            .await
+            .unwrap();
+        connection.close().await.unwrap();
+        let file = fs::File::options().write(true).open(database).unwrap();
+        file.write_all_at(&vec![0; bytes as usize], page * bytes)
+            .unwrap();
     }
 }
 
@@ -394,4 +414,34 @@ async fn what_is_intact_is_saved_and_the_rest_is_named() {
     let report = inspect(new_folder.path(), None).await.unwrap();
     assert_eq!(report.findings, Vec::<String>::new());
     assert_eq!((report.jobs, report.intact), (3, 3));
+}
+
+#[tokio::test]
+async fn nothing_is_written_to_a_damaged_database() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    submit_three(&store).await;
+    store.close().await;
+    drop(store);
+    Store::erase_table(folder.path(), "request_key").await;
+    let store = Store::open(folder.path()).await.unwrap();
+    assert!(store.health().await.is_ok());
+    let first = store.submit(by("ada", vec![new("4")], Some("key")), false);
+    let first = first.await.unwrap_err();
+    assert!(matches!(first, StoreError::Broken(_)), "{first}");
+    let claimed = store.claim_next().await;
+    assert!(matches!(claimed, Err(StoreError::Broken(_))));
+    let paused = store.set_paused(true).await;
+    assert!(matches!(paused, Err(StoreError::Broken(_))), "{paused:?}");
+    let refused = store
+        .submit(by("ada", vec![new("4")], None), false)
+        .await
+        .unwrap_err();
+    assert!(matches!(refused, StoreError::Broken(_)), "{refused}");
+    let health = store.health().await;
+    assert!(matches!(health, Err(StoreError::Broken(_))), "{health:?}");
+    // what is intact can be read
+    let all = Filter::default();
+    let jobs = store.jobs(Owners::All, &all, Order::NEWEST_FIRST, None, 9);
+    assert_eq!(jobs.await.unwrap().len(), 3);
 }

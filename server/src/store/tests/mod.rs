@@ -11,7 +11,7 @@ mod upgrades;
 use super::*;
 use crate::{
     caller::Owners,
-    job::{Cache, Job, Limits, Status},
+    job::{Cache, Job, Limits, ResultAvailable, Status},
 };
 
 impl Store {
@@ -109,4 +109,49 @@ async fn a_full_disk_refuses_jobs_and_writing_continues_when_there_is_space() {
     store.bound(1_000_000).await; // there is room again
     store.submit(submission("{}"), false).await.unwrap();
     assert_eq!(store.waiting(), accepted + 1);
+}
+
+#[tokio::test]
+async fn a_job_that_another_answers_keeps_no_piece_of_its_interrupted_attempt() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let submit = async |priority, cache| {
+        let job = NewJob {
+            priority,
+            cache,
+            ..new("1")
+        };
+        let accepted = store.submit(by("ada", vec![job], None), true).await;
+        accepted.unwrap().claim.unwrap().job
+    };
+    let first = submit(0, Cache::Use).await;
+    let large = Parts(vec![parts::Part::new("fields".into(), vec![b' '; 3 << 20])]);
+    let written = store.write_before_end(first.key, first.attempt, &large);
+    assert!(written.await.unwrap());
+    store
+        .requeue_drained(first.key, first.attempt)
+        .await
+        .unwrap();
+    let second = submit(1, Cache::Refresh).await;
+    assert_ne!(second.key, first.key);
+    let ending = Ending {
+        status: Status::Succeeded,
+        reason: None,
+        failure: None,
+        result: ResultAvailable::Final,
+    };
+    let (parts, last) = (Parts::of_a_summary(), FinalBatch::default());
+    let finished = store
+        .finish(second.key, second.attempt, &ending, last, Some(&parts))
+        .await;
+    finished.unwrap().unwrap();
+    assert!(store.claim_next().await.unwrap().0.is_none());
+    let answered = store.job(Owners::All, first.id).await.unwrap().unwrap();
+    assert_eq!(answered.status, Status::Succeeded);
+    let left: i64 = sqlx::query_scalar("select count(*) from result_part where job_id = ?")
+        .bind(first.key)
+        .fetch_one(&store.reader)
+        .await
+        .unwrap();
+    assert_eq!(left, 0);
 }

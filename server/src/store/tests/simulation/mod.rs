@@ -3,7 +3,8 @@
 //!
 //! One driver does one thing after the other, in simulated time, so that a seed gives the same sequence and the same
 //! final state each time. What fails is printed with its seed and what was done before:
-//! `SIGNORINI_SIMULATION_SEED=n` runs that seed alone, `SIGNORINI_SIMULATION_SEEDS=count` the first `count`.
+//! `SIGNORINI_SIMULATION_SEED=n` runs that seed alone, `SIGNORINI_SIMULATION_SEEDS=count` the first `count`, and
+//! `SIGNORINI_SIMULATION_FIRST=n` leaves out those before n.
 
 mod checks;
 mod jobs;
@@ -274,7 +275,10 @@ fn setting(name: &str) -> Option<u64> {
 fn jobs_keys_and_events_are_kept_whatever_happens() {
     let (first, end) = match setting("SIGNORINI_SIMULATION_SEED") {
         Some(seed) => (seed, seed + 1),
-        None => (0, setting("SIGNORINI_SIMULATION_SEEDS").unwrap_or(SEEDS)),
+        None => (
+            setting("SIGNORINI_SIMULATION_FIRST").unwrap_or(0),
+            setting("SIGNORINI_SIMULATION_SEEDS").unwrap_or(SEEDS),
+        ),
     };
     let (next, failed) = (AtomicU64::new(first), AtomicBool::new(false));
     let empty = empty_store();
