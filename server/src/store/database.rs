@@ -271,7 +271,7 @@ pub(super) async fn compare_with_the_past(
                 let file = path.join(progress::FILE);
                 if found.is_some() && !file.exists() {
                     tracing::warn!(
-                        "{} is missing: whether all that was stored is still there is not known; it is written anew",
+                        "{} is missing: whether all that was stored is still there is not known",
                         file.display()
                     );
                 }

@@ -49,7 +49,7 @@ pub(super) fn read(folder: &Path) -> io::Result<Option<LastCommit>> {
             let last = LastCommit::parse(&bytes);
             if last.is_none() {
                 tracing::warn!(
-                    "{} is damaged: whether all that was stored is still there is not known; it is written anew",
+                    "{} is damaged: whether all that was stored is still there is not known",
                     path.display()
                 );
             }
