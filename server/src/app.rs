@@ -109,7 +109,7 @@ impl App {
         let (data, budget) = (config.data.display(), size(config.memory.bytes()));
         info!(
             %address, version = env!("CARGO_PKG_VERSION"), %data, workers, %isolation, budget,
-            "listening on {address}: version {}, store in {data}, {} of isolation {isolation}, {budget} of memory for jobs",
+            "listening on {address}: version {}, store in {data}, {}, isolation {isolation}, {budget} of memory for jobs",
             env!("CARGO_PKG_VERSION"), number_of((*workers).into(), "worker"),
         );
         if !address.ip().is_loopback() {

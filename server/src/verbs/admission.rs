@@ -23,14 +23,16 @@ use crate::{
 /// A job that was read, but not yet checked in depth.
 pub(super) struct Prepared {
     envelope: Envelope,
-    problem: Result<Problem, Vec<Violation>>,
+    /// With its fingerprint.
+    problem: Result<(Problem, String), Vec<Violation>>,
     violations: Findings,
     pub(super) id: Option<JobId>,
-    /// Fingerprint of everything that was submitted.
+    /// Fingerprint of everything that was submitted. Empty if the problem cannot be read: then the job is refused before
+    /// fingerprints are compared.
     pub(super) payload: String,
 }
 
-/// Takes the fingerprint of a job.
+/// Takes the fingerprints of a job and of its problem, once: that of a large mesh takes half a second.
 pub(super) async fn prepare(
     service: &Service,
     JobRequest { envelope, problem }: JobRequest,
@@ -39,11 +41,15 @@ pub(super) async fn prepare(
     let violations = envelope.violations();
     service
         .work(move || {
-            let payload = match &problem {
+            let mut payload = String::new();
+            let problem = match problem {
                 Ok(problem) => {
-                    digest::of_json(&(&envelope, problem, id)).map_err(ApiError::internal)?
+                    let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
+                    let submitted = (&envelope, &problem.title, &input_hash, id);
+                    payload = digest::of_json(&submitted).map_err(ApiError::internal)?;
+                    Ok((problem, input_hash))
                 }
-                Err(_) => String::new(), // not used: the job is refused before fingerprints are compared
+                Err(violations) => Err(violations),
             };
             Ok(Prepared {
                 envelope,
@@ -80,22 +86,22 @@ pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJo
         payload,
     } = prepared;
     let admitted = match problem {
-        Ok(problem) => match problems::admit(service, problem).await {
+        Ok((problem, input_hash)) => match problems::admit(service, problem).await {
             Err(ApiError::InvalidProblem(more)) => Err(more),
-            admitted => Ok(admitted?),
+            admitted => Ok((admitted?, input_hash)),
         },
         Err(more) => Err(more),
     };
     match admitted {
         Ok(admitted) => {
             let admitted = violations.into_result(admitted);
+            let (admitted, input_hash) = admitted.map_err(ApiError::InvalidProblem)?;
             let Admitted {
                 title,
-                input_hash,
                 json,
                 mesh,
                 memory_bytes,
-            } = admitted.map_err(ApiError::InvalidProblem)?;
+            } = admitted;
             let Envelope {
                 name,
                 labels,

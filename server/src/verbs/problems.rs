@@ -118,8 +118,6 @@ fn too_large(problem: &Problem, estimate: &Estimate, budget_bytes: u64) -> Viola
 pub(super) struct Admitted {
     /// The title, which is the job's.
     pub title: Option<String>,
-    /// Fingerprint of the rest.
-    pub input_hash: String,
     /// The rest as JSON.
     pub json: String,
     /// The stored mesh that it refers to.
@@ -155,12 +153,10 @@ pub(super) async fn admit(service: &Service, mut problem: Problem) -> Result<Adm
         within(before.map_err(|violation| ApiError::InvalidProblem(vec![violation]))?)?;
         let checked = check(&problem, stored).map_err(ApiError::InvalidProblem)?;
         let memory_bytes = within(checked.estimate)?.memory_bytes;
-        let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
         let title = problem.title.take();
         let json = serde_json::to_string(&problem).map_err(ApiError::internal)?;
         Ok(Admitted {
             title,
-            input_hash,
             json,
             mesh: problem.mesh.stored().map(str::to_owned),
             memory_bytes,
