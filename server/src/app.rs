@@ -81,10 +81,7 @@ impl App {
             Err(StoreError::Full) => warn!(
                 "the disk is full: jobs that were interrupted wait again as soon as that can be written"
             ),
-            Err(error) => {
-                let store = format!("the store in {}", config.data.display());
-                return Err(anyhow::Error::new(error).context(store));
-            }
+            Err(error) => return Err(store::with_advice(error, &config.data).into()),
         }
         store.set_budget(config.memory.bytes(), config.workers);
         let solver = match config.isolation {

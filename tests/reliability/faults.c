@@ -1,7 +1,8 @@
 /* Disks that fail and power that goes, for a program that does not know of it. To be loaded with LD_PRELOAD.
  *
  * It intercepts the calls that change regular files and directories below the folder FAULTS_FOLDER (an absolute path,
- * as the program spells it). Everything else passes untouched: sockets, pipes, other files, and every reading call.
+ * as the program spells it), and those that read a part of such a file, which are counted apart. Everything else passes
+ * untouched: sockets, pipes, other files.
  *
  * FAULTS_CONTROL names a file of the size of `struct control`, through which a test counts these calls, and has some of
  * them fail, while the program runs. FAULTS_UNDO, if it is set, names a file to which everything is written that would
@@ -37,6 +38,8 @@ struct control {
     _Atomic int64_t error;    /* with this errno, or as below */
     _Atomic int64_t failed;   /* so many have failed */
     _Atomic int64_t lying;    /* syncs succeed, but keep nothing: shows that a test would find a loss */
+    _Atomic int64_t reads;    /* so many calls have read */
+    _Atomic int64_t fail_read_at; /* the one of them that fails, with EIO; 0: none */
 };
 enum { HALF = -1, DIE = -2 }; /* half of the bytes are written; the process is killed before the call */
 
@@ -152,7 +155,7 @@ static void keep(int kind, int fd, const struct stat *found, int64_t offset, int
         snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
         reading = syscall(SYS_openat, AT_FDCWD, link, O_RDONLY | O_CLOEXEC);
     }
-    if (!old || (bytes && pread(reading, old, bytes, offset) != (ssize_t)bytes)) give_up("the old bytes of a file");
+    if (!old || (bytes && syscall(SYS_pread64, reading, old, bytes, offset) != (ssize_t)bytes)) give_up("the old bytes of a file");
     if (reading != fd) close(reading);
     number++;
     add_record(kind, found->st_ino, offset, size, found->st_size, old, bytes);
@@ -206,6 +209,17 @@ static ssize_t write_bytes(int fd, const void *bytes, size_t size, off64_t offse
         return written;
     }
     return offset < 0 ? syscall(SYS_write, fd, bytes, size) : syscall(SYS_pwrite64, fd, bytes, size, offset);
+}
+
+static ssize_t read_bytes(int fd, void *bytes, size_t size, off64_t offset) {
+    struct stat found;
+    if (control && control->fail_read_at && is_ours(fd, &found) &&
+        atomic_fetch_add(&control->reads, 1) + 1 == control->fail_read_at) {
+        atomic_fetch_add(&control->failed, 1);
+        errno = EIO;
+        return -1;
+    }
+    return syscall(SYS_pread64, fd, bytes, size, offset);
 }
 
 /* Several pieces. On our files the first that is not empty: fewer bytes than asked for are allowed, and rare. */
@@ -299,6 +313,8 @@ static int open_file(int at, const char *path, int flags, mode_t mode) {
 ssize_t write(int fd, const void *bytes, size_t size) { return write_bytes(fd, bytes, size, -1); }
 ssize_t pwrite(int fd, const void *bytes, size_t size, off_t at) { return write_bytes(fd, bytes, size, at); }
 ssize_t pwrite64(int fd, const void *bytes, size_t size, off64_t at) { return write_bytes(fd, bytes, size, at); }
+ssize_t pread(int fd, void *bytes, size_t size, off_t at) { return read_bytes(fd, bytes, size, at); }
+ssize_t pread64(int fd, void *bytes, size_t size, off64_t at) { return read_bytes(fd, bytes, size, at); }
 ssize_t writev(int fd, const struct iovec *pieces, int count) { return write_pieces(fd, pieces, count, -1); }
 ssize_t pwritev(int fd, const struct iovec *pieces, int count, off_t at) { return write_pieces(fd, pieces, count, at); }
 ssize_t pwritev64(int fd, const struct iovec *pieces, int count, off64_t at) { return write_pieces(fd, pieces, count, at); }

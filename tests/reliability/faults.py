@@ -20,7 +20,7 @@ FOREVER = 1 << 62
 # instead of an errno: half of the bytes are written; the process is killed just before the call
 HALF, DIE = -1, -2
 # the fields of `struct control`, and of `struct record` with its kinds
-CONTROL = ("calls", "fail_at", "count", "error", "failed", "lying")
+CONTROL = ("calls", "fail_at", "count", "error", "failed", "lying", "reads", "fail_read_at")
 RECORD = struct.Struct("=7q")
 WRITE, CUT, SYNCED, CREATED, REMOVED = range(1, 6)
 PAGE = 4096
@@ -65,9 +65,16 @@ class Faulty(Attacked):
         self.write("error", error)
         self.write("fail_at", self.read("calls") + n)
 
+    def fail_read(self, n):
+        """The n-th read from now on fails once, with EIO."""
+        self.write("failed", 0)
+        self.write("reads", 0)
+        self.write("fail_read_at", n)
+
     def heal(self):
         """No call fails from now on; so many have since it was last asked."""
         self.write("fail_at", 0)
+        self.write("fail_read_at", 0)
         failed = self.read("failed")
         self.write("failed", 0)
         return failed

@@ -1,4 +1,4 @@
-"""The n-th write, sync, truncation, removal or opening of a file fails, for n = 1, 2, 3, … (R3).
+"""The n-th write, sync, truncation, removal, opening or reading of a file fails, for n = 1, 2, 3, … (R3).
 
     io_errors.py [--soak] [SEED]
 
@@ -27,6 +27,7 @@ FAULTS = [(error, count) for error in (errno.EIO, errno.ENOSPC, errno.EDQUOT) fo
     (errno.EROFS, FOREVER), (errno.EINTR, 1), (HALF, 1)]
 # a disk that works again; then the longest pause between two attempts to store something
 SOON_S, LATEST_S = 5, 12
+MOST_READS = 60 if SOAK else 10
 STARTS = range(1, 61) if SOAK else range(1, 61, 5)
 ENDED = ("succeeded", "failed", "canceled")
 
@@ -152,6 +153,39 @@ def jobs_under_faults(dice):
     return met, broken
 
 
+def reads_under_faults():
+    """The disk fails to read once. Whoever asked is told; everybody else is served, and the next job runs."""
+    met, n, missed = 0, 0, 0
+    with Faulty() as server:
+        kept = server.finished_job()
+        while missed < 3 and n < MOST_READS:
+            n += 1
+            server.fail_read(n)
+            name = "reading, call %d" % n
+            answer = server.call("POST", "/v1/jobs", submission(example(), name=name, cache="off"))
+            if answer.status == 202:
+                # its worker may have given up: then it is started again; what cannot be read of it fails it
+                found = until_ended(server, answer.json()["id"], LATEST_S)
+                if found.get("code") == "corrupt-data":  # it was this answer that was not read
+                    found = until_ended(server, answer.json()["id"], LATEST_S)
+                check((found["status"], found["reason"]) in (("succeeded", None), ("failed", "internal")), "%s: %r" % (name, found))
+            else:
+                equal((answer.status, answer.json()["code"]), (500, "corrupt-data"), "%s: %r" % (name, answer))
+            for path in ("/v1/jobs/" + kept, "/v1/jobs/%s/result" % kept, "/v1/jobs?page_size=5"):
+                answer = server.call("GET", path)
+                check(answer.status in (200, 500), "%s: %r" % (name, answer))
+            failed = server.heal()
+            met, missed = met + failed, 0 if failed else missed + 1
+            next_job_runs(server)
+            # what SQLite has in memory it does not read
+            if n % 3 == 0:
+                server.stop()
+                server.start()
+        server.stop()
+        check_database(server)
+    return met
+
+
 def starts_under_faults():
     """A server whose n-th call fails while it starts: it runs, or ends with its reason; the next start is as usual."""
     refused = 0
@@ -185,12 +219,15 @@ def main():
     dice = random.Random(SEED)
     refused = starts_under_faults()
     print("%d starts under faults, %d of them refused" % (len(STARTS), refused), flush=True)
+    reads = reads_under_faults()
+    check(reads, "no read has failed")
     met, broken = jobs_under_faults(dice)
     print(", ".join("%s %d: %d ×" % (*key, count) for key, count in sorted(told.items())))
     check(not broken, "%d of %d faults were not overcome; the first: %s" % (len(broken), met, broken[:1]))
     print("figure: %d faults in a job's writes, syncs, truncations and openings (EIO, ENOSPC, EDQUOT, EROFS, EINTR, half writes; "
           "once or from then on): every answer clean, 0 accepted jobs lost, the next job ran each time; %d faults while "
-          "starting: %d refused with a reason, all started afterwards" % (met, len(STARTS), refused))
+          "starting: %d refused with a reason, all started afterwards; %d reads that failed once were told, and disturbed no other "
+          "job" % (met, len(STARTS), refused, reads))
 
 
 main()

@@ -59,10 +59,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             _ => format!("; they were copied to {}", new.display()),
         };
         if report.intact < report.jobs {
-            text += &format!(
-                "; of the others, what is intact can be read as long as {} is kept: start the service in it",
-                data.display()
-            );
+            text += &format!("; keep {}, which has what was not copied", data.display());
         }
     }
     text.push('\n');

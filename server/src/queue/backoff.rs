@@ -3,23 +3,48 @@
 use std::time::Duration;
 
 use tokio_util::sync::CancellationToken;
+use tracing::error;
+
+use crate::{job::JobId, store::StoreError};
+
+/// After so many, which take some seconds, a disk that could not be read is not asked again.
+const MOST_TRIES_TO_READ: u32 = 5;
 
 /// Increasing waits between attempts to store data that must not be lost.
 #[derive(Debug)]
-pub(super) struct Backoff(Duration);
+pub(super) struct Backoff {
+    pause: Duration,
+    tries: u32,
+}
 
 impl Default for Backoff {
     fn default() -> Self {
-        Backoff(Duration::from_millis(100))
+        Backoff {
+            pause: Duration::from_millis(100),
+            tries: 1,
+        }
     }
 }
 
 impl Backoff {
+    /// Whether it is no use to try again to store something of this job, which the log is told then: its worker is free
+    /// for others.
+    pub(super) fn gives_up(&self, id: JobId, key: i64, cause: &StoreError) -> bool {
+        let unreadable =
+            matches!(cause, StoreError::Damaged(_)) && self.tries >= MOST_TRIES_TO_READ;
+        let gives_up = unreadable || cause.is_lasting(key);
+        if gives_up {
+            error!(job.id = %id, %cause, "nothing more of job {id} can be stored: {cause}");
+        }
+        gives_up
+    }
+
     /// Waits; false if the service stops meanwhile.
     pub(super) async fn wait(&mut self, stopping: &CancellationToken) -> bool {
         const LONGEST: Duration = Duration::from_secs(5);
-        let pause = self.0;
-        self.0 = (pause * 3).min(LONGEST);
+        let pause = self.pause;
+        self.pause = (pause * 3).min(LONGEST);
+        self.tries += 1;
         tokio::select! {
             () = tokio::time::sleep(pause) => true,
             () = stopping.cancelled() => false,

@@ -89,7 +89,7 @@ impl Queue {
                     );
                 }
                 Ok(false) => return,
-                Err(cause) if cause.is_lasting(key) => return,
+                Err(cause) if backoff.gives_up(id, key, &cause) => return,
                 Err(cause) => {
                     error!(job.id = %id, %cause, "job {id} could not be canceled yet: {cause}")
                 }

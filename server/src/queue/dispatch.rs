@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     failpoint::{self, Point},
-    store::{Accepted, Claim, Result, Submission},
+    store::{Accepted, Claim, Result, StoreError, Submission},
     time::Time,
 };
 
@@ -73,7 +73,7 @@ impl Queue {
             while self.store.waiting() > 0
                 && let Some(slot) = self.free_slot()
             {
-                match starting.unless(self.claim(slot).await) {
+                match starting.note(self.claim(slot).await) {
                     Some(true) => {}
                     Some(false) => break,
                     None => tokio::time::sleep(CHECK_INTERVAL).await, // the disk may be full for a while
@@ -169,7 +169,7 @@ impl Queue {
         let mut requeuing = Complaint::new("lost jobs could not be requeued");
         let mut forgetting = Complaint::new("ids of deleted jobs could not be removed");
         loop {
-            match expiring.unless(self.store.expire_queued(Time::now()).await) {
+            match expiring.note(self.store.expire_queued(Time::now()).await) {
                 Some(changed) if !changed.is_empty() => {
                     self.announce(&changed);
                     self.wake.notify_one();
@@ -177,8 +177,8 @@ impl Queue {
                 }
                 Some(_) | None => {}
             }
-            requeuing.unless(self.requeue_lost().await);
-            forgetting.unless(self.store.forget_deleted(Time::now()).await);
+            requeuing.note(self.requeue_lost().await);
+            forgetting.note(self.store.forget_deleted(Time::now()).await);
             tokio::select! {
                 () = tokio::time::sleep(CHECK_INTERVAL) => {}
                 () = self.stopping.cancelled() => return,
@@ -199,13 +199,14 @@ impl Complaint {
         Complaint { what, told }
     }
 
-    /// What was done, unless it failed.
-    fn unless<T>(&mut self, done: Result<T>) -> Option<T> {
+    /// What was done; `None` if it failed, which the log is told if it is new.
+    fn note<T>(&mut self, done: Result<T>) -> Option<T> {
         let cause = match done {
             Ok(done) => {
                 self.told.clear();
                 return Some(done);
             }
+            Err(StoreError::Broken(_)) => return None, // it was told that nothing is stored any more
             Err(cause) => cause.to_string(),
         };
         if self.told != cause {

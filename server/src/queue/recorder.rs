@@ -81,8 +81,7 @@ async fn store_with_retries(
     loop {
         let cause = match store_batch(queue, job, running, batch, progress).await {
             Ok(stored) => return stored,
-            // another attempt would find the same
-            Err(cause) if cause.is_lasting(job.key) => return false,
+            Err(cause) if backoff.gives_up(job.id, job.key, &cause) => return false,
             Err(cause) => cause,
         };
         warn!(job.id = %job.id, %cause, "events of job {} could not be stored yet: {cause}", job.id);

@@ -147,7 +147,7 @@ async fn requeue_with_retries(queue: &Queue, job: &Job, how: &str) {
     loop {
         match queue.store.requeue_lost(job.key, job.attempt, how).await {
             Ok(changed) => return queue.announce(&changed),
-            Err(cause) if cause.is_lasting(job.key) => return, // nothing can end it; the worker is free for others
+            Err(cause) if backoff.gives_up(job.id, job.key, &cause) => return,
             Err(cause) => {
                 warn!(job.id = %job.id, %cause, "job {} could not be requeued yet: {cause}", job.id);
             }
@@ -190,8 +190,8 @@ async fn end_with_retries(
 ) {
     let mut backoff = Backoff::default();
     while let Err(cause) = try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
-        if cause.is_lasting(job.key) {
-            return; // nothing can end it; the worker is free for others
+        if backoff.gives_up(job.id, job.key, &cause) {
+            return;
         }
         warn!(job.id = %job.id, %cause, "job {} could not be ended yet: {cause}", job.id);
         if !backoff.wait(&queue.stopping).await {

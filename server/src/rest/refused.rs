@@ -2,9 +2,9 @@
 
 use std::{
     collections::BTreeMap,
-    mem::take,
+    mem,
     sync::{LazyLock, Mutex, MutexGuard, PoisonError},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use tracing::info;
@@ -18,16 +18,27 @@ const LONGEST_PATH: usize = 100;
 static KINDS: LazyLock<Mutex<BTreeMap<String, Since>>> = LazyLock::new(Mutex::default);
 
 /// How many requests were refused since the last line, and the path of the latest.
-#[derive(Debug, Default, PartialEq, Eq)]
+#[derive(Debug)]
 struct Since {
+    line: Instant,
     count: u64,
     latest: String,
+}
+
+impl Default for Since {
+    fn default() -> Self {
+        Since {
+            line: Instant::now(),
+            count: 0,
+            latest: String::new(),
+        }
+    }
 }
 
 /// A request was refused for this kind of error.
 pub(super) fn note(kind: &str, path: &str) {
     let path: String = path.chars().take(LONGEST_PATH).collect();
-    if is_counted(kind, &path) {
+    if count(kind, &path) {
         return;
     }
     info!(
@@ -39,7 +50,7 @@ pub(super) fn note(kind: &str, path: &str) {
     tokio::spawn(async move {
         loop {
             tokio::time::sleep(INTERVAL).await;
-            let Some(Since { count, latest }) = counted(&kind) else {
+            let Some(Since { count, latest, .. }) = take(&kind) else {
                 return;
             };
             info!(
@@ -51,9 +62,14 @@ pub(super) fn note(kind: &str, path: &str) {
 }
 
 /// Counts a request for the next line; false if there is none to come, since nothing of this kind was refused lately.
-fn is_counted(kind: &str, path: &str) -> bool {
+fn count(kind: &str, path: &str) -> bool {
     let mut kinds = kinds();
     match kinds.get_mut(kind) {
+        // who was to write the next line has ended, with its runtime
+        Some(since) if since.line.elapsed() > 2 * INTERVAL => {
+            *since = Since::default();
+            false
+        }
         Some(since) => {
             since.count += 1;
             since.latest = path.to_owned();
@@ -67,9 +83,9 @@ fn is_counted(kind: &str, path: &str) -> bool {
 }
 
 /// What was refused since the last line; `None` if there was nothing, and then no line is to come.
-fn counted(kind: &str) -> Option<Since> {
+fn take(kind: &str) -> Option<Since> {
     let mut kinds = kinds();
-    let since = take(kinds.get_mut(kind)?);
+    let since = mem::take(kinds.get_mut(kind)?);
     if since.count == 0 {
         kinds.remove(kind);
         return None;
@@ -89,12 +105,13 @@ mod tests {
     #[test]
     fn what_is_refused_after_the_first_is_counted_for_the_next_line_until_there_is_none() {
         let kind = "a kind of this test";
-        assert!(!is_counted(kind, "/1"), "the first has its own line");
-        assert!(is_counted(kind, "/2") && is_counted(kind, "/3"));
-        assert!(!is_counted("another one", "/1"));
-        let (count, latest) = (2, "/3".to_owned());
-        assert_eq!(counted(kind), Some(Since { count, latest }));
-        assert_eq!(counted(kind), None);
-        assert!(!is_counted(kind, "/4"));
+        assert!(!count(kind, "/1"), "the first has its own line");
+        assert!(count(kind, "/2") && count(kind, "/3"));
+        assert!(!count("another one", "/1"));
+        let since = take(kind);
+        let since = since.map(|since| (since.count, since.latest));
+        assert_eq!(since, Some((2, "/3".into())));
+        assert!(take(kind).is_none());
+        assert!(!count(kind, "/4"));
     }
 }

@@ -11,6 +11,7 @@ use super::{
     database::{Store, Writing},
     error::{Result, StoreError},
     intact::{self, WHOLE},
+    problems::{self, StoredProblem},
     rows,
     waiting::Move,
 };
@@ -146,13 +147,23 @@ impl Change<'_> {
         self.store.damages.summary().0
     }
 
-    /// Whether the result of a job is as it was written; checked once.
-    pub(super) async fn has_intact_result(&mut self, job: &Job) -> Result<bool> {
+    /// The problem of a job. Read beside the transaction, if it is not of it: a page that cannot be read would end that.
+    pub(super) async fn problem(&mut self, job: &Job) -> Result<StoredProblem> {
+        let mut reader = self.store.reader.acquire().await?;
+        match problems::find(&mut reader, job).await? {
+            Some(found) => Ok(found),
+            None => problems::read(&mut self.tx, job).await,
+        }
+    }
+
+    /// Whether the result of a job that has ended is as it was written; checked once, and beside the transaction, as above.
+    pub(super) async fn has_intact_result(&self, job: &Job) -> Result<bool> {
         let (store, key) = (self.store, job.result_key);
         if store.intact.contains(key, WHOLE) {
             return Ok(true);
         }
-        let checked = intact::check_result(&mut self.tx, key).await;
+        let mut reader = store.reader.acquire().await?;
+        let checked = intact::check_result(&mut reader, key).await;
         let intact = self.unless_damaged(checked).await?.is_some();
         if intact {
             store.intact.insert(key, WHOLE);

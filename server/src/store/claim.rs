@@ -7,7 +7,6 @@ use super::{
     end,
     error::{Result, StoreError},
     lifecycle::{self, Ending},
-    problems,
     rows::read,
     submission::Claim,
 };
@@ -20,7 +19,7 @@ impl Store {
     /// Starts an attempt of the next job of the queue: highest priority first, then in order of arrival. Jobs
     /// before it for which there is a result by now are answered. Also returns all jobs that have changed.
     pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
-        self.damages.writing(self.try_to_claim_next()).await
+        self.writing(self.try_to_claim_next()).await
     }
 
     async fn try_to_claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
@@ -80,7 +79,7 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         {
             continue;
         }
-        let stored = problems::read(change.sql(), &waiting).await;
+        let stored = change.problem(&waiting).await;
         let needed = match &stored {
             Ok(stored) => stored.memory_bytes,
             // it is not going to be solved

@@ -23,7 +23,7 @@ pub(super) struct Damages {
     found: Mutex<BTreeMap<Record, (Uuid, Option<JobId>)>>,
     /// The indexes of the jobs cannot be trusted: a job that is not found may exist.
     indexes: AtomicBool,
-    /// Why nothing is written any more: damage to the database itself, and more could be damaged by writing.
+    /// Why nothing is written any more.
     broken: OnceLock<String>,
     /// Finds the public id of a job.
     reader: SqlitePool,
@@ -49,22 +49,17 @@ impl Damages {
         }
     }
 
-    /// Runs what writes, and takes note of damage that it finds; if that is of the database itself, nothing is written any
-    /// more.
-    pub(super) async fn writing<T>(&self, work: impl Future<Output = Result<T>>) -> Result<T> {
-        match self.noting(work).await {
-            Err(StoreError::Damaged(damage)) if damage.record.is_database() => {
-                let text = format!(
-                    "{damage}: nothing is stored and no job is started any more; stop the service and run \
-                     `signorini doctor`"
-                );
-                if self.broken.set(text.clone()).is_ok() {
-                    tracing::error!("{text}");
-                }
-                Err(StoreError::Broken(text))
-            }
-            other => other,
+    /// Nothing is written any more, since this damage stands in the way of all that is written.
+    pub(super) fn stop_writing(&self, damage: &Damage) -> StoreError {
+        let incident = damage.incident.unwrap_or_default();
+        let text = format!(
+            "{damage}, incident {incident}: nothing is stored and no job is started any more; stop the service and run \
+             `signorini doctor`"
+        );
+        if self.broken.set(text.clone()).is_ok() {
+            tracing::error!(%incident, "{text}");
         }
+        StoreError::Broken(text)
     }
 
     /// An error if nothing is written any more.

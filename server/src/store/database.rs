@@ -23,7 +23,7 @@ use super::{
     folder::{Folder, Identity, JOURNAL, LOG},
     intact::Intact,
     migrations,
-    progress::{self, LastCommit, Progress},
+    progress::{self, Known, LastCommit, Progress},
     reserve::Reserve,
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
@@ -62,6 +62,8 @@ pub struct Store {
     pub(super) ahead: AtomicI64,
     /// How far the store has come.
     pub(super) progress: Progress,
+    /// The service that had it before this one stopped, and did not die.
+    pub(super) was_stopped: bool,
     /// Space for control when the disk is full.
     pub(super) reserve: Reserve,
     /// How many of the next commits find the disk full.
@@ -112,11 +114,6 @@ impl Store {
     /// Connects to the database in `folder`, created if necessary, and brings its tables up to date. Also
     /// returns the receiver of submissions. The data kept in memory is not read yet.
     pub(super) async fn connect(path: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
-        let connected = Store::try_to_connect(path).await;
-        connected.map_err(|error| with_advice(error, path))
-    }
-
-    async fn try_to_connect(path: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
         let folder = Folder::lock(path)?;
         let known = progress::read(path).map_err(|error| {
             let file = path.join(progress::FILE);
@@ -127,7 +124,9 @@ impl Store {
             .filename(&database)
             .foreign_keys(true)
             .busy_timeout(Duration::from_secs(5));
-        compare_with_the_past(path, known.as_ref(), options.clone()).await?;
+        if let Some(doubt) = compare_with_the_past(path, &known, options.clone()).await? {
+            tracing::warn!("{}: {doubt}", path.display());
+        }
         folder.prepare()?;
         folder.tighten();
         let reserve = Reserve::new(path);
@@ -177,6 +176,7 @@ impl Store {
             intact: Arc::default(),
             ahead: AtomicI64::default(),
             progress,
+            was_stopped: matches!(known, Known::Last(LastCommit { stopped: true, .. })),
             reserve,
             #[cfg(test)]
             full_commits: Arc::default(),
@@ -197,7 +197,7 @@ impl Store {
         self.lists.close().await;
         self.reader.close().await;
         self.writer.close().await;
-        if let Err(error) = self.progress.sync() {
+        if let Err(error) = self.progress.stop() {
             tracing::warn!(%error, "{}: {error}", progress::FILE);
         }
         self.folder.unlock();
@@ -240,23 +240,39 @@ impl Store {
             }
             other => other,
         };
-        self.damages.writing(async { done }).await
+        self.writing(async { done }).await
+    }
+
+    /// Runs what writes, and takes note of damage that it finds. Damage of the database may be that of a single page, of data
+    /// that this alone has met, or a disk may have failed to read once: only if nothing else can be written either, all
+    /// writing ends.
+    pub(super) async fn writing<T>(&self, work: impl Future<Output = Result<T>>) -> Result<T> {
+        match self.damages.noting(work).await {
+            Err(StoreError::Damaged(damage)) if damage.record.is_database() => {
+                self.cannot_begin.store(true, Relaxed); // a new connection has read nothing yet
+                match self.write_and_roll_back().await {
+                    Err(StoreError::Damaged(_)) => Err(self.damages.stop_writing(&damage)),
+                    Ok(()) | Err(_) => Err(StoreError::Damaged(damage)),
+                }
+            }
+            other => other,
+        }
     }
 }
 
-/// Compares the database with what is known of it before anything is written to it.
+/// Compares the database with what is known of it before anything is written to it. If too little is known, why.
 pub(super) async fn compare_with_the_past(
     path: &Path,
-    known: Option<&LastCommit>,
+    known: &Known,
     options: SqliteConnectOptions,
-) -> Result<()> {
+) -> Result<Option<String>> {
     if !progress::has_content(&path.join(super::folder::DATABASE)) {
         return match known {
-            Some(_) => Err(StoreError::Lost("it is missing or empty".into())),
-            None if progress::has_content(&path.join(LOG)) => Err(StoreError::Lost(
+            Known::Last(_) => Err(StoreError::Lost("it is missing or empty".into())),
+            _ if progress::has_content(&path.join(LOG)) => Err(StoreError::Lost(
                 "it is missing or empty, and only its write-ahead log is there".into(),
             )),
-            None => Ok(()),
+            _ => Ok(None),
         };
     }
     // the disk failed when the database was created: what was half done is undone first
@@ -265,19 +281,7 @@ pub(super) async fn compare_with_the_past(
     let compared = async {
         migrations::check(&mut connection).await?;
         let found = progress::in_database(&mut connection).await?;
-        match known {
-            Some(known) => progress::compare(known, found.as_ref()),
-            None => {
-                let file = path.join(progress::FILE);
-                if found.is_some() && !file.exists() {
-                    tracing::warn!(
-                        "{} is missing: whether all that was stored is still there is not known",
-                        file.display()
-                    );
-                }
-                Ok(())
-            }
-        }
+        progress::compare(known, found.as_ref())
     };
     let compared = compared.await;
     connection.close().await?;
@@ -285,7 +289,7 @@ pub(super) async fn compare_with_the_past(
 }
 
 /// What the operator can do.
-fn with_advice(error: StoreError, path: &Path) -> StoreError {
+pub fn with_advice(error: StoreError, path: &Path) -> StoreError {
     let database = path.join(super::folder::DATABASE);
     match error {
         StoreError::Lost(what) => StoreError::Lost(format!(
@@ -293,6 +297,12 @@ fn with_advice(error: StoreError, path: &Path) -> StoreError {
              on with what is there, run `signorini doctor --accept --data {}`",
             database.display(),
             super::folder::DATABASE,
+            path.display()
+        )),
+        StoreError::Broken(_) => StoreError::Lost(format!(
+            "the database {} is damaged where jobs are stored; restore it from a backup, or save what is intact with \
+             `signorini doctor --data {} --salvage NEW_FOLDER`",
+            database.display(),
             path.display()
         )),
         StoreError::Damaged(damage) => StoreError::Lost(format!(

@@ -36,28 +36,31 @@ impl Store {
 
     /// Whether a job of these owners with this public id was deleted recently.
     pub async fn was_deleted(&self, owners: Owners<'_>, id: JobId) -> Result<bool> {
-        let mut connection = self.reader.acquire().await?;
-        let owner = owner_of_deleted(&mut connection, id).await?;
-        Ok(owner.is_some_and(|owner| owners.include(&owner)))
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            let owner = owner_of_deleted(&mut connection, id).await?;
+            Ok(owner.is_some_and(|owner| owners.include(&owner)))
+        };
+        self.damages.noting(read).await
     }
 
     /// Removes the ids of jobs that were deleted long ago.
     pub async fn forget_deleted(&self, now: Time) -> Result<()> {
         let before = now.after_s(-REMEMBERED_S).micros();
-        let some: bool =
-            sqlx::query_scalar("select exists (select 1 from deleted_job where deleted_at < ?)")
-                .bind(before)
-                .fetch_one(&self.reader)
-                .await?;
-        if some {
-            let mut tx = self.begin().await?;
-            sqlx::query("delete from deleted_job where deleted_at < ?")
-                .bind(before)
-                .execute(&mut *tx)
-                .await?;
-            tx.commit().await?;
-        }
-        Ok(())
+        let forget = async {
+            let some = "select exists (select 1 from deleted_job where deleted_at < ?)";
+            let some = sqlx::query_scalar(some).bind(before);
+            if some.fetch_one(&self.reader).await? {
+                let mut tx = self.begin().await?;
+                sqlx::query("delete from deleted_job where deleted_at < ?")
+                    .bind(before)
+                    .execute(&mut *tx)
+                    .await?;
+                tx.commit().await?;
+            }
+            Ok(())
+        };
+        self.writing(forget).await
     }
 }
 

@@ -87,7 +87,7 @@ impl Store {
         match result {
             Some(_) => {
                 let finishing = self.try_to_finish(key, attempt, ending, &last, result);
-                self.damages.writing(finishing).await
+                self.writing(finishing).await
             }
             None => {
                 self.control(|| self.try_to_finish(key, attempt, ending, &last, None))
@@ -156,15 +156,14 @@ impl Store {
     pub async fn expire_queued(&self, now: Time) -> Result<Vec<i64>> {
         let now = self.by_our_clock(now);
         // nearly always there is none, which a reader finds without occupying the writer
-        let some = sqlx::query(EXPIRED)
-            .bind(now.micros())
-            .bind(1)
-            .fetch_optional(&self.reader)
-            .await?;
-        if some.is_none() {
-            return Ok(vec![]);
-        }
-        self.damages.writing(self.end_expired(now)).await
+        let expire = async {
+            let some = sqlx::query(EXPIRED).bind(now.micros()).bind(1);
+            match some.fetch_optional(&self.reader).await? {
+                Some(_) => self.end_expired(now).await,
+                None => Ok(vec![]),
+            }
+        };
+        self.writing(expire).await
     }
 
     async fn end_expired(&self, now: Time) -> Result<Vec<i64>> {

@@ -46,7 +46,7 @@ pub enum StoreError {
     /// The database was removed or replaced while the store is open.
     #[error("{0}")]
     Replaced(String),
-    /// The database itself was found damaged when something was stored: nothing is stored any more.
+    /// The database itself is damaged, so that nothing can be stored.
     #[error("{0}")]
     Broken(String),
     /// A record that is not as it was written.
@@ -89,7 +89,7 @@ impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.job {
             Some(id) => write!(f, "the stored {} of {id} is damaged", self.record.name),
-            None => write!(f, "the stored {} is damaged", self.record.name),
+            None => write!(f, "the {} is damaged", self.record.name),
         }
     }
 }
@@ -174,7 +174,6 @@ impl From<sqlx::Error> for StoreError {
             _ if matches!(number & 0xff, code::CORRUPT | code::NOT_A_DATABASE) => {
                 Record::database().damaged(told)
             }
-            // the disk may give it when it is asked again
             _ if matches!(number, code::IOERR_READ | code::IOERR_SHORT_READ) => {
                 Record::named("page of the database").damaged(told)
             }

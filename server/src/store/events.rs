@@ -46,7 +46,7 @@ impl Store {
             tx.commit().await?;
             Ok(true)
         };
-        self.damages.writing(write).await
+        self.writing(write).await
     }
 
     /// At most `limit` events after number `after`, in order.

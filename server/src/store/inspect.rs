@@ -12,7 +12,8 @@ use super::{
     error::{Record, Result, StoreError},
     events,
     folder::{DATABASE, Folder},
-    intact, keys, meshes, migrations, problems, progress,
+    intact, keys, meshes, migrations, problems,
+    progress::{self, Known},
     rows::find,
     salvage::{copy_job, copy_the_rest, insert, new_store},
 };
@@ -60,10 +61,10 @@ pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
     let options = SqliteConnectOptions::new().filename(folder.join(DATABASE));
     let known = progress::read(folder).unwrap_or_else(|error| {
         report.findings.push(format!("{}: {error}", progress::FILE));
-        None
+        Known::Damaged
     });
-    match compare_with_the_past(folder, known.as_ref(), options.clone()).await {
-        Ok(()) => {}
+    match compare_with_the_past(folder, &known, options.clone()).await {
+        Ok(doubt) => report.findings.extend(doubt),
         Err(StoreError::Folder(why)) => {
             return Err(unusable(format!(
                 "{why}; to read a database, SQLite writes beside it: copy the folder to where that is allowed, and \
@@ -101,13 +102,7 @@ impl Report {
             StoreError::Damaged(damage) => format!("{}: {}", damage.record.name, damage.cause),
             other => other.to_string(),
         };
-        // of the database itself every table tells the same
-        let of_all = matches!(error, StoreError::Damaged(damage) if damage.record.is_database());
-        let known =
-            |finding: &String| finding.starts_with("database: ") && finding.ends_with(&text);
-        if !(of_all && self.findings.iter().any(known)) {
-            self.findings.push(format!("{what}: {text}"));
-        }
+        self.findings.push(format!("{what}: {text}"));
     }
 
     /// Checks one table after the other; an error only if the new store cannot be written.
@@ -116,6 +111,15 @@ impl Report {
         source: &mut SqliteConnection,
         target: Option<&Store>,
     ) -> Result<()> {
+        let tables = sqlx::query("select name from sqlite_schema");
+        if let Err(error) = tables.fetch_all(&mut *source).await {
+            // every table would tell the same
+            self.incomplete = true;
+            if self.findings.is_empty() {
+                self.finding("database", &error.into());
+            }
+            return Ok(());
+        }
         let complaints = sqlx::query_scalar("pragma integrity_check(20)");
         let complaints: sqlx::Result<Vec<String>> = complaints.fetch_all(&mut *source).await;
         match complaints {

@@ -79,7 +79,7 @@ impl Store {
             tx.commit().await?;
             Ok(())
         };
-        self.damages.writing(write).await
+        self.writing(write).await
     }
 
     /// Completes a mesh with this number of pieces; false if it was stored already. `None`: some pieces were removed
@@ -117,7 +117,7 @@ impl Store {
             tx.commit().await?;
             Ok(Some(key.is_some()))
         };
-        self.damages.writing(write).await
+        self.writing(write).await
     }
 
     /// The parsed mesh as it was written.
@@ -154,7 +154,7 @@ impl Store {
             tx.commit().await?;
             Ok(Removal::Removed)
         };
-        self.damages.writing(write).await
+        self.writing(write).await
     }
 
     /// Removes the pieces of uploads that were interrupted.

@@ -53,6 +53,7 @@ mod delete;
 mod edit;
 mod keys;
 mod submit;
+mod trial;
 
 // Read: one job, its queue position, its result; many jobs.
 mod health;
@@ -76,6 +77,7 @@ use std::{path::Path, sync::Arc};
 
 pub use self::{
     database::Store,
+    database::with_advice,
     delete::Deletion,
     edit::Edit,
     end::CancelOutcome,
@@ -96,7 +98,8 @@ pub use self::{
 impl Store {
     /// Opens the store in `folder`, which is created if necessary, and brings its tables up to date.
     pub async fn open(folder: &Path) -> Result<Arc<Store>> {
-        let store = Store::open_unwatched(folder).await?;
+        let store = Store::open_unwatched(folder).await;
+        let store = store.map_err(|error| with_advice(error, folder))?;
         tokio::spawn(health::watch(Arc::downgrade(&store)));
         tokio::spawn(health::check_indexes(Arc::downgrade(&store)));
         Ok(store)

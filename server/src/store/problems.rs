@@ -4,7 +4,7 @@ use sqlx::SqliteConnection;
 
 use super::{
     checksum::Checksum,
-    error::{Record, Result},
+    error::{Record, Result, StoreError},
     submission::NewJob,
 };
 use crate::job::Job;
@@ -47,23 +47,34 @@ pub(super) async fn write(tx: &mut SqliteConnection, new: &NewJob) -> Result<()>
 /// Body, mesh, memory and checksum.
 type Columns = (String, Option<String>, Option<i64>, Option<i64>);
 
-/// The problem of a job.
+/// The problem of a job, which must exist.
 pub(super) async fn read(tx: &mut SqliteConnection, job: &Job) -> Result<StoredProblem> {
+    let found = find(tx, job).await?;
+    found.ok_or_else(|| Record::of_job(job.key, "problem").damaged("it is missing"))
+}
+
+/// The problem of a job, if it is there.
+pub(super) async fn find(
+    connection: &mut SqliteConnection,
+    job: &Job,
+) -> Result<Option<StoredProblem>> {
     let record = || Record::of_job(job.key, "problem");
     let found: sqlx::Result<Option<Columns>> = sqlx::query_as(
         "select body, mesh, memory_bytes, checksum from problem where input_hash = ?",
     )
     .bind(&job.input_hash)
-    .fetch_optional(tx)
+    .fetch_optional(connection)
     .await;
-    let found = found.map_err(|error| crate::store::StoreError::from(error).reading(record))?;
-    let (body, mesh, memory, stored) = found.ok_or_else(|| record().damaged("it is missing"))?;
+    let found = found.map_err(|error| StoreError::from(error).reading(record))?;
+    let Some((body, mesh, memory, stored)) = found else {
+        return Ok(None);
+    };
     checksum(&job.input_hash, &body, mesh.as_deref(), memory).verify(stored, record)?;
-    Ok(StoredProblem {
+    Ok(Some(StoredProblem {
         body,
         mesh,
         memory_bytes: memory.and_then(|bytes| u64::try_from(bytes).ok()),
-    })
+    }))
 }
 
 fn checksum(input_hash: &str, body: &str, mesh: Option<&str>, memory: Option<i64>) -> Checksum {

@@ -1,7 +1,7 @@
 //! How far the store has come, in a file beside the database: so that it is noticed when the database, or the
 //! write-ahead log with its last transactions, is missing or has been replaced by an older one.
 //!
-//! Every transaction counts itself in the database, and after its commit the file gets the number too: 72 bytes in
+//! Every transaction counts itself in the database, and after its commit the file gets the number too: 80 bytes in
 //! place, without a flush, which would cost as much as the commit. So the file is never ahead of what is durable. After
 //! a power cut it may be behind, and then less is noticed, but nothing is refused that is whole.
 
@@ -19,6 +19,9 @@ use super::error::{Result, StoreError};
 
 /// The name of the file.
 pub(super) const FILE: &str = "signorini.progress";
+/// Its words for whether the service runs, or was killed as it ran; of the same length.
+const RUNNING: &str = "running";
+const STOPPED: &str = "stopped";
 
 /// What the file says.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,6 +30,19 @@ pub(super) struct LastCommit {
     pub(super) store: String,
     /// The number of its last transaction.
     pub(super) commits: i64,
+    /// The service stopped after it, and did not die.
+    pub(super) stopped: bool,
+}
+
+/// What is known of the last commit.
+#[derive(Debug)]
+pub(super) enum Known {
+    /// There is no file.
+    Missing,
+    /// The file is not as it was written.
+    Damaged,
+    /// What the file says.
+    Last(LastCommit),
 }
 
 /// The file, open.
@@ -41,21 +57,11 @@ struct Open {
     failed: bool,
 }
 
-/// Reads the file; `None` if there is none, or none that can be read.
-pub(super) fn read(folder: &Path) -> io::Result<Option<LastCommit>> {
-    let path = folder.join(FILE);
-    match std::fs::read(&path) {
-        Ok(bytes) => {
-            let last = LastCommit::parse(&bytes);
-            if last.is_none() {
-                tracing::warn!(
-                    "{} is damaged: whether all that was stored is still there is not known",
-                    path.display()
-                );
-            }
-            Ok(last)
-        }
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+/// Reads the file.
+pub(super) fn read(folder: &Path) -> io::Result<Known> {
+    match std::fs::read(folder.join(FILE)) {
+        Ok(bytes) => Ok(LastCommit::parse(&bytes).map_or(Known::Damaged, Known::Last)),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(Known::Missing),
         Err(error) => Err(error),
     }
 }
@@ -71,11 +77,28 @@ pub(super) async fn in_database(connection: &mut SqliteConnection) -> Result<Opt
     }
     let row = sqlx::query_as("select store, commits from progress").fetch_one(connection);
     let (store, commits) = row.await?;
-    Ok(Some(LastCommit { store, commits }))
+    let stopped = false;
+    Ok(Some(LastCommit {
+        store,
+        commits,
+        stopped,
+    }))
 }
 
-/// An error if the database is not the one that the file tells of, or has not come as far.
-pub(super) fn compare(file: &LastCommit, database: Option<&LastCommit>) -> Result<()> {
+/// An error if the database is not the one that the file tells of, or has not come as far. If that cannot be known, why.
+pub(super) fn compare(known: &Known, database: Option<&LastCommit>) -> Result<Option<String>> {
+    let doubt = |how: &str| {
+        // a version that did not count had no file
+        let counted = database.map(|_| {
+            format!("{FILE} is {how}: whether all that was stored is still there is not known")
+        });
+        Ok(counted)
+    };
+    let file = match known {
+        Known::Missing => return doubt("missing"),
+        Known::Damaged => return doubt("damaged"),
+        Known::Last(file) => file,
+    };
     let lost = |what: String| Err(StoreError::Lost(what));
     match database {
         None => lost("it is of an older version than the store that was here last".into()),
@@ -84,7 +107,7 @@ pub(super) fn compare(file: &LastCommit, database: Option<&LastCommit>) -> Resul
             "its last {} transactions are missing",
             file.commits - found.commits
         )),
-        Some(_) => Ok(()),
+        Some(_) => Ok(None),
     }
 }
 
@@ -114,11 +137,21 @@ impl Progress {
             return; // a later one was faster
         }
         open.last.commits = number;
-        let written = open.file.write_all_at(open.last.text().as_bytes(), 0);
+        let written = open.write();
         if let (Err(error), false) = (&written, open.failed) {
             tracing::warn!(%error, "{FILE} cannot be written: {error}");
         }
         open.failed = written.is_err();
+    }
+
+    /// The service stops, and nothing is written any more. Needs no space on the disk.
+    pub(super) fn stop(&self) -> io::Result<()> {
+        {
+            let mut open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            open.last.stopped = true;
+            open.write()?;
+        }
+        self.sync()
     }
 
     /// Flushes the file.
@@ -131,11 +164,18 @@ impl Progress {
     }
 }
 
+impl Open {
+    fn write(&self) -> io::Result<()> {
+        self.file.write_all_at(self.last.text().as_bytes(), 0)
+    }
+}
+
 impl LastCommit {
     /// Always of the same length, so that it is replaced in place, and within one sector.
     fn text(&self) -> String {
-        let LastCommit { store, commits } = self;
-        let line = format!("signorini {store} {commits:020}");
+        let LastCommit { store, commits, .. } = self;
+        let state = if self.stopped { STOPPED } else { RUNNING };
+        let line = format!("signorini {store} {commits:020} {state}");
         format!("{line} {:08x}\n", crc32fast::hash(line.as_bytes()))
     }
 
@@ -146,6 +186,7 @@ impl LastCommit {
         let last = LastCommit {
             store: store.to_owned(),
             commits: commits.parse().ok()?,
+            stopped: words.next()? == STOPPED,
         };
         (last.text() == text).then_some(last)
     }
@@ -185,9 +226,10 @@ mod tests {
         let last = LastCommit {
             store: "0123456789abcdef0123456789abcdef".into(),
             commits: 12,
+            stopped: true,
         };
         let text = last.text().into_bytes();
-        assert_eq!(text.len(), 73);
+        assert_eq!(text.len(), 81);
         assert_eq!(LastCommit::parse(&text), Some(last));
         for place in 0..text.len() {
             let mut other = text.clone();

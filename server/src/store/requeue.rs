@@ -45,8 +45,8 @@ impl Store {
         Ok(Some(status))
     }
 
-    /// Requeues the jobs that were running when the process died; ends those that were asked to stop, and those
-    /// whose attempts are used up. To be called before the listener opens. Returns their number.
+    /// Requeues the jobs that were running when the service ended; ends those that were asked to stop, and, if the process
+    /// died, those whose attempts are used up. To be called before the listener opens. Returns their number.
     pub async fn requeue_interrupted(&self) -> Result<usize> {
         self.control(|| self.try_to_requeue_interrupted()).await
     }
@@ -64,7 +64,13 @@ impl Store {
             let Ok(job) = self.damages.noting(async { from_row(row) }).await else {
                 continue; // damaged: the service starts with the others
             };
-            requeue_after_death(&mut change, &job, "the service died with it").await?;
+            // the service that stopped could not store that it requeued it
+            match self.was_stopped && !job.cancel_requested {
+                true => requeue(&mut change, &job, Requeue::Drain).await?,
+                false => {
+                    requeue_after_death(&mut change, &job, "the service died with it").await?;
+                }
+            }
             interrupted.push(job);
         }
         change.commit().await?;
@@ -77,7 +83,8 @@ impl Store {
     /// The jobs that run, with the numbers of their attempts.
     pub async fn running(&self) -> Result<Vec<(i64, i32)>> {
         let running = sqlx::query_as("select id, attempt from job where status = 'running'");
-        Ok(running.fetch_all(&self.reader).await?)
+        let read = async { Ok(running.fetch_all(&self.reader).await?) };
+        self.damages.noting(read).await
     }
 
     /// Requeues a running job whose own process died; ends it if it was asked to stop, or if its attempts are used up.

@@ -37,7 +37,7 @@ impl Store {
             }
             Ok(true)
         };
-        self.damages.writing(write).await
+        self.writing(write).await
     }
 
     /// Stores the partial result of a running job in place of an earlier one; false when the attempt is no longer
@@ -63,7 +63,7 @@ impl Store {
             tx.commit().await?;
             Ok(true)
         };
-        self.damages.writing(write).await
+        self.writing(write).await
     }
 }
 

@@ -55,7 +55,7 @@ impl Store {
             replies.push(one.reply);
         }
         let mut answers = vec![];
-        let committed = self.damages.writing(async {
+        let committed = self.writing(async {
             let mut change = self.change().await?;
             for (submission, claim) in submissions {
                 let savepoint = change.savepoint().await?;
@@ -161,7 +161,7 @@ pub(super) async fn commit_submissions(store: Weak<Store>, mut inbox: mpsc::Rece
 }
 
 /// Inserts a job: waiting for a worker, answered at once by an earlier result, or coalesced into another.
-async fn insert(
+pub(super) async fn insert(
     change: &mut Change<'_>,
     owner: &str,
     new: &NewJob,

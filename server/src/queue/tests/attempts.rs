@@ -93,9 +93,23 @@ async fn a_job_whose_end_a_damaged_database_cannot_store_frees_its_worker() {
         .unwrap();
     let refused = rig.queue.submit(submission(vec![new(0)], None)).await;
     assert!(matches!(refused, Err(StoreError::Broken(_))));
-    // the next start requeues it, once the store is repaired
-    let job = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
-    assert_eq!(job.status, Status::Running);
+    let Rig {
+        mut store,
+        queue,
+        folder,
+    } = rig;
+    // the service did not die with it, however often it is stopped and started so
+    for starts in 1..5 {
+        let found = store.job(Owners::All, job.id).await.unwrap().unwrap();
+        assert_eq!(found.status, Status::Running);
+        queue.drain().await;
+        store.close().await;
+        store = Store::open(folder.path()).await.unwrap();
+        assert_eq!(store.requeue_interrupted().await.unwrap(), 1);
+        let claim = store.claim_next().await.unwrap().0.unwrap();
+        assert_eq!(claim.job.attempt, starts + 1);
+        assert_eq!(claim.job.max_attempts, 3 + starts);
+    }
 }
 
 #[tokio::test]

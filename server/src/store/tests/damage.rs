@@ -445,3 +445,71 @@ async fn nothing_is_written_to_a_damaged_database() {
     let jobs = store.jobs(Owners::All, &all, Order::NEWEST_FIRST, None, 9);
     assert_eq!(jobs.await.unwrap().len(), 3);
 }
+
+/// Overwrites a page that is filled with this character, and is not the last of its value.
+fn erase_page_of(folder: &Path, character: u8) {
+    const PAGE: usize = 4096;
+    let database = folder.join("signorini.db");
+    let mut bytes = fs::read(&database).unwrap();
+    let page = bytes
+        .chunks_mut(PAGE)
+        .find(|page| page[..4] != [0; 4] && page[4..].iter().all(|byte| *byte == character));
+    page.unwrap().fill(0);
+    fs::write(database, bytes).unwrap();
+}
+
+#[tokio::test]
+async fn a_page_of_one_job_that_cannot_be_read_disturbs_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let cached = |input: &str, character: &str| NewJob {
+        cache: Cache::Use,
+        problem: format!("\"{}\"", character.repeat(50_000)),
+        ..new(input)
+    };
+    let submit = async |store: &Store, job| {
+        let accepted = store.submit(by("ada", vec![job], None), false).await;
+        accepted.unwrap().jobs.remove(0)
+    };
+    let store = Store::open(folder.path()).await.unwrap();
+    submit(&store, cached("1", "p")).await;
+    let first = store.claim_next().await.unwrap().0.unwrap().job;
+    let ending = Ending {
+        status: Status::Succeeded,
+        reason: None,
+        failure: None,
+        result: ResultAvailable::Final,
+    };
+    let large = format!("\"{}\"", "r".repeat(50_000)).into_bytes();
+    let result = Parts(vec![
+        ResultPart::new("summary".into(), b"{}".to_vec()),
+        ResultPart::new("fields".into(), large),
+    ]);
+    let last = FinalBatch::default();
+    let finished = store.finish(first.key, 1, &ending, last, Some(&result));
+    finished.await.unwrap().unwrap();
+    store.close().await;
+    drop(store);
+    erase_page_of(folder.path(), b'r');
+    let store = Store::open(folder.path()).await.unwrap();
+    // its result answers no other job, of which the problem is damaged next
+    let second = submit(&store, cached("1", "p")).await;
+    assert_eq!(second.status, Status::Queued);
+    submit(&store, cached("2", "q")).await;
+    let third = submit(&store, cached("3", "s")).await;
+    let deleted = store.delete(Owners::All, first.key).await;
+    assert!(
+        matches!(deleted, Err(StoreError::Damaged(_))),
+        "{deleted:?}"
+    );
+    store.close().await;
+    drop(store);
+    erase_page_of(folder.path(), b'p');
+    erase_page_of(folder.path(), b'q');
+    let store = Store::open(folder.path()).await.unwrap();
+    let claim = store.claim_next().await.unwrap().0.unwrap();
+    assert_eq!(claim.job.id, third.id);
+    let failed = store.job(Owners::All, second.id).await.unwrap().unwrap();
+    assert_eq!(failed.reason, Some(crate::job::Reason::Internal));
+    assert!(store.health().await.is_ok());
+    submit(&store, new("4")).await;
+}

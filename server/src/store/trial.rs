@@ -1,0 +1,53 @@
+//! Whether a damaged database can still take a job: by writing one, which is rolled back.
+
+use super::{
+    database::Store,
+    end::end,
+    error::Result,
+    keys,
+    lifecycle::{self, Ending},
+    parts::{Part, Parts},
+    results,
+    rows::read,
+    submission::{NewJob, RequestKey},
+    submit,
+};
+use crate::job::{Cache, JobId, Limits, Reason, ResultAvailable};
+
+impl Store {
+    /// Writes all that belongs to a small job, from its submission to its end, and rolls it back.
+    pub(super) async fn write_and_roll_back(&self) -> Result<()> {
+        let id = JobId::default();
+        let job = NewJob {
+            id: Some(id),
+            name: None,
+            labels: [("trial".to_owned(), id.to_string())].into(),
+            priority: 0,
+            limits: Limits::default(),
+            cache: Cache::Off,
+            parent: None,
+            title: None,
+            input_hash: id.to_string(),
+            problem: "{}".into(),
+            mesh: None,
+            memory_bytes: 0,
+            payload: String::new(),
+        };
+        let request = RequestKey {
+            key: id.to_string(),
+            payload: String::new(),
+        };
+        let result = Parts(vec![Part::new("summary".into(), b"{}".to_vec())]);
+        let ending = Ending {
+            result: ResultAvailable::Partial,
+            ..Ending::failed(Reason::Internal, "")
+        };
+        let mut change = self.control_change().await?;
+        let key = submit::insert(&mut change, "", &job, u32::MAX).await?;
+        keys::remember(&mut change, "", &request, &[key]).await?;
+        let job = read(change.sql(), key).await?;
+        let job = lifecycle::start_attempt(&mut change, &job).await?;
+        results::write_at_end(change.sql(), key, &result).await?;
+        end(&mut change, &job, &ending).await
+    }
+}
