@@ -31,7 +31,7 @@ MOST_LONGER = 1.05 if SOAK else None
 # with slow watchers; with all
 MOST_PROCESSOR = (1.2, 1.5)
 MOST_MEMORY, MOST_WAL = 64 << 10, 64 * MIB
-WATCHED_S, FEWEST_ROUNDS = (600, 10) if SOAK else (2, 2)
+WATCHED_S, FEWEST_ROUNDS = (600, 10) if SOAK else (2, 5)
 # ten events for each increment
 INCREMENTS, REFINE = (100, 4) if SOAK else (10, 4)
 MOST_ANSWERED_S, MOST_WARNINGS = 10, 3
