@@ -100,14 +100,13 @@ impl App {
         let closing = CancellationToken::new();
         let server = tokio::spawn(listener.serve(router, closing.clone()));
         queue.start();
-        let Config {
-            workers, isolation, ..
-        } = config;
-        let (data, budget) = (config.data.display(), size(config.memory.bytes()));
+        let (version, data) = (env!("CARGO_PKG_VERSION"), config.data.display());
+        let (isolation, budget) = (config.isolation, size(config.memory.bytes()));
+        let workers = number_of(config.workers.into(), "worker");
         info!(
-            %address, version = env!("CARGO_PKG_VERSION"), %data, workers, %isolation, budget,
-            "listening on {address}: version {}, store in {data}, {}, isolation {isolation}, {budget} of memory for jobs",
-            env!("CARGO_PKG_VERSION"), number_of((*workers).into(), "worker"),
+            %address, version, %data, workers = config.workers, %isolation, budget,
+            "listening on {address}: version {version}, store in {data}, {workers}, isolation {isolation}, {budget} of \
+             memory for jobs"
         );
         if !address.ip().is_loopback() {
             warn!(%address, "anyone who can reach {address} can do everything: there is no authentication");

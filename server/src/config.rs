@@ -141,3 +141,21 @@ fn machine_memory() -> u64 {
         .and_then(|text| text.trim().parse().ok());
     total.unwrap_or(UNKNOWN).min(container.unwrap_or(u64::MAX))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_is_a_number_or_a_name_with_a_port() {
+        assert_eq!(address("127.0.0.1:80"), Ok(([127, 0, 0, 1], 80).into()));
+        assert!(address("localhost:80").is_ok_and(|found| found.ip().is_loopback()));
+        for wrong in ["localhost", "127.0.0.1", "127.0.0.1:99999", ""] {
+            let told = address(wrong);
+            assert!(
+                told.is_err_and(|text| text.contains("127.0.0.1:8080")),
+                "{wrong}"
+            );
+        }
+    }
+}

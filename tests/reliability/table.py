@@ -25,7 +25,7 @@ ROWS = [
     Row("R2", "Power loss: a submit is answered only after its job is on the disk, and survives whatever else the disk lost",
         "power.py", "power.py --soak"),
     Row("R2a", "The order of system calls behind a submit: read, logged, synced, answered", "durable.py", "durable.py"),
-    Row("R3", "The n-th write, sync, opening or reading of a file fails: a clean error or success, and the next job runs",
+    Row("R3", "The n-th write, sync, opening or reading of a file fails, for every n: a clean error or success, and the next job runs",
         "io_errors.py", "io_errors.py --soak"),
     Row("R4", "A panic or an error at every boundary of a job's stages costs that job only", "unit.py failpoints", "unit.py failpoints"),
     Row("R5", "A full disk: 507 within a second, reads and control verbs work, and all is as before when there is space",

@@ -2,8 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    mem,
-    sync::{LazyLock, Mutex, MutexGuard, PoisonError},
+    sync::{LazyLock, Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
@@ -14,88 +13,78 @@ const INTERVAL: Duration = Duration::from_secs(10);
 /// A client chooses the path.
 const LONGEST_PATH: usize = 100;
 
-/// By kind, what was refused since its last line. There are as many kinds as errors.
-static KINDS: LazyLock<Mutex<BTreeMap<String, Since>>> = LazyLock::new(Mutex::default);
+/// By kind: when it was last logged, and how many requests were refused since. There are as many kinds as errors.
+static KINDS: LazyLock<Mutex<BTreeMap<String, Kind>>> = LazyLock::new(Mutex::default);
 
-/// How many requests were refused since the last line, and the path of the latest.
-#[derive(Debug)]
-struct Since {
-    line: Instant,
-    count: u64,
-    latest: String,
-}
-
-impl Default for Since {
-    fn default() -> Self {
-        Since {
-            line: Instant::now(),
-            count: 0,
-            latest: String::new(),
-        }
-    }
+struct Kind {
+    logged: Instant,
+    since: u64,
 }
 
 /// A request was refused for this kind of error.
 pub(super) fn note(kind: &str, path: &str) {
-    let path: String = path.chars().take(LONGEST_PATH).collect();
-    if count(kind, &path) {
+    let Some(count) = due(kind, Instant::now()) else {
         return;
+    };
+    tokio::spawn(tell_the_rest(kind.to_owned()));
+    let path: String = path.chars().take(LONGEST_PATH).collect();
+    match count {
+        1 => info!(
+            error = kind,
+            count, "refused as {kind}: a request to {path:?}"
+        ),
+        _ => info!(
+            error = kind,
+            count, "refused as {kind}: {count} more requests, the latest to {path:?}"
+        ),
     }
-    info!(
-        error = kind,
-        count = 1,
-        "refused as {kind}: a request to {path:?}"
-    );
-    let kind = kind.to_owned();
-    tokio::spawn(async move {
-        loop {
-            tokio::time::sleep(INTERVAL).await;
-            let Some(Since { count, latest, .. }) = take(&kind) else {
-                return;
-            };
-            info!(
-                error = kind,
-                count, "refused as {kind}: {count} more, the latest a request to {latest:?}"
-            );
-        }
-    });
 }
 
-/// Counts a request for the next line; false if there is none to come, since nothing of this kind was refused lately.
-fn count(kind: &str, path: &str) -> bool {
-    let mut kinds = kinds();
-    match kinds.get_mut(kind) {
-        // who was to write the next line has ended, with its runtime
-        Some(since) if since.line.elapsed() > 2 * INTERVAL => {
-            *since = Since::default();
-            false
+/// After a line, tells of those that were refused since, until there are none: no further one may come that would.
+async fn tell_the_rest(kind: String) {
+    loop {
+        tokio::time::sleep(INTERVAL).await;
+        let count = rest(&kind, Instant::now());
+        if count == 0 {
+            return;
         }
-        Some(since) => {
-            since.count += 1;
-            since.latest = path.to_owned();
-            true
+        info!(
+            error = kind,
+            count, "refused as {kind}: {count} more requests"
+        );
+    }
+}
+
+/// How many requests were refused since the last line; from now on they are counted anew.
+fn rest(kind: &str, now: Instant) -> u64 {
+    let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
+    match kinds.get_mut(kind) {
+        Some(known) if known.since > 0 => {
+            known.logged = now;
+            std::mem::take(&mut known.since)
+        }
+        Some(_) | None => 0,
+    }
+}
+
+/// How many requests a line is due for.
+fn due(kind: &str, now: Instant) -> Option<u64> {
+    let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
+    match kinds.get_mut(kind) {
+        Some(known) => {
+            known.since += 1;
+            let due = now.saturating_duration_since(known.logged) >= INTERVAL;
+            due.then(|| {
+                known.logged = now;
+                std::mem::take(&mut known.since)
+            })
         }
         None => {
-            kinds.insert(kind.to_owned(), Since::default());
-            false
+            let (logged, since) = (now, 0);
+            kinds.insert(kind.to_owned(), Kind { logged, since });
+            Some(1)
         }
     }
-}
-
-/// What was refused since the last line; `None` if there was nothing, and then no line is to come.
-fn take(kind: &str) -> Option<Since> {
-    let mut kinds = kinds();
-    let since = mem::take(kinds.get_mut(kind)?);
-    if since.count == 0 {
-        kinds.remove(kind);
-        return None;
-    }
-    Some(since)
-}
-
-fn kinds() -> MutexGuard<'static, BTreeMap<String, Since>> {
-    // No code panics while it holds this lock; if one did, the counts would still be whole.
-    KINDS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
@@ -103,15 +92,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_refused_after_the_first_is_counted_for_the_next_line_until_there_is_none() {
-        let kind = "a kind of this test";
-        assert!(!count(kind, "/1"), "the first has its own line");
-        assert!(count(kind, "/2") && count(kind, "/3"));
-        assert!(!count("another one", "/1"));
-        let since = take(kind);
-        let since = since.map(|since| (since.count, since.latest));
-        assert_eq!(since, Some((2, "/3".into())));
-        assert!(take(kind).is_none());
-        assert!(!count(kind, "/4"));
+    fn a_kind_is_logged_at_once_and_then_every_ten_seconds_with_its_number() {
+        let start = Instant::now();
+        let after = |seconds| due("a kind of this test", start + Duration::from_secs(seconds));
+        assert_eq!(after(0), Some(1));
+        assert_eq!((after(1), after(9)), (None, None));
+        assert_eq!(after(10), Some(3));
+        assert_eq!(after(11), None);
+        let rest = |seconds| rest("a kind of this test", start + Duration::from_secs(seconds));
+        assert_eq!((rest(20), rest(30)), (1, 0));
+        assert_eq!(after(30), Some(1));
+        assert_eq!(due("another one", start), Some(1));
     }
 }

@@ -147,12 +147,16 @@ impl Change<'_> {
         self.store.damages.summary().0
     }
 
-    /// The problem of a job. Read beside the transaction, if it is not of it: a page that cannot be read would end that.
+    /// The problem of a job. It is read beside the transaction first: a page that cannot be read would end that.
     pub(super) async fn problem(&mut self, job: &Job) -> Result<StoredProblem> {
         let mut reader = self.store.reader.acquire().await?;
-        match problems::find(&mut reader, job).await? {
-            Some(found) => Ok(found),
-            None => problems::read(&mut self.tx, job).await,
+        match problems::find(&mut reader, job).await {
+            Ok(Some(found)) => Ok(found),
+            Err(error) if !error.is_damage_of(job.key) => {
+                Err(error.reading(|| problems::record(job)))
+            }
+            // this transaction may have written it, or mended it
+            Ok(None) | Err(_) => problems::read(&mut self.tx, job).await,
         }
     }
 

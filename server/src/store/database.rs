@@ -115,10 +115,7 @@ impl Store {
     /// returns the receiver of submissions. The data kept in memory is not read yet.
     pub(super) async fn connect(path: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
         let folder = Folder::lock(path)?;
-        let known = progress::read(path).map_err(|error| {
-            let file = path.join(progress::FILE);
-            StoreError::Folder(format!("cannot read {}: {error}", file.display()))
-        })?;
+        let known = progress::read(path)?;
         let database = folder.database();
         let options = SqliteConnectOptions::new()
             .filename(&database)
@@ -291,6 +288,14 @@ pub(super) async fn compare_with_the_past(
 /// What the operator can do.
 pub fn with_advice(error: StoreError, path: &Path) -> StoreError {
     let database = path.join(super::folder::DATABASE);
+    let damaged = |how: &str| {
+        StoreError::Lost(format!(
+            "the database {} {how}; restore it from a backup, or save what is intact with \
+             `signorini doctor --data {} --salvage NEW_FOLDER`",
+            database.display(),
+            path.display()
+        ))
+    };
     match error {
         StoreError::Lost(what) => StoreError::Lost(format!(
             "the database {} is not as it was left: {what}; put back {} and {LOG} as they were, or, if you mean to go \
@@ -299,19 +304,8 @@ pub fn with_advice(error: StoreError, path: &Path) -> StoreError {
             super::folder::DATABASE,
             path.display()
         )),
-        StoreError::Broken(_) => StoreError::Lost(format!(
-            "the database {} is damaged where jobs are stored; restore it from a backup, or save what is intact with \
-             `signorini doctor --data {} --salvage NEW_FOLDER`",
-            database.display(),
-            path.display()
-        )),
-        StoreError::Damaged(damage) => StoreError::Lost(format!(
-            "the database {} cannot be read: {}; restore it from a backup, or save what is intact with \
-             `signorini doctor --data {} --salvage NEW_FOLDER`",
-            database.display(),
-            damage.cause,
-            path.display()
-        )),
+        StoreError::Broken(_) => damaged("is damaged where jobs are stored"),
+        StoreError::Damaged(damage) => damaged(&format!("cannot be read: {}", damage.cause)),
         StoreError::Full | StoreError::Database(_) | StoreError::Migrate(_) => StoreError::Folder(
             format!("the store in {} cannot be opened: {error}", path.display()),
         ),

@@ -1,6 +1,7 @@
 //! The folder of a store: its files, who may read them, and the lock that keeps a second server out.
 
 use std::{
+    fmt::Display,
     fs::{self, DirBuilder, File, OpenOptions, Permissions, TryLockError},
     io::{self, ErrorKind},
     os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt, PermissionsExt},
@@ -31,6 +32,11 @@ const FILES: [&str; 7] = [
 /// What earlier versions locked. It could be removed apart from the data.
 const OLD_LOCK: &str = "lock";
 
+/// The error that a folder cannot be used.
+pub(super) fn unusable(path: &Path, why: impl Display) -> StoreError {
+    StoreError::Folder(format!("cannot use the folder {}: {why}", path.display()))
+}
+
 /// The folder, locked as long as this exists.
 #[derive(Debug)]
 pub(super) struct Folder {
@@ -42,9 +48,7 @@ impl Folder {
     /// Creates the folder if necessary, and locks it: the folder itself, since a lock file could be removed. A second
     /// server in it would run the same jobs.
     pub(super) fn lock(path: &Path) -> Result<Folder> {
-        let named = |error: io::Error| {
-            StoreError::Folder(format!("cannot use the folder {}: {error}", path.display()))
-        };
+        let named = |error: io::Error| unusable(path, error);
         DirBuilder::new()
             .recursive(true)
             .mode(0o700)

@@ -11,9 +11,8 @@ use super::{
     database::{Store, Writing, compare_with_the_past},
     error::{Record, Result, StoreError},
     events,
-    folder::{DATABASE, Folder},
-    intact, keys, meshes, migrations, problems,
-    progress::{self, Known},
+    folder::{DATABASE, Folder, unusable},
+    intact, keys, meshes, migrations, problems, progress,
     rows::find,
     salvage::{copy_job, copy_the_rest, insert, new_store},
 };
@@ -45,31 +44,22 @@ const EVENTS_PER_READ: i64 = 1000;
 
 /// Checks everything in the store of this folder; with `new`, which must be empty or missing, copies what is intact.
 pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
-    let unusable = |why: String| {
-        StoreError::Folder(format!(
-            "the folder {} cannot be used: {why}",
-            folder.display()
-        ))
-    };
+    // to lock it would create it
     match folder.join(DATABASE).try_exists() {
         Ok(true) => {}
-        Ok(false) => return Err(unusable(format!("there is no {DATABASE} in it"))),
-        Err(error) => return Err(unusable(error.to_string())),
+        Ok(false) => return Err(unusable(folder, format!("there is no {DATABASE} in it"))),
+        Err(error) => return Err(unusable(folder, error)),
     }
     let _locked = Folder::lock(folder)?;
     let mut report = Report::default();
     let options = SqliteConnectOptions::new().filename(folder.join(DATABASE));
-    let known = progress::read(folder).unwrap_or_else(|error| {
-        report.findings.push(format!("{}: {error}", progress::FILE));
-        Known::Damaged
-    });
+    let known = progress::read(folder)?;
     match compare_with_the_past(folder, &known, options.clone()).await {
         Ok(doubt) => report.findings.extend(doubt),
         Err(StoreError::Folder(why)) => {
-            return Err(unusable(format!(
-                "{why}; to read a database, SQLite writes beside it: copy the folder to where that is allowed, and \
-                 check the copy"
-            )));
+            let advice = "to read a database, SQLite writes beside it: copy the folder to where that is allowed, and \
+                          check the copy";
+            return Err(unusable(folder, format!("{why}; {advice}")));
         }
         Err(error) => report.finding("database", &error),
     }
@@ -102,7 +92,11 @@ impl Report {
             StoreError::Damaged(damage) => format!("{}: {}", damage.record.name, damage.cause),
             other => other.to_string(),
         };
-        self.findings.push(format!("{what}: {text}"));
+        let finding = format!("{what}: {text}");
+        // what made the comparison with the past fail may be met again
+        if !self.findings.contains(&finding) {
+            self.findings.push(finding);
+        }
     }
 
     /// Checks one table after the other; an error only if the new store cannot be written.
@@ -115,9 +109,7 @@ impl Report {
         if let Err(error) = tables.fetch_all(&mut *source).await {
             // every table would tell the same
             self.incomplete = true;
-            if self.findings.is_empty() {
-                self.finding("database", &error.into());
-            }
+            self.finding("database", &error.into());
             return Ok(());
         }
         let complaints = sqlx::query_scalar("pragma integrity_check(20)");

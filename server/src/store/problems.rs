@@ -4,7 +4,7 @@ use sqlx::SqliteConnection;
 
 use super::{
     checksum::Checksum,
-    error::{Record, Result, StoreError},
+    error::{Record, Result},
     submission::NewJob,
 };
 use crate::job::Job;
@@ -49,27 +49,31 @@ type Columns = (String, Option<String>, Option<i64>, Option<i64>);
 
 /// The problem of a job, which must exist.
 pub(super) async fn read(tx: &mut SqliteConnection, job: &Job) -> Result<StoredProblem> {
-    let found = find(tx, job).await?;
-    found.ok_or_else(|| Record::of_job(job.key, "problem").damaged("it is missing"))
+    let record = || record(job);
+    let found = find(tx, job).await.map_err(|error| error.reading(record))?;
+    found.ok_or_else(|| record().damaged("it is missing"))
 }
 
-/// The problem of a job, if it is there.
+/// The problem of a job, in errors.
+pub(super) fn record(job: &Job) -> Record {
+    Record::of_job(job.key, "problem")
+}
+
+/// The problem of a job, if it is there. What cannot be read is an error of the database, what was changed one of the job.
 pub(super) async fn find(
     connection: &mut SqliteConnection,
     job: &Job,
 ) -> Result<Option<StoredProblem>> {
-    let record = || Record::of_job(job.key, "problem");
-    let found: sqlx::Result<Option<Columns>> = sqlx::query_as(
+    let found: Option<Columns> = sqlx::query_as(
         "select body, mesh, memory_bytes, checksum from problem where input_hash = ?",
     )
     .bind(&job.input_hash)
     .fetch_optional(connection)
-    .await;
-    let found = found.map_err(|error| StoreError::from(error).reading(record))?;
+    .await?;
     let Some((body, mesh, memory, stored)) = found else {
         return Ok(None);
     };
-    checksum(&job.input_hash, &body, mesh.as_deref(), memory).verify(stored, record)?;
+    checksum(&job.input_hash, &body, mesh.as_deref(), memory).verify(stored, || record(job))?;
     Ok(Some(StoredProblem {
         body,
         mesh,

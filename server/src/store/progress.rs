@@ -19,7 +19,7 @@ use super::error::{Result, StoreError};
 
 /// The name of the file.
 pub(super) const FILE: &str = "signorini.progress";
-/// Its words for whether the service runs, or was killed as it ran; of the same length.
+/// Its words for how the service ended: it runs, or died, or it stopped. They have the same length.
 const RUNNING: &str = "running";
 const STOPPED: &str = "stopped";
 
@@ -58,11 +58,15 @@ struct Open {
 }
 
 /// Reads the file.
-pub(super) fn read(folder: &Path) -> io::Result<Known> {
-    match std::fs::read(folder.join(FILE)) {
+pub(super) fn read(folder: &Path) -> Result<Known> {
+    let path = folder.join(FILE);
+    match std::fs::read(&path) {
         Ok(bytes) => Ok(LastCommit::parse(&bytes).map_or(Known::Damaged, Known::Last)),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(Known::Missing),
-        Err(error) => Err(error),
+        Err(error) => Err(StoreError::Folder(format!(
+            "cannot read {}: {error}",
+            path.display()
+        ))),
     }
 }
 

@@ -513,3 +513,13 @@ async fn a_page_of_one_job_that_cannot_be_read_disturbs_no_other() {
     assert!(store.health().await.is_ok());
     submit(&store, new("4")).await;
 }
+
+#[tokio::test]
+async fn a_damaged_problem_that_is_submitted_again_is_mended_before_it_is_claimed() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    solved(&store, new("1")).await;
+    set(&store, "problem", 1, "body", "'[]'").await;
+    let again = store.submit(by("ada", vec![new("1")], None), true).await;
+    assert_eq!(again.unwrap().claim.unwrap().problem, "{}");
+}
