@@ -1,0 +1,55 @@
+//! Random problems: each is solved or refused in words, and what is solved keeps its promises.
+
+use std::collections::BTreeMap;
+
+use solver::solution::Outcome;
+
+use crate::catalogue;
+use crate::support::quiet;
+
+/// Problems that are solved; `SIGNORINI_RANDOM` asks for others: `from..to`.
+const NUMBERS: std::ops::Range<u64> = 0..500;
+
+fn numbers() -> std::ops::Range<u64> {
+    let asked = std::env::var("SIGNORINI_RANDOM").ok();
+    let range = asked.as_deref().and_then(|text| {
+        let (from, to) = text.split_once("..")?;
+        Some(from.parse().ok()?..to.parse().ok()?)
+    });
+    range.unwrap_or(NUMBERS)
+}
+
+#[test]
+fn random_problems_converge() {
+    let mut ends: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    let mut warned: BTreeMap<&str, u32> = BTreeMap::new();
+    let total = numbers().count();
+    for number in numbers() {
+        let case = catalogue::case(number);
+        let end = match solver::solve(&case.problem, &mut quiet) {
+            Err(error) => {
+                let line = format!("{number}: {}: {error}", case.words);
+                ends.entry("refused").or_default().push(line);
+                continue;
+            }
+            Ok(solution) => solution.summary,
+        };
+        for warning in &end.warnings {
+            *warned.entry(warning.code.as_str()).or_default() += 1;
+        }
+        if end.outcome != Outcome::Converged {
+            let r = end.residuals;
+            let line = format!(
+                "{number}: {}: {:?} kkt {:.1e} friction {:.1e} monolithic {:.1e} after {}",
+                case.words, end.outcome, r.kkt, r.friction, r.monolithic, end.iterations
+            );
+            ends.entry("not converged").or_default().push(line);
+        }
+    }
+    println!("{total} problems; warnings {warned:?}");
+    for (end, lines) in &ends {
+        println!("{end}: {}\n  {}", lines.len(), lines.join("\n  "));
+    }
+    let missed: usize = ends.values().map(Vec::len).sum();
+    assert!(200 * missed <= total, "{missed} of {total}");
+}
