@@ -132,9 +132,16 @@ pub(crate) fn case(number: u64) -> Case {
             {"indentation": 1, "tangential_displacement": 1, "increments": increments},
         ]);
     }
-    let elements = if triangles { "triangles" } else { "quadrilaterals" };
+    let elements = if triangles {
+        "triangles"
+    } else {
+        "quadrilaterals"
+    };
     Case {
-        words: format!("{body} {kind}, {law}, drag {:.2}, {elements} {load} {history}", drag / depth),
+        words: format!(
+            "{body} {kind}, {law}, drag {:.2}, {elements} {load} {history}",
+            drag / depth
+        ),
         problem: problem(&whole.to_string()),
     }
 }
@@ -142,7 +149,16 @@ pub(crate) fn case(number: u64) -> Case {
 /// An obstacle that touches over a half-width near 1, its shape and its indentation.
 fn obstacle(dice: &mut Rng, round: bool, center: f64) -> (Value, Shape, f64) {
     let loads = between(dice, 0.6, 1.6);
-    let kinds = ["flat", "circle", "parabola", "cone", "tilted", "power", "rounded_flat", "table"];
+    let kinds = [
+        "flat",
+        "circle",
+        "parabola",
+        "cone",
+        "tilted",
+        "power",
+        "rounded_flat",
+        "table",
+    ];
     match one_of(dice, &kinds) {
         "flat" => {
             let edge = between(dice, 0.5, 1.0);
@@ -157,13 +173,21 @@ fn obstacle(dice: &mut Rng, round: bool, center: f64) -> (Value, Shape, f64) {
         }
         "circle" => {
             let radius = between(dice, 6.0, 40.0);
-            (json!({"kind": "circle", "radius": radius, "center": center}), Shape::Smooth, loads / radius)
+            (
+                json!({"kind": "circle", "radius": radius, "center": center}),
+                Shape::Smooth,
+                loads / radius,
+            )
         }
         "cone" => {
             let angle: f64 = between(dice, 0.5, 5.0);
             let kind = if round { "cone" } else { "wedge" };
             let depth = loads * 1.2 * angle.to_radians().tan();
-            (json!({"kind": kind, "angle": angle, "center": center}), Shape::Tip, depth)
+            (
+                json!({"kind": kind, "angle": angle, "center": center}),
+                Shape::Tip,
+                depth,
+            )
         }
         "power" => {
             let (coefficient, exponent) = (between(dice, 0.01, 0.08), between(dice, 1.5, 4.5));
@@ -183,11 +207,19 @@ fn obstacle(dice: &mut Rng, round: bool, center: f64) -> (Value, Shape, f64) {
                 x * x / (2.0 * radius) + wave * (1.0 - (2.0 * x).cos()) / (8.0 * radius)
             };
             let gap: Vec<f64> = x.iter().map(gap).collect();
-            (json!({"kind": "table", "x": x, "gap": gap}), Shape::Smooth, loads / radius)
+            (
+                json!({"kind": "table", "x": x, "gap": gap}),
+                Shape::Smooth,
+                loads / radius,
+            )
         }
         _ => {
             let radius = between(dice, 6.0, 40.0);
-            (json!({"kind": "parabola", "radius": radius, "center": center}), Shape::Smooth, loads / radius)
+            (
+                json!({"kind": "parabola", "radius": radius, "center": center}),
+                Shape::Smooth,
+                loads / radius,
+            )
         }
     }
 }
@@ -210,7 +242,8 @@ fn friction(dice: &mut Rng, depth: f64, modulus: f64, round: bool) -> (Option<Va
         _ => between(dice, 0.02, 0.5),
     };
     let slip = depth * 10f64.powf(between(dice, -4.0, -1.5));
-    let mut friction = json!({"coefficient": coefficient, "nonlocal_radius": radius, "elastic_slip": slip});
+    let mut friction =
+        json!({"coefficient": coefficient, "nonlocal_radius": radius, "elastic_slip": slip});
     let mut law = format!("μ {coefficient:.2} ρ {radius:.2} ε/δ {:.0e}", slip / depth);
     let mut set = |name: &str, value: Value| {
         law += &format!(" {name} {value}");
@@ -233,7 +266,10 @@ fn friction(dice: &mut Rng, depth: f64, modulus: f64, round: bool) -> (Option<Va
 fn with_edge(lines: Vec<f64>, edge: f64, halvings: u32) -> Vec<f64> {
     let nearest = lines.iter().copied().filter(|x| *x > 0.0);
     let nearest = nearest.min_by(|a, b| (a - edge).abs().total_cmp(&(b - edge).abs()));
-    let mut lines: Vec<f64> = lines.into_iter().map(|x| if Some(x) == nearest { edge } else { x }).collect();
+    let mut lines: Vec<f64> = lines
+        .into_iter()
+        .map(|x| if Some(x) == nearest { edge } else { x })
+        .collect();
     for _ in 0..halvings {
         let at = lines.iter().position(|x| *x == edge).unwrap_or(1);
         let (before, after) = (0.5 * (lines[at - 1] + edge), 0.5 * (edge + lines[at + 1]));

@@ -37,3 +37,4 @@ mod stick;
 mod support;
 mod thesis;
 mod thick_cylinder;
+mod traps;

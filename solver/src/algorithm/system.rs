@@ -4,7 +4,7 @@
 use crate::body::ElasticBody;
 use crate::elasticity::Dof;
 use crate::error::SolveError;
-use crate::friction::{Average, BoundLaw, Chain, FrictionLaw, Source};
+use crate::friction::{Average, BoundLaw, Chain, FrictionLaw, Source, largest_pressure};
 use crate::linear::Dense;
 use crate::model::{ContactModel, Level, Model};
 use crate::problem::{Condition, FrictionPoints, History, Measure};
@@ -464,10 +464,13 @@ impl<'a> System<'a> {
 
     /// τ at every friction point, thesis (1.3): also where the body is open but within ρ of contact.
     pub fn friction_bound(&self, pressures: &[f64]) -> Vec<f64> {
-        self.points
-            .iter()
-            .map(|point| self.law(point).bound.bound(&point.source, pressures))
-            .collect()
+        let of_patch = |patch| largest_pressure(&pressures[self.range(patch)]);
+        let largest: Vec<f64> = self.patches.iter().map(of_patch).collect();
+        let bound = |point: &Point| {
+            let law = &self.law(point).bound;
+            law.bound(&point.source, pressures, largest[point.patch])
+        };
+        self.points.iter().map(bound).collect()
     }
 
     /// The largest force or complementarity defect for a given friction bound, divided by the

@@ -3,10 +3,16 @@
 use crate::friction::{Average, Averaging, Chain, Row};
 use crate::problem::PrescribedBound;
 
+/// With cohesion an averaged pressure below this part of the largest nodal pressure is none: rounding must not
+/// switch on the cohesion where nothing touches. Pressures are known to far more digits, and what the kernel leaves of
+/// them at its very end matters to nobody.
+const NO_PRESSURE: f64 = 1e-9;
+
 /// The source of the friction bound; `A` as in [`FrictionLaw`](crate::friction::FrictionLaw).
 #[derive(Clone, Debug, PartialEq)]
 pub enum BoundLaw<A = Averaging> {
-    /// τ = min(cap, cohesion + μ S) where S > 0, else 0: thesis (1.3) with an offset and a cap.
+    /// τ = min(cap, cohesion + μ S) where S > 0, else 0: thesis (1.3) with an offset and a cap. With cohesion, S > 0
+    /// means more than a billionth of the largest nodal pressure.
     Pressure {
         /// μ.
         coefficient: f64,
@@ -125,30 +131,30 @@ impl BoundLaw {
         }
     }
 
-    /// τ (stress, ≥ 0) for the nodal pressures (stress).
-    pub fn bound(&self, source: &Source, pressures: &[f64]) -> f64 {
+    /// τ (stress, ≥ 0) for the nodal pressures (stress), of which those of the contact are at most `largest`.
+    pub fn bound(&self, source: &Source, pressures: &[f64], largest: f64) -> f64 {
         match (self, source) {
             (_, Source::Given(bound)) => *bound,
-            (_, Source::Average(row)) => self.of_average(row.apply(pressures)),
+            (_, Source::Average(row)) => self.of_average(row.apply(pressures), largest),
         }
     }
 
-    /// τ from an averaged pressure S.
-    pub fn of_average(&self, nonlocal_pressure: f64) -> f64 {
+    /// τ from an averaged pressure S, beside nodal pressures up to `largest`.
+    pub fn of_average(&self, nonlocal_pressure: f64, largest: f64) -> f64 {
         match self {
             BoundLaw::Pressure {
                 coefficient,
                 cohesion,
                 shear_cap,
                 ..
-            } if nonlocal_pressure > 0.0 => {
+            } if nonlocal_pressure > least_pressure(*cohesion, largest) => {
                 (cohesion + coefficient * nonlocal_pressure).min(*shear_cap)
             }
             _ => 0.0,
         }
     }
 
-    /// dτ/dS.
+    /// dτ/dS, apart from the jump by the cohesion.
     pub fn slope(&self, nonlocal_pressure: f64) -> f64 {
         match self {
             BoundLaw::Pressure {
@@ -164,6 +170,21 @@ impl BoundLaw {
             _ => 0.0,
         }
     }
+}
+
+/// S has to be above this to count as pressure.
+fn least_pressure(cohesion: f64, largest: f64) -> f64 {
+    // without cohesion nothing jumps
+    if cohesion > 0.0 {
+        NO_PRESSURE * largest
+    } else {
+        0.0
+    }
+}
+
+/// The largest of some nodal pressures (stress, ≥ 0).
+pub fn largest_pressure(pressures: &[f64]) -> f64 {
+    pressures.iter().fold(0.0, |most, p| p.max(most))
 }
 
 /// Linear between the points of a table, 0 outside.
@@ -195,8 +216,10 @@ mod tests {
             average: average(0.0),
         };
         let law = law.along(Chain::plain(vec![0.0, 0.5, 1.0]));
-        let tau = |s: f64| (law.of_average(s), law.slope(s));
+        let tau = |s: f64| (law.of_average(s, 100.0), law.slope(s));
         assert_eq!(tau(-1.0), (0.0, 0.0));
+        assert_eq!(tau(2e-14).0, 0.0);
+        assert_eq!(tau(2e-7).0, 2.0 + 0.3 * 2e-7);
         assert_eq!(tau(0.0), (0.0, 0.0));
         assert_eq!(tau(5.0), (3.5, 0.3));
         assert_eq!(tau(50.0), (4.0, 0.0));
@@ -220,7 +243,7 @@ mod tests {
             (3.5, 0.0),
         ] {
             let source = law.source(s);
-            assert_eq!(law.bound(&source, &[9.0; 3]), tau, "{s}");
+            assert_eq!(law.bound(&source, &[9.0; 3], 9.0), tau, "{s}");
             assert_eq!(source.nonlocal_pressure(&[9.0; 3]), 0.0);
         }
     }

@@ -4,7 +4,7 @@ mod bound;
 mod kernel;
 mod transition;
 
-pub use bound::{BoundLaw, Source};
+pub use bound::{BoundLaw, Source, largest_pressure};
 pub use kernel::{Average, Averaging, Chain, Row};
 pub use transition::{phi, phi_slope, psi};
 

@@ -9,6 +9,7 @@ use crate::algorithm::finished::Finished;
 use crate::contact::edge_nodes;
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
+use crate::friction::largest_pressure;
 use crate::problem::{Condition, FrictionPoints};
 use crate::solution::{ContactProfile, NodeState};
 
@@ -150,7 +151,8 @@ impl<'a> PatchView<'a> {
         let pressures = self.own_pressures();
         (
             source.nonlocal_pressure(pressures),
-            law.bound.bound(&source, pressures),
+            law.bound
+                .bound(&source, pressures, largest_pressure(pressures)),
         )
     }
 

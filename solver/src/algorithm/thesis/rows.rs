@@ -282,6 +282,7 @@ impl RowValues {
         options: &ThesisOptions,
     ) -> Vec<Vec<f64>> {
         let mut bound = Vec::with_capacity(stress.len());
+        let largest = stress.iter().flatten().fold(0.0f64, |most, s| most.max(-s));
         for (k, (p, edge)) in self.edges.iter().enumerate() {
             let patch = &system.patches[*p];
             let Some(law) = &patch.law else {
@@ -306,7 +307,7 @@ impl RowValues {
                 let s = edge3::interpolate(&edge3::shape(*zeta), &arc);
                 let average =
                     average::nonlocal(&law.bound, &neighbours, self.rule, options.local_points, s);
-                law.bound.of_average(-average)
+                law.bound.of_average(-average, largest)
             };
             bound.push(self.rule.iter().map(at).collect());
         }
