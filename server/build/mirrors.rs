@@ -118,6 +118,11 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("Summary", "solution::Summary").answer()
         .theirs(&["timings: BTreeMap::new()", "solver_version: String::new()", "input_hash: String::new()", "digest: String::new()"]),
     fields("ErrorEstimate", "solution::ErrorEstimate").answer(),
+    fields("Accuracy", "solution::Accuracy").answer(),
+    names("Verdict", "solution::Verdict").answer(),
+    fields("EstimatedQuantity", "solution::EstimatedQuantity").answer(),
+    names("QuantityName", "solution::QuantityName").answer(),
+    names("ErrorMethod", "solution::ErrorMethod").answer(),
     fields("Comparison", "solution::Comparison").answer(),
     fields("Refinement", "solution::Refinement").answer(),
     names("Outcome", "solution::Outcome").answer(),

@@ -25,11 +25,14 @@ pub fn of_json(value: &impl Serialize) -> serde_json::Result<String> {
     Ok(hash.text())
 }
 
-/// Fingerprint of a result: equal digests mean equal bits. Times and the program's version are not
-/// included. All numbers must be finite: others have no canonical form.
+/// Fingerprint of a result: equal digests mean equal bits. Times, the program's version and what is said about the
+/// accuracy are not included. All numbers must be finite: others have no canonical form.
 pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<String> {
     let mut summary = serde_json::to_value(&solution.summary)?;
     summary["input_hash"] = json!(input_hash);
+    if let Some(summary) = summary.as_object_mut() {
+        summary.remove("accuracy");
+    }
     // The outermost object is written by hand, its keys in canonical order: the canonical writer
     // holds every object it is inside of in memory, and fields can be large.
     let mut hash = Hash::default();
@@ -139,6 +142,10 @@ mod tests {
         });
         let mut document = serde_json::to_value(&solution).unwrap();
         document["summary"]["input_hash"] = json!("h");
+        document["summary"]
+            .as_object_mut()
+            .unwrap()
+            .remove("accuracy");
         let mut whole = Hash::default();
         whole.json(&document).unwrap();
         assert_eq!(digest(&solution, "h").unwrap(), whole.text());

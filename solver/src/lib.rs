@@ -40,6 +40,9 @@ pub mod body;
 // Contact and friction on that system.
 pub mod algorithm;
 
+// What the mesh may have done to each number.
+pub mod accuracy;
+
 // Load steps, one after the other.
 pub mod steps;
 

@@ -1,6 +1,7 @@
 //! Load steps and their increments: the incremental law (formulation 1.5), and results along a load
 //! history for both laws.
 
+use crate::accuracy;
 use crate::algorithm::{self, Finished, Place, System, report};
 use crate::body::ElasticBody;
 use crate::error::SolveError;
@@ -38,7 +39,13 @@ pub fn run(
         // a stopped solution is reported too: the answer of the observer no longer matters
         let _ = observe(Progress::Phase(Phase::Recover));
         let reported = report(model, body, &load_history.system, &finished)?;
+        let last = number + 1 == steps.len() || !can_continue(reported.summary.outcome);
+        let accuracy = last.then(|| {
+            let system = &load_history.system;
+            accuracy::assess(model, body, system, &finished, &reported, observe)
+        });
         let mut summary = reported.summary;
+        summary.accuracy = accuracy;
         if model.controls.check_uniqueness && summary.converged {
             let (system, controls) = (&load_history.system, &model.controls);
             let second = algorithm::other_solution(system, controls, &finished, observe);
@@ -55,7 +62,10 @@ pub fn run(
         history.extend(rows.iter().cloned());
         ends.push(StepSolution {
             name: step.name.clone().unwrap_or_else(|| number.to_string()),
-            summary: summary.clone(),
+            summary: Summary {
+                accuracy: None,
+                ..summary.clone()
+            },
             history: rows,
             profiles: reported.profiles.clone(),
             friction_profiles: reported.friction_profiles.clone(),

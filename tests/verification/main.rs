@@ -7,6 +7,7 @@ mod abaqus_files;
 mod adaptive;
 mod annular_punch;
 mod balance;
+mod calibration;
 mod catalogue;
 mod contact_patch;
 mod cook;

@@ -5,26 +5,18 @@ use std::collections::BTreeMap;
 use solver::solution::Outcome;
 
 use crate::catalogue;
-use crate::support::quiet;
+use crate::support::{numbers, quiet};
 
 /// Problems that are solved; `SIGNORINI_RANDOM` asks for others: `from..to`.
 const NUMBERS: std::ops::Range<u64> = 0..500;
-
-fn numbers() -> std::ops::Range<u64> {
-    let asked = std::env::var("SIGNORINI_RANDOM").ok();
-    let range = asked.as_deref().and_then(|text| {
-        let (from, to) = text.split_once("..")?;
-        Some(from.parse().ok()?..to.parse().ok()?)
-    });
-    range.unwrap_or(NUMBERS)
-}
 
 #[test]
 fn random_problems_converge() {
     let mut ends: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     let mut warned: BTreeMap<&str, u32> = BTreeMap::new();
-    let total = numbers().count();
-    for number in numbers() {
+    let numbers = numbers("SIGNORINI_RANDOM", NUMBERS);
+    let total = numbers.clone().count();
+    for number in numbers {
         let case = catalogue::case(number);
         let end = match solver::solve(&case.problem, &mut quiet) {
             Err(error) => {

@@ -29,6 +29,16 @@ pub(crate) fn quiet(_: solver::solution::Progress<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
+/// The problems of the catalogue that the environment asks for, as `from..to`.
+pub(crate) fn numbers(name: &str, otherwise: std::ops::Range<u64>) -> std::ops::Range<u64> {
+    let asked = std::env::var(name).ok();
+    let range = asked.as_deref().and_then(|text| {
+        let (from, to) = text.split_once("..")?;
+        Some(from.parse().ok()?..to.parse().ok()?)
+    });
+    range.unwrap_or(otherwise)
+}
+
 /// Asserts |got − expected| ≤ tolerance · |expected|.
 #[track_caller]
 pub(crate) fn close(got: f64, expected: f64, tolerance: f64) {

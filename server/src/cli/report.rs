@@ -2,9 +2,14 @@
 
 use std::fmt::Write;
 
-use solver::solution::{ContactProfile, ContactSummary, Iteration, NodeState, Outcome, Peak};
+use solver::solution::{
+    ContactProfile, ContactSummary, Iteration, NodeState, Outcome, Peak, Verdict,
+};
 
 use crate::run::Document;
+
+/// Reasons of a verdict that are shown.
+const MOST_REASONS: usize = 5;
 
 /// One row of history on one line.
 pub(super) fn iteration(row: &Iteration) -> String {
@@ -51,6 +56,20 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
     if let Some(title) = title {
         line("title", title.into());
     }
+    if let Some(accuracy) = &s.accuracy {
+        let verdict = match accuracy.verdict {
+            Verdict::Good => "good: forces to 1 %, peaks and extents to 5 %, or better",
+            Verdict::Fair => "fair: forces to 5 %, peaks and extents to 20 %",
+            Verdict::Poor => "POOR: some numbers are not to be relied on",
+        };
+        line("accuracy", verdict.into());
+        for reason in accuracy.reasons.iter().take(MOST_REASONS) {
+            line("", reason.clone());
+        }
+        if let more @ 1.. = accuracy.reasons.len().saturating_sub(MOST_REASONS) {
+            line("", format!("and {more} more, in summary.accuracy.reasons"));
+        }
+    }
     let seconds: f64 = document.summary.timings.values().sum();
     line(
         "outcome",
@@ -72,11 +91,6 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
             "kkt {:.1e}, friction {:.1e}, monolithic {:.1e}, force balance {:.1e}",
             s.residuals.kkt, s.residuals.friction, s.residuals.monolithic, s.residuals.equilibrium
         ),
-    );
-    let error = 100.0 * s.error_estimate.relative;
-    line(
-        "estimated error",
-        format!("{error:.1} % in the energy norm"),
     );
     for mesh in &s.refinements {
         let change = mesh

@@ -3,6 +3,7 @@
 //! Algorithms are functions from a [`System`] to its final state, and show each iteration to the
 //! observer. [`run`] chooses among them.
 
+mod adjoint;
 mod convex;
 mod finished;
 mod fixed_point;
@@ -14,8 +15,10 @@ mod thesis;
 mod track;
 mod uniqueness;
 
+pub use adjoint::{Gradient, influences};
 pub use convex::{Minimum, minimise};
 pub use finished::Finished;
+pub use profile::Quantity;
 pub use report::{Reported, report};
 pub use system::{ContactNode, Patch, Point, State, System, Work};
 pub use track::{Cycle, Place};

@@ -151,7 +151,7 @@ fn step(system: &System<'_>, state: &State, observe: &mut Observer<'_>) -> Optio
 }
 
 /// H on the free unknowns; `place`: where each of all unknowns is among them.
-fn jacobian(
+pub(super) fn jacobian(
     system: &System<'_>,
     state: &State,
     (bound, pressures): (&[f64], &[f64]),
@@ -188,7 +188,10 @@ fn jacobian(
         if coupling == 0.0 {
             continue;
         }
-        for (dof, weight) in reaction_weights(system, state, point) {
+        for (node, weight) in reaction_weights(system, state, point) {
+            let Dof::Free(dof) = system.nodes[node].normal else {
+                continue;
+            };
             // dR/dv = −Ŝ: the row of Ŝ is its column
             let column = system.stiffness.column(dof);
             for (k, &free_dof) in free.iter().enumerate() {
@@ -206,16 +209,19 @@ fn averaged(point: &Point, pressures: &[f64]) -> f64 {
     point.source.nonlocal_pressure(pressures)
 }
 
-/// The averaged pressure of a point as a sum over reactions: normal unknowns of active nodes and
-/// their weights, W P.
-fn reaction_weights(system: &System<'_>, state: &State, point: &Point) -> Vec<(usize, f64)> {
+/// The averaged pressure of a point as a sum over reactions, W P: nodes in contact and their weights.
+pub(super) fn reaction_weights(
+    system: &System<'_>,
+    state: &State,
+    point: &Point,
+) -> Vec<(usize, f64)> {
     let Source::Average(row) = &point.source else {
         return Vec::new();
     };
     let mut weights: Vec<(usize, f64)> = Vec::with_capacity(row.weights.len());
     let mut add = |node: usize, weight: f64| {
-        if let (Dof::Free(dof), true) = (system.nodes[node].normal, state.active[node]) {
-            weights.push((dof, weight / system.nodes[node].weight));
+        if state.active[node] {
+            weights.push((node, weight / system.nodes[node].weight));
         }
     };
     for (i, &weight) in row.weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use crate::algorithm::finished::Finished;
+use crate::algorithm::profile::Quantity;
 use crate::algorithm::profile::{Forces, PatchView};
 use crate::algorithm::system::System;
 use crate::body::ElasticBody;
-use crate::elasticity::{Dof, Recovered, StressError, recover, stress_error};
+use crate::elasticity::{Dof, Recovered, StressDifference, StressError, recover};
 use crate::error::SolveError;
 use crate::model::Model;
 use crate::solution::{
@@ -36,6 +37,10 @@ pub struct Reported {
     pub friction_profiles: BTreeMap<String, ContactProfile>,
     /// Displacements and stresses.
     pub fields: Fields,
+    /// The quantities for which an error is stated.
+    pub quantities: Vec<Quantity>,
+    /// What recovered stresses differ by from those of the elements.
+    pub difference: StressDifference,
 }
 
 /// The results of a final state: forces, extents, profiles, fields and warnings.
@@ -63,7 +68,10 @@ pub fn report(
         model.quadrature,
         &displacements,
     );
-    let error = stress_error(&model.mesh, &model.section, model.quadrature, &recovered);
+    let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
+    let difference = StressDifference::new(mesh, order, &recovered);
+    let error = difference.norms(mesh, section, order);
+    let mut quantities = Vec::new();
     let circumference = system.circumference;
 
     let mut contact_state = vec![-1; model.mesh.nodes.len()];
@@ -74,6 +82,7 @@ pub fn report(
         let view = PatchView::new(system, p, finished, &forces);
         let summary = view.summary();
         view.warn(&mut warnings);
+        quantities.extend(view.quantities());
         let profile = view.profile();
         for (&node, state) in patch.contact.boundary.nodes.iter().zip(&profile.state) {
             let seen: &mut i8 = &mut contact_state[node as usize];
@@ -136,6 +145,7 @@ pub fn report(
         energy: circumference
             * (recovered.strain_energy - work_of_loads + friction_energy(system, finished)),
         friction_work: circumference * (work.total + work.incremental),
+        accuracy: None,
         error_estimate: error_estimate(circumference, &recovered, &error),
         increments: 1,
         cut_backs: 0,
@@ -167,6 +177,8 @@ pub fn report(
         profiles,
         friction_profiles,
         fields,
+        quantities,
+        difference,
     })
 }
 

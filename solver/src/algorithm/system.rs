@@ -250,6 +250,31 @@ impl<'a> System<'a> {
         Ok(())
     }
 
+    /// A friction point beside those of the solution, without a weight in it.
+    pub(super) fn probe(
+        &self,
+        patch: usize,
+        s: f64,
+        nodes: [usize; 3],
+        shape: [f64; 3],
+        anchor: f64,
+    ) -> Point {
+        let (first, law) = (self.patches[patch].first, &self.patches[patch].law);
+        Point {
+            patch,
+            s,
+            nodes,
+            shape,
+            weight: 0.0,
+            source: match law {
+                Some(law) => law.bound.source(s).shifted(first),
+                None => Source::Given(0.0),
+            },
+            anchor,
+            past_displacement: 0.0,
+        }
+    }
+
     /// Forgets the increments so far: anchors and work.
     pub fn restart(&mut self) {
         self.past_work = 0.0;

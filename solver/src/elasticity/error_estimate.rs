@@ -16,46 +16,66 @@ pub struct StressError {
     pub total: f64,
 }
 
-/// Compares recovered and element stresses at the integration points.
-///
-/// `quadrature`: the one that `recovered` was made with.
-pub fn stress_error(
-    mesh: &Mesh,
-    section: &Section,
-    quadrature: u32,
-    recovered: &Recovered,
-) -> StressError {
-    let compliances: Vec<Moduli> = section
-        .materials()
-        .iter()
-        .map(|moduli| inverse(moduli).unwrap_or_default())
-        .collect();
-    let mut stresses = recovered.point_stress.iter();
-    let square = |(e, element): (usize, &Element)| {
-        let (family, nodes) = (element.family(), mesh.element_nodes(element));
-        let (smooth, compliance) = (
-            &recovered.element_stress[e],
-            &compliances[section.material_of(e)],
-        );
-        let mut square = 0.0;
-        for (point, own) in family.rule(quadrature).iter().zip(&mut stresses) {
-            let m = family.map(&nodes, point.place);
-            let difference: [f64; COMPONENTS] = std::array::from_fn(|c| {
-                (0..8).map(|i| m.shape[i] * smooth[i][c]).sum::<f64>() - own[c]
-            });
-            let mut density = 0.0;
-            for i in 0..COMPONENTS {
-                for j in 0..COMPONENTS {
-                    density += difference[i] * compliance[i][j] * difference[j];
-                }
+/// σ* − σ at the integration points.
+pub struct StressDifference(Vec<[f64; COMPONENTS]>);
+
+impl StressDifference {
+    /// `quadrature`: the one that `recovered` was made with.
+    pub fn new(mesh: &Mesh, quadrature: u32, recovered: &Recovered) -> Self {
+        let mut stresses = recovered.point_stress.iter();
+        let mut differences = Vec::with_capacity(stresses.len());
+        for (e, element) in mesh.elements.iter().enumerate() {
+            let (family, smooth) = (element.family(), &recovered.element_stress[e]);
+            for (point, own) in family.rule(quadrature).iter().zip(&mut stresses) {
+                let shape = family.shape(point.place);
+                differences.push(std::array::from_fn(|c| {
+                    (0..8).map(|i| shape[i] * smooth[i][c]).sum::<f64>() - own[c]
+                }));
             }
-            square += point.weight * m.det * section.depth(m.x) * density;
         }
-        square.max(0.0)
-    };
-    let squares: Vec<f64> = mesh.elements.iter().enumerate().map(square).collect();
-    StressError {
-        total: squares.iter().sum::<f64>().sqrt(),
-        elements: squares.iter().map(|s| s.sqrt()).collect(),
+        StressDifference(differences)
+    }
+
+    /// ∫ (σ* − σ) : C⁻¹ (σ* − σ)′ of every element, with the difference of another field (force × length, without 2π).
+    pub fn products(
+        &self,
+        mesh: &Mesh,
+        section: &Section,
+        quadrature: u32,
+        other: &StressDifference,
+    ) -> Vec<f64> {
+        let compliances: Vec<Moduli> = section
+            .materials()
+            .iter()
+            .map(|moduli| inverse(moduli).unwrap_or_default())
+            .collect();
+        let mut pairs = self.0.iter().zip(&other.0);
+        let product = |(e, element): (usize, &Element)| {
+            let (family, nodes) = (element.family(), mesh.element_nodes(element));
+            let compliance = &compliances[section.material_of(e)];
+            let mut sum = 0.0;
+            for (point, (own, other)) in family.rule(quadrature).iter().zip(&mut pairs) {
+                let m = family.map(&nodes, point.place);
+                let mut density = 0.0;
+                for i in 0..COMPONENTS {
+                    for j in 0..COMPONENTS {
+                        density += own[i] * compliance[i][j] * other[j];
+                    }
+                }
+                sum += point.weight * m.det * section.depth(m.x) * density;
+            }
+            sum
+        };
+        mesh.elements.iter().enumerate().map(product).collect()
+    }
+
+    /// The norm of the difference, of every element and of the whole: the estimate.
+    pub fn norms(&self, mesh: &Mesh, section: &Section, quadrature: u32) -> StressError {
+        let squares = self.products(mesh, section, quadrature, self);
+        let squares: Vec<f64> = squares.into_iter().map(|square| square.max(0.0)).collect();
+        StressError {
+            total: squares.iter().sum::<f64>().sqrt(),
+            elements: squares.iter().map(|square| square.sqrt()).collect(),
+        }
     }
 }

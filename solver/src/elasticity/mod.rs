@@ -8,6 +8,6 @@ mod recovery;
 pub use assembly::{
     Dof, DofMap, EdgeLoad, LoadAxes, Loads, assemble_element, assemble_loads, assemble_stiffness,
 };
-pub use error_estimate::{StressError, stress_error};
+pub use error_estimate::{StressDifference, StressError};
 pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic, stress};
 pub use recovery::{Recovered, recover, stress_at};

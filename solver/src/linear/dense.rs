@@ -222,12 +222,23 @@ impl General {
         &mut self.values[j * self.size..(j + 1) * self.size]
     }
 
-    /// Solves A x = b; the factors take the place of A.
+    /// Exchanges rows and columns.
+    pub fn transpose(&mut self) {
+        for j in 0..self.size {
+            for i in 0..j {
+                self.values.swap(j * self.size + i, i * self.size + j);
+            }
+        }
+    }
+
+    /// Solves A x = b for one b, or for several, one after the other; the factors take the place of A.
     pub fn solve(mut self, b: &[f64], breaks: &mut Breaks<'_>) -> Result<Vec<f64>, Unsolved> {
         let n = self.size;
         let mut x = b.to_vec();
+        let columns = b.len().checked_div(n).unwrap_or(0);
         let a = MatMut::from_column_major_slice_mut(&mut self.values, n, n);
-        blocked::solve_lu(a, MatMut::from_column_major_slice_mut(&mut x, n, 1), breaks)?;
+        let b = MatMut::from_column_major_slice_mut(&mut x, n, columns);
+        blocked::solve_lu(a, b, breaks)?;
         match x.iter().all(|x| x.is_finite()) {
             true => Ok(x),
             false => Err(Unsolved::Singular),

@@ -4,9 +4,11 @@
 //! normal turned clockwise. Forces are those of the modelled part: a half model gives half, plane stress
 //! includes the thickness, axisymmetric totals include 2π.
 
+mod accuracy;
 mod sample;
 
 pub use crate::phase::Phase;
+pub use accuracy::{Accuracy, ErrorMethod, EstimatedQuantity, QuantityName, Verdict};
 pub use sample::sample;
 
 use std::collections::BTreeMap;
@@ -87,6 +89,10 @@ pub enum Outcome {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(rename = "SolutionSummary")]
 pub struct Summary {
+    /// How far the numbers can be trusted; absent at the end of a load step that is not the last, and in results of
+    /// older versions. It is about the result and not a part of it: the digest leaves it out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<Accuracy>,
     /// How it ended.
     pub outcome: Outcome,
     /// True for `converged` only.
@@ -112,7 +118,7 @@ pub struct Summary {
     /// Work done against friction (force × length): ∫τ φ |u_t − d| in the total law; in the
     /// incremental law ∫τ φ Δ(u_t − d), summed over the increments so far.
     pub friction_work: f64,
-    /// Estimate of the discretisation error.
+    /// Estimate of the discretisation error of the whole body in one norm. It bounds no quantity: see `accuracy`.
     pub error_estimate: ErrorEstimate,
     /// Increments over all steps so far.
     pub increments: u32,
@@ -136,7 +142,7 @@ pub struct Summary {
 /// in the energy norm (∫ σ : C⁻¹ σ)^½.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ErrorEstimate {
-    /// Estimated norm of the error ((force × length)^½).
+    /// EstimatedQuantity norm of the error ((force × length)^½).
     pub error: f64,
     /// Norm of the solution, √(2 · strain energy).
     pub energy_norm: f64,
@@ -522,7 +528,7 @@ pub struct Fields {
     pub contact_state: Vec<i8>,
     /// Eight or six node numbers per element: corners counter-clockwise, then midsides.
     pub elements: Vec<Element>,
-    /// Estimated error of each element (see [`ErrorEstimate`]).
+    /// EstimatedQuantity error of each element (see [`ErrorEstimate`]).
     pub element_error: Vec<f64>,
     /// Stresses at the integration points of every element, not averaged.
     pub gauss: GaussFields,

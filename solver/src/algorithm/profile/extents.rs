@@ -103,13 +103,25 @@ impl PatchView<'_> {
             < law.elastic_slip
     }
 
-    /// Arc lengths at which |e| = ε: roots of a quadratic on each edge, in order.
+    /// Arc lengths at which |e| = ε, in order.
     fn stick_ends(&self) -> Vec<f64> {
+        let boundary = &self.patch.contact.boundary;
+        let at = |(edge, xi): (usize, f64)| {
+            edge3::interpolate(&edge3::shape(xi), &boundary.edge_arc(edge))
+        };
+        let mut ends: Vec<f64> = self.turns().into_iter().map(at).collect();
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        ends
+    }
+
+    /// The edges, and the places on them, at which |e| = ε: roots of a quadratic on each.
+    pub(super) fn turns(&self) -> Vec<(usize, f64)> {
         let Some(law) = &self.patch.law else {
             return Vec::new();
         };
         let boundary = &self.patch.contact.boundary;
-        let mut ends = Vec::new();
+        let mut turns = Vec::new();
         for edge in 0..boundary.edge_count() {
             let [start, end, middle] = [-1.0, 1.0, 0.0].map(|xi| self.slip_at(edge, xi));
             for target in [-law.elastic_slip, law.elastic_slip] {
@@ -118,20 +130,11 @@ impl PatchView<'_> {
                     0.5 * (end - start),
                     middle - target,
                 );
-                for xi in quadratic_roots(a, b, c)
-                    .into_iter()
-                    .filter(|xi| xi.abs() <= 1.0)
-                {
-                    ends.push(edge3::interpolate(
-                        &edge3::shape(xi),
-                        &boundary.edge_arc(edge),
-                    ));
-                }
+                let roots = quadratic_roots(a, b, c).into_iter();
+                turns.extend(roots.filter(|xi| xi.abs() <= 1.0).map(|xi| (edge, xi)));
             }
         }
-        ends.sort_by(f64::total_cmp);
-        ends.dedup();
-        ends
+        turns
     }
 
     fn peak(&self, value: f64, edge: usize, xi: f64) -> Peak {
@@ -147,9 +150,15 @@ impl PatchView<'_> {
     }
 
     fn peak_normal_stress(&self) -> Option<Peak> {
+        let (value, edge, xi) = self.highest_pressure()?;
+        Some(self.peak(-value + 0.0, edge, xi))
+    }
+
+    /// The largest pressure, its edge, and its place there.
+    pub(super) fn highest_pressure(&self) -> Option<(f64, usize, f64)> {
         let edges = 0..self.patch.contact.boundary.edge_count();
         let in_contact = edges.filter(|edge| edge_nodes(*edge).iter().any(|&i| self.active(i)));
-        let best = in_contact
+        in_contact
             .flat_map(|edge| {
                 let p = edge_nodes(edge).map(|i| self.pressure(i));
                 // ends, and the vertex of the parabola where it lies inside
@@ -161,11 +170,16 @@ impl PatchView<'_> {
                 };
                 [-1.0, 1.0, vertex].map(|xi| (edge3::interpolate(&edge3::shape(xi), &p), edge, xi))
             })
-            .max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(self.peak(-best.0 + 0.0, best.1, best.2))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     fn peak_tangential_stress(&self) -> Option<Peak> {
+        let (value, edge, xi) = self.highest_traction()?;
+        Some(self.peak(value, edge, xi))
+    }
+
+    /// σ_t where it is largest, its edge, and its place there.
+    pub(super) fn highest_traction(&self) -> Option<(f64, usize, f64)> {
         if self.patch.law.is_none() && self.tractions.is_none() {
             return None;
         }
@@ -193,7 +207,7 @@ impl PatchView<'_> {
         } else {
             centre
         };
-        Some(self.peak(self.tangential_stress_at(edge, xi), edge, xi))
+        Some((self.tangential_stress_at(edge, xi), edge, xi))
     }
 }
 

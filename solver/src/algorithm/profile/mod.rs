@@ -2,7 +2,10 @@
 //! their own.
 
 mod extents;
+mod quantities;
 mod warnings;
+
+pub use quantities::Quantity;
 
 use super::system::{Patch, System};
 use crate::algorithm::finished::Finished;

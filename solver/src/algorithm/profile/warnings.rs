@@ -158,13 +158,29 @@ impl PatchView<'_> {
     /// other cancellation inside edges is an oscillation of stick tractions, and `friction_force` is too large by
     /// about that part.
     fn warn_of_oscillation(&self, warnings: &mut Vec<Warning>) {
+        let (canceling, total) = self.oscillation();
+        if canceling > OSCILLATING * total {
+            warnings.push(Warning {
+                code: WarningCode::OscillatingStick,
+                pointer: self.patch.contact.pointer.clone(),
+                message: format!(
+                    "The tangential stress oscillates between the friction points of single edges: the mesh does not resolve elastic_slip, and friction_force is too large by about {:.1} %. Refine the contact, raise elastic_slip, or choose \"points\": \"nodal\".",
+                    100.0 * canceling / total
+                ),
+            });
+        }
+    }
+
+    /// The part of the friction force that cancels inside edges though the motion does not turn there, and the whole
+    /// (force, without 2π).
+    pub(super) fn oscillation(&self) -> (f64, f64) {
         let points = self.system.points.iter().zip(&self.finished.tractions);
         let own: Vec<f64> = points
             .filter(|(point, _)| point.patch == self.p)
             .map(|(point, traction)| point.weight * traction)
             .collect();
         if !self.at_gauss_points() {
-            return; // friction at nodes does not oscillate
+            return (0.0, 0.0); // friction at nodes does not oscillate
         }
         let cancels = |edge: &[f64]| {
             let size: f64 = edge.iter().map(|force| force.abs()).sum();
@@ -190,20 +206,11 @@ impl PatchView<'_> {
         if turn < TURN * total {
             canceling -= turn;
         }
-        if canceling > OSCILLATING * total {
-            warnings.push(Warning {
-                code: WarningCode::OscillatingStick,
-                pointer: self.patch.contact.pointer.clone(),
-                message: format!(
-                    "The tangential stress oscillates between the friction points of single edges: the mesh does not resolve elastic_slip, and friction_force is too large by about {:.1} %. Refine the contact, raise elastic_slip, or choose \"points\": \"nodal\".",
-                    100.0 * canceling / total
-                ),
-            });
-        }
+        (canceling, total)
     }
 
     /// A node on a line of symmetry: on the axis, or held along the tangent.
-    fn symmetric(&self, i: usize) -> bool {
+    pub(super) fn symmetric(&self, i: usize) -> bool {
         let node = &self.system.nodes[self.patch.first + i];
         node.follows.is_some() || matches!(node.tangent, Dof::Fixed(value) if value == 0.0)
     }

@@ -1,0 +1,362 @@
+//! How far the numbers of a solution can be trusted: the errors that the mesh causes in forces, peaks and extents.
+//!
+//! The errors of the body's stresses, estimated by recovery, are weighted by their influence on each quantity J,
+//!
+//!   J(u) − J(u_h) ≈ ∫ (σ* − σ_h) : C⁻¹ (σ_z* − σ_z,h)
+//!
+//! with σ* recovered from σ_h, and σ_z the stresses of the dual solution of J: those of the body under the contact
+//! displacements z of [`influences`]. What happens between the nodes and points of the contact is added (`Parts`),
+//! each with a factor that makes the sum a bound: they are calibrated on random problems by
+//! `tests/verification/calibration.rs`, which also says how often the bound holds.
+
+use crate::algorithm::{Finished, Quantity, Reported, System, influences};
+use crate::body::ElasticBody;
+use crate::contact::edge_nodes;
+use crate::elasticity::{Dof, StressDifference, recover};
+use crate::model::{Level, Model};
+use crate::solution::{
+    Accuracy, ErrorMethod, EstimatedQuantity, Observer, Outcome, Progress, QuantityName, Verdict,
+};
+
+/// What is known of the error of a quantity, in its unit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Parts {
+    /// The weighted errors of all elements.
+    signed: f64,
+    /// The same without signs: some cancel that need not.
+    absolute: f64,
+    /// What becomes of the quantity if the pressure, quadratic between nodes, is brought back to the nodes.
+    consistency: f64,
+    /// What the gap leaves open within the edges at the ends of contact.
+    gap: f64,
+    /// The square of the distance between the nodes at the ends of contact, in lengths of the contact, times the
+    /// quantity: its change if the end moves by a node, since it is nearly stationary there.
+    ends: f64,
+    /// [`Quantity::spacing`].
+    spacing: f64,
+    /// [`Quantity::between`].
+    between: f64,
+    /// The quantity itself: rounding, and what no other part sees.
+    value: f64,
+}
+
+impl Parts {
+    /// The bound: each part with its factor.
+    fn bound(&self, name: QuantityName) -> f64 {
+        let [
+            signed,
+            absolute,
+            consistency,
+            gap,
+            ends,
+            spacing,
+            between,
+            value,
+        ] = factors(name);
+        signed * self.signed.abs()
+            + absolute * self.absolute
+            + consistency * self.consistency
+            + gap * self.gap.abs()
+            + ends * self.ends
+            + spacing * self.spacing
+            + between * self.between
+            + value * self.value
+    }
+}
+
+/// The factors of [`Parts`], in its order: calibrated, with what did not help left at 0.
+fn factors(name: QuantityName) -> [f64; 8] {
+    use QuantityName::*;
+    #[rustfmt::skip] // a table
+    let factors = match name {
+        NormalForce              => [2.0, 1.0, 0.0, 1.0, 0.0,  0.0,  0.0,  1e-4],
+        TangentialForce          => [3.0, 0.3, 0.0, 0.0, 0.75, 0.0,  0.33, 1e-4],
+        FrictionForce            => [1.6, 1.5, 0.0, 0.0, 0.5,  0.33, 1.0,  1e-4],
+        PeakNormalStress         => [0.0, 1.1, 4.2, 0.0, 0.0,  0.0,  0.0,  1e-4],
+        PeakTangentialStress     => [0.0, 2.5, 1.0, 0.0, 0.0,  0.2,  0.0,  1e-4],
+        ContactStart | ContactEnd => [0.0, 0.0, 0.0, 0.0, 0.0, 0.75, 0.0,  0.0],
+        StickEnd                 => [0.0, 1.0, 0.0, 0.0, 0.0,  0.54, 0.0,  0.0],
+    };
+    factors
+}
+
+/// Relative errors up to which a verdict is `good`, and `fair`: of forces, and of peaks and extents.
+const FORCES: [f64; 2] = [0.01, 0.05];
+const OTHERS: [f64; 2] = [0.05, 0.2];
+
+/// The errors of all quantities, and the verdict.
+pub fn assess(
+    model: &Model,
+    body: &ElasticBody,
+    system: &System<'_>,
+    finished: &Finished,
+    reported: &Reported,
+    observe: &mut Observer<'_>,
+) -> Accuracy {
+    let quantities = &reported.quantities;
+    let bounds = match reported.summary.outcome {
+        Outcome::Converged => bounds(model, body, system, finished, reported, observe),
+        _ => None,
+    };
+    let mut found = Vec::with_capacity(quantities.len());
+    for (i, quantity) in quantities.iter().enumerate() {
+        let error = bounds.as_ref().map(|bounds| bounds[i]);
+        let (error, method) = match (error, quantity.name) {
+            _ if quantity.unlimited => (None, ErrorMethod::NoLimit),
+            (Some(error), QuantityName::ContactStart | QuantityName::ContactEnd) => {
+                (Some(error), ErrorMethod::NodeSpacing)
+            }
+            (Some(error), _) if error.is_finite() => (Some(error), ErrorMethod::WeightedRecovery),
+            _ => (None, ErrorMethod::Unknown),
+        };
+        let relative = |error: f64| match error {
+            0.0 => 0.0,
+            error => error / scale(quantity, quantities),
+        };
+        found.push(EstimatedQuantity {
+            quantity: quantity.name,
+            contact: system.patches[quantity.patch].contact.name.clone(),
+            value: quantity.value,
+            error,
+            relative: error.map(relative).filter(|r| r.is_finite()),
+            method,
+        });
+    }
+    conclude(reported.summary.outcome, found)
+}
+
+/// What the error of a quantity is compared with.
+fn scale(quantity: &Quantity, all: &[Quantity]) -> f64 {
+    let own = |name: QuantityName| {
+        let same = move |q: &&Quantity| q.patch == quantity.patch && q.name == name;
+        all.iter().filter(same).map(|q| q.value)
+    };
+    let scale = match quantity.name {
+        QuantityName::TangentialForce => own(QuantityName::FrictionForce).sum(),
+        QuantityName::ContactStart | QuantityName::ContactEnd | QuantityName::StickEnd => length(
+            own(QuantityName::ContactStart),
+            own(QuantityName::ContactEnd),
+        ),
+        _ => quantity.value,
+    };
+    f64::abs(scale)
+}
+
+/// From the first start of contact to its last end.
+fn length(starts: impl Iterator<Item = f64>, ends: impl Iterator<Item = f64>) -> f64 {
+    ends.fold(f64::NEG_INFINITY, f64::max) - starts.fold(f64::INFINITY, f64::min)
+}
+
+/// The bounds of the errors of all quantities; none if the linearised problem has no unique solution, or the observer
+/// stops.
+fn bounds(
+    model: &Model,
+    body: &ElasticBody,
+    system: &System<'_>,
+    finished: &Finished,
+    reported: &Reported,
+    observe: &mut Observer<'_>,
+) -> Option<Vec<f64>> {
+    let quantities = &reported.quantities;
+    let influencing: Vec<&Quantity> = quantities.iter().filter(|q| q.gradient.is_some()).collect();
+    let gradients: Vec<_> = influencing
+        .iter()
+        .filter_map(|q| q.gradient.as_ref())
+        .collect();
+    let influences = influences(system, &finished.state, &gradients, observe)?;
+    let mut influences = influences.iter();
+    let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
+    let smoothing = smoothing_of_reactions(system, finished);
+    let mut bounds = Vec::with_capacity(quantities.len());
+    for quantity in quantities {
+        let mut parts = Parts {
+            ends: quantity.value.abs() * end_spacing(quantity, quantities).powi(2),
+            spacing: quantity.spacing,
+            between: quantity.between,
+            value: quantity.value.abs(),
+            ..Parts::default()
+        };
+        if let Some(gradient) = &quantity.gradient {
+            if observe(Progress::Pulse).is_break() {
+                return None;
+            }
+            let z = influences.next()?;
+            let force = system.stiffness.times(z);
+            let dual = body.displacements(&force, z, &Level::ZERO);
+            let dual = recover(mesh, section, order, &dual);
+            let dual = StressDifference::new(mesh, order, &dual);
+            let errors = reported.difference.products(mesh, section, order, &dual);
+            let moved = gradient.reaction.iter().zip(&smoothing);
+            parts.signed = quantity.factor * errors.iter().sum::<f64>();
+            parts.absolute = quantity.factor.abs() * errors.iter().map(|e| e.abs()).sum::<f64>();
+            parts.consistency = (quantity.factor * moved.map(|(a, b)| a * b).sum::<f64>()).abs();
+            parts.gap = quantity.factor * gap_between_nodes(system, finished, &force);
+        }
+        bounds.push(parts.bound(quantity.name));
+    }
+    Some(bounds)
+}
+
+/// The largest distance between the nodes at the ends of the contact, in lengths of the contact.
+fn end_spacing(quantity: &Quantity, all: &[Quantity]) -> f64 {
+    let is_end = |q: &&Quantity| {
+        let end = matches!(
+            q.name,
+            QuantityName::ContactStart | QuantityName::ContactEnd
+        );
+        end && q.patch == quantity.patch
+    };
+    let ends: Vec<&Quantity> = all.iter().filter(is_end).collect();
+    let values = |name: QuantityName| {
+        let ends = ends.iter().filter(move |q| q.name == name);
+        ends.map(|q| q.value)
+    };
+    let length = length(
+        values(QuantityName::ContactStart),
+        values(QuantityName::ContactEnd),
+    );
+    let spacing = ends.iter().fold(0.0f64, |most, q| most.max(q.spacing));
+    // a contact of one node is not resolved at all
+    if length > 0.0 {
+        (spacing / length).min(1.0)
+    } else {
+        1.0
+    }
+}
+
+/// The change of every nodal reaction if the pressure between the nodes is brought back to the nodes: ∫ h_i p − R_i.
+fn smoothing_of_reactions(system: &System<'_>, finished: &Finished) -> Vec<f64> {
+    let reactions = system.reactions(&finished.state);
+    let pressures = system.pressures(&reactions);
+    let mut change: Vec<f64> = reactions.iter().map(|r| -r).collect();
+    for patch in &system.patches {
+        let places = &patch.contact.boundary.friction_points;
+        for (k, place) in places.iter().enumerate() {
+            let nodes = edge_nodes(k / 3).map(|i| patch.first + i);
+            let pressure: f64 = (0..3).map(|i| place.shape[i] * pressures[nodes[i]]).sum();
+            for (node, shape) in nodes.into_iter().zip(place.shape) {
+                change[node] += place.weight * shape * pressure;
+            }
+        }
+    }
+    change
+}
+
+/// ∫ p_z (gap − u_n) over edges with a node in contact, p_z the pressure of the dual solution under `force`.
+fn gap_between_nodes(system: &System<'_>, finished: &Finished, force: &[f64]) -> f64 {
+    let state = &finished.state;
+    let reaction = |node: usize| match system.nodes[node].normal {
+        Dof::Free(dof) if state.active[node] => force[dof],
+        _ => 0.0,
+    };
+    let reactions: Vec<f64> = (0..system.nodes.len()).map(reaction).collect();
+    let pressures = system.pressures(&reactions);
+    let opening = |node: usize| system.nodes[node].gap - system.normal_displacement(&state.v, node);
+    let mut sum = 0.0;
+    for patch in &system.patches {
+        let places = &patch.contact.boundary.friction_points;
+        for (k, place) in places.iter().enumerate() {
+            let nodes = edge_nodes(k / 3).map(|i| patch.first + i);
+            if !nodes.iter().any(|n| state.active[*n]) {
+                continue;
+            }
+            let pressure: f64 = (0..3).map(|i| place.shape[i] * pressures[nodes[i]]).sum();
+            let gap: f64 = (0..3).map(|i| place.shape[i] * opening(nodes[i])).sum();
+            sum += place.weight * pressure * gap;
+        }
+    }
+    sum
+}
+
+/// The verdict and its reasons.
+fn conclude(outcome: Outcome, quantities: Vec<EstimatedQuantity>) -> Accuracy {
+    let mut verdict = Verdict::Good;
+    let mut reasons: Vec<(f64, String)> = Vec::new();
+    if outcome != Outcome::Converged {
+        verdict = Verdict::Poor;
+        let reason = "The iterations did not converge: nothing is known of the errors.";
+        reasons.push((f64::INFINITY, reason.to_owned()));
+    }
+    for q in quantities.iter().filter(|_| outcome == Outcome::Converged) {
+        let (name, contact) = (<&str>::from(q.quantity), &q.contact);
+        let [good, fair] = match q.quantity {
+            QuantityName::NormalForce
+            | QuantityName::TangentialForce
+            | QuantityName::FrictionForce => FORCES,
+            _ => OTHERS,
+        };
+        let (own, reason) = match (q.error, q.relative, q.method) {
+            (Some(_), Some(relative), _) if relative <= good => continue,
+            (_, _, ErrorMethod::NoLimit) => (
+                Verdict::Good,
+                (
+                    0.0,
+                    format!(
+                        "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge or a tip of the obstacle: do not use it. Forces have a limit, and so has the averaged pressure."
+                    ),
+                ),
+            ),
+            // nothing acts, and nothing is wrong
+            (Some(error), None, _) if q.value == 0.0 && error == 0.0 => continue,
+            (Some(error), relative, ErrorMethod::NodeSpacing) => {
+                let relative = relative.unwrap_or(f64::INFINITY);
+                (
+                    if relative <= fair {
+                        Verdict::Fair
+                    } else {
+                        Verdict::Poor
+                    },
+                    (
+                        relative / good,
+                        format!(
+                            "`{name}` of contact `{contact}`, s = {:.4}, is known to ±{error:.1e} only, {} of the length of the contact: the nodes there are as far apart.",
+                            q.value,
+                            percent(relative)
+                        ),
+                    ),
+                )
+            }
+            (Some(error), Some(relative), _) => (
+                if relative <= fair {
+                    Verdict::Fair
+                } else {
+                    Verdict::Poor
+                },
+                (
+                    relative / good,
+                    format!(
+                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}, that is {error:.1e}: the mesh is too coarse for it.",
+                        q.value,
+                        percent(relative)
+                    ),
+                ),
+            ),
+            _ => (
+                Verdict::Poor,
+                (
+                    f64::INFINITY,
+                    format!(
+                        "Of `{name}` of contact `{contact}` the error is not known: the linearised problem has no unique solution."
+                    ),
+                ),
+            ),
+        };
+        verdict = verdict.max(own);
+        reasons.push(reason);
+    }
+    // the most serious first; equal ones stay in order
+    reasons.sort_by(|a, b| b.0.total_cmp(&a.0));
+    Accuracy {
+        verdict,
+        reasons: reasons.into_iter().map(|(_, reason)| reason).collect(),
+        quantities,
+    }
+}
+
+fn percent(part: f64) -> String {
+    match 100.0 * part {
+        p if p > 100.0 => "more than 100 %".to_owned(),
+        p if p < 10.0 => format!("{p:.1} %"),
+        p => format!("{p:.0} %"),
+    }
+}

@@ -1,0 +1,249 @@
+//! What small forces on the contact unknowns would change in a quantity of the solution: the adjoint of the
+//! linearised contact problem.
+//!
+//! Free unknowns F move, those of nodes in contact and of held tangents, A, do not; their reactions answer. With
+//! H = ∂r/∂v_F of [`newton`](super::newton), a quantity J(v, R, Q) of displacements, normal reactions
+//! R = (f̂ − Ŝ v)_A and tangential ones Q = (Ŝ v − f̂)_A changes by z · δf̂,
+//!
+//!   Hᵀ z_F = J_v − Ŝ_FA J_R + Ŝ_FA J_Q,    z_A = J_R − Bᵀ z_F  or  −J_Q,
+//!
+//! where B = ∂(friction forces)/∂R. These z are also displacements of the contact nodes: those of the dual solution, by
+//! which the errors of the body's stresses are weighted.
+
+use crate::algorithm::convex::{dense, free_dofs};
+use crate::algorithm::newton::{jacobian, reaction_weights};
+use crate::algorithm::system::{Point, State, System};
+use crate::elasticity::Dof;
+use crate::solution::Observer;
+
+/// The derivatives of a quantity.
+#[derive(Clone, Debug)]
+pub struct Gradient {
+    /// By the contact unknowns.
+    pub displacement: Vec<f64>,
+    /// By the normal reaction of every contact node.
+    pub reaction: Vec<f64>,
+    /// By the tangential reaction of every contact node whose tangent is held.
+    pub held: Vec<f64>,
+}
+
+impl Gradient {
+    /// Of a quantity that depends on nothing.
+    pub fn zero(system: &System<'_>) -> Self {
+        Gradient {
+            displacement: vec![0.0; system.load.len()],
+            reaction: vec![0.0; system.nodes.len()],
+            held: vec![0.0; system.nodes.len()],
+        }
+    }
+
+    /// Adds `factor` times the derivatives of σ_t = −τ φ at a point.
+    pub(super) fn add_traction(
+        &mut self,
+        system: &System<'_>,
+        state: &State,
+        pressures: &[f64],
+        bound: f64,
+        point: &Point,
+        factor: f64,
+    ) {
+        let (law, slip) = (system.law(point), system.slip(&state.v, point));
+        self.add_slip(system, point, -factor * bound * law.phi_slope(slip));
+        let slope = law.bound.slope(point.source.nonlocal_pressure(pressures));
+        let factor = -factor * law.phi(slip) * slope;
+        if factor != 0.0 {
+            for (node, weight) in reaction_weights(system, state, point) {
+                self.reaction[node] += factor * weight;
+            }
+        }
+    }
+
+    /// Adds `factor` times the derivatives of the slip at a point.
+    pub(super) fn add_slip(&mut self, system: &System<'_>, point: &Point, factor: f64) {
+        for (node, shape) in point.nodes.iter().zip(point.shape) {
+            if let Dof::Free(dof) = system.nodes[*node].tangent {
+                self.displacement[dof] += factor * shape;
+            }
+        }
+    }
+
+    /// Adds `factor` times the derivatives of a node's pressure.
+    pub(super) fn add_pressure(&mut self, system: &System<'_>, node: usize, factor: f64) {
+        let mut add = |node: usize, factor: f64| {
+            self.reaction[node] += factor / system.nodes[node].weight;
+        };
+        match system.nodes[node].follows {
+            // as in System::pressures
+            Some([next, after]) => {
+                add(next, 4.0 / 3.0 * factor);
+                add(after, -factor / 3.0);
+            }
+            None => add(node, factor),
+        }
+    }
+}
+
+/// z of every quantity, on the contact unknowns: dJ = z · δf̂. None if the linearised problem has no unique solution,
+/// or the observer stops.
+pub fn influences(
+    system: &System<'_>,
+    state: &State,
+    gradients: &[&Gradient],
+    observe: &mut Observer<'_>,
+) -> Option<Vec<Vec<f64>>> {
+    let free = free_dofs(system, |i| state.active[i]);
+    let mut place = vec![usize::MAX; system.load.len()];
+    free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
+    let pressures = system.pressures(&system.reactions(state));
+    let bound = system.friction_bound(&pressures);
+    let mut rhs = Vec::with_capacity(free.len() * gradients.len());
+    let mut fixed = Vec::new();
+    for gradient in gradients {
+        let mut z = vec![0.0; system.load.len()];
+        for (i, node) in system.nodes.iter().enumerate() {
+            if let (true, Dof::Free(dof)) = (state.active[i], node.normal) {
+                z[dof] = gradient.reaction[i];
+            }
+            if let (Some(_), Dof::Free(dof)) = (node.held_tangent, node.tangent) {
+                z[dof] = -gradient.held[i];
+            }
+        }
+        let reflected = system.stiffness.times(&z);
+        rhs.extend(
+            free.iter()
+                .map(|&dof| gradient.displacement[dof] - reflected[dof]),
+        );
+        fixed.push(z);
+    }
+    let solved = dense(free.len(), observe, |breaks| {
+        let known = (&bound[..], &pressures[..]);
+        let mut h = jacobian(system, state, known, &free, &place, 0.0, breaks)?;
+        h.transpose();
+        h.solve(&rhs, breaks)
+    })?;
+    let mut influences = fixed;
+    for (k, z) in influences.iter_mut().enumerate() {
+        let own = &solved[k * free.len()..(k + 1) * free.len()];
+        free.iter()
+            .zip(own)
+            .for_each(|(&dof, value)| z[dof] = *value);
+        // friction follows the reactions: −Bᵀ z_F
+        for point in &system.points {
+            let law = system.law(point);
+            let moved: f64 = (0..3)
+                .filter_map(|i| match system.nodes[point.nodes[i]].tangent {
+                    Dof::Free(dof) if place[dof] != usize::MAX => Some(point.shape[i] * z[dof]),
+                    _ => None,
+                })
+                .sum();
+            let slope = law.bound.slope(point.source.nonlocal_pressure(&pressures));
+            let factor = point.weight * law.phi(system.slip(&state.v, point)) * slope * moved;
+            if factor != 0.0 {
+                for (node, weight) in reaction_weights(system, state, point) {
+                    if let Dof::Free(dof) = system.nodes[node].normal {
+                        z[dof] -= factor * weight;
+                    }
+                }
+            }
+        }
+    }
+    Some(influences)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::algorithm::{Place, Quantity, report, run};
+
+    fn solve(system: &System<'_>) -> (State, Vec<Quantity>) {
+        let quiet: &mut Observer<'_> = &mut |_| ControlFlow::Continue(());
+        let controls = &system.model.controls;
+        let finished = run(system, controls, Place::default(), None, quiet);
+        let reported = report(system.model, system.body, system, &finished).unwrap();
+        assert!(reported.summary.converged);
+        (finished.state, reported.quantities)
+    }
+
+    /// The change of every quantity under small forces on the contact, found by solving again, against z · δf̂: with
+    /// averaging, in axisymmetry with a node on the axis, without friction, and bonded.
+    #[test]
+    fn influences_are_what_small_forces_change() {
+        let law =
+            serde_json::json!({"coefficient": 0.4, "nonlocal_radius": 0.2, "elastic_slip": 1e-2});
+        let cases = [
+            ("plane_strain", "unilateral", Some(law.clone())),
+            ("axisymmetric", "unilateral", Some(law)),
+            ("plane_strain", "unilateral", None),
+            ("plane_strain", "bonded", None),
+        ];
+        for (kind, condition, friction) in cases {
+            let mut problem = serde_json::json!({
+                "analysis": {"kind": kind},
+                "mesh": {"grid": {"x": [0, 0.2, 0.4, 0.6, 0.8, 1, 1.5, 2], "y": [-2, -1, -0.4, 0]}},
+                "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+                "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
+                "contacts": [{"boundary": "top", "obstacle": {"kind": "parabola", "radius": 5},
+                    "indentation": 0.1, "condition": condition}],
+                "solver": {"tolerance": 1e-13}
+            });
+            if let Some(friction) = friction {
+                problem["contacts"][0]["friction"] = friction;
+            }
+            let problem = serde_json::from_value(problem).unwrap();
+            let quiet: &mut Observer<'_> = &mut |_| ControlFlow::Continue(());
+            let prepared = crate::prepare(&problem, None, quiet).unwrap();
+            let mut system = System::new(&prepared.model, &prepared.body, quiet).unwrap();
+            let (state, quantities) = solve(&system);
+            let known: Vec<&Quantity> =
+                quantities.iter().filter(|q| q.gradient.is_some()).collect();
+            let gradients: Vec<&Gradient> =
+                known.iter().filter_map(|q| q.gradient.as_ref()).collect();
+            let z = influences(&system, &state, &gradients, quiet).unwrap();
+            let load = system.load.clone();
+            let forces: Vec<f64> = (0..load.len()).map(|i| 1e-4 * (i as f64).sin()).collect();
+            let mut moved = |sign: f64| {
+                system.load = load
+                    .iter()
+                    .zip(&forces)
+                    .map(|(a, b)| a + sign * b)
+                    .collect();
+                let (_, quantities) = solve(&system);
+                quantities
+            };
+            let (more, less) = (moved(1.0), moved(-1.0));
+            for (quantity, z) in known.iter().zip(&z) {
+                let value = |all: &[Quantity]| {
+                    let nearest = |a: &&Quantity, b: &&Quantity| {
+                        let off = |q: &Quantity| (q.value - quantity.value).abs();
+                        off(a).total_cmp(&off(b))
+                    };
+                    let same = all.iter().filter(|q| q.name == quantity.name);
+                    same.min_by(nearest).unwrap().value
+                };
+                let found = 0.5 * (value(&more) - value(&less));
+                // an end of stick moves against the slip there
+                let sign = if quantity.name == crate::solution::QuantityName::StickEnd {
+                    -1.0
+                } else {
+                    1.0
+                };
+                let along: f64 = z.iter().zip(&forces).map(|(a, b)| a * b).sum();
+                let expected = sign * quantity.factor * along;
+                let size: f64 = z
+                    .iter()
+                    .zip(&forces)
+                    .map(|(a, b)| (quantity.factor * a * b).abs())
+                    .sum();
+                assert!(
+                    (found - expected).abs() <= 1e-4 * size + 1e-11 * quantity.value.abs(),
+                    "{kind} {condition} {:?}: {found:e} for {expected:e}",
+                    quantity.name
+                );
+            }
+            assert!(known.len() >= 4, "{kind} {condition}");
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! How far the numbers of a solution can be trusted.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use strum::IntoStaticStr;
+
+/// How far the numbers of a solution can be trusted: what the mesh may have done to each, and a verdict.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Accuracy {
+    /// The verdict on the whole.
+    pub verdict: Verdict,
+    /// Why it is not `good`, in words, the most serious reason first; what is good besides.
+    pub reasons: Vec<String>,
+    /// Every force, extent and peak with its error.
+    pub quantities: Vec<EstimatedQuantity>,
+}
+
+/// Whether a solution can be relied on.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum Verdict {
+    /// Every force is known to 1 %, every peak that has a limit and every extent to 5 %.
+    Good,
+    /// Every force is known to 5 %, every peak and every extent to 20 %.
+    Fair,
+    /// Something is known to less than that, or not at all.
+    Poor,
+}
+
+/// A number of the solution with its error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EstimatedQuantity {
+    /// What it is.
+    pub quantity: QuantityName,
+    /// The contact, by the name of its boundary.
+    pub contact: String,
+    /// Its value, as in the summary.
+    pub value: f64,
+    /// EstimatedQuantity error that the mesh causes, in the unit of the value; absent where the quantity has no limit, or
+    /// nothing is known.
+    pub error: Option<f64>,
+    /// The error as a part: of the value; of the friction force for a tangential one; of the length of the contact for
+    /// an extent.
+    pub relative: Option<f64>,
+    /// How it was found.
+    pub method: ErrorMethod,
+}
+
+/// A force, a peak or an end of an extent.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum QuantityName {
+    /// ∫p.
+    NormalForce,
+    /// ∫σ_t.
+    TangentialForce,
+    /// ∫|σ_t|.
+    FrictionForce,
+    /// Largest pressure, as a stress.
+    PeakNormalStress,
+    /// Largest |σ_t|, with its sign.
+    PeakTangentialStress,
+    /// Arc length at which an interval of contact begins.
+    ContactStart,
+    /// Arc length at which it ends.
+    ContactEnd,
+    /// Arc length between stick and slip.
+    StickEnd,
+}
+
+/// How an error was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, IntoStaticStr)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum ErrorMethod {
+    /// The errors of the stresses (recovered against computed), weighted by their influence on the quantity.
+    WeightedRecovery,
+    /// The distance between nodes.
+    NodeSpacing,
+    /// There is no limit that a finer mesh would approach.
+    NoLimit,
+    /// Not found.
+    Unknown,
+}

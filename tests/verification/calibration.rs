@@ -1,0 +1,126 @@
+//! The stated errors against the true ones: on random problems of the catalogue, and on each once refined, the true
+//! error is the difference from the mesh refined three times.
+
+use std::collections::BTreeMap;
+
+use serde_json::json;
+use solver::problem::Refine;
+use solver::solution::{ErrorMethod, EstimatedQuantity, QuantityName, Summary};
+
+use crate::catalogue;
+use crate::record::keep_table;
+use crate::support::{numbers, quiet};
+
+/// Problems that are solved with all tests. With SIGNORINI_CALIBRATION=0..240, for an hour, the table is published.
+const NUMBERS: std::ops::Range<u64> = 0..12;
+
+/// The finest mesh has errors of its own, below this part of the value: smaller ones of a coarse mesh are not seen.
+const KNOWN: f64 = 1e-5;
+
+/// True errors of a quantity in parts of the stated ones.
+#[derive(Default)]
+struct Row {
+    ratios: Vec<f64>,
+    /// Relative true errors.
+    errors: Vec<f64>,
+    /// Quantities without a stated error.
+    unknown: u32,
+}
+
+fn solved(number: u64, refine: u32) -> Option<Summary> {
+    let mut problem = catalogue::case(number).problem;
+    problem.mesh.refine = Refine::Times(refine);
+    let summary = solver::solve(&problem, &mut quiet).unwrap().summary;
+    summary.converged.then_some(summary)
+}
+
+/// Quantities of one kind in the order of their values.
+fn by_kind(summary: &Summary) -> BTreeMap<QuantityName, Vec<&EstimatedQuantity>> {
+    let mut kinds: BTreeMap<QuantityName, Vec<&EstimatedQuantity>> = BTreeMap::new();
+    for estimated in &summary.accuracy.as_ref().unwrap().quantities {
+        kinds.entry(estimated.quantity).or_default().push(estimated);
+    }
+    for kind in kinds.values_mut() {
+        kind.sort_by(|a, b| a.value.total_cmp(&b.value));
+    }
+    kinds
+}
+
+#[test]
+fn stated_errors_are_those_of_much_finer_meshes() {
+    let mut rows: BTreeMap<QuantityName, Row> = BTreeMap::new();
+    let (mut problems, mut worst) = (0, Vec::new());
+    for number in numbers("SIGNORINI_CALIBRATION", NUMBERS) {
+        let Some(fine) = solved(number, 3) else {
+            continue;
+        };
+        problems += 1;
+        for refine in [0, 1] {
+            let Some(own) = solved(number, refine) else {
+                continue;
+            };
+            for (name, kind) in by_kind(&own) {
+                // ends that appear or vanish have no true error
+                let fine = by_kind(&fine);
+                let Some(finer) = fine.get(&name).filter(|finer| finer.len() == kind.len()) else {
+                    continue;
+                };
+                for (coarse, fine) in kind.into_iter().zip(finer) {
+                    let row = rows.entry(name).or_default();
+                    let (Some(error), Some(relative)) = (coarse.error, coarse.relative) else {
+                        row.unknown += u32::from(coarse.method == ErrorMethod::Unknown);
+                        continue;
+                    };
+                    // a peak has the same size on both sides of a symmetric problem
+                    let value = |q: &EstimatedQuantity| match name {
+                        QuantityName::PeakTangentialStress => q.value.abs(),
+                        _ => q.value,
+                    };
+                    if error == 0.0 {
+                        continue;
+                    }
+                    let off = (value(coarse) - value(fine)).abs();
+                    let scale = error / relative;
+                    if off <= KNOWN * scale {
+                        continue;
+                    }
+                    row.ratios.push(off / error);
+                    row.errors.push(off / scale);
+                    worst.push((
+                        off / error,
+                        format!("{number} refine {refine}: {name:?} {off:.1e}, stated {error:.1e}"),
+                    ));
+                }
+            }
+        }
+    }
+    let median = |values: &mut Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    let mut lines = Vec::new();
+    let (mut all, mut held) = (Vec::new(), 0);
+    for (name, row) in &mut rows {
+        if row.ratios.is_empty() {
+            continue;
+        }
+        let within = row.ratios.iter().filter(|r| **r <= 1.0).count();
+        held += within;
+        all.extend(row.ratios.iter().copied());
+        lines.push(json!({
+            "quantity": <&str>::from(*name), "cases": row.ratios.len(), "unknown": row.unknown,
+            "within": within as f64 / row.ratios.len() as f64,
+            "overestimated": 1.0 / median(&mut row.ratios), "error": median(&mut row.errors),
+        }));
+    }
+    let (within, over) = (held as f64 / all.len() as f64, 1.0 / median(&mut all));
+    let table = json!({"problems": problems, "cases": all.len(), "within": within, "overestimated": over,
+        "quantities": lines});
+    keep_table("calibration", &table);
+    worst.sort_by(|a, b| b.0.total_cmp(&a.0));
+    println!("{table:#}");
+    for (ratio, line) in worst.iter().take(20) {
+        println!("{ratio:.2} {line}");
+    }
+    assert!(within >= 0.9 && over <= 5.0, "{table:#}");
+}
