@@ -188,7 +188,7 @@ catalog! {
     Overloaded: of_request("Too many transfers at once", 503, Grpc::Unavailable, Some(2),
         "Bodies or answers of other requests occupy the memory that this service has for them, or all its connections are busy. Nothing was done. Try again."),
     StorageLost: of_request("The store was removed, replaced or damaged", 503, Grpc::Unavailable, Some(60),
-        "The database was removed, replaced, cut short or damaged while the service was running. Nothing is accepted, since it would be lost. The operator can stop the service, put the files back as they were or save what is intact with `signorini doctor`, and start it again."),
+        "The database was removed, replaced, cut short or damaged, since it was opened or before. Nothing is accepted, since it would be lost; what can still be read is answered. The operator can stop the service, put the files back as they were or save what is intact with `signorini doctor`, and start it again."),
     StorageFull: of_request("The disk is full or cannot be written", 507, Grpc::ResourceExhausted, Some(60),
         "Nothing more can be stored: the disk is full, or a quota is reached, or it refuses to be written. Reading still works, and running jobs wait; the operator can free space."),
     NotConverged: of_job("The iteration did not converge",

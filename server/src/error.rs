@@ -163,17 +163,20 @@ pub enum ApiError {
         incident: Uuid,
     },
     /// Too many jobs wait.
-    #[error("the queue holds {limit} jobs already")]
+    #[error("the queue holds {limit} jobs already{}", if *paused { ", and is paused: they wait until it is resumed" } else { "" })]
     QueueFull {
         /// The limit.
         limit: u32,
+        /// No job is started until the queue is resumed.
+        paused: bool,
     },
     /// The service is about to stop.
     #[error("the service is stopping; try again when it has been restarted")]
     Draining,
-    /// The database was removed, replaced or damaged while the service runs.
+    /// The database was removed, replaced or damaged.
     #[error(
-        "the database was removed, replaced or damaged while the service was running; nothing is stored"
+        "the database was removed, replaced or damaged: what is sent now may not be stored, and only what can still be read is \
+         answered; the operator should stop the service and run `signorini doctor`"
     )]
     StorageLost,
     /// The disk is full.

@@ -64,10 +64,22 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     }
     text.push('\n');
     output::print(&text)?;
-    Ok(match report.findings.is_empty() {
-        true => Exit::Ok,
-        false => Exit::Damaged,
-    })
+    if report.findings.is_empty() {
+        return Ok(Exit::Ok);
+    }
+    match (&salvage, report.intact) {
+        (None, 1..) => eprintln!(
+            "To save what is intact in a new store: signorini doctor --data {} --salvage NEW_FOLDER",
+            data.display()
+        ),
+        (_, 0) if report.jobs > 0 => eprintln!(
+            "No job is whole. If the service still starts on {}, it answers what can be read of them, like a result \
+             without its events",
+            data.display()
+        ),
+        _ => {}
+    }
+    Ok(Exit::Damaged)
 }
 
 /// How many jobs are intact.
@@ -76,6 +88,9 @@ fn summed_up(report: &Report) -> String {
     match (report.incomplete, jobs) {
         (true, 0) => "no job can be read: restore the store from a backup".into(),
         (true, _) => format!("{intact} jobs are intact, of at least {jobs}"),
+        (false, _) if intact == jobs && !report.findings.is_empty() => {
+            format!("{intact} of {jobs} jobs are intact, but the store around them is not")
+        }
         (false, _) => format!("{intact} of {jobs} jobs are intact"),
     }
 }

@@ -48,7 +48,12 @@ impl Folder {
     /// Creates the folder if necessary, and locks it: the folder itself, since a lock file could be removed. A second
     /// server in it would run the same jobs.
     pub(super) fn lock(path: &Path) -> Result<Folder> {
-        let named = |error: io::Error| unusable(path, error);
+        let named = |error: io::Error| match error.kind() {
+            ErrorKind::AlreadyExists | ErrorKind::NotADirectory => {
+                unusable(path, "it is not a folder")
+            }
+            _ => unusable(path, error),
+        };
         DirBuilder::new()
             .recursive(true)
             .mode(0o700)

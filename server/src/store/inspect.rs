@@ -12,7 +12,8 @@ use super::{
     error::{Record, Result, StoreError},
     events,
     folder::{DATABASE, Folder, unusable},
-    intact, keys, meshes, migrations, problems, progress,
+    intact, keys, meshes, migrations, problems,
+    progress::{self, Known},
     rows::find,
     salvage::{copy_job, copy_the_rest, insert, new_store},
 };
@@ -47,7 +48,7 @@ pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
     // to lock it would create it
     match folder.join(DATABASE).try_exists() {
         Ok(true) => {}
-        Ok(false) => return Err(unusable(folder, format!("there is no {DATABASE} in it"))),
+        Ok(false) => return Err(unusable(folder, absent(folder))),
         Err(error) => return Err(unusable(folder, error)),
     }
     let _locked = Folder::lock(folder)?;
@@ -83,6 +84,16 @@ pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
         target.close().await;
     }
     Ok(report)
+}
+
+/// Why there is nothing to inspect.
+fn absent(folder: &Path) -> String {
+    match progress::read(folder) {
+        Ok(Known::Missing) => format!("there is no {DATABASE} in it"),
+        _ => format!(
+            "there is no {DATABASE} in it, although there was one: put it back, or restore it from a backup"
+        ),
+    }
 }
 
 impl Report {

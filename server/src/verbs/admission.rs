@@ -149,7 +149,10 @@ pub(super) async fn enqueue(
     };
     let accepted = service.queue.submit(submission).await;
     let accepted = accepted.map_err(|error| match error {
-        StoreError::QueueFull => ApiError::QueueFull { limit },
+        StoreError::QueueFull => ApiError::QueueFull {
+            limit,
+            paused: service.store.is_paused(),
+        },
         // it was stored when the problem was checked, and has been deleted since
         StoreError::UnknownMesh => {
             ApiError::InvalidProblem(vec![meshes::missing(&hash.unwrap_or_default())])

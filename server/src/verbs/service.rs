@@ -75,7 +75,11 @@ impl Service {
     pub async fn health(&self) -> Result<Health, ApiError> {
         self.accepting()?;
         let health = timeout(HEALTH_PATIENCE, self.store.health()).await;
-        Ok(health.map_err(|_| ApiError::internal("the store does not answer"))??)
+        match health.map_err(|_| ApiError::internal("the store does not answer"))? {
+            // not a record of a job, but the database around them
+            Err(StoreError::Damaged(_)) => Err(ApiError::StorageLost),
+            health => Ok(health?),
+        }
     }
 
     /// Runs work whose duration depends on the client's input (reading, meshing, hashing a problem) on a blocking
