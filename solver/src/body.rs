@@ -190,6 +190,26 @@ impl ElasticBody {
         u.iter_mut().zip(&correction).for_each(|(u, c)| *u += c);
         self.map.displacements(&u, level.supports)
     }
+
+    /// Displacements along x and y of every node under the given displacements of the contact unknowns alone, of
+    /// several such fields at once. To fewer digits than [`ElasticBody::displacements`]: enough for an estimate.
+    pub fn displacements_without_loads(
+        &self,
+        contact_displacements: &[Vec<f64>],
+    ) -> Vec<Vec<[f64; 2]>> {
+        let n = self.map.unknowns;
+        let mut u = vec![0.0; n * contact_displacements.len()];
+        for (u, contact_displacement) in u.chunks_mut(n.max(1)).zip(contact_displacements) {
+            let contact_force = self.stiffness.times(contact_displacement);
+            let interior = n - contact_force.len();
+            for (i, force) in contact_force.iter().enumerate() {
+                u[interior + i] = force + self.spring * contact_displacement[i];
+            }
+        }
+        self.factor.solve(&mut u);
+        let fields = u.chunks(n.max(1));
+        fields.map(|u| self.map.displacements(u, 0.0)).collect()
+    }
 }
 
 /// Contact nodes of all contacts in a row.

@@ -4,6 +4,7 @@
 //!   ‖e‖² = ∫ (σ* − σ) : C⁻¹ (σ* − σ),   σ* = Σ h_i σ_i with the recovered nodal stresses σ_i
 
 use crate::elasticity::material::{COMPONENTS, Moduli, inverse};
+use crate::elasticity::recovery::{ELEMENTS_PER_QUESTION, recover_nodal_stresses};
 use crate::elasticity::{Recovered, Section};
 use crate::element::Element;
 use crate::mesh::Mesh;
@@ -69,6 +70,70 @@ impl StressDifference {
         mesh.elements.iter().enumerate().map(product).collect()
     }
 
+    /// The same products with the differences of several fields, by their displacements at the nodes. None if `stop`
+    /// says so, which is asked now and then.
+    ///
+    /// Both σ* and σ of those fields are linear in what is known at the nodes, so that each element's integral is a sum
+    /// over its nodes: the points of integration are visited once for all fields.
+    pub fn products_with_fields(
+        &self,
+        mesh: &Mesh,
+        section: &Section,
+        quadrature: u32,
+        fields: &[Vec<[f64; 2]>],
+        stop: &mut dyn FnMut() -> bool,
+    ) -> Option<Vec<Vec<f64>>> {
+        let mut products = vec![vec![0.0; mesh.elements.len()]; fields.len()];
+        for (material, moduli) in section.materials().iter().enumerate() {
+            let compliance = inverse(moduli).unwrap_or_default();
+            let smooth = recover_nodal_stresses(mesh, section, material, fields, stop)?;
+            let mut first = 0;
+            for (e, element) in mesh.elements.iter().enumerate() {
+                if e % ELEMENTS_PER_QUESTION == 0 && stop() {
+                    return None;
+                }
+                let (family, nodes) = (element.family(), mesh.element_nodes(element));
+                let rule = family.rule(quadrature);
+                let own = &self.0[first..first + rule.len()];
+                first += rule.len();
+                if section.material_of(e) != material {
+                    continue;
+                }
+                // ∫ h_i C⁻¹ (σ* − σ), and the same as forces of a stress: ∫ B_iᵀ (σ* − σ)
+                let mut by_stress = [[0.0; COMPONENTS]; 8];
+                let mut by_displacement = [[0.0; 2]; 8];
+                for (point, own) in rule.iter().zip(own) {
+                    let m = family.map(&nodes, point.place);
+                    let weight = point.weight * m.det * section.depth(m.x);
+                    let strain: [f64; COMPONENTS] = std::array::from_fn(|i| {
+                        (0..COMPONENTS)
+                            .map(|j| compliance[i][j] * own[j])
+                            .sum::<f64>()
+                    });
+                    for i in 0..family.nodes() {
+                        let b = section.strain(m.shape[i], m.gradient[i], m.x);
+                        for c in 0..COMPONENTS {
+                            by_stress[i][c] += weight * m.shape[i] * strain[c];
+                            for p in 0..2 {
+                                by_displacement[i][p] += weight * b[c][p] * own[c];
+                            }
+                        }
+                    }
+                }
+                for ((product, u), smooth) in products.iter_mut().zip(fields).zip(&smooth) {
+                    let at_node = |(i, &node): (usize, &u32)| {
+                        let (u, smooth) = (u[node as usize], smooth[node as usize]);
+                        let recovered: f64 =
+                            (0..COMPONENTS).map(|c| by_stress[i][c] * smooth[c]).sum();
+                        recovered - (0..2).map(|p| by_displacement[i][p] * u[p]).sum::<f64>()
+                    };
+                    product[e] = element.iter().enumerate().map(at_node).sum();
+                }
+            }
+        }
+        Some(products)
+    }
+
     /// The norm of the difference, of every element and of the whole: the estimate.
     pub fn norms(&self, mesh: &Mesh, section: &Section, quadrature: u32) -> StressError {
         let squares = self.products(mesh, section, quadrature, self);
@@ -76,6 +141,66 @@ impl StressDifference {
         StressError {
             total: squares.iter().sum::<f64>().sqrt(),
             elements: squares.iter().map(|square| square.sqrt()).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::elasticity::recover;
+    use crate::solution::Observer;
+
+    /// In every kind of analysis, with two materials, quadrilaterals and triangles.
+    #[test]
+    fn products_of_fields_are_those_of_their_recovered_stresses() {
+        for kind in ["plane_strain", "plane_stress", "axisymmetric"] {
+            let problem = serde_json::json!({
+                "analysis": {"kind": kind},
+                "mesh": {
+                    "nodes": [[0, 0], [1, 0], [2, 0], [0, 1], [1.1, 1], [2, 1]],
+                    "elements": [[0, 1, 4, 3], [1, 2, 5], [1, 5, 4]],
+                    "groups": {"left": [0], "right": [1, 2]},
+                    "boundaries": {"low": {"line": [[0, 0], [2, 0]]}, "high": {"line": [[0, 1], [2, 1]]}},
+                    "refine": 1
+                },
+                "materials": [
+                    {"group": "left", "youngs_modulus": 1000, "poissons_ratio": 0.3},
+                    {"group": "right", "youngs_modulus": 10, "poissons_ratio": 0.2}
+                ],
+                "supports": [{"boundary": "low", "ux": 0, "uy": 0}],
+                "contacts": [{"boundary": "high", "obstacle": {"kind": "flat"}, "indentation": 0.1}]
+            });
+            let problem = serde_json::from_value(problem).unwrap();
+            let quiet: &mut Observer<'_> = &mut |_| ControlFlow::Continue(());
+            let model = crate::prepare(&problem, None, quiet).unwrap().model;
+            let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
+            let field = |k: usize| -> Vec<[f64; 2]> {
+                let at = |n: usize, a: usize| ((n * (3 + a) + k) as f64).sin();
+                (0..mesh.nodes.len())
+                    .map(|n| [at(n, 0), at(n, 1)])
+                    .collect()
+            };
+            let difference = |u: &[[f64; 2]]| {
+                StressDifference::new(mesh, order, &recover(mesh, section, order, u))
+            };
+            let (own, fields) = (difference(&field(0)), [field(1), field(2)]);
+            let never = &mut || false;
+            let found = own.products_with_fields(mesh, section, order, &fields, never);
+            for (found, u) in found.unwrap().iter().zip(&fields) {
+                let expected = own.products(mesh, section, order, &difference(u));
+                let size: f64 = expected.iter().map(|p| p.abs()).sum();
+                for (a, b) in found.iter().zip(&expected) {
+                    assert!((a - b).abs() <= 1e-12 * size, "{kind}: {a} for {b}");
+                }
+            }
+            assert!(
+                own.products_with_fields(mesh, section, order, &fields, &mut || true)
+                    .is_none()
+            );
         }
     }
 }

@@ -110,6 +110,54 @@ fn average(
     sum.iter().zip(&count).map(mean).collect()
 }
 
+/// Elements between two questions whether to stop.
+pub(super) const ELEMENTS_PER_QUESTION: usize = 1 << 14;
+
+/// The stresses of several displacement fields at the nodes, averaged over the elements of one material, as
+/// [`recover`] does; 0 at nodes of other materials. None if `stop` says so.
+pub(super) fn recover_nodal_stresses(
+    mesh: &Mesh,
+    section: &Section,
+    material: usize,
+    fields: &[Vec<[f64; 2]>],
+    stop: &mut dyn FnMut() -> bool,
+) -> Option<Vec<Vec<[f64; COMPONENTS]>>> {
+    let mut sums = vec![vec![[0.0; COMPONENTS]; mesh.nodes.len()]; fields.len()];
+    let mut count = vec![0u32; mesh.nodes.len()];
+    for (e, element) in mesh.elements.iter().enumerate() {
+        if e % ELEMENTS_PER_QUESTION == 0 && stop() {
+            return None;
+        }
+        if section.material_of(e) != material {
+            continue;
+        }
+        let (family, nodes) = (element.family(), mesh.element_nodes(element));
+        let points: Vec<Mapped> = family
+            .stress_points()
+            .iter()
+            .map(|point| family.map(&nodes, point.place))
+            .collect();
+        for (sum, u) in sums.iter_mut().zip(fields) {
+            let u = element.gather(|n| u[n as usize]);
+            let mut stresses = [[0.0; COMPONENTS]; 4];
+            for (own, m) in stresses.iter_mut().zip(&points) {
+                *own = stress(section.moduli(e), &strain_at(section, m, &u));
+            }
+            let carried = carried_to_nodes(family, &stresses);
+            for (own, &node) in carried.iter().zip(element.iter()) {
+                (0..COMPONENTS).for_each(|c| sum[node as usize][c] += own[c]);
+            }
+        }
+        element.iter().for_each(|&node| count[node as usize] += 1);
+    }
+    for sum in &mut sums {
+        for (stress, n) in sum.iter_mut().zip(&count) {
+            *stress = stress.map(|v| v / f64::from((*n).max(1)));
+        }
+    }
+    Some(sums)
+}
+
 /// Stress of an element at a place in master coordinates.
 pub fn stress_at(
     section: &Section,
@@ -144,6 +192,11 @@ fn at_nodes(
     for (stress, point) in points.iter_mut().zip(family.stress_points()) {
         *stress = stress_at(section, moduli, family, nodes, u, point.place);
     }
+    carried_to_nodes(family, &points)
+}
+
+/// The stresses at the superconvergent points of an element, carried to its nodes.
+fn carried_to_nodes(family: Family, points: &[[f64; COMPONENTS]; 4]) -> [[f64; COMPONENTS]; 8] {
     let mut at_nodes = [[0.0; COMPONENTS]; 8];
     for (stress, &place) in at_nodes.iter_mut().zip(family.places()) {
         let weights = family.from_stress_points(place);

@@ -175,12 +175,13 @@ impl Factor {
         Ok(Factor { ordering, values })
     }
 
-    /// Solves A x = b in place.
+    /// Solves A x = b in place; `b` may hold several right-hand sides, one after the other.
     pub fn solve(&self, b: &mut [f64]) {
         let symbolic = &self.ordering.symbolic;
-        let n = b.len();
-        let mut memory = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(1, PAR));
-        let rhs = MatMut::from_column_major_slice_mut(b, n, 1);
+        let n = symbolic.nrows();
+        let count = b.len().checked_div(n).unwrap_or(0);
+        let mut memory = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(count, PAR));
+        let rhs = MatMut::from_column_major_slice_mut(b, n, count);
         LltRef::new(symbolic, &self.values).solve_in_place_with_conj(
             Conj::No,
             rhs,
