@@ -10,7 +10,7 @@
 //! `tests/verification/calibration.rs`, which also says how often the bound holds.
 
 use crate::algorithm::{Finished, Quantity, Reported, System, influences};
-use crate::body::ElasticBody;
+use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
 use crate::model::Model;
@@ -246,17 +246,22 @@ fn end_spacing(quantity: &Quantity, all: &[Quantity]) -> f64 {
 fn smoothing_of_reactions(system: &System<'_>, finished: &Finished) -> Vec<f64> {
     let reactions = system.reactions(&finished.state);
     let pressures = system.pressures(&reactions);
-    let mut change: Vec<f64> = reactions.iter().map(|r| -r).collect();
+    let mut change = vec![0.0; reactions.len()];
     for patch in &system.patches {
         let places = &patch.contact.boundary.friction_points;
         for (k, place) in places.iter().enumerate() {
             let nodes = edge_nodes(k / 3).map(|i| patch.first + i);
             let pressure: f64 = (0..3).map(|i| place.shape[i] * pressures[nodes[i]]).sum();
             for (node, shape) in nodes.into_iter().zip(place.shape) {
-                change[node] += place.weight * shape * pressure;
+                let force = place.weight * shape * pressure;
+                change[node] += force;
+                if let Some(end) = system.nodes[node].beside_axis {
+                    change[end] += AXIS_SHARE * force;
+                }
             }
         }
     }
+    change.iter_mut().zip(&reactions).for_each(|(c, r)| *c -= r);
     change
 }
 
@@ -269,7 +274,7 @@ fn gap_between_nodes(system: &System<'_>, finished: &Finished, force: &[f64]) ->
     };
     let reactions: Vec<f64> = (0..system.nodes.len()).map(reaction).collect();
     let pressures = system.pressures(&reactions);
-    let opening = |node: usize| system.nodes[node].gap - system.normal_displacement(&state.v, node);
+    let opening = |node: usize| system.opening(&state.v, node);
     let mut sum = 0.0;
     for patch in &system.patches {
         let places = &patch.contact.boundary.friction_points;

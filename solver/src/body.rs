@@ -32,7 +32,14 @@ pub struct ElasticBody {
     /// only contact holds has no factor (force/length).
     spring: f64,
     factor: Factor,
+    /// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it.
+    axis_ends: Vec<[usize; 2]>,
 }
+
+/// The unknown of the midside node beside a contact's end on the axis is u_n − a u_n⁰, with u_n⁰ of that end, which has
+/// no area of its own: ∫ h₀ r dr = 0. With a = 1/8 the end's unknown moves h₀ + h₁/8, of which the area is that of h₁
+/// over 8, and the pressure there, its reaction over that area, is exact for p = p₀ + β r² (formulation 3.5).
+pub const AXIS_SHARE: f64 = 0.125;
 
 impl ElasticBody {
     /// Assembles, factors and condenses, and reports each phase to the observer.
@@ -116,9 +123,22 @@ impl ElasticBody {
             Dof::Free(i) => Dof::Free(i - interior),
             fixed => fixed,
         };
-        let contact_dofs = contact_nodes(model)
+        let contact_dofs: Vec<[Dof; 2]> = contact_nodes(model)
             .map(|node| map.dofs[node as usize].map(to_contact))
             .collect();
+        let axis_ends = axis_ends(model, &contact_dofs);
+        let (mut load_of_loads, mut load_of_supports) = (load_of_loads, load_of_supports);
+        for &[end, beside] in &axis_ends {
+            for load in [&mut load_of_loads, &mut load_of_supports] {
+                load[end] += AXIS_SHARE * load[beside];
+            }
+            let turned = |i: usize| stiffness.at(i, end) + AXIS_SHARE * stiffness.at(i, beside);
+            let mut column: Vec<f64> = (0..stiffness.size()).map(turned).collect();
+            column[end] += AXIS_SHARE * column[beside];
+            for (i, value) in column.into_iter().enumerate() {
+                stiffness.set(i, end, value);
+            }
+        }
         Ok(ElasticBody {
             stiffness,
             load_of_loads,
@@ -130,7 +150,39 @@ impl ElasticBody {
             right_hand_sides,
             spring,
             factor,
+            axis_ends,
         })
+    }
+
+    /// The forces on contact nodes along n and t, from those on the contact unknowns.
+    pub fn nodal_forces(&self, contact_force: &[f64]) -> Vec<f64> {
+        let mut forces = contact_force.to_vec();
+        for &[end, beside] in &self.axis_ends {
+            forces[end] -= AXIS_SHARE * forces[beside];
+        }
+        forces
+    }
+
+    /// The displacements of contact nodes along n and t, from the contact unknowns.
+    pub fn nodal_displacements(&self, contact_displacement: &[f64]) -> Vec<f64> {
+        let mut displacements = contact_displacement.to_vec();
+        for &[end, beside] in &self.axis_ends {
+            displacements[beside] += AXIS_SHARE * displacements[end];
+        }
+        displacements
+    }
+
+    /// Forces on the contact nodes in the system with its springs, from forces on and values of the contact unknowns.
+    fn forces_with_springs<'a>(
+        &'a self,
+        contact_force: &[f64],
+        contact_displacement: &[f64],
+    ) -> impl Iterator<Item = f64> + 'a {
+        let forces = self.nodal_forces(contact_force).into_iter();
+        let displacements = self.nodal_displacements(contact_displacement);
+        forces
+            .zip(displacements)
+            .map(|(force, displacement)| force + self.spring * displacement)
     }
 
     /// Whether the body of one model is the body of another: all that [`ElasticBody::new`] reads is equal.
@@ -172,10 +224,11 @@ impl ElasticBody {
             .map(|(a, b)| level.loads * a + level.supports * b)
             .collect();
         let interior = rhs.len() - contact_force.len();
-        for (i, force) in contact_force.iter().enumerate() {
-            // the force of the springs in the matrix
-            rhs[interior + i] += force + self.spring * contact_displacement[i];
-        }
+        let forces = self.forces_with_springs(contact_force, contact_displacement);
+        rhs[interior..]
+            .iter_mut()
+            .zip(forces)
+            .for_each(|(rhs, force)| *rhs += force);
         let mut u = rhs.clone();
         self.factor.solve(&mut u);
         // one step of iterative refinement: the residual is known to far more digits than u
@@ -202,14 +255,30 @@ impl ElasticBody {
         for (u, contact_displacement) in u.chunks_mut(n.max(1)).zip(contact_displacements) {
             let contact_force = self.stiffness.times(contact_displacement);
             let interior = n - contact_force.len();
-            for (i, force) in contact_force.iter().enumerate() {
-                u[interior + i] = force + self.spring * contact_displacement[i];
-            }
+            let forces = self.forces_with_springs(&contact_force, contact_displacement);
+            u[interior..]
+                .iter_mut()
+                .zip(forces)
+                .for_each(|(u, force)| *u = force);
         }
         self.factor.solve(&mut u);
         let fields = u.chunks(n.max(1));
         fields.map(|u| self.map.displacements(u, 0.0)).collect()
     }
+}
+
+/// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it, if both are free.
+fn axis_ends(model: &Model, contact_dofs: &[[Dof; 2]]) -> Vec<[usize; 2]> {
+    let (mut first, mut ends) = (0, Vec::new());
+    for contact in &model.contacts {
+        for pair in model.axis.ends(&contact.boundary.positions) {
+            if let [Dof::Free(end), Dof::Free(beside)] = pair.map(|i| contact_dofs[first + i][0]) {
+                ends.push([end, beside]);
+            }
+        }
+        first += contact.boundary.nodes.len();
+    }
+    ends
 }
 
 /// Contact nodes of all contacts in a row.

@@ -23,7 +23,8 @@ fn the_examples_of_the_thesis_size_have_their_discrete_values() {
         ("rectangular_punch", 96.650513, 14.169464),
         ("cylinder", 313.363150, 39.187802),
         ("annular_punch", 551.444080, 71.774590),
-        ("cylinder_on_end", 258.266978, 44.771350),
+        // 44.771350 while the pressure on the axis was extrapolated from beside it (formulation 3.5)
+        ("cylinder_on_end", 258.266978, 44.771292),
     ] {
         let problem = example(name);
         let summary = solve(&problem).summary;

@@ -6,6 +6,7 @@
 mod abaqus_files;
 mod adaptive;
 mod annular_punch;
+mod axis;
 mod balance;
 mod calibration;
 mod catalogue;

@@ -69,17 +69,7 @@ impl Gradient {
 
     /// Adds `factor` times the derivatives of a node's pressure.
     pub(super) fn add_pressure(&mut self, system: &System<'_>, node: usize, factor: f64) {
-        let mut add = |node: usize, factor: f64| {
-            self.reaction[node] += factor / system.nodes[node].weight;
-        };
-        match system.nodes[node].follows {
-            // as in System::pressures
-            Some([next, after]) => {
-                add(next, 4.0 / 3.0 * factor);
-                add(after, -factor / 3.0);
-            }
-            None => add(node, factor),
-        }
+        self.reaction[node] += factor / system.nodes[node].weight;
     }
 }
 

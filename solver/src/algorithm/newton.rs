@@ -12,7 +12,7 @@
 //! to twenty steps.
 
 use crate::algorithm::convex::{
-    close, dense, follow, free_dofs, least_along, semidefinite_shift, update_active,
+    close, dense, free_dofs, least_along, semidefinite_shift, update_active,
 };
 use crate::algorithm::finished::End;
 use crate::algorithm::system::{Point, State, System};
@@ -36,7 +36,6 @@ pub(super) fn run(
     let tolerance = track.controls.tolerance;
     let mut end = End::new(start.clone(), Stage::Newton, Outcome::NotConverged);
     let mut state = start.state.clone();
-    follow(system, &mut state.active);
     let (mut best, mut residual_before) = (f64::INFINITY, f64::INFINITY);
     let mut since_best = 0;
     for _ in 0..most_steps {
@@ -219,20 +218,10 @@ pub(super) fn reaction_weights(
         return Vec::new();
     };
     let mut weights: Vec<(usize, f64)> = Vec::with_capacity(row.weights.len());
-    let mut add = |node: usize, weight: f64| {
-        if state.active[node] {
-            weights.push((node, weight / system.nodes[node].weight));
-        }
-    };
     for (i, &weight) in row.weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
         let node = row.first + i;
-        match system.nodes[node].follows {
-            // as in System::pressures
-            Some([next, after]) => {
-                add(next, 4.0 / 3.0 * weight);
-                add(after, -weight / 3.0);
-            }
-            None => add(node, weight),
+        if state.active[node] {
+            weights.push((node, weight / system.nodes[node].weight));
         }
     }
     weights

@@ -115,7 +115,7 @@ pub fn report(
         system.level.loads,
         &recovered,
         &displacements,
-        &contact_force,
+        &body.nodal_forces(&contact_force),
     );
     let outcome = match finished.outcome {
         Outcome::Converged if equilibrium > OUT_OF_BALANCE => Outcome::FalseConvergence,

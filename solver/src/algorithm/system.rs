@@ -1,7 +1,7 @@
 //! The problem reduced to Γ_C at one load level: contact nodes, friction points, and the forces between
 //! them.
 
-use crate::body::ElasticBody;
+use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::elasticity::Dof;
 use crate::error::SolveError;
 use crate::friction::{Average, BoundLaw, Chain, FrictionLaw, Source, largest_pressure};
@@ -47,11 +47,11 @@ pub struct System<'a> {
 /// them (docs/theory.md, "Where a second body would enter").
 #[derive(Clone, Copy, Debug)]
 pub struct ContactNode {
-    /// u_n.
+    /// u_n; of a node beside the axis what [`AXIS_SHARE`] leaves of it.
     pub normal: Dof,
     /// u_t.
     pub tangent: Dof,
-    /// u_n ≤ gap; infinite where there is no obstacle.
+    /// `normal` ≤ gap; infinite where there is no obstacle.
     pub gap: f64,
     /// u_n = gap, whatever the reaction.
     pub bonded: bool,
@@ -59,17 +59,21 @@ pub struct ContactNode {
     pub drag: f64,
     /// u_t where it is held.
     pub held_tangent: Option<f64>,
-    /// ∫ h_i.
+    /// ∫ of what `normal` moves, h_i, on the axis h₀ + h₁/8: the area of its reaction.
     pub weight: f64,
-    /// A node on the axis has no weight: its state is that of this node, and its pressure is
-    /// extrapolated from this one and the next.
-    pub follows: Option<[usize; 2]>,
+    /// On the axis of a body of revolution.
+    pub on_axis: bool,
+    /// The node on the axis that this midside node lies beside.
+    pub beside_axis: Option<usize>,
 }
 
 impl ContactNode {
-    /// True where u_n ≤ gap and R ≥ 0 decide the state: neither bonded nor following another node.
-    pub fn decides(&self) -> bool {
-        !self.bonded && self.follows.is_none()
+    /// The sum of the nodal forces of a unit reaction of `normal`.
+    pub fn force(&self) -> f64 {
+        match self.beside_axis {
+            Some(_) => 1.0 - AXIS_SHARE,
+            None => 1.0,
+        }
     }
 }
 
@@ -173,12 +177,6 @@ impl<'a> System<'a> {
         let on_axis = |i: usize| model.axis.holds(boundary.positions[i]);
         for i in 0..count {
             let [normal, tangent] = self.body.contact_dofs[first + i];
-            let towards = |step: [usize; 2]| Some(step.map(|s| first + s));
-            let follows = match i {
-                0 if on_axis(0) => towards([1, 2]),
-                _ if i == count - 1 && on_axis(i) => towards([i - 1, i - 2]),
-                _ => None,
-            };
             self.nodes.push(ContactNode {
                 normal,
                 tangent,
@@ -187,8 +185,15 @@ impl<'a> System<'a> {
                 drag: 0.0,
                 held_tangent: None,
                 weight: boundary.weights[i],
-                follows,
+                on_axis: on_axis(i),
+                beside_axis: None,
             });
+        }
+        for [end, beside] in model.axis.ends(&boundary.positions) {
+            let [end, beside] = [first + end, first + beside];
+            self.nodes[end].weight = AXIS_SHARE * self.nodes[beside].weight;
+            let free = [end, beside].map(|i| matches!(self.nodes[i].normal, Dof::Free(_)));
+            self.nodes[beside].beside_axis = (free == [true; 2]).then_some(end);
         }
         let surface = |law: &FrictionLaw<Average>| match &law.bound {
             BoundLaw::Pressure { average, .. } => average.measure == Measure::Surface,
@@ -307,6 +312,13 @@ impl<'a> System<'a> {
                 node.held_tangent = node.bonded.then_some(node.drag);
             }
         }
+        for i in 0..self.nodes.len() {
+            if let Some(end) = self.nodes[i].beside_axis
+                && self.nodes[i].gap.is_finite()
+            {
+                self.nodes[i].gap -= AXIS_SHARE * self.nodes[end].gap;
+            }
+        }
     }
 
     /// This system with u_t = d at all nodes of contacts with friction: everything sticks.
@@ -379,7 +391,20 @@ impl<'a> System<'a> {
 
     /// u_n of a node.
     pub fn normal_displacement(&self, v: &[f64], node: usize) -> f64 {
-        value(self.nodes[node].normal, v)
+        let own = |node: usize| value(self.nodes[node].normal, v);
+        match self.nodes[node].beside_axis {
+            Some(end) => own(node) + AXIS_SHARE * own(end),
+            None => own(node),
+        }
+    }
+
+    /// How far a node is from the obstacle: gap − u_n.
+    pub fn opening(&self, v: &[f64], node: usize) -> f64 {
+        let own = |node: usize| self.nodes[node].gap - value(self.nodes[node].normal, v);
+        match self.nodes[node].beside_axis {
+            Some(end) => own(node) + AXIS_SHARE * own(end),
+            None => own(node),
+        }
     }
 
     /// u_t of a node.
@@ -438,7 +463,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Nodal reactions R = f̂_n − (Ŝ v)_n of the obstacle on active nodes; exactly 0 on the others.
+    /// Reactions R = f̂_n − (Ŝ v)_n of the obstacle on the unknowns of active nodes; exactly 0 on the others.
     pub fn reactions(&self, state: &State) -> Vec<f64> {
         self.reactions_of(state, &self.elastic_force(&state.v))
     }
@@ -476,15 +501,17 @@ impl<'a> System<'a> {
             .fold([0.0; 2], |[sum, size], f| [sum + f, size + f.abs()])
     }
 
-    /// Nodal pressures p = R / ∫h; on the axis the parabola through the next two nodes.
+    /// Nodal pressures p = R / ∫h.
     pub fn pressures(&self, reactions: &[f64]) -> Vec<f64> {
-        let direct = |i: usize| reactions[i] / self.nodes[i].weight;
-        let pressure = |i: usize| match self.nodes[i].follows {
-            // zero slope at the axis: p₀ = (4 p₁ − p₂)/3
-            Some([next, after]) => (4.0 * direct(next) - direct(after)) / 3.0,
-            None => direct(i),
-        };
-        (0..self.nodes.len()).map(pressure).collect()
+        let nodes = self.nodes.iter().zip(reactions);
+        nodes
+            .map(|(node, reaction)| reaction / node.weight)
+            .collect()
+    }
+
+    /// ∫p over some nodes by their reactions (without 2π).
+    pub fn normal_force(&self, nodes: std::ops::Range<usize>, reactions: &[f64]) -> f64 {
+        nodes.map(|i| self.nodes[i].force() * reactions[i]).sum()
     }
 
     /// τ at every friction point, thesis (1.3): also where the body is open but within ρ of contact.
@@ -520,11 +547,10 @@ impl<'a> System<'a> {
             };
             let opening = node.gap - state.v[dof];
             let stiffness = self.stiffness.at(dof, dof);
-            defect = defect.max(match (state.active[i], node.decides()) {
-                (true, true) => (stiffness * opening).abs().max(-reactions[i]),
-                (true, false) => (stiffness * opening).abs(),
-                (false, true) => force[dof].abs().max(-stiffness * opening),
-                (false, false) => force[dof].abs(),
+            defect = defect.max(match (state.active[i], node.bonded) {
+                (true, false) => (stiffness * opening).abs().max(-reactions[i]),
+                (true, true) => (stiffness * opening).abs(),
+                (false, _) => force[dof].abs().max(-stiffness * opening),
             });
         }
         let largest = |values: &[f64]| values.iter().fold(0.0f64, |a, b| a.max(b.abs()));

@@ -173,7 +173,8 @@ impl<'s, 'a> Track<'s, 'a> {
             contact,
             friction: FrictionCount { slip, stick },
             force: ForcePair {
-                normal: system.circumference * measured.reactions.iter().sum::<f64>(),
+                normal: system.circumference
+                    * system.normal_force(0..system.nodes.len(), &measured.reactions),
                 tangential: system.circumference * (friction + held),
             },
             contraction: row.contraction,

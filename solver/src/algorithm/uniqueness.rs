@@ -151,6 +151,6 @@ fn forces(system: &System<'_>, measured: &Measured) -> [f64; 3] {
     let held = system.tangential_reactions(&measured.state);
     let points = system.points.iter().zip(&tractions);
     let [tangential, friction] = system.tangential_forces(points, &held);
-    let normal: f64 = measured.reactions.iter().sum();
+    let normal = system.normal_force(0..system.nodes.len(), &measured.reactions);
     [normal, tangential, friction].map(|f| system.circumference * f)
 }

@@ -21,6 +21,16 @@ impl Axis {
         Axis { reach }
     }
 
+    /// The ends of a contact that lie on the axis, each with the midside node beside it: numbers along the contact.
+    pub fn ends(&self, positions: &[[f64; 2]]) -> Vec<[usize; 2]> {
+        let Some(last) = positions.len().checked_sub(1).filter(|last| *last > 0) else {
+            return Vec::new();
+        };
+        let ends = [[0, 1], [last, last - 1]].into_iter();
+        ends.filter(|[end, _]| self.holds(positions[*end]))
+            .collect()
+    }
+
     /// Whether a place (r, z) lies on the axis; never in the plane.
     pub fn holds(&self, [r, _]: [f64; 2]) -> bool {
         self.reach.is_some_and(|reach| r <= reach)

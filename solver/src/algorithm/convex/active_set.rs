@@ -1,6 +1,6 @@
 //! Primal–dual active set with semi-smooth Newton steps.
 
-use super::step::{AIM, Minimum, close, follow, free_dofs, gradient, newton_direction};
+use super::step::{AIM, Minimum, close, free_dofs, gradient, newton_direction};
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 use crate::solution::{Observer, Progress};
@@ -62,7 +62,7 @@ pub(in crate::algorithm) fn update_active(system: &System<'_>, state: &mut State
         let Dof::Free(dof) = node.normal else {
             continue;
         };
-        if !node.decides() {
+        if node.bonded {
             continue;
         }
         let active = if state.active[i] {
@@ -73,5 +73,5 @@ pub(in crate::algorithm) fn update_active(system: &System<'_>, state: &mut State
         changed |= active != state.active[i];
         state.active[i] = active;
     }
-    changed | follow(system, &mut state.active)
+    changed
 }

@@ -1,6 +1,6 @@
 //! Projected Newton (Bertsekas 1982) with a line search: slower, but J decreases at every step.
 
-use super::step::{AIM, Minimum, close, follow, free_dofs, gradient, newton_direction};
+use super::step::{AIM, Minimum, close, free_dofs, gradient, newton_direction};
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::elasticity::Dof;
 use crate::friction::FrictionLaw;
@@ -14,9 +14,6 @@ const PATIENCE: u32 = 5;
 
 /// Projected Newton (Bertsekas): hold the nodes that press against the obstacle, step in the
 /// others, and let the step end on the obstacle where it would pass it.
-///
-/// A node on the axis has no inequality: it is locked to its neighbour's state, and the problem is solved again
-/// if that state changes.
 pub(super) fn run(
     system: &System<'_>,
     bound: &[f64],
@@ -29,111 +26,96 @@ pub(super) fn run(
         steps: 0,
         residual: f64::INFINITY,
     };
-    let mut locked = start.active.clone();
-    follow(system, &mut locked);
-    let mut steps = 0;
-    for _ in 0..4 {
-        let mut begin = start.clone();
-        close(system, &mut begin);
-        let mut v = begin.v;
-        project(system, &mut v, &locked);
-        while steps < PROJECTED_STEPS {
-            let mut force = gradient(system, &v, bound);
-            let state = State {
-                active: pressed(system, &v, &force, &locked),
-                v: v.clone(),
+    let mut begin = start.clone();
+    close(system, &mut begin);
+    let (mut v, mut steps) = (begin.v, 0);
+    project(system, &mut v);
+    while steps < PROJECTED_STEPS {
+        let mut force = gradient(system, &v, bound);
+        let state = State {
+            active: pressed(system, &v, &force),
+            v: v.clone(),
+        };
+        let residual = system.kkt_residual(&state, bound);
+        if residual < best.residual {
+            best = Minimum {
+                state,
+                steps,
+                residual,
             };
-            let residual = system.kkt_residual(&state, bound);
-            if residual < best.residual {
-                best = Minimum {
-                    state,
-                    steps,
-                    residual,
-                };
-            }
-            let stale = steps - best.steps.min(steps);
-            let arrived =
-                best.residual <= AIM * tolerance || best.residual <= tolerance && stale >= PATIENCE;
-            if arrived || observe(Progress::Pulse).is_break() {
-                break;
-            }
-            steps += 1;
-            let held = binding(system, &v, &force, &locked);
-            for (i, node) in system.nodes.iter().enumerate() {
-                if let (true, Dof::Free(dof)) = (held[i], node.normal)
-                    && node.decides()
-                {
-                    v[dof] = node.gap;
-                }
-            }
-            force = gradient(system, &v, bound);
-            let free = free_dofs(system, |i| held[i]);
-            let Some(direction) = newton_direction(system, bound, &v, &force, &free, observe)
-            else {
-                break;
-            };
-            let mut d = vec![0.0; v.len()];
-            free.iter()
-                .zip(direction)
-                .for_each(|(&dof, value)| d[dof] = value);
-            if !line_search(system, bound, &mut v, &d, &force, &locked) {
-                break;
-            }
         }
-        let mut expected = best.state.active.clone();
-        if !follow(system, &mut expected) {
+        let stale = steps - best.steps.min(steps);
+        let arrived =
+            best.residual <= AIM * tolerance || best.residual <= tolerance && stale >= PATIENCE;
+        if arrived || observe(Progress::Pulse).is_break() {
             break;
         }
-        locked = expected;
-        best.residual = f64::INFINITY;
+        steps += 1;
+        let held = binding(system, &v, &force);
+        for (i, node) in system.nodes.iter().enumerate() {
+            if let (true, Dof::Free(dof)) = (held[i], node.normal)
+                && !node.bonded
+            {
+                v[dof] = node.gap;
+            }
+        }
+        force = gradient(system, &v, bound);
+        let free = free_dofs(system, |i| held[i]);
+        let Some(direction) = newton_direction(system, bound, &v, &force, &free, observe) else {
+            break;
+        };
+        let mut d = vec![0.0; v.len()];
+        free.iter()
+            .zip(direction)
+            .for_each(|(&dof, value)| d[dof] = value);
+        if !line_search(system, bound, &mut v, &d, &force) {
+            break;
+        }
     }
     best.steps = steps;
     best
 }
 
 /// Puts v where the constraints allow it.
-fn project(system: &System<'_>, v: &mut [f64], locked: &[bool]) {
-    for (i, node) in system.nodes.iter().enumerate() {
+fn project(system: &System<'_>, v: &mut [f64]) {
+    for node in &system.nodes {
         let Dof::Free(dof) = node.normal else {
             continue;
         };
-        match node.decides() {
-            false if locked[i] => v[dof] = node.gap,
-            false => {}
-            true => v[dof] = v[dof].min(node.gap),
-        }
+        v[dof] = match node.bonded {
+            true => node.gap,
+            false => v[dof].min(node.gap),
+        };
     }
 }
 
 /// The active set at a point: nodes on the obstacle and pressed against it.
-fn pressed(system: &System<'_>, v: &[f64], force: &[f64], locked: &[bool]) -> Vec<bool> {
-    let state = |(i, node): (usize, &ContactNode)| match (node.normal, node.decides()) {
-        (Dof::Fixed(_), _) => false,
-        (_, false) => locked[i],
-        (Dof::Free(dof), true) => v[dof] >= node.gap && -force[dof] >= 0.0,
+fn pressed(system: &System<'_>, v: &[f64], force: &[f64]) -> Vec<bool> {
+    let state = |node: &ContactNode| match node.normal {
+        Dof::Fixed(_) => false,
+        Dof::Free(dof) => node.bonded || v[dof] >= node.gap && -force[dof] >= 0.0,
     };
-    system.nodes.iter().enumerate().map(state).collect()
+    system.nodes.iter().map(state).collect()
 }
 
 /// Bertsekas' set: nodes so near to the obstacle, for the force on them, that a step would reach it.
-fn binding(system: &System<'_>, v: &[f64], force: &[f64], locked: &[bool]) -> Vec<bool> {
+fn binding(system: &System<'_>, v: &[f64], force: &[f64]) -> Vec<bool> {
     // nearness is measured by the natural residual: it shrinks as the solution is approached
     let mut natural: f64 = 0.0;
-    for node in system.nodes.iter().filter(|node| node.decides()) {
+    for node in system.nodes.iter().filter(|node| !node.bonded) {
         if let Dof::Free(dof) = node.normal {
             let step = -force[dof] / system.stiffness.at(dof, dof);
             natural = natural.max(step.min(node.gap - v[dof]).abs());
         }
     }
-    let holds = |(i, node): (usize, &ContactNode)| match (node.normal, node.decides()) {
-        (Dof::Fixed(_), _) => true,
-        (_, false) => locked[i],
-        (Dof::Free(dof), true) => {
+    let holds = |node: &ContactNode| match node.normal {
+        Dof::Fixed(_) => true,
+        Dof::Free(dof) => {
             let near = natural.min(-force[dof] / system.stiffness.at(dof, dof));
-            force[dof] < 0.0 && node.gap - v[dof] <= near
+            node.bonded || force[dof] < 0.0 && node.gap - v[dof] <= near
         }
     };
-    system.nodes.iter().enumerate().map(holds).collect()
+    system.nodes.iter().map(holds).collect()
 }
 
 /// Moves v along d: exactly to the minimum where no obstacle blocks the way, else by Armijo's rule
@@ -144,7 +126,6 @@ fn line_search(
     v: &mut Vec<f64>,
     d: &[f64],
     force: &[f64],
-    locked: &[bool],
 ) -> bool {
     let slope: f64 = force.iter().zip(d).map(|(g, d)| g * d).sum();
     if slope >= 0.0 {
@@ -153,7 +134,7 @@ fn line_search(
     let blocked_at = system
         .nodes
         .iter()
-        .filter(|node| node.decides())
+        .filter(|node| !node.bonded)
         .filter_map(|node| match node.normal {
             Dof::Free(dof) if d[dof] > 0.0 => Some((node.gap - v[dof]) / d[dof]),
             _ => None,
@@ -168,7 +149,7 @@ fn line_search(
     let mut step = 1.0;
     for _ in 0..60 {
         let mut trial: Vec<f64> = v.iter().zip(d).map(|(v, d)| v + step * d).collect();
-        project(system, &mut trial, locked);
+        project(system, &mut trial);
         let moved: Vec<f64> = trial.iter().zip(v.iter()).map(|(a, b)| a - b).collect();
         let predicted: f64 = force.iter().zip(&moved).map(|(g, m)| g * m).sum();
         let path = Along::new(system, bound, v, &moved, predicted);

@@ -31,18 +31,6 @@ pub(in crate::algorithm) fn close(system: &System<'_>, state: &mut State) {
     }
 }
 
-/// Nodes on the axis take the state of their neighbours; true on any change.
-pub(in crate::algorithm) fn follow(system: &System<'_>, active: &mut [bool]) -> bool {
-    let mut changed = false;
-    for (i, node) in system.nodes.iter().enumerate() {
-        if let Some([next, _]) = node.follows {
-            changed |= active[i] != active[next];
-            active[i] = active[next];
-        }
-    }
-    changed
-}
-
 /// ∇J.
 pub(super) fn gradient(system: &System<'_>, v: &[f64], bound: &[f64]) -> Vec<f64> {
     let mut force = system.elastic_force(v);

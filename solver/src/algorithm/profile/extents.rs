@@ -32,7 +32,7 @@ impl PatchView<'_> {
         } = self.extents();
         ContactSummary {
             normal: self.patch.contact.normal,
-            normal_force: circumference * self.forces.reactions[range].iter().sum::<f64>(),
+            normal_force: circumference * self.system.normal_force(range, &self.forces.reactions),
             tangential_force: circumference * tangential,
             friction_force: circumference * friction,
             contact,

@@ -67,7 +67,9 @@ impl PatchView<'_> {
         let circumference = system.circumference;
         let zero = || Gradient::zero(system);
         let mut normal = zero();
-        normal.reaction[range.clone()].fill(1.0);
+        for i in range.clone() {
+            normal.reaction[i] = system.nodes[i].force();
+        }
         let (mut tangential, mut size) = (zero(), zero());
         let pressures = &self.forces.pressures;
         let points = system.points.iter().zip(&self.finished.bound);

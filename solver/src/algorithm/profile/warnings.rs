@@ -212,7 +212,7 @@ impl PatchView<'_> {
     /// A node on a line of symmetry: on the axis, or held along the tangent.
     pub(super) fn symmetric(&self, i: usize) -> bool {
         let node = &self.system.nodes[self.patch.first + i];
-        node.follows.is_some() || matches!(node.tangent, Dof::Fixed(value) if value == 0.0)
+        node.on_axis || matches!(node.tangent, Dof::Fixed(value) if value == 0.0)
     }
 
     /// The largest |σ_t| that a prescribed bound exerts on edges of which no node touches.

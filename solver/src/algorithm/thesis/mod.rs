@@ -16,7 +16,7 @@ mod average;
 mod friction;
 mod rows;
 
-use crate::algorithm::convex::{close, dense, follow, free_dofs};
+use crate::algorithm::convex::{close, dense, free_dofs};
 use crate::algorithm::finished::End;
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::algorithm::track::{Measured, Row, Track, relative_change};
@@ -125,7 +125,6 @@ fn first_guess(system: &System<'_>, options: &ThesisOptions) -> State {
             state.active[node] = guess.is_none_or(|[s0, s1]| (*s0..=*s1).contains(&s[i]));
         }
     }
-    follow(system, &mut state.active);
     state
 }
 
@@ -162,9 +161,7 @@ fn next_contact(system: &System<'_>, state: &State, node_stress: &[f64]) -> Vec<
         _ if state.active[i] => node_stress[i] <= 0.0,
         Dof::Free(dof) => state.v[dof] >= node.gap,
     };
-    let mut next: Vec<bool> = system.nodes.iter().enumerate().map(stays).collect();
-    follow(system, &mut next);
-    next
+    system.nodes.iter().enumerate().map(stays).collect()
 }
 
 /// Step 5. f̂ = τ φ along Γ_C*, 0 off it; along +t, or against the motion with option `signed`.
