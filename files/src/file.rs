@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{abaqus, gmsh, source::ReadError};
-use solver::error::{Reason, Violation};
+use solver::error::{Reason, Violation, shortened};
 use solver::mesh::{Mesh, check_inverted, inline_mesh};
 use solver::problem::InlineMesh;
 use solver::solution::Warning;
@@ -66,13 +66,26 @@ fn recognised(start: &[u8]) -> &'static str {
     }
 }
 
+/// Characters of a parser's message that are repeated.
+const LONGEST: usize = 300;
+
 fn json(reader: impl BufRead) -> Result<Mesh, ReadError> {
     let inline: InlineMesh = serde_json::from_reader(reader).map_err(|error| {
         if error.is_io() {
             return ReadError::Io(error.into());
         }
+        // it quotes a name that may be as long as the file
+        let (text, at) = (error.to_string(), (error.line(), error.column()));
         invalid(
-            error.to_string(),
+            match text.len() {
+                0..=LONGEST => text,
+                _ => format!(
+                    "{} at line {} column {}",
+                    shortened(&text, LONGEST),
+                    at.0,
+                    at.1
+                ),
+            },
             "an inline mesh: nodes, elements, boundaries, groups, node_sets",
             "See `InlineMesh` in /v1/schema/problem.json.",
         )
@@ -91,6 +104,19 @@ fn invalid(got: String, expected: &str, hint: &str) -> ReadError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_as_long_as_the_file_is_quoted_by_its_beginning() {
+        let text = format!("{{\"{}\": []}}", "element".repeat(10_000));
+        let Err(ReadError::Invalid(violations)) = read_mesh(text.as_bytes()) else {
+            panic!("it is no mesh");
+        };
+        let got = &violations[0].got;
+        assert!(
+            got.len() < 400 && got.ends_with("at line 1 column 70003"),
+            "{got}"
+        );
+    }
 
     #[test]
     fn a_format_is_recognised_by_its_first_characters() {

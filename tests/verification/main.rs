@@ -35,6 +35,7 @@ mod record;
 mod refusals;
 mod robustness;
 mod sliding;
+mod small_strain;
 mod stick;
 mod support;
 mod thesis;

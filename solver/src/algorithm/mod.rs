@@ -10,6 +10,7 @@ mod fixed_point;
 mod newton;
 mod profile;
 mod report;
+mod small_strain;
 mod system;
 mod thesis;
 mod track;

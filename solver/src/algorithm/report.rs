@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::algorithm::finished::Finished;
 use crate::algorithm::profile::Quantity;
 use crate::algorithm::profile::{Forces, PatchView};
+use crate::algorithm::small_strain::warn_of_large_strain;
 use crate::algorithm::system::System;
 use crate::body::ElasticBody;
 use crate::elasticity::{Dof, Recovered, StressDifference, StressError, recover};
@@ -20,9 +21,6 @@ const OUT_OF_BALANCE: f64 = 1e-7;
 
 /// Forces count as more than rounding when they exceed this part of modulus × displacement × depth.
 const FORCE_FLOOR: f64 = 1e-6;
-
-/// Displacements above this part of the body's size are not small.
-const LARGE_DISPLACEMENT: f64 = 0.1;
 
 /// q above which the sweeps barely contract.
 const SLOW_CONTRACTION: f64 = 0.9;
@@ -97,7 +95,14 @@ pub fn report(
         contacts.insert(patch.contact.name.clone(), summary);
     }
     warn_of_iteration(finished, &mut warnings);
-    warn_of_displacement(model, &displacements, &mut warnings);
+    warn_of_large_strain(
+        model,
+        system,
+        &finished.state.active,
+        &recovered,
+        &displacements,
+        &mut warnings,
+    );
 
     let total =
         |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
@@ -347,25 +352,6 @@ fn fields(
             stress_xy: at_points(2),
             stress_zz: at_points(3),
         },
-    }
-}
-
-/// Linear elasticity assumes displacements that are small beside the body.
-fn warn_of_displacement(model: &Model, displacements: &[[f64; 2]], warnings: &mut Vec<Warning>) {
-    let size = model.mesh.extent(0).hypot(model.mesh.extent(1));
-    let largest = displacements
-        .iter()
-        .map(|[x, y]| x.hypot(*y))
-        .fold(0.0, f64::max);
-    if largest > LARGE_DISPLACEMENT * size {
-        warnings.push(Warning {
-            code: WarningCode::LargeDisplacement,
-            pointer: String::new(),
-            message: format!(
-                "The largest displacement, {largest:.4}, is {:.0} % of the body's size: linear elasticity is no longer accurate.",
-                100.0 * largest / size
-            ),
-        });
     }
 }
 

@@ -86,7 +86,10 @@ impl Findings {
         self.listed.push(Violation {
             pointer: shortened(&format!("{}{pointer}", self.at), LONGEST),
             reason,
-            got: shortened(&got, LONGEST),
+            got: match got.as_str() {
+                "" => "an empty text".to_owned(),
+                got => shortened(got, LONGEST),
+            },
             expected: shortened(&expected, LONGEST),
             hint: shortened(&hint, LONGEST),
         });
@@ -206,6 +209,13 @@ mod tests {
             let _ = findings.report(place, Reason::UnknownName, "it", "nothing", hint);
         }
         findings.into_violations()
+    }
+
+    #[test]
+    fn an_empty_text_is_named() {
+        let mut findings = Findings::default();
+        let _ = findings.report("", Reason::UnknownName, "", "a name", "Give one.");
+        assert_eq!(findings.into_violations()[0].got, "an empty text");
     }
 
     #[test]

@@ -305,6 +305,8 @@ pub enum WarningCode {
     ContactCycling,
     /// Forces on the body that do not balance.
     OutOfBalance,
+    /// Strains in a contact beyond what linear elasticity describes.
+    LargeStrain,
     /// Displacements that are not small beside the body.
     LargeDisplacement,
     /// A second solution that did not converge.
