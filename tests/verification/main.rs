@@ -10,6 +10,7 @@ mod axis;
 mod balance;
 mod calibration;
 mod catalogue;
+mod conserving;
 mod contact_patch;
 mod cook;
 mod cylinder;

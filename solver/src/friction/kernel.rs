@@ -73,6 +73,8 @@ pub struct Averaging {
     measure: Measure,
     /// C of (1.2).
     scale: f64,
+    /// [`Normalization::Conserving`].
+    conserving: bool,
 }
 
 /// One row of W: weights of the nodes from `first` on.
@@ -105,16 +107,12 @@ impl Averaging {
         };
         let disc = radius * radius;
         let scale = match (average.normalization, average.kernel, average.measure) {
-            (Normalization::UnitIntegral, Kernel::Bump, Measure::Line) => {
-                1.0 / (BUMP_INTEGRAL * radius)
-            }
-            (Normalization::UnitIntegral, Kernel::Parabola, Measure::Line) => 0.75 / radius,
-            (Normalization::UnitIntegral, Kernel::Bump, Measure::Surface) => BUMP_DISC / disc,
-            (Normalization::UnitIntegral, Kernel::Parabola, Measure::Surface) => {
-                2.0 / (std::f64::consts::PI * disc)
-            }
             (Normalization::PeakOne, Kernel::Bump, _) => std::f64::consts::E,
             (Normalization::PeakOne, Kernel::Parabola, _) => 1.0,
+            (_, Kernel::Bump, Measure::Line) => 1.0 / (BUMP_INTEGRAL * radius),
+            (_, Kernel::Parabola, Measure::Line) => 0.75 / radius,
+            (_, Kernel::Bump, Measure::Surface) => BUMP_DISC / disc,
+            (_, Kernel::Parabola, Measure::Surface) => 2.0 / (std::f64::consts::PI * disc),
         };
         Averaging {
             chain,
@@ -122,7 +120,28 @@ impl Averaging {
             kernel: average.kernel,
             measure: average.measure,
             scale,
+            conserving: average.normalization == Normalization::Conserving,
         }
+    }
+
+    /// The part of ∫ω around a place on the chain that lies on the chain, in (0, 1]; beyond a line of symmetry it goes on.
+    pub fn part_inside(&self, s: f64) -> f64 {
+        let (start, end) = (self.chain.s[0], self.chain.s[self.chain.s.len() - 1]);
+        let reach = |distance: f64, mirrored: bool| match mirrored {
+            true => 1.0,
+            false => (distance / self.radius).clamp(0.0, 1.0),
+        };
+        let before = reach(s - start, self.chain.mirror_start);
+        let after = reach(end - s, self.chain.mirror_end);
+        if self.radius == 0.0 || before >= 1.0 && after >= 1.0 {
+            return 1.0;
+        }
+        let half = |to: f64| -> f64 {
+            let rule = FULL_RULE.iter();
+            rule.map(|(xi, w)| 0.5 * to * w * self.omega(0.5 * to * (1.0 + xi) * self.radius))
+                .sum()
+        };
+        (half(before) + half(after)) / (2.0 * half(1.0))
     }
 
     /// ρ, or 0 where the law is local (length).
@@ -247,7 +266,11 @@ impl Averaging {
                         None => self.omega(y - centre),
                         Some(r) => self.ring_omega(y - centre, r, self.distance_from_axis(y)),
                     };
-                    let factor = 0.5 * length * w * omega;
+                    let inside = match self.conserving {
+                        true => self.part_inside(y),
+                        false => 1.0,
+                    };
+                    let factor = 0.5 * length * w * omega / inside;
                     add(edge, &edge3::shape(edge3::invert(&arc, y)), factor);
                 }
             }

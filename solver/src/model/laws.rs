@@ -5,7 +5,8 @@ use super::checks::Checks;
 use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, BoundLaw, FrictionLaw};
 use crate::problem::{
-    Analysis, Condition, Contact, Friction, History, Measure, Obstacle, PrescribedBound, Transition,
+    Analysis, Condition, Contact, Friction, History, Measure, Normalization, Obstacle,
+    PrescribedBound, Transition,
 };
 
 impl Checks {
@@ -301,6 +302,17 @@ impl Checks {
             ));
         }
         let round = matches!(analysis, Analysis::Axisymmetric {});
+        if friction.measure == Measure::Surface
+            && friction.normalization == Normalization::Conserving
+        {
+            all.fail(self.report(
+                at("normalization"),
+                Reason::Unsupported,
+                "`conserving` with `measure: surface`",
+                "`unit_integral` or `peak_one`, or `measure: line`",
+                "Only averages along the boundary can be kept on it.",
+            ));
+        }
         if friction.measure == Measure::Surface && !round {
             all.fail(self.report(
                 at("measure"),

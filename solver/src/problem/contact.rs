@@ -291,6 +291,9 @@ pub enum Normalization {
     UnitIntegral,
     /// ω(0) = 1, the literal text of the thesis; friction then vanishes with ρ.
     PeakOne,
+    /// As `unit_integral`, divided by the part of the integral that lies on the contact boundary: no friction is lost beyond
+    /// an end of it, and at full sliding it is μ times the normal force. For `measure: line`.
+    Conserving,
 }
 
 /// φ_ε, thesis (1.7).

@@ -287,6 +287,8 @@ pub enum WarningCode {
     NoContact,
     /// Contact up to the end of the obstacle.
     ContactReachesObstacleEnd,
+    /// An averaged pressure, and friction with it, that reaches beyond an end of the contact boundary and is lost.
+    FrictionLostAtEnd,
     /// A nonlocal radius larger than the contact.
     RadiusExceedsContact,
     /// A prescribed friction bound that acts where the body does not touch.

@@ -4,7 +4,7 @@ use super::PatchView;
 use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
 use crate::friction::{Average, BoundLaw, FrictionLaw};
-use crate::problem::Condition;
+use crate::problem::{Condition, Measure, Normalization};
 use crate::solution::{Outcome, Warning, WarningCode};
 
 /// Error of a smooth peak times the square of the number of elements across.
@@ -15,6 +15,9 @@ const OSCILLATING: f64 = 3e-3;
 
 /// One edge may contribute this part, because the motion may turn there.
 const TURN: f64 = 0.02;
+
+/// More than this part of the friction must not be lost at the ends without a word.
+const MOST_LOST: f64 = 0.05;
 
 /// With fewer edges than this across a contact, its pressure is not reliable.
 const FEWEST_EDGES: usize = 6;
@@ -117,6 +120,17 @@ impl PatchView<'_> {
                 ),
             );
         }
+        let lost = self.lost_at_ends();
+        if lost > MOST_LOST {
+            warn(
+                WarningCode::FrictionLostAtEnd,
+                format!(
+                    "The averaged pressure reaches beyond the end of the contact boundary, and {:.1} % of the friction is lost there: at full sliding the friction force would be {:.3} of μ times the normal force. Choose a smaller nonlocal_radius, or \"normalization\": \"conserving\".",
+                    100.0 * lost,
+                    1.0 - lost
+                ),
+            );
+        }
         let radius = contact.friction.as_ref().and_then(|f| f.bound.radius());
         let first = (0..self.count()).find(|&i| self.active(i));
         let last = (0..self.count()).rfind(|&i| self.active(i));
@@ -135,6 +149,34 @@ impl PatchView<'_> {
                 );
             }
         }
+    }
+
+    /// The part of ∫p whose average lies beyond the ends of the contact boundary, where no friction acts.
+    fn lost_at_ends(&self) -> f64 {
+        let averages = self.patch.law.as_ref().map(|law| &law.bound);
+        let (
+            Some(BoundLaw::Pressure { average, .. }),
+            Some(BoundLaw::Pressure { average: given, .. }),
+        ) = (
+            averages,
+            self.patch.contact.friction.as_ref().map(|law| &law.bound),
+        )
+        else {
+            return 0.0;
+        };
+        if given.normalization != Normalization::UnitIntegral || given.measure != Measure::Line {
+            return 0.0;
+        }
+        let pressures = &self.forces.pressures;
+        let (mut lost, mut whole) = (0.0, 0.0);
+        for place in &self.patch.contact.boundary.friction_points {
+            let pressure: f64 = (0..3)
+                .map(|i| place.shape[i] * pressures[self.patch.first + place.nodes[i]])
+                .sum();
+            whole += place.weight * pressure;
+            lost += place.weight * pressure * (1.0 - average.part_inside(place.s));
+        }
+        if whole > 0.0 { lost / whole } else { 0.0 }
     }
 
     /// The possible error of the peak pressure with so few elements in contact. The worst of many meshes
