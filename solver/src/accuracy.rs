@@ -183,7 +183,7 @@ fn bounds(
             let z = influences.next()?;
             let force = system.stiffness.times(z);
             let dual = body.displacements(&force, z, &Level::ZERO);
-            let dual = recover(mesh, section, order, &dual);
+            let dual = recover(mesh, section, order, &dual, [0.0; 2]);
             let dual = StressDifference::new(mesh, order, &dual);
             let errors = reported.difference.products(mesh, section, order, &dual);
             let moved = gradient.reaction.iter().zip(&smoothing);

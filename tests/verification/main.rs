@@ -25,6 +25,7 @@ mod invariance;
 mod lift_off;
 mod loads;
 mod manufactured;
+mod nearly_incompressible;
 mod oblique;
 mod obstacle_normals;
 mod patch;
