@@ -59,7 +59,9 @@ impl ElasticBody {
         );
         let nodal_loads =
             elasticity::assemble_loads(&model.mesh, &model.section, model.quadrature, &model.loads);
-        let of_loads = on_unknowns(&map, &nodal_loads);
+        let mut condensed = nodal_loads.clone();
+        elasticity::condense_body_force(&model.mesh, &model.section, &model.loads, &mut condensed);
+        let of_loads = on_unknowns(&map, &condensed);
         let right_hand_sides = [of_loads, of_supports];
         let finite = |forces: &Vec<f64>| forces.iter().all(|f| f.is_finite());
         if !matrix.is_finite() || !right_hand_sides.iter().all(finite) {

@@ -29,6 +29,7 @@ fn main() {
 
     let mut text = String::from(INTRODUCTION);
     text += &table::rows(&records);
+    text += &table::nearly_incompressible(&records);
     text += &table::robustness(&records);
     text += &table::dragged_sheet(&records);
     text += &examples::section(&figures);

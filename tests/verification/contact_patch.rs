@@ -16,10 +16,10 @@ use crate::record::held;
 use crate::support::{Lattice, problem, solve};
 
 const E: f64 = 1000.0;
-const NU: f64 = 0.3;
+const RATIOS: [f64; 2] = [0.3, 0.4999];
 
 /// Width 3, height 2; uneven corners along the base too. The flat comes to `gap` below it.
-fn block(kind: &Value, top: (&str, Value), gap: f64) -> Solution {
+fn block(kind: &Value, ratio: f64, top: (&str, Value), gap: f64) -> Solution {
     let shift = |i: usize, j: usize| match (i, j) {
         (1, 0) => [0.2, 0.0],
         (2, 0) => [-0.15, 0.0],
@@ -42,7 +42,7 @@ fn block(kind: &Value, top: (&str, Value), gap: f64) -> Solution {
             "bottom": lattice.edges(3, |k| (6 - k, 0)), "top": lattice.edges(3, |k| (k, 4)),
             "left": lattice.edges(2, |k| (0, k)),
         }}},
-        "materials": [{"youngs_modulus": E, "poissons_ratio": NU}],
+        "materials": [{"youngs_modulus": E, "poissons_ratio": ratio}],
         // a ring must be free to grow
         "supports": if round { json!([]) } else { json!([{"boundary": "left", "ux": 0}]) },
         "loads": [],
@@ -63,30 +63,44 @@ fn unevenness(solution: &Solution, pressure: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn theories() -> [Value; 3] {
-    [
+fn theories() -> impl Iterator<Item = (Value, f64)> {
+    let kinds = [
         json!({"kind": "plane_strain"}),
         json!({"kind": "plane_stress", "thickness": 0.3}),
         json!({"kind": "axisymmetric"}),
-    ]
+    ];
+    let at = |kind: Value| RATIOS.map(|ratio| (kind.clone(), ratio));
+    kinds.into_iter().flat_map(at)
+}
+
+/// 1e-11: rounding of a system whose condition is about 1e3; λ/G = 5000 of the nearly incompressible one multiplies it.
+fn allowed(ratio: f64) -> f64 {
+    if ratio > 0.48 { 1e-9 } else { 1e-11 }
+}
+
+fn described(kind: &Value, ratio: f64) -> String {
+    let kind = kind["kind"].as_str().unwrap();
+    match ratio {
+        0.3 => kind.to_owned(),
+        _ => format!("{kind}, ν = {ratio}"),
+    }
 }
 
 /// Pressed down by a prescribed displacement: p = E′ δ/h with E′ = E/(1 − ν²) in plane strain, else E.
-/// 1e-11: rounding of a system whose condition is about 1e3.
 #[test]
 fn a_block_squeezed_against_a_flat_presses_evenly() {
-    for kind in theories() {
+    for (kind, ratio) in theories() {
         let modulus = if kind["kind"] == "plane_strain" {
-            E / (1.0 - NU * NU)
+            E / (1.0 - ratio * ratio)
         } else {
             E
         };
         let (squeeze, gap) = (0.02, 0.01);
         let exact = modulus * (squeeze - gap) / 2.0;
-        let solution = block(&kind, ("supports", json!({"uy": -squeeze})), gap);
+        let solution = block(&kind, ratio, ("supports", json!({"uy": -squeeze})), gap);
         let what = format!(
             "contact patch test, {}, squeezed: unevenness of p",
-            kind["kind"].as_str().unwrap()
+            described(&kind, ratio)
         );
         held(
             7,
@@ -94,7 +108,7 @@ fn a_block_squeezed_against_a_flat_presses_evenly() {
             "6 distorted Q8",
             unevenness(&solution, exact),
             0.0,
-            1e-11,
+            allowed(ratio),
         );
     }
 }
@@ -102,11 +116,11 @@ fn a_block_squeezed_against_a_flat_presses_evenly() {
 /// Pressed down by a pressure, with nothing but contact to hold it up.
 #[test]
 fn a_block_pressed_on_a_flat_that_alone_holds_it_presses_evenly() {
-    for kind in theories() {
-        let solution = block(&kind, ("loads", json!({"pressure": 5})), 0.01);
+    for (kind, ratio) in theories() {
+        let solution = block(&kind, ratio, ("loads", json!({"pressure": 5})), 0.01);
         let what = format!(
             "contact patch test, {}, held by contact alone: unevenness of p",
-            kind["kind"].as_str().unwrap()
+            described(&kind, ratio)
         );
         held(
             7,
@@ -114,8 +128,8 @@ fn a_block_pressed_on_a_flat_that_alone_holds_it_presses_evenly() {
             "6 distorted Q8",
             unevenness(&solution, 5.0),
             0.0,
-            1e-11,
+            allowed(ratio),
         );
-        assert!(solution.summary.residuals.equilibrium < 1e-11);
+        assert!(solution.summary.residuals.equilibrium < allowed(ratio));
     }
 }

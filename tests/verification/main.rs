@@ -27,6 +27,7 @@ mod invariance;
 mod lift_off;
 mod loads;
 mod manufactured;
+mod nearly_incompressible;
 mod oblique;
 mod obstacle_normals;
 mod patch;

@@ -67,7 +67,7 @@ fn distorted_patch(analysis: &str, patch: &Patch, ux: [f64; 3], uy: [f64; 3]) ->
             "bottom": lattice.edges(3, |k| (k, 0)), "top": lattice.edges(3, |k| (k, 6)),
             "left": lattice.edges(3, |k| (0, k)), "right": lattice.edges(3, |k| (6, k)),
         }}},
-        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": patch.ratio}],
         "supports": supports,
         "quadrature": patch.quadrature,
     });
@@ -78,6 +78,7 @@ struct Patch {
     elements: &'static str,
     curved: bool,
     quadrature: u32,
+    ratio: f64,
 }
 
 /// Largest errors of displacement and of stress against a linear field with constant stress.
@@ -158,6 +159,7 @@ fn a_distorted_patch_reproduces_constant_strain() {
                 elements,
                 curved,
                 quadrature,
+                ratio: nu,
             })
         });
         for patch in patches {
@@ -189,6 +191,65 @@ fn a_distorted_patch_reproduces_constant_strain() {
     }
 }
 
+/// The same with a volume that changes and the pressure that this takes: errors of stress are relative to it, and those
+/// of displacement grow with λ/G, as the condition of the system does. With any `quadrature`: nearly incompressible elements have one rule.
+#[test]
+fn a_nearly_incompressible_patch_reproduces_constant_strain() {
+    let (ux, uy) = ([0.005, 0.01, 0.02], [0.003, 0.01, -0.02]);
+    for ratio in [0.4801, 0.4999, 0.49999] {
+        let shear = 1000.0 / (2.0 * (1.0 + ratio));
+        let lambda = 2.0 * shear * ratio / (1.0 - 2.0 * ratio);
+        let volume = 3.0 * lambda + 2.0 * shear;
+        let allowed = 1e-12 * f64::max(1.0, lambda / shear / 500.0);
+        let dilation = -0.01 * lambda;
+        let strain = [
+            dilation + 2.0 * shear * 0.01,
+            dilation - 2.0 * shear * 0.02,
+            shear * 0.03,
+            dilation,
+        ];
+        let round = [volume, volume, 0.0, volume];
+        for (kind, ux, uy, stress, size) in [
+            ("plane_strain", ux, uy, strain, 0.01 * lambda),
+            (
+                "axisymmetric",
+                [0.0, 1.0, 0.0],
+                [0.0, 0.0, 1.0],
+                round,
+                volume,
+            ),
+        ] {
+            let analysis = format!("{{\"kind\": \"{kind}\"}}");
+            for elements in ["Q8", "T6", "Q8 and T6"] {
+                for (curved, quadrature) in [(false, 3), (true, 3), (true, 2)] {
+                    let patch = Patch {
+                        elements,
+                        curved,
+                        quadrature,
+                        ratio,
+                    };
+                    let (of_u, of_stress) = errors(&analysis, &patch, ux, uy, stress);
+                    let mesh = format!(
+                        "{} {elements}, quadrature {quadrature}",
+                        if curved { "curved" } else { "distorted" }
+                    );
+                    let what = format!("patch test, {kind}, ν = {ratio}");
+                    held(1, &format!("{what}: error of u"), &mesh, of_u, 0.0, allowed);
+                    let of_stress = 1000.0 * of_stress / size;
+                    held(
+                        1,
+                        &format!("{what}: error of σ"),
+                        &mesh,
+                        of_stress,
+                        0.0,
+                        1e-11,
+                    );
+                }
+            }
+        }
+    }
+}
+
 /// Row 2. Eigenvalues of one element's stiffness that are zero to rounding.
 #[test]
 fn an_element_has_its_rigid_modes_and_no_others() {
@@ -212,17 +273,19 @@ fn an_element_has_its_rigid_modes_and_no_others() {
         [0.0; 2],
         [0.0; 2],
     ];
-    let zero_modes = |(family, nodes): (Family, [[f64; 2]; 8]), analysis: Analysis, rule: u32| {
-        let moduli = isotropic(&analysis, 1000.0, 0.3);
-        let section = Section::uniform(analysis, moduli);
-        let k = assemble_element(family, &nodes, &section, &moduli, rule);
-        let size = 2 * family.nodes();
-        let values = faer::Mat::from_fn(size, size, |i, j| k[i][j])
-            .self_adjoint_eigenvalues(Side::Lower)
-            .unwrap();
-        let largest = values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
-        values.iter().filter(|v| v.abs() < 1e-12 * largest).count()
-    };
+    let modes_at =
+        |(family, nodes): (Family, [[f64; 2]; 8]), analysis: Analysis, rule: u32, ratio: f64| {
+            let moduli = isotropic(&analysis, 1000.0, ratio);
+            let section = Section::uniform(analysis, moduli);
+            let k = assemble_element(family, &nodes, &section, 0, rule);
+            let size = 2 * family.nodes();
+            let values = faer::Mat::from_fn(size, size, |i, j| k[i][j])
+                .self_adjoint_eigenvalues(Side::Lower)
+                .unwrap();
+            let largest = values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+            values.iter().filter(|v| v.abs() < 1e-12 * largest).count()
+        };
+    let zero_modes = |shape, analysis: Analysis, rule: u32| modes_at(shape, analysis, rule, 0.3);
     let (quad, triangle) = ((Family::Quad, quad), (Family::Triangle, triangle));
     let (strain, round) = (Analysis::PlaneStrain {}, Analysis::Axisymmetric {});
     let sheet = Analysis::PlaneStress { thickness: 0.5 };
@@ -255,6 +318,26 @@ fn an_element_has_its_rigid_modes_and_no_others() {
         (
             "zero modes, triangle, axisymmetric, 7 points",
             zero_modes(triangle, round, 3),
+            1,
+        ),
+        (
+            "zero modes, plane strain, ν = .4999",
+            modes_at(quad, strain, 2, 0.4999),
+            3,
+        ),
+        (
+            "zero modes, axisymmetric, ν = .4999",
+            modes_at(quad, round, 2, 0.4999),
+            1,
+        ),
+        (
+            "zero modes, triangle, plane strain, ν = .4999",
+            modes_at(triangle, strain, 2, 0.4999),
+            3,
+        ),
+        (
+            "zero modes, triangle, axisymmetric, ν = .4999",
+            modes_at(triangle, round, 2, 0.4999),
             1,
         ),
         // one more than the rigid ones

@@ -19,6 +19,10 @@ use crate::solution::{
 /// Forces with a larger imbalance than this have lost half of their digits: the result is not reliable.
 const OUT_OF_BALANCE: f64 = 1e-7;
 
+/// The same where a material is nearly incompressible: its bulk modulus multiplies the rounding of displacements, and
+/// long thin elements do so again. Forces are still known to six digits.
+const OUT_OF_BALANCE_INCOMPRESSIBLE: f64 = 1e-6;
+
 /// Forces count as more than rounding when they exceed this part of modulus × displacement × depth.
 const FORCE_FLOOR: f64 = 1e-6;
 
@@ -65,6 +69,7 @@ pub fn report(
         &model.section,
         model.quadrature,
         &displacements,
+        model.body_force(&system.level),
     );
     let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
     let difference = StressDifference::new(mesh, order, &recovered);
@@ -113,7 +118,8 @@ pub fn report(
         .zip(&displacements)
         .map(|(f, u)| f[0] * u[0] + f[1] * u[1])
         .sum::<f64>()
-        * system.level.loads;
+        * system.level.loads
+        + recovered.work_on_bubbles;
     let equilibrium = equilibrium(
         model,
         body,
@@ -122,15 +128,25 @@ pub fn report(
         &displacements,
         &body.nodal_forces(&contact_force),
     );
+    let out_of_balance = match model.section.has_split() {
+        true => OUT_OF_BALANCE_INCOMPRESSIBLE,
+        false => OUT_OF_BALANCE,
+    };
     let outcome = match finished.outcome {
-        Outcome::Converged if equilibrium > OUT_OF_BALANCE => Outcome::FalseConvergence,
+        Outcome::Converged if equilibrium > out_of_balance => Outcome::FalseConvergence,
         outcome => outcome,
     };
-    if equilibrium > OUT_OF_BALANCE {
+    if equilibrium > out_of_balance {
         warnings.push(Warning {
             code: WarningCode::OutOfBalance,
             pointer: String::new(),
-            message: format!("The forces on the body do not balance: {equilibrium:.1e} of their sum remains. The stiffness is nearly singular: check supports, hinges and badly shaped elements."),
+            message: format!(
+                "The forces on the body do not balance: {equilibrium:.1e} of their sum remains. The stiffness is nearly singular: check supports, hinges and badly shaped elements{}.",
+                match model.section.has_split() {
+                    true => ", and Poisson's ratios closer to 0.5 than 0.49999",
+                    false => "",
+                }
+            ),
         });
     }
     let summary = Summary {
@@ -292,9 +308,7 @@ fn equilibrium(
         .iter()
         .map(|x| model.section.depth(x[0]))
         .fold(0.0, f64::max);
-    let materials = model.section.materials().iter();
-    let modulus = materials.map(|m| m[0][0]).fold(0.0, f64::max);
-    let floor = FORCE_FLOOR * modulus * moved * depth;
+    let floor = FORCE_FLOOR * model.section.modulus() * moved * depth;
     let sum = sum[0].hypot(sum[1]);
     if sum == 0.0 {
         0.0

@@ -74,7 +74,7 @@ fn mean_strain(model: &Model, patch: &Patch<'_>, active: &[bool], recovered: &Re
         if !sides.any(|[_, _, midside]| midsides.binary_search(&midside).is_ok()) {
             continue;
         }
-        let compliance = inverse(section.moduli(e)).unwrap_or_default();
+        let compliance = inverse(&section.materials()[section.material_of(e)]).unwrap_or_default();
         for (point, stress) in rule.iter().zip(own) {
             let m = family.map(&nodes, point.place);
             let weight = point.weight * m.det * section.depth(m.x);

@@ -1,7 +1,8 @@
 //! `assemble_element`, `assemble_stiffness`, `assemble_loads`: thesis (2.18), (2.20), (2.27), (2.28).
 
 use crate::elasticity::Section;
-use crate::elasticity::material::{COMPONENTS, Moduli, stress};
+use crate::elasticity::material::{COMPONENTS, stress};
+use crate::elasticity::mixed::Mixed;
 use crate::element::gauss::GAUSS_3;
 use crate::element::{Family, edge3};
 use crate::linear::{Graph, SparseSymmetric};
@@ -70,15 +71,20 @@ impl DofMap {
 /// Element stiffness k_ij = ∫ B_iᵀ D B_j, along x and y; 16 × 16, symmetric. The last four rows and
 /// columns of a triangle are zero.
 ///
-/// `quadrature`: with 3 only the rigid modes have no stiffness; with 2 a quadrilateral has one more such
+/// `material`: its number in the section; one that is nearly incompressible has the element of [`Mixed`], with the
+/// full rule. `quadrature`: with 3 only the rigid modes have no stiffness; with 2 a quadrilateral has one more such
 /// mode, which its neighbours may or may not suppress.
 pub fn assemble_element(
     family: Family,
     nodes: &[[f64; 2]; 8],
     section: &Section,
-    moduli: &Moduli,
+    material: usize,
     quadrature: u32,
 ) -> [[f64; 16]; 16] {
+    if let Some(split) = section.split(material) {
+        return Mixed::stiffness(section, split, family, nodes);
+    }
+    let moduli = &section.materials()[material];
     let mut k = [[0.0; 16]; 16];
     for point in family.rule(quadrature) {
         let m = family.map(nodes, point.place);
@@ -142,7 +148,7 @@ pub fn assemble_stiffness(
             element.family(),
             &nodes,
             section,
-            section.moduli(e),
+            section.material_of(e),
             quadrature,
         );
         for (i, &node) in element.iter().enumerate() {
@@ -221,9 +227,13 @@ pub fn assemble_loads(
         add_edge_load(mesh, section, load, &mut forces);
     }
     if loads.body_force != [0.0; 2] {
-        for element in &mesh.elements {
+        for (e, element) in mesh.elements.iter().enumerate() {
             let (family, nodes) = (element.family(), mesh.element_nodes(element));
-            for point in family.rule(quadrature) {
+            let rule = match section.split(section.material_of(e)) {
+                Some(_) => Mixed::rule(family),
+                None => family.rule(quadrature),
+            };
+            for point in rule {
                 let m = family.map(&nodes, point.place);
                 let weight = point.weight * m.det * section.depth(m.x);
                 for (i, &node) in element.iter().enumerate() {
@@ -239,6 +249,29 @@ pub fn assemble_loads(
         forces[*node as usize][1] += y;
     }
     forces
+}
+
+/// Adds what the body force on the bubbles of nearly incompressible elements does to the nodes: `forces` of
+/// [`assemble_loads`] add up to the load, and become the right-hand side of the stiffness, whose bubbles are condensed.
+pub fn condense_body_force(mesh: &Mesh, section: &Section, loads: &Loads, forces: &mut [[f64; 2]]) {
+    if loads.body_force == [0.0; 2] || !section.has_split() {
+        return;
+    }
+    for (e, element) in mesh.elements.iter().enumerate() {
+        let Some(split) = section.split(section.material_of(e)) else {
+            continue;
+        };
+        let mixed = Mixed::new(
+            section,
+            split,
+            element.family(),
+            &mesh.element_nodes(element),
+        );
+        let passed_on = mixed.passed_on(&mixed.force_on_bubble(loads.body_force));
+        for (&node, force) in element.iter().zip(passed_on) {
+            (0..2).for_each(|a| forces[node as usize][a] += force[a]);
+        }
+    }
 }
 
 fn add_edge_load(mesh: &Mesh, section: &Section, load: &EdgeLoad, forces: &mut [[f64; 2]]) {
@@ -285,7 +318,7 @@ mod tests {
             let moduli = isotropic(&analysis, 1000.0, 0.3);
             let section = Section::uniform(analysis, moduli);
             let u: Vec<f64> = SQUARE.iter().flat_map(|&x| motion(x)).collect();
-            for row in assemble_element(Family::Quad, &SQUARE, &section, &moduli, 3) {
+            for row in assemble_element(Family::Quad, &SQUARE, &section, 0, 3) {
                 let force: f64 = row.iter().zip(&u).map(|(a, b)| a * b).sum();
                 assert!(force.abs() < 1e-11, "{force}");
             }

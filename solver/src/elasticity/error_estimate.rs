@@ -3,9 +3,10 @@
 //!
 //!   ‖e‖² = ∫ (σ* − σ) : C⁻¹ (σ* − σ),   σ* = Σ h_i σ_i with the recovered nodal stresses σ_i
 
-use crate::elasticity::material::{COMPONENTS, Moduli, inverse};
+use crate::elasticity::material::{COMPONENTS, Moduli, inverse, stress};
+use crate::elasticity::mixed::dilatation;
 use crate::elasticity::recovery::{ELEMENTS_PER_QUESTION, recover_nodal_stresses};
-use crate::elasticity::{Recovered, Section};
+use crate::elasticity::{Recovered, Section, recover};
 use crate::element::Element;
 use crate::mesh::Mesh;
 
@@ -18,7 +19,11 @@ pub struct StressError {
 }
 
 /// σ* − σ at the integration points.
-pub struct StressDifference(Vec<[f64; COMPONENTS]>);
+pub struct StressDifference {
+    stress: Vec<[f64; COMPONENTS]>,
+    /// As in [`Recovered`].
+    dilatation_gap: Vec<f64>,
+}
 
 impl StressDifference {
     /// `quadrature`: the one that `recovered` was made with.
@@ -34,11 +39,33 @@ impl StressDifference {
                 }));
             }
         }
-        StressDifference(differences)
+        StressDifference {
+            stress: differences,
+            dilatation_gap: recovered.dilatation_gap.clone(),
+        }
     }
 
     /// ∫ (σ* − σ) : C⁻¹ (σ* − σ)′ of every element, with the difference of another field (force × length, without 2π).
+    ///
+    /// In nearly incompressible elements stress and strain are not those of each other, and the energy that the errors
+    /// of both fields have in common is more: with g = θ̄ − div u and t = tr C⁻¹ (σ* − σ),
+    ///
+    ///   … + κ (g t′ + t g′) − κ (1 − κ mᵀC⁻¹m) g g′
     pub fn products(
+        &self,
+        mesh: &Mesh,
+        section: &Section,
+        quadrature: u32,
+        other: &StressDifference,
+    ) -> Vec<f64> {
+        let mut products = self.stress_products(mesh, section, quadrature, other);
+        if section.has_split() {
+            self.add_dilatation(mesh, section, quadrature, other, &mut products);
+        }
+        products
+    }
+
+    fn stress_products(
         &self,
         mesh: &Mesh,
         section: &Section,
@@ -50,7 +77,7 @@ impl StressDifference {
             .iter()
             .map(|moduli| inverse(moduli).unwrap_or_default())
             .collect();
-        let mut pairs = self.0.iter().zip(&other.0);
+        let mut pairs = self.stress.iter().zip(&other.stress);
         let product = |(e, element): (usize, &Element)| {
             let (family, nodes) = (element.family(), mesh.element_nodes(element));
             let compliance = &compliances[section.material_of(e)];
@@ -70,11 +97,48 @@ impl StressDifference {
         mesh.elements.iter().enumerate().map(product).collect()
     }
 
+    fn add_dilatation(
+        &self,
+        mesh: &Mesh,
+        section: &Section,
+        quadrature: u32,
+        other: &StressDifference,
+        products: &mut [f64],
+    ) {
+        let compliances: Vec<Moduli> = section
+            .materials()
+            .iter()
+            .map(|moduli| inverse(moduli).unwrap_or_default())
+            .collect();
+        let own = self.stress.iter().zip(&self.dilatation_gap);
+        let other = other.stress.iter().zip(&other.dilatation_gap);
+        let mut pairs = own.zip(other);
+        for (e, element) in mesh.elements.iter().enumerate() {
+            let (family, nodes) = (element.family(), mesh.element_nodes(element));
+            let material = section.material_of(e);
+            let points = family.rule(quadrature).iter().zip(&mut pairs);
+            let Some(split) = section.split(material) else {
+                points.for_each(drop);
+                continue;
+            };
+            let (compliance, bulk) = (&compliances[material], split.bulk);
+            let of_pressure = stress(compliance, &[1.0, 1.0, 0.0, 1.0]);
+            let rest = bulk * (1.0 - bulk * dilatation(&of_pressure));
+            for (point, ((own, g), (other, g_other))) in points {
+                let trace = |difference| dilatation(&stress(compliance, difference));
+                let density = bulk * (g * trace(other) + g_other * trace(own)) - rest * g * g_other;
+                let m = family.map(&nodes, point.place);
+                products[e] += point.weight * m.det * section.depth(m.x) * density;
+            }
+        }
+    }
+
     /// The same products with the differences of several fields, by their displacements at the nodes. None if `stop`
     /// says so, which is asked now and then.
     ///
     /// Both σ* and σ of those fields are linear in what is known at the nodes, so that each element's integral is a sum
-    /// over its nodes: the points of integration are visited once for all fields.
+    /// over its nodes: the points of integration are visited once for all fields. Nearly incompressible elements, whose
+    /// stress depends on more, are recovered field by field.
     pub fn products_with_fields(
         &self,
         mesh: &Mesh,
@@ -83,6 +147,14 @@ impl StressDifference {
         fields: &[Vec<[f64; 2]>],
         stop: &mut dyn FnMut() -> bool,
     ) -> Option<Vec<Vec<f64>>> {
+        if section.has_split() {
+            let products = |u: &Vec<[f64; 2]>| {
+                let recovered = recover(mesh, section, quadrature, u, [0.0; 2]);
+                let other = StressDifference::new(mesh, quadrature, &recovered);
+                (!stop()).then(|| self.products(mesh, section, quadrature, &other))
+            };
+            return fields.iter().map(products).collect();
+        }
         let mut products = vec![vec![0.0; mesh.elements.len()]; fields.len()];
         for (material, moduli) in section.materials().iter().enumerate() {
             let compliance = inverse(moduli).unwrap_or_default();
@@ -94,7 +166,7 @@ impl StressDifference {
                 }
                 let (family, nodes) = (element.family(), mesh.element_nodes(element));
                 let rule = family.rule(quadrature);
-                let own = &self.0[first..first + rule.len()];
+                let own = &self.stress[first..first + rule.len()];
                 first += rule.len();
                 if section.material_of(e) != material {
                     continue;
@@ -136,7 +208,7 @@ impl StressDifference {
 
     /// The norm of the difference, of every element and of the whole: the estimate.
     pub fn norms(&self, mesh: &Mesh, section: &Section, quadrature: u32) -> StressError {
-        let squares = self.products(mesh, section, quadrature, self);
+        let squares = self.stress_products(mesh, section, quadrature, self);
         let squares: Vec<f64> = squares.into_iter().map(|square| square.max(0.0)).collect();
         StressError {
             total: squares.iter().sum::<f64>().sqrt(),
@@ -151,7 +223,6 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::*;
-    use crate::elasticity::recover;
     use crate::solution::Observer;
 
     /// In every kind of analysis, with two materials, quadrilaterals and triangles.
@@ -185,7 +256,7 @@ mod tests {
                     .collect()
             };
             let difference = |u: &[[f64; 2]]| {
-                StressDifference::new(mesh, order, &recover(mesh, section, order, u))
+                StressDifference::new(mesh, order, &recover(mesh, section, order, u, [0.0; 2]))
             };
             let (own, fields) = (difference(&field(0)), [field(1), field(2)]);
             let never = &mut || false;

@@ -9,11 +9,47 @@ pub const COMPONENTS: usize = 4;
 /// σ = moduli · ε, symmetric (stress).
 pub type Moduli = [[f64; COMPONENTS]; COMPONENTS];
 
+/// The moduli of a nearly incompressible material in two parts, σ = rest · ε + bulk (ε_xx + ε_yy + ε_zz) m with
+/// m = (1, 1, 0, 1): of an isotropic one 2G and λ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Split {
+    /// What resists all strains alike; positive definite.
+    pub rest: Moduli,
+    /// What resists the change of volume (stress).
+    pub bulk: f64,
+}
+
+/// λ/G = 2ν/(1 − 2ν) of an isotropic material with ν = .48: above it a material is nearly incompressible.
+const NEARLY_INCOMPRESSIBLE: f64 = 24.0;
+
+/// About λ/G of ν = .49999: what is stiffer still is no measure of forces any more.
+const STIFFEST: f64 = 1e5;
+
+impl Split {
+    /// `None`: not nearly incompressible, or plane stress, where the thickness takes up any change of volume.
+    fn new(moduli: &Moduli) -> Option<Split> {
+        let bulk = moduli[0][1].min(moduli[0][3]).min(moduli[1][3]);
+        let mut rest = *moduli;
+        let normal = [0, 1, 3];
+        for (i, j) in normal.iter().flat_map(|i| normal.map(|j| (*i, j))) {
+            rest[i][j] -= bulk;
+        }
+        // 2G for each of three normal strains and G for the shear strain, where the material is isotropic
+        let shear = (0..COMPONENTS).map(|c| rest[c][c]).sum::<f64>() / 7.0;
+        // rounding must not make ν = .48 itself nearly incompressible
+        let nearly = bulk > NEARLY_INCOMPRESSIBLE * (1.0 + 1e-9) * shear;
+        let sheet = moduli[COMPONENTS - 1][COMPONENTS - 1] == 0.0;
+        (nearly && !sheet && inverse(&rest).is_some()).then_some(Split { rest, bulk })
+    }
+}
+
 /// The body's theory and its materials, in the plane of the analysis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
     analysis: Analysis,
     moduli: Vec<Moduli>,
+    /// Of every material.
+    splits: Vec<Option<Split>>,
     /// Material of every element; empty: the first for all.
     material_of: Vec<u16>,
 }
@@ -21,17 +57,14 @@ pub struct Section {
 impl Section {
     /// One material for the whole body.
     pub fn uniform(analysis: Analysis, moduli: Moduli) -> Self {
-        Section {
-            analysis,
-            moduli: vec![moduli],
-            material_of: Vec::new(),
-        }
+        Section::by_element(analysis, vec![moduli], Vec::new())
     }
 
     /// Several materials, with the number of its material for every element.
     pub fn by_element(analysis: Analysis, moduli: Vec<Moduli>, material_of: Vec<u16>) -> Self {
         Section {
             analysis,
+            splits: moduli.iter().map(Split::new).collect(),
             moduli,
             material_of,
         }
@@ -42,14 +75,30 @@ impl Section {
         self.material_of.get(element).map_or(0, |&m| usize::from(m))
     }
 
-    /// Moduli of an element.
-    pub fn moduli(&self, element: usize) -> &Moduli {
-        &self.moduli[self.material_of(element)]
-    }
-
     /// Moduli of every material.
     pub fn materials(&self) -> &[Moduli] {
         &self.moduli
+    }
+
+    /// The modulus by which displacements are compared with forces: the largest of all materials, but no bulk modulus
+    /// far above the resistance to shear (stress).
+    pub fn modulus(&self) -> f64 {
+        let of_material = |(moduli, split): (&Moduli, &Option<Split>)| match split {
+            None => moduli[0][0],
+            Some(split) => moduli[0][0].min(STIFFEST * split.rest[0][0]),
+        };
+        let moduli = self.moduli.iter().zip(&self.splits).map(of_material);
+        moduli.fold(0.0, f64::max)
+    }
+
+    /// The two parts of the moduli of a material that is nearly incompressible.
+    pub fn split(&self, material: usize) -> Option<&Split> {
+        self.splits[material].as_ref()
+    }
+
+    /// Whether any material is nearly incompressible.
+    pub fn has_split(&self) -> bool {
+        self.splits.iter().any(Option::is_some)
     }
 
     /// The factor of every integral over the section at the first coordinate x: thickness, or r.
@@ -254,6 +303,72 @@ mod tests {
                 + s.powi(4) / 10.0;
             assert!((compliance[0][0] / exact - 1.0).abs() < 1e-12, "{angle}");
         }
+    }
+
+    #[test]
+    fn a_material_is_nearly_incompressible_above_a_ratio_of_48() {
+        let split = |analysis: Analysis, nu: f64| Split::new(&isotropic(&analysis, 200.0, nu));
+        let sheet = Analysis::PlaneStress { thickness: 1.0 };
+        for analysis in [Analysis::PlaneStrain {}, Analysis::Axisymmetric {}] {
+            for nu in [-0.9, 0.0, 0.3, 0.48] {
+                assert_eq!(split(analysis, nu), None, "{nu}");
+            }
+            for nu in [0.4801, 0.49, 0.49999, 0.4999999] {
+                let Split { rest, bulk } = split(analysis, nu).unwrap();
+                let shear = 200.0 / (2.0 * (1.0 + nu));
+                assert!((bulk * (1.0 - 2.0 * nu) / (2.0 * shear * nu) - 1.0).abs() < 1e-12);
+                for (i, row) in rest.iter().enumerate() {
+                    for (j, value) in row.iter().enumerate() {
+                        let expected = match (i, j) {
+                            (2, 2) => shear,
+                            _ if i == j => 2.0 * shear,
+                            _ => 0.0,
+                        };
+                        // what the difference from the larger bulk loses
+                        assert!((value - expected).abs() <= 1e-15 * bulk, "{nu}: {i}, {j}");
+                    }
+                }
+            }
+        }
+        assert_eq!(split(sheet, 0.499), None);
+    }
+
+    /// An orthotropic material is judged in the same way; wood is far from it.
+    #[test]
+    fn an_orthotropic_material_is_split_as_the_isotropic_one_that_it_is() {
+        let strain = Analysis::PlaneStrain {};
+        assert_eq!(
+            Split::new(&orthotropic(&strain, &wood(30.0)).unwrap()),
+            None
+        );
+        for (nu, nearly) in [(0.479, false), (0.499, true)] {
+            let (e, g12) = (200.0, 200.0 / (2.0 * (1.0 + nu)));
+            let material = Orthotropic {
+                e1: e,
+                e2: e,
+                nu12: nu,
+                g12,
+                angle: 20.0,
+                e3: Some(e),
+                nu13: Some(nu),
+                nu23: Some(nu),
+            };
+            let split = Split::new(&orthotropic(&strain, &material).unwrap());
+            assert_eq!(split.is_some(), nearly, "{nu}");
+        }
+        // fibres twice as stiff in a matrix that keeps its volume: ν_12/e1 + ν_32/e3 = 1/e2 − 1/K, and so on round
+        let matrix = Orthotropic {
+            e1: 2.0,
+            e2: 1.0,
+            nu12: 0.4999,
+            g12: 0.4,
+            angle: 20.0,
+            e3: Some(1.0),
+            nu13: Some(0.4999),
+            nu23: Some(0.7499),
+        };
+        let split = Split::new(&orthotropic(&strain, &matrix).unwrap()).unwrap();
+        assert!(split.bulk > 1000.0, "{}", split.bulk);
     }
 
     #[test]

@@ -3,11 +3,14 @@
 mod assembly;
 mod error_estimate;
 mod material;
+mod mixed;
 mod recovery;
 
 pub use assembly::{
     Dof, DofMap, EdgeLoad, LoadAxes, Loads, assemble_element, assemble_loads, assemble_stiffness,
+    condense_body_force,
 };
 pub use error_estimate::{StressDifference, StressError};
 pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic, stress};
-pub use recovery::{Recovered, recover, stress_at};
+pub use mixed::Mixed;
+pub use recovery::{Deformed, Recovered, recover};

@@ -1,8 +1,9 @@
 //! From displacements to stresses, nodal forces and energy.
 
 use crate::elasticity::Section;
-use crate::elasticity::material::{COMPONENTS, Moduli, stress};
-use crate::element::{Family, Mapped};
+use crate::elasticity::material::{COMPONENTS, stress};
+use crate::elasticity::mixed::{Inside, Mixed, dilatation, position};
+use crate::element::{AtNodes, Family, GaussPoint, Mapped};
 use crate::mesh::Mesh;
 
 /// Stresses, forces and energy of a displacement field.
@@ -15,36 +16,57 @@ pub struct Recovered {
     pub points: Vec<[f64; 2]>,
     /// Stress there, not averaged.
     pub point_stress: Vec<[f64; COMPONENTS]>,
+    /// θ̄ − div u there: what the pressure of nearly incompressible elements leaves out of the dilatation. Empty if
+    /// there are none.
+    pub dilatation_gap: Vec<f64>,
     /// Force that the stresses exert at every node along x and y, ∫ Bᵀ σ (without 2π).
     pub internal_force: Vec<[f64; 2]>,
     /// ½ ∫ σ : ε (without 2π).
     pub strain_energy: f64,
+    /// Work of the body force on the bubbles of nearly incompressible elements (without 2π).
+    pub work_on_bubbles: f64,
 }
 
 /// Stresses at nodes are taken at the superconvergent points of each element (2 × 2 of a
 /// quadrilateral), carried to its nodes linearly, and averaged over the elements that meet there.
 ///
-/// `quadrature`: as in `assemble_element`.
+/// `quadrature`: as in `assemble_element`; `body_force`: the one (force/volume) that the displacements belong to.
 pub fn recover(
     mesh: &Mesh,
     section: &Section,
     quadrature: u32,
     displacements: &[[f64; 2]],
+    body_force: [f64; 2],
 ) -> Recovered {
     let mut own = Vec::with_capacity(mesh.elements.len());
     let mut internal_force = vec![[0.0; 2]; mesh.nodes.len()];
-    let mut strain_energy = 0.0;
+    let (mut strain_energy, mut work_on_bubbles) = (0.0, 0.0);
+    let mut dilatation_gap = Vec::new();
     let (mut points, mut point_stress) = (Vec::new(), Vec::new());
     for (e, element) in mesh.elements.iter().enumerate() {
-        let (nodes, moduli) = (mesh.element_nodes(element), section.moduli(e));
-        let (family, u) = (
-            element.family(),
-            element.gather(|n| displacements[n as usize]),
+        let (family, nodes) = (element.family(), mesh.element_nodes(element));
+        let u = element.gather(|n| displacements[n as usize]);
+        let deformed = Deformed::new(
+            section,
+            section.material_of(e),
+            family,
+            &nodes,
+            &u,
+            body_force,
         );
-        for point in family.rule(quadrature) {
+        work_on_bubbles += deformed.work_on_bubble;
+        let (rule, sampled) = (deformed.rule(quadrature), family.rule(quadrature));
+        let mut sample = |at: &DeformedAt, m: &Mapped| {
+            points.push(position(m, &nodes));
+            point_stress.push(at.stress);
+            if section.has_split() {
+                dilatation_gap.push(at.dilatation_gap);
+            }
+        };
+        for point in rule {
             let m = family.map(&nodes, point.place);
-            let strain = strain_at(section, &m, &u);
-            let stress = stress(moduli, &strain);
+            let at = deformed.at(&m, point.place);
+            let DeformedAt { strain, stress, .. } = at;
             let weight = point.weight * m.det * section.depth(m.x);
             strain_energy +=
                 0.5 * weight * (0..COMPONENTS).map(|c| stress[c] * strain[c]).sum::<f64>();
@@ -55,11 +77,17 @@ pub fn recover(
                         weight * (0..COMPONENTS).map(|c| b[c][p] * stress[c]).sum::<f64>();
                 }
             }
-            let y = (0..8).map(|i| m.shape[i] * nodes[i][1]).sum();
-            points.push([m.x, y]);
-            point_stress.push(stress);
+            if rule.len() == sampled.len() {
+                sample(&at, &m);
+            }
         }
-        own.push(at_nodes(section, moduli, family, &nodes, &u));
+        if rule.len() != sampled.len() {
+            for point in sampled {
+                let m = family.map(&nodes, point.place);
+                sample(&deformed.at(&m, point.place), &m);
+            }
+        }
+        own.push(deformed.at_nodes());
     }
     let averaged = |of_material: Option<usize>| average(mesh, section, &own, of_material);
     let stress = averaged(None);
@@ -83,8 +111,10 @@ pub fn recover(
         element_stress,
         points,
         point_stress,
+        dilatation_gap,
         internal_force,
         strain_energy,
+        work_on_bubbles,
     }
 }
 
@@ -139,9 +169,10 @@ pub(super) fn recover_nodal_stresses(
             .collect();
         for (sum, u) in sums.iter_mut().zip(fields) {
             let u = element.gather(|n| u[n as usize]);
+            let deformed = Deformed::new(section, material, family, &nodes, &u, [0.0; 2]);
             let mut stresses = [[0.0; COMPONENTS]; 4];
-            for (own, m) in stresses.iter_mut().zip(&points) {
-                *own = stress(section.moduli(e), &strain_at(section, m, &u));
+            for ((own, m), point) in stresses.iter_mut().zip(&points).zip(family.stress_points()) {
+                *own = deformed.at(m, point.place).stress;
             }
             let carried = carried_to_nodes(family, &stresses);
             for (own, &node) in carried.iter().zip(element.iter()) {
@@ -158,41 +189,107 @@ pub(super) fn recover_nodal_stresses(
     Some(sums)
 }
 
-/// Stress of an element at a place in master coordinates.
-pub fn stress_at(
-    section: &Section,
-    moduli: &Moduli,
+/// An element with the displacements of its nodes.
+pub struct Deformed<'a> {
+    section: &'a Section,
+    material: usize,
     family: Family,
-    nodes: &[[f64; 2]; 8],
-    displacements: &[[f64; 2]; 8],
-    place: [f64; 2],
-) -> [f64; COMPONENTS] {
-    let m = family.map(nodes, place);
-    stress(moduli, &strain_at(section, &m, displacements))
+    nodes: &'a AtNodes<[f64; 2]>,
+    u: &'a AtNodes<[f64; 2]>,
+    /// Of a nearly incompressible material.
+    inside: Option<Inside<'a>>,
+    work_on_bubble: f64,
 }
 
-fn strain_at(section: &Section, m: &Mapped, u: &[[f64; 2]; 8]) -> [f64; COMPONENTS] {
-    let mut strain = [0.0; COMPONENTS];
-    for i in 0..8 {
-        let b = section.strain(m.shape[i], m.gradient[i], m.x);
-        (0..COMPONENTS).for_each(|c| strain[c] += b[c][0] * u[i][0] + b[c][1] * u[i][1]);
-    }
-    strain
+/// Strain and stress at a place of an element.
+#[derive(Clone, Copy, Debug)]
+struct DeformedAt {
+    strain: [f64; COMPONENTS],
+    stress: [f64; COMPONENTS],
+    /// θ̄ − div u; 0 of other materials.
+    dilatation_gap: f64,
 }
 
-/// One element's stresses at its nodes, carried from its superconvergent points.
-fn at_nodes(
-    section: &Section,
-    moduli: &Moduli,
-    family: Family,
-    nodes: &[[f64; 2]; 8],
-    u: &[[f64; 2]; 8],
-) -> [[f64; COMPONENTS]; 8] {
-    let mut points = [[0.0; COMPONENTS]; 4];
-    for (stress, point) in points.iter_mut().zip(family.stress_points()) {
-        *stress = stress_at(section, moduli, family, nodes, u, point.place);
+impl<'a> Deformed<'a> {
+    /// `material`: its number in the section; `body_force`: the one (force/volume) that the displacements belong to.
+    pub fn new(
+        section: &'a Section,
+        material: usize,
+        family: Family,
+        nodes: &'a AtNodes<[f64; 2]>,
+        u: &'a AtNodes<[f64; 2]>,
+        body_force: [f64; 2],
+    ) -> Self {
+        let mut deformed = Deformed {
+            section,
+            material,
+            family,
+            nodes,
+            u,
+            inside: None,
+            work_on_bubble: 0.0,
+        };
+        if let Some(split) = section.split(material) {
+            let mixed = Mixed::new(section, split, family, nodes);
+            let force = mixed.force_on_bubble(body_force);
+            let inside = mixed.inside(u, &force);
+            deformed.work_on_bubble = force[0] * inside.bubble[0] + force[1] * inside.bubble[1];
+            deformed.inside = Some(inside);
+        }
+        deformed
     }
-    carried_to_nodes(family, &points)
+
+    /// The points of its integrals.
+    fn rule(&self, quadrature: u32) -> &'static [GaussPoint] {
+        match self.inside {
+            Some(_) => Mixed::rule(self.family),
+            None => self.family.rule(quadrature),
+        }
+    }
+
+    /// Stress at a place in master coordinates.
+    pub fn stress_at(&self, place: [f64; 2]) -> [f64; COMPONENTS] {
+        let m = self.family.map(self.nodes, place);
+        self.at(&m, place).stress
+    }
+
+    fn at(&self, m: &Mapped, place: [f64; 2]) -> DeformedAt {
+        let mut strain = self.strain_of_nodes(m);
+        let Some(inside) = &self.inside else {
+            return DeformedAt {
+                strain,
+                stress: stress(&self.section.materials()[self.material], &strain),
+                dilatation_gap: 0.0,
+            };
+        };
+        inside.add_strain(self.section, self.family, m, place, &mut strain);
+        let (projected, stress) = inside.stress(&strain, position(m, self.nodes));
+        DeformedAt {
+            strain,
+            stress,
+            dilatation_gap: projected - dilatation(&strain),
+        }
+    }
+
+    fn strain_of_nodes(&self, m: &Mapped) -> [f64; COMPONENTS] {
+        let (section, u) = (self.section, self.u);
+        let mut strain = [0.0; COMPONENTS];
+        for i in 0..8 {
+            let b = section.strain(m.shape[i], m.gradient[i], m.x);
+            (0..COMPONENTS).for_each(|c| strain[c] += b[c][0] * u[i][0] + b[c][1] * u[i][1]);
+        }
+        strain
+    }
+
+    /// Stresses at the nodes, carried from the superconvergent points.
+    fn at_nodes(&self) -> [[f64; COMPONENTS]; 8] {
+        let family = self.family;
+        let mut points = [[0.0; COMPONENTS]; 4];
+        for (stress, point) in points.iter_mut().zip(family.stress_points()) {
+            *stress = self.stress_at(point.place);
+        }
+        carried_to_nodes(family, &points)
+    }
 }
 
 /// The stresses at the superconvergent points of an element, carried to its nodes.

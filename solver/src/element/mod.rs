@@ -48,6 +48,21 @@ pub struct Mapped {
     pub x: f64,
 }
 
+impl Mapped {
+    /// dξ/dx, dξ/dy and dη/dx, dη/dy: the nodes reproduce ξ and η themselves.
+    pub fn master_gradients(&self, family: Family) -> [[f64; 2]; 2] {
+        let mut gradients = [[0.0; 2]; 2];
+        for (place, gradient) in family.places().iter().zip(&self.gradient) {
+            for a in 0..2 {
+                for b in 0..2 {
+                    gradients[a][b] += place[a] * gradient[b];
+                }
+            }
+        }
+        gradients
+    }
+}
+
 impl Element {
     /// The family of the element.
     pub fn family(&self) -> Family {
@@ -170,6 +185,22 @@ impl Family {
         }
     }
 
+    /// Master coordinates of the centre.
+    pub fn centre(self) -> [f64; 2] {
+        match self {
+            Family::Quad => [0.0; 2],
+            Family::Triangle => [1.0 / 3.0; 2],
+        }
+    }
+
+    /// A function that is 1 at the centre and 0 on all sides, and its derivatives by ξ and η.
+    pub fn bubble(self, [xi, eta]: [f64; 2]) -> (f64, [f64; 2]) {
+        match self {
+            Family::Quad => quad8::bubble(xi, eta),
+            Family::Triangle => tri6::bubble(xi, eta),
+        }
+    }
+
     /// The rule of thesis 2.3 for quadrilaterals, 3 × 3 or 2 × 2 points, ξ running fastest; of the
     /// same use for triangles 7 points (degree 5) or 3 points (degree 2).
     pub fn rule(self, order: u32) -> &'static [GaussPoint] {
@@ -274,6 +305,28 @@ mod tests {
                     let difference = (plus[i] - minus[i]) / (2.0 * step);
                     assert!((exact[i][a] - difference).abs() < 1e-9);
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn a_bubble_is_one_at_the_centre_and_vanishes_on_the_sides() {
+        for family in FAMILIES {
+            assert!((family.bubble(family.centre()).0 - 1.0).abs() < 1e-15);
+            for &[a, b, _] in family.sides() {
+                let (a, b) = (family.places()[a], family.places()[b]);
+                let on_side = [0, 1].map(|k| 0.3 * a[k] + 0.7 * b[k]);
+                assert!(family.bubble(on_side).0.abs() < 1e-15, "{family:?}");
+            }
+            let (place, step) = ([0.3, 0.4], 1e-6);
+            for a in 0..2 {
+                let shifted = |by: f64| {
+                    let mut place = place;
+                    place[a] += by;
+                    family.bubble(place).0
+                };
+                let difference = (shifted(step) - shifted(-step)) / (2.0 * step);
+                assert!((family.bubble(place).1[a] - difference).abs() < 1e-8);
             }
         }
     }

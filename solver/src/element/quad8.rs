@@ -35,6 +35,14 @@ pub fn shape(xi: f64, eta: f64) -> [f64; 8] {
     })
 }
 
+/// The function that an element may have beside its nodes, 0 on all sides, and its derivatives. With it the
+/// element has all functions of the 9-node quadrilateral.
+#[rustfmt::skip]
+pub fn bubble(xi: f64, eta: f64) -> (f64, [f64; 2]) {
+    let (p, q) = (1.0 - xi * xi, 1.0 - eta * eta);
+    (p * q, [-2.0 * xi * q, -2.0 * eta * p])
+}
+
 /// dh_i/dξ and dh_i/dη.
 #[rustfmt::skip]
 pub fn derivative(xi: f64, eta: f64) -> [[f64; 2]; 8] {

@@ -32,6 +32,13 @@ pub fn shape(xi: f64, eta: f64) -> [f64; 8] {
     ]
 }
 
+/// The function that an element may have beside its nodes, 0 on all sides, and its derivatives.
+#[rustfmt::skip]
+pub fn bubble(xi: f64, eta: f64) -> (f64, [f64; 2]) {
+    let zeta = 1.0 - xi - eta;
+    (27.0 * xi * eta * zeta, [27.0 * eta * (zeta - xi), 27.0 * xi * (zeta - eta)])
+}
+
 /// dh_i/dξ and dh_i/dη; two zeros follow.
 #[rustfmt::skip]
 pub fn derivative(xi: f64, eta: f64) -> [[f64; 2]; 8] {

@@ -72,7 +72,7 @@ impl Checks {
             format!("{pointer}/poissons_ratio"),
             nu,
             "−1 < Poisson's ratio < 0.5",
-            "For a nearly incompressible body use a value such as 0.49.",
+            "For an incompressible body use 0.49999, which differs from it by some 1e-5; its elements do not lock.",
         ));
         all.finish(elasticity::isotropic(analysis, e, nu))
     }

@@ -66,6 +66,11 @@ impl Model {
         checks.found.conclude(model)
     }
 
+    /// Force per volume along x and y at a load level.
+    pub fn body_force(&self, level: &Level) -> [f64; 2] {
+        self.loads.body_force.map(|f| level.loads * f)
+    }
+
     /// A rigid motion that neither the supports nor the given nodes and directions prevent, in words, and a node
     /// that moves.
     pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(&'static str, u32)> {

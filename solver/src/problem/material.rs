@@ -29,7 +29,7 @@ pub enum Elasticity {
     Isotropic {
         /// E > 0 (stress).
         youngs_modulus: f64,
-        /// −1 < ν < 0.5.
+        /// −1 < ν < 0.5; above 0.48 elements take a formulation that does not lock.
         poissons_ratio: f64,
     },
     /// Three axes of symmetry, two of them in the plane.
@@ -43,7 +43,7 @@ pub struct MaterialFields {
     /// E > 0 (stress).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub youngs_modulus: Option<f64>,
-    /// −1 < ν < 0.5. Not the friction coefficient, which the thesis calls ν.
+    /// −1 < ν < 0.5; use 0.49999 for an incompressible material. Not the friction coefficient, which the thesis calls ν.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub poissons_ratio: Option<f64>,
     /// Three axes of symmetry, two of them in the plane.

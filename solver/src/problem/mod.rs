@@ -54,7 +54,8 @@ pub struct Problem {
     /// Load steps, one after the other. Empty: one step to the given values.
     #[serde(default)]
     pub steps: Vec<Step>,
-    /// Gauss points of an element in each direction, 3 or 2 (thesis 2.3).
+    /// Gauss points of an element in each direction, 3 or 2 (thesis 2.3); elements of nearly incompressible materials
+    /// always have 3.
     #[serde(default = "default_quadrature")]
     pub quadrature: u32,
     /// Algorithm, tolerance and limits.

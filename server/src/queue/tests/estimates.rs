@@ -71,6 +71,10 @@ fn problems() -> Vec<(String, Value)> {
             }),
         ));
         problems.push((
+            format!("{name}, nearly incompressible"),
+            with(&|p| p["materials"][0]["poissons_ratio"] = json!(0.4999)),
+        ));
+        problems.push((
             format!("{name}, wide average"),
             with(&|p| p["contacts"][0]["friction"]["nonlocal_radius"] = json!(0.6)),
         ));

@@ -18,7 +18,7 @@ use super::average::{self, linear};
 use super::friction::{Friction, signed_ratio};
 use crate::algorithm::system::{State, System};
 use crate::contact::edge_nodes;
-use crate::elasticity::{self, Dof};
+use crate::elasticity::{Deformed, Dof};
 use crate::element::{Family, edge3, gauss, quad8};
 use crate::problem::{ThesisOptions, ThesisPressure};
 
@@ -155,7 +155,14 @@ impl Rows {
         let nodes = model.mesh.element_nodes(element);
         let u = element.gather(|n| displacements[n as usize]);
         let positions = edge_nodes(rows.edge).map(|i| patch.contact.boundary.positions[i]);
-        let moduli = model.section.moduli(rows.element);
+        let deformed = Deformed::new(
+            &model.section,
+            model.section.material_of(rows.element),
+            Family::Quad,
+            &nodes,
+            &u,
+            model.body_force(&system.level),
+        );
         let (mut stress, mut phi) = ([vec![], vec![]], [vec![], vec![]]);
         for (row, depth) in depths(self.rule).into_iter().enumerate() {
             for &(zeta, _) in self.rule {
@@ -164,14 +171,7 @@ impl Rows {
                 let length = dx.hypot(dy);
                 let ([tx, ty], [nx, ny]) =
                     ([dx / length, dy / length], [-dy / length, dx / length]);
-                let [xx, yy, xy, _] = elasticity::stress_at(
-                    &model.section,
-                    moduli,
-                    Family::Quad,
-                    &nodes,
-                    &u,
-                    [xi, eta],
-                );
+                let [xx, yy, xy, _] = deformed.stress_at([xi, eta]);
                 stress[row].push(xx * nx * nx + 2.0 * xy * nx * ny + yy * ny * ny);
                 let h = quad8::shape(xi, eta);
                 let u_t: f64 = (0..8).map(|i| h[i] * (u[i][0] * tx + u[i][1] * ty)).sum();

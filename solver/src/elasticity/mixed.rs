@@ -1,0 +1,420 @@
+//! The element of nearly incompressible materials, formulation 3.1: displacements of the nodes and of a bubble,
+//! and a pressure that is linear in x and y, all but the first condensed inside the element.
+//!
+//!   u = Σ h_i u_i + b a,    θ̄ = Σ_k ψ_k ∫ ψ_k div u    (the dilatation's projection on the ψ_k)
+//!   k = ∫ Bᵀ R B + κ Σ_k g_k g_kᵀ,    g_k = ∫ ψ_k mᵀ B    with R = `rest`, κ = `bulk` of the [`Split`]
+//!
+//! ψ_1, ψ_2, ψ_3 are orthonormal in the element and span 1, x and y. The pressure −κ θ̄ follows from the
+//! displacements, so that k stays positive; with the bubble's rows b it is reduced to the nodes,
+//!
+//!   k_ij − k_ib k_bb⁻¹ k_bj,    f_i − k_ib k_bb⁻¹ f_b,    a = k_bb⁻¹ (f_b − k_bi u_i)
+
+use crate::elasticity::Section;
+use crate::elasticity::material::{COMPONENTS, Split, stress};
+use crate::element::{AtNodes, Family, GaussPoint, Mapped};
+
+/// Displacements of the largest element with its bubble, which comes after the nodes.
+const SIZE: usize = 18;
+
+/// The components of strain that add up to the dilatation.
+const NORMAL: [usize; 3] = [0, 1, 3];
+
+/// One element, without its displacements.
+pub struct Mixed<'a> {
+    split: &'a Split,
+    /// Nodes: the number of the bubble.
+    nodes: usize,
+    frame: Frame,
+    /// g_k.
+    dilatation: [[f64; SIZE]; 3],
+    /// Rows of the bubble in k.
+    bubble: [[f64; SIZE]; 2],
+    /// k_bb⁻¹.
+    flexibility: [[f64; 2]; 2],
+    /// ∫ b.
+    volume: f64,
+}
+
+/// B of every node and of the bubble at an integration point.
+type Strains = [[[f64; 2]; COMPONENTS]; SIZE / 2];
+
+/// The functions ψ_k.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    centre: [f64; 2],
+    /// From x − centre to ξ, η: the inverse of the element's map, linear as at its centre. These two are of the
+    /// same size in an element of any shape.
+    to_master: [[f64; 2]; 2],
+    /// ψ from (1, ξ, η): lower triangular.
+    orthonormal: [[f64; 3]; 3],
+}
+
+impl Frame {
+    fn monomials(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+        let (dx, dy) = (x - self.centre[0], y - self.centre[1]);
+        let [xi, eta] = self.to_master.map(|[a, b]| a * dx + b * dy);
+        [1.0, xi, eta]
+    }
+
+    /// Σ_k c_k ψ_k at a position.
+    fn combine(&self, coefficients: &[f64; 3], position: [f64; 2]) -> f64 {
+        let q = self.monomials(position);
+        let psi = self.orthonormal.map(|row| dot(&row, &q));
+        dot(coefficients, &psi)
+    }
+}
+
+impl<'a> Mixed<'a> {
+    /// The rule of an element: always the full one, since a smaller one would leave the bubble modes without stiffness.
+    pub fn rule(family: Family) -> &'static [GaussPoint] {
+        family.rule(3)
+    }
+
+    /// The element with these nodes, of a material with this split.
+    pub fn new(
+        section: &Section,
+        split: &'a Split,
+        family: Family,
+        nodes: &AtNodes<[f64; 2]>,
+    ) -> Self {
+        Self::integrate(section, split, family, nodes, |_, _| {})
+    }
+
+    /// `visit`: called at every integration point, with its weight.
+    fn integrate(
+        section: &Section,
+        split: &'a Split,
+        family: Family,
+        nodes: &AtNodes<[f64; 2]>,
+        mut visit: impl FnMut(f64, &Strains),
+    ) -> Self {
+        let count = family.nodes();
+        let centre = family.map(nodes, family.centre());
+        let mut element = Mixed {
+            split,
+            nodes: count,
+            frame: Frame {
+                centre: position(&centre, nodes),
+                to_master: centre.master_gradients(family),
+                orthonormal: [[0.0; 3]; 3],
+            },
+            dilatation: [[0.0; SIZE]; 3],
+            bubble: [[0.0; SIZE]; 2],
+            flexibility: [[0.0; 2]; 2],
+            volume: 0.0,
+        };
+        // of 1, ξ and η instead of the ψ_k, which follow from them
+        let (mut mass, mut moments) = ([[0.0; 3]; 3], [[0.0; SIZE]; 3]);
+        for point in Self::rule(family) {
+            let m = family.map(nodes, point.place);
+            let weight = point.weight * m.det * section.depth(m.x);
+            let (shape, gradient) = bubble(family, &m, point.place);
+            let mut strains = [[[0.0; 2]; COMPONENTS]; SIZE / 2];
+            for i in 0..count {
+                strains[i] = section.strain(m.shape[i], m.gradient[i], m.x);
+            }
+            strains[count] = section.strain(shape, gradient, m.x);
+            let q = element.frame.monomials(position(&m, nodes));
+            for i in 0..3 {
+                (0..=i).for_each(|j| mass[i][j] += weight * q[i] * q[j]);
+            }
+            for (j, b) in strains[..=count].iter().enumerate() {
+                for p in 0..2 {
+                    let trace: f64 = NORMAL.iter().map(|c| b[*c][p]).sum();
+                    (0..3).for_each(|k| moments[k][2 * j + p] += weight * q[k] * trace);
+                }
+            }
+            for p in 0..2 {
+                add_row(split, weight, &strains, count, p, &mut element.bubble[p]);
+            }
+            element.volume += weight * shape;
+            visit(weight, &strains);
+        }
+        element.frame.orthonormal = inverse_of_root(&mass);
+        for (g, row) in element
+            .dilatation
+            .iter_mut()
+            .zip(&element.frame.orthonormal)
+        {
+            *g = std::array::from_fn(|j| (0..3).map(|k| row[k] * moments[k][j]).sum());
+        }
+        for p in 0..2 {
+            let row = element.volumetric_row(2 * count + p);
+            (0..SIZE).for_each(|j| element.bubble[p][j] += row[j]);
+        }
+        let corner = |row: [f64; SIZE]| [row[2 * count], row[2 * count + 1]];
+        let [[a, b], [c, d]] = element.bubble.map(corner);
+        let det = a * d - b * c;
+        element.flexibility = [[d / det, -b / det], [-c / det, a / det]];
+        element
+    }
+
+    /// κ Σ_k g_k g_kᵀ: a row.
+    fn volumetric_row(&self, dof: usize) -> [f64; SIZE] {
+        let own = self.dilatation.map(|g| self.split.bulk * g[dof]);
+        std::array::from_fn(|j| (0..3).map(|k| own[k] * self.dilatation[k][j]).sum())
+    }
+
+    /// The stiffness of the nodes, along x and y; what a triangle does not have is zero.
+    pub fn stiffness(
+        section: &Section,
+        split: &Split,
+        family: Family,
+        nodes: &AtNodes<[f64; 2]>,
+    ) -> [[f64; 16]; 16] {
+        let mut rows = [[0.0; SIZE]; 16];
+        let element = Mixed::integrate(section, split, family, nodes, |weight, strains| {
+            for i in 0..family.nodes() {
+                for p in 0..2 {
+                    add_row(split, weight, strains, i, p, &mut rows[2 * i + p]);
+                }
+            }
+        });
+        let mut k = [[0.0; 16]; 16];
+        for i in 0..2 * element.nodes {
+            let volumetric = element.volumetric_row(i);
+            let own = element.bubble_from(&element.bubble.map(|row| row[i]));
+            for j in 0..=i {
+                let through = own[0] * element.bubble[0][j] + own[1] * element.bubble[1][j];
+                k[i][j] = rows[i][j] + volumetric[j] - through;
+                k[j][i] = k[i][j];
+            }
+        }
+        k
+    }
+
+    /// k_bb⁻¹ f.
+    fn bubble_from(&self, force: &[f64; 2]) -> [f64; 2] {
+        self.flexibility
+            .map(|row| row[0] * force[0] + row[1] * force[1])
+    }
+
+    /// The force of a body force (force/volume) on the bubble.
+    pub fn force_on_bubble(&self, body_force: [f64; 2]) -> [f64; 2] {
+        body_force.map(|f| f * self.volume)
+    }
+
+    /// What a force on the bubble does to the nodes: −k_ib k_bb⁻¹ f_b.
+    pub fn passed_on(&self, force_on_bubble: &[f64; 2]) -> AtNodes<[f64; 2]> {
+        let a = self.bubble_from(force_on_bubble);
+        let mut forces = [[0.0; 2]; 8];
+        for (i, force) in forces.iter_mut().enumerate().take(self.nodes) {
+            *force = [0, 1].map(|p| {
+                let dof = 2 * i + p;
+                -(self.bubble[0][dof] * a[0] + self.bubble[1][dof] * a[1])
+            });
+        }
+        forces
+    }
+
+    /// What the displacements of the nodes, and a force on the bubble, cause inside.
+    pub fn inside(&self, u: &AtNodes<[f64; 2]>, force_on_bubble: &[f64; 2]) -> Inside<'a> {
+        let nodal = |row: &[f64; SIZE]| -> f64 {
+            let nodes = u.iter().take(self.nodes).enumerate();
+            nodes
+                .map(|(i, u)| row[2 * i] * u[0] + row[2 * i + 1] * u[1])
+                .sum()
+        };
+        let force = [0, 1].map(|p| force_on_bubble[p] - nodal(&self.bubble[p]));
+        let bubble = self.bubble_from(&force);
+        let b = 2 * self.nodes;
+        let dilatation = |g: &[f64; SIZE]| nodal(g) + g[b] * bubble[0] + g[b + 1] * bubble[1];
+        Inside {
+            split: self.split,
+            frame: self.frame,
+            bubble,
+            dilatation: self.dilatation.each_ref().map(dilatation),
+        }
+    }
+}
+
+/// The state inside an element whose nodes are displaced.
+pub struct Inside<'a> {
+    split: &'a Split,
+    frame: Frame,
+    /// a.
+    pub bubble: [f64; 2],
+    /// The coefficients of θ̄.
+    dilatation: [f64; 3],
+}
+
+impl Inside<'_> {
+    /// Adds the bubble's part to the strain of the nodes at a place.
+    pub fn add_strain(
+        &self,
+        section: &Section,
+        family: Family,
+        m: &Mapped,
+        place: [f64; 2],
+        strain: &mut [f64; COMPONENTS],
+    ) {
+        let (shape, gradient) = bubble(family, m, place);
+        let b = section.strain(shape, gradient, m.x);
+        (0..COMPONENTS).for_each(|c| strain[c] += dot2(&b[c], &self.bubble));
+    }
+
+    /// θ̄ at a position, and the stress there with the whole strain.
+    pub fn stress(
+        &self,
+        strain: &[f64; COMPONENTS],
+        position: [f64; 2],
+    ) -> (f64, [f64; COMPONENTS]) {
+        let dilatation = self.frame.combine(&self.dilatation, position);
+        let mut stress = stress(&self.split.rest, strain);
+        NORMAL
+            .iter()
+            .for_each(|c| stress[*c] += self.split.bulk * dilatation);
+        (dilatation, stress)
+    }
+}
+
+/// Adds ∫ Bᵀ R B of one point to the row for displacement `p` of node `i`, up to that node.
+fn add_row(
+    split: &Split,
+    weight: f64,
+    strains: &Strains,
+    i: usize,
+    p: usize,
+    row: &mut [f64; SIZE],
+) {
+    let strain = std::array::from_fn(|c| weight * strains[i][c][p]);
+    let stress = stress(&split.rest, &strain);
+    for (j, b) in strains[..=i].iter().enumerate() {
+        for q in 0..2 {
+            row[2 * j + q] += (0..COMPONENTS).map(|c| b[c][q] * stress[c]).sum::<f64>();
+        }
+    }
+}
+
+/// ε_xx + ε_yy + ε_zz.
+pub(super) fn dilatation(strain: &[f64; COMPONENTS]) -> f64 {
+    NORMAL.iter().map(|c| strain[*c]).sum()
+}
+
+/// The bubble at a place, and its derivatives by x and y.
+fn bubble(family: Family, m: &Mapped, place: [f64; 2]) -> (f64, [f64; 2]) {
+    let (value, [p, q]) = family.bubble(place);
+    let [xi, eta] = m.master_gradients(family);
+    (value, [0, 1].map(|d| p * xi[d] + q * eta[d]))
+}
+
+/// x and y of a mapped place.
+pub(super) fn position(m: &Mapped, nodes: &AtNodes<[f64; 2]>) -> [f64; 2] {
+    [m.x, (0..8).map(|i| m.shape[i] * nodes[i][1]).sum()]
+}
+
+/// L⁻¹ of the lower triangle of M = L Lᵀ.
+fn inverse_of_root(m: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    let a = m[0][0].sqrt();
+    let (b, c) = (m[1][0] / a, m[2][0] / a);
+    let d = (m[1][1] - b * b).sqrt();
+    let e = (m[2][1] - b * c) / d;
+    let f = (m[2][2] - c * c - e * e).sqrt();
+    [
+        [1.0 / a, 0.0, 0.0],
+        [-b / (a * d), 1.0 / d, 0.0],
+        [(b * e - c * d) / (a * d * f), -e / (d * f), 1.0 / f],
+    ]
+}
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn dot2(a: &[f64; 2], b: &[f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::elasticity::isotropic;
+    use crate::problem::Analysis;
+
+    const QUAD: [[f64; 2]; 8] = [
+        [1.0, 0.0],
+        [2.0, 0.1],
+        [2.2, 1.0],
+        [1.0, 0.9],
+        [1.5, 0.0],
+        [2.1, 0.6],
+        [1.6, 1.0],
+        [0.95, 0.45],
+    ];
+
+    fn section(analysis: Analysis, nu: f64) -> Section {
+        Section::uniform(analysis, isotropic(&analysis, 1000.0, nu))
+    }
+
+    #[test]
+    fn the_pressures_functions_are_orthonormal_in_elements_of_any_shape() {
+        // 1000 times as long as wide, and turned
+        let thin = QUAD.map(|[x, y]| {
+            let (a, b) = (1000.0 * x, y);
+            [1e4 + 0.8 * a - 0.6 * b, 0.6 * a + 0.8 * b]
+        });
+        for nodes in [QUAD, thin] {
+            for (family, analysis) in [
+                (Family::Quad, Analysis::PlaneStrain {}),
+                (Family::Quad, Analysis::Axisymmetric {}),
+                (Family::Triangle, Analysis::PlaneStrain {}),
+            ] {
+                let mut nodes = nodes;
+                if family == Family::Triangle {
+                    let middle =
+                        |a: usize, b: usize| [0, 1].map(|c| 0.5 * (nodes[a][c] + nodes[b][c]));
+                    (nodes[3], nodes[4], nodes[5]) = (middle(0, 1), middle(1, 2), middle(2, 0));
+                }
+                let section = section(analysis, 0.499);
+                let split = section.split(0).unwrap();
+                let element = Mixed::new(&section, split, family, &nodes);
+                for i in 0..3 {
+                    for j in 0..3 {
+                        let sum: f64 = Mixed::rule(family)
+                            .iter()
+                            .map(|point| {
+                                let m = family.map(&nodes, point.place);
+                                let weight = point.weight * m.det * section.depth(m.x);
+                                let at = position(&m, &nodes);
+                                let unit = |k: usize| {
+                                    let mut c = [0.0; 3];
+                                    c[k] = 1.0;
+                                    element.frame.combine(&c, at)
+                                };
+                                weight * unit(i) * unit(j)
+                            })
+                            .sum();
+                        let expected = f64::from(u8::from(i == j));
+                        assert!((sum - expected).abs() < 1e-9, "{family:?} {i} {j}: {sum}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// The bubble takes the displacement at which the element's energy is least.
+    #[test]
+    fn the_bubble_minimises_the_energy() {
+        let section = section(Analysis::PlaneStrain {}, 0.4999);
+        let element = Mixed::new(&section, section.split(0).unwrap(), Family::Quad, &QUAD);
+        let u = QUAD.map(|[x, y]| [0.01 * x * y + 0.003 * y * y, -0.02 * x * x]);
+        let force = element.force_on_bubble([3.0, -5.0]);
+        let inside = element.inside(&u, &force);
+        for p in 0..2 {
+            let mut residual = force[p]
+                - dot2(
+                    &[element.bubble[p][16], element.bubble[p][17]],
+                    &inside.bubble,
+                );
+            let mut size = force[p].abs();
+            for (i, u) in u.iter().enumerate() {
+                for q in 0..2 {
+                    residual -= element.bubble[p][2 * i + q] * u[q];
+                    size += (element.bubble[p][2 * i + q] * u[q]).abs();
+                }
+            }
+            assert!(residual.abs() < 1e-13 * size, "{residual:e} of {size:e}");
+        }
+    }
+}
