@@ -27,6 +27,7 @@ mod loads;
 mod manufactured;
 mod oblique;
 mod obstacle_normals;
+mod obstacle_points;
 mod patch;
 mod profiles;
 mod random;

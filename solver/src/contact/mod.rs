@@ -2,6 +2,8 @@
 //! normals, weights and the points where friction is evaluated.
 
 pub mod obstacle;
+pub mod shape;
+mod spline;
 
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;

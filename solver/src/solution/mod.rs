@@ -277,6 +277,8 @@ pub enum WarningCode {
     StripCutsPolyline,
     /// An obstacle that ends inside an edge.
     ObstacleCutsEdge,
+    /// A standard deviation that leaves little of a measured profile.
+    SmoothingFlattens,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
     /// Edges longer than the nonlocal radius.
@@ -287,6 +289,10 @@ pub enum WarningCode {
     NoContact,
     /// Contact up to the end of the obstacle.
     ContactReachesObstacleEnd,
+    /// An obstacle that reaches into the body between two nodes.
+    ObstacleBetweenNodes,
+    /// A kink of the obstacle in the contact.
+    KinkInContact,
     /// A nonlocal radius larger than the contact.
     RadiusExceedsContact,
     /// A prescribed friction bound that acts where the body does not touch.
