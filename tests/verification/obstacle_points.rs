@@ -324,6 +324,40 @@ fn a_wedge_between_nodes_is_told() {
     assert!(open.message.contains("never touches"), "{}", open.message);
 }
 
+/// A stamp drawn as a line with upright or overhanging sides, on a plate that is seen beside it: its edges are kinks
+/// without a measure, at nodes and between them.
+#[test]
+fn the_edges_of_a_stamp_drawn_in_space_are_kinks() {
+    for side in [0.5, 0.4, 0.6] {
+        let stamp = [
+            [-1.0, 1.0],
+            [-side, 1.0],
+            [-0.5, 0.0],
+            [0.5, 0.0],
+            [side, 1.0],
+            [1.0, 1.0],
+        ];
+        for spacing in [0.05, 0.07] {
+            let stamp = json!({"kind": "polyline", "points": stamp});
+            let solution = solve(&block(&lines(spacing, &[]), stamp, 0.01));
+            let steep = side == 0.6;
+            let kink = warning(&solution, WarningCode::KinkInContact).unwrap();
+            assert!(
+                kink.message.contains("sharpest of 2"),
+                "{side} {spacing}: {}",
+                kink.message
+            );
+            assert_eq!(
+                kink.message.contains("it has an edge there"),
+                !steep,
+                "{}",
+                kink.message
+            );
+            assert!(unlimited(&solution));
+        }
+    }
+}
+
 /// A smooth tooth in space, between the nodes of the upright side of a body: places are found along any boundary.
 #[test]
 fn a_curve_in_space_is_seen_between_nodes() {

@@ -1,7 +1,8 @@
 //! Rigid obstacles: the part of a boundary that faces one, its distance at the nodes, and what lies between them.
 
-use super::shape::{Corner, Hit, Profile, ROUNDING, Ray, Shape};
-use crate::contact::{ContactBoundary, edge_nodes};
+use super::curve::{Curve, Hit, Ray};
+use super::shape::{Corner, Shape};
+use super::{ContactBoundary, Profile, ROUNDING, edge_nodes};
 use crate::element::edge3;
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{Along, Obstacle};
@@ -136,8 +137,8 @@ impl<'a> View<'a> {
             mesh,
             along: obstacle.span().2,
             surface: match shape.in_space() {
-                true => mesh.surface(),
-                false => Vec::new(),
+                Some(_) => mesh.surface(),
+                None => Vec::new(),
             },
             corners: shape.corners(),
             rounding: ROUNDING * whole.s[whole.s.len() - 1],
@@ -161,10 +162,10 @@ impl<'a> View<'a> {
 
     fn from_place(&self, place: [f64; 2], n: [f64; 2], c: f64) -> Option<Seen> {
         let t = tangent(n);
-        if self.shape.in_space() {
+        if let Some(curve) = self.shape.in_space() {
             let depth = depth(self.mesh, &self.surface, place, n, self.rounding);
             let ray = Ray { place, n, t, depth };
-            let Hit { profile, pieces } = self.shape.met_by(&ray, self.rounding)?;
+            let Hit { profile, pieces } = curve.met_by(&ray, self.rounding)?;
             return Some(Seen { profile, pieces });
         }
         let (distance, slope) = self.shape.at(c, self.rounding)?;
@@ -208,7 +209,7 @@ impl<'a> View<'a> {
     /// at a node, nothing of it is seen beside that node.
     fn ends_inside(&self, edge: usize, seen: &[Option<Seen>; 3]) -> bool {
         const BESIDE: f64 = 1.0 / 64.0;
-        if !self.shape.in_space() || seen.iter().all(Option::is_some) {
+        if self.shape.in_space().is_none() || seen.iter().all(Option::is_some) {
             return false;
         }
         let [start, end, middle] = seen.map(|seen| seen.is_some());
@@ -229,21 +230,35 @@ impl<'a> View<'a> {
             kink,
             nearer: edge3::interpolate(&edge3::shape(xi), &at_nodes) - profile.distance,
         };
+        let [start, end, middle] = nodes;
+        let mut sight = vec![(-1.0, start), (0.0, middle), (1.0, end)];
         for xi in BETWEEN {
-            let (_, n, _) = self.place(edge, xi);
-            let seen = self.from_edge(edge, xi);
-            found.extend(seen.map(|seen| place(xi, n, seen.profile, 0.0)));
+            if let Some(seen) = self.from_edge(edge, xi) {
+                let (_, n, _) = self.place(edge, xi);
+                found.push(place(xi, n, seen.profile, 0.0));
+                sight.push((xi, seen));
+            }
         }
+        sight.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (xi, corner) in self.corners_in(edge) {
             let (position, n, _) = self.place(edge, xi);
             let kink = corner.change * self.per_length(tangent(n)).abs();
             let seen = self.from_place(position, n, corner.c);
             found.extend(seen.map(|seen| place(xi, n, seen.profile, kink)));
         }
-        for (xi, kink) in self.joints_in(edge, nodes) {
-            let (_, n, _) = self.place(edge, xi);
-            let seen = self.from_edge(edge, xi);
-            found.extend(seen.map(|seen| place(xi, n, seen.profile, kink)));
+        let joints = match self.shape.in_space() {
+            Some(curve) => self.joints_in(curve, edge, &sight),
+            None => Vec::new(),
+        };
+        for (xi, point, change) in joints {
+            let (position, n, _) = self.place(edge, xi);
+            let ahead = (0..2).map(|a| (point[a] - position[a]) * n[a]).sum::<f64>();
+            if let Some(seen) = self.from_edge(edge, xi) {
+                // another part of the line may lie before it
+                let hidden = (ahead - seen.profile.distance).abs() > 1e3 * self.rounding;
+                let kink = if hidden { 0.0 } else { change };
+                found.push(place(xi, n, seen.profile, kink));
+            }
         }
         if found.len() > MOST_PLACES {
             let half = MOST_PLACES / 2;
@@ -288,29 +303,21 @@ impl<'a> View<'a> {
         found
     }
 
-    /// Joints of the pieces of a curve in space, as seen from an edge, and the changes of slope there.
-    fn joints_in(&self, edge: usize, nodes: [Seen; 3]) -> Vec<(f64, f64)> {
-        if !self.shape.in_space() {
-            return Vec::new();
-        }
-        let [start, end, middle] = nodes;
-        let mut sight = vec![(-1.0, start), (0.0, middle), (1.0, end)];
-        for xi in BETWEEN {
-            sight.extend(self.from_edge(edge, xi).map(|seen| (xi, seen)));
-        }
-        sight.sort_by(|a, b| a.0.total_cmp(&b.0));
+    /// Joints of the pieces of a curve in space that an edge faces: where on the edge, the point, and the change of slope.
+    /// `sight`: the obstacle from places of the edge, in their order.
+    fn joints_in(
+        &self,
+        curve: &Curve<'_>,
+        edge: usize,
+        sight: &[(f64, Seen)],
+    ) -> Vec<(f64, [f64; 2], f64)> {
         let last = edge + 1 == self.whole.edge_count();
-        let mut found: Vec<(f64, f64)> = Vec::new();
-        let add = |joint: usize, xi: f64, found: &mut Vec<(f64, f64)>| {
-            let (_, n, _) = self.place(edge, xi);
-            let (_, change) = self.shape.joint(joint, n, tangent(n));
-            found.push((xi, change));
-        };
-        for (xi, seen) in &sight {
+        let mut found: Vec<(f64, usize)> = Vec::new();
+        for (xi, seen) in sight {
             // that at the end belongs to the next edge
             if *xi < 1.0 || last {
                 if seen.pieces[1] == seen.pieces[0] + 1 {
-                    add(seen.pieces[1], *xi, &mut found);
+                    found.push((*xi, seen.pieces[1]));
                 }
             }
         }
@@ -321,30 +328,43 @@ impl<'a> View<'a> {
                 () if b.pieces[1] < a.pieces[0] => b.pieces[1] + 1..=a.pieces[0],
                 () => continue,
             };
-            for joint in between {
-                if let Some(xi) = self.faces(edge, joint, [low, high]) {
-                    add(joint, xi, &mut found);
-                }
-            }
+            let facing = |joint| Some((self.faces(curve, edge, joint, [low, high])?, joint));
+            found.extend(between.filter_map(facing));
         }
-        found
+        let with_change = |(xi, joint)| {
+            let (_, n, _) = self.place(edge, xi);
+            let (point, change) = curve.joint(joint, n, tangent(n));
+            (xi, point, change)
+        };
+        found.into_iter().map(with_change).collect()
     }
 
     /// Where between two places of an edge its normal meets a joint, if it does.
-    fn faces(&self, edge: usize, joint: usize, [mut low, mut high]: [f64; 2]) -> Option<f64> {
-        let before = |xi: f64| {
+    fn faces(
+        &self,
+        curve: &Curve<'_>,
+        edge: usize,
+        joint: usize,
+        [mut low, mut high]: [f64; 2],
+    ) -> Option<f64> {
+        let ahead = |xi: f64| {
             let (place, n, _) = self.place(edge, xi);
             let t = tangent(n);
-            let (point, _) = self.shape.joint(joint, n, t);
-            (point[0] - place[0]) * t[0] + (point[1] - place[1]) * t[1] > 0.0
+            let (point, _) = curve.joint(joint, n, t);
+            (point[0] - place[0]) * t[0] + (point[1] - place[1]) * t[1]
         };
-        if !before(low) || before(high) {
+        for end in [low, high] {
+            if ahead(end).abs() <= self.rounding {
+                return Some(end);
+            }
+        }
+        if ahead(low) < 0.0 || ahead(high) > 0.0 {
             return None;
         }
         // to rounding
         for _ in 0..50 {
             let middle = 0.5 * (low + high);
-            if before(middle) {
+            if ahead(middle) > 0.0 {
                 low = middle;
             } else {
                 high = middle;

@@ -1,20 +1,9 @@
-//! The shape of an obstacle: its distance as a function of the coordinate c, or a curve in space that is met along the
-//! body's normal.
+//! The shape of an obstacle: its distance as a function of the coordinate c, or a curve in space.
 
+use super::ROUNDING;
+use super::curve::Curve;
 use super::spline::{Spline, smoothed};
 use crate::problem::{Interpolation, Obstacle};
-
-/// Positions count as equal within this part of a length: they coincide with grid lines only up to rounding.
-pub(super) const ROUNDING: f64 = 1e-9;
-
-/// Distance and slope of an obstacle at a place on the boundary.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Profile {
-    /// Distance along the body's normal (length); the indentation is not yet subtracted.
-    pub distance: f64,
-    /// Its change per length along t; the mean of both sides at a kink.
-    pub slope: f64,
-}
 
 /// A place where an obstacle may be nearer to the body than beside it, or has a kink.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,30 +20,8 @@ pub(super) enum Shape<'a> {
     Of(&'a Obstacle),
     /// A smooth table.
     Smooth(Spline),
-    /// A broken line in space.
-    Segments(&'a [[f64; 2]]),
-    /// A smooth line in space: the Bézier points of its cubics.
-    Curve(Vec<Bezier>),
-    /// A straight line in space through a point along a direction, without ends.
-    Line([f64; 2], [f64; 2]),
-}
-
-/// The four points of a cubic: its ends, and two between that its tangents there point at.
-type Bezier = [[f64; 2]; 4];
-
-/// Where a normal meets a curve in space.
-pub(super) struct Hit {
-    pub(super) profile: Profile,
-    /// The first and the last of the pieces that meet there.
-    pub(super) pieces: [usize; 2],
-}
-
-/// A normal of the body: its foot n, t, and how far the body reaches along −n.
-pub(super) struct Ray {
-    pub(super) place: [f64; 2],
-    pub(super) n: [f64; 2],
-    pub(super) t: [f64; 2],
-    pub(super) depth: f64,
+    /// A curve in space, which has no coordinate c.
+    InSpace(Curve<'a>),
 }
 
 impl<'a> Shape<'a> {
@@ -77,21 +44,18 @@ impl<'a> Shape<'a> {
                 points,
                 interpolation,
                 ..
-            } => match interpolation {
-                Interpolation::Linear => Shape::Segments(points),
-                Interpolation::Cubic => Shape::Curve(curve(points)),
-            },
-            Obstacle::Line { point, angle, .. } => {
-                let (sine, cosine) = angle.to_radians().sin_cos();
-                Shape::Line(*point, [point[0] + cosine, point[1] + sine])
-            }
+            } => Shape::InSpace(Curve::through(points, *interpolation)),
+            Obstacle::Line { point, angle, .. } => Shape::InSpace(Curve::line(*point, *angle)),
             other => Shape::Of(other),
         }
     }
 
-    /// A curve in space, which has no coordinate c.
-    pub(super) fn in_space(&self) -> bool {
-        !matches!(self, Shape::Of(_) | Shape::Smooth(_))
+    /// The curve, if it is one in space.
+    pub(super) fn in_space(&self) -> Option<&Curve<'a>> {
+        match self {
+            Shape::InSpace(curve) => Some(curve),
+            Shape::Of(_) | Shape::Smooth(_) => None,
+        }
     }
 
     /// The ends of the obstacle in the coordinate c. A circle has none: contact does not come near to where it stands
@@ -174,74 +138,9 @@ impl<'a> Shape<'a> {
             _ => None,
         }
     }
-
-    /// Where a normal of the body meets a curve in space.
-    pub(super) fn met_by(&self, ray: &Ray, rounding: f64) -> Option<Hit> {
-        let mut hits: Vec<Hit> = Vec::new();
-        match self {
-            Shape::Of(_) | Shape::Smooth(_) => {}
-            Shape::Segments(points) => {
-                for (k, pair) in points.windows(2).enumerate() {
-                    hits.extend(on_segment(ray, pair[0], pair[1], [0.0, 1.0], k, rounding));
-                }
-            }
-            Shape::Line(start, end) => {
-                let endless = [f64::NEG_INFINITY, f64::INFINITY];
-                hits.extend(on_segment(ray, *start, *end, endless, 0, rounding));
-            }
-            Shape::Curve(cubics) => {
-                for (k, cubic) in cubics.iter().enumerate() {
-                    on_cubic(ray, cubic, k, rounding, &mut hits);
-                }
-            }
-        }
-        // an obstacle behind the body faces its other side
-        hits.retain(|hit| hit.profile.distance >= -ray.depth);
-        let nearest = hits
-            .iter()
-            .map(|hit| hit.profile.distance.abs())
-            .fold(f64::INFINITY, f64::min);
-        // two segments meet in a kink: the mean of their slopes
-        hits.retain(|hit| hit.profile.distance.abs() <= nearest + rounding);
-        let count = hits.len() as f64;
-        let slope = hits.iter().map(|hit| hit.profile.slope).sum::<f64>() / count;
-        let (first, last) = (hits.first()?, hits.last()?);
-        Some(Hit {
-            profile: Profile {
-                slope,
-                ..first.profile
-            },
-            pieces: [first.pieces[0], last.pieces[0]],
-        })
-    }
-
-    /// The point between piece `k − 1` and piece `k` of a curve in space, and the change of the profile's slope there,
-    /// seen along the normal `n`.
-    pub(super) fn joint(&self, k: usize, n: [f64; 2], t: [f64; 2]) -> ([f64; 2], f64) {
-        match self {
-            Shape::Segments(points) => {
-                let side = |k: usize| {
-                    let direction = [0, 1].map(|a| points[k + 1][a] - points[k][a]);
-                    (dot(direction, n), dot(direction, t))
-                };
-                let ((rise, along), (next_rise, next_along)) = (side(k - 1), side(k));
-                let upright = |rise: f64, along: f64| along.abs() <= ROUNDING * rise.abs();
-                let change = match (upright(rise, along), upright(next_rise, next_along)) {
-                    // the edge of a face that overhangs
-                    (false, false) if along * next_along < 0.0 => f64::INFINITY,
-                    (false, false) => (next_rise / next_along - rise / along) * along.signum(),
-                    (false, true) => next_rise * f64::INFINITY,
-                    (true, false) => -rise * f64::INFINITY,
-                    (true, true) => 0.0,
-                };
-                (points[k], change)
-            }
-            Shape::Curve(cubics) => (cubics[k][0], 0.0),
-            Shape::Of(_) | Shape::Smooth(_) | Shape::Line(..) => ([f64::NAN; 2], 0.0),
-        }
-    }
 }
 
+/// Distance and its change with c, where the profile is a formula or a table with straight lines.
 fn formula(obstacle: &Obstacle, c: f64, rounding: f64) -> Option<(f64, f64)> {
     // a circle of radius R that leaves the surface at x = 0
     let round = |radius: f64, x: f64| {
@@ -304,137 +203,6 @@ fn tabulated(x: &[f64], y: &[f64], at: f64, rounding: f64) -> Option<(f64, f64)>
         slope(k)
     };
     Some((distance, mean))
-}
-
-/// Where a normal meets the straight line from `start` to `end`, if the parameter between them is in its range.
-fn on_segment(
-    ray: &Ray,
-    start: [f64; 2],
-    end: [f64; 2],
-    [least, most]: [f64; 2],
-    piece: usize,
-    rounding: f64,
-) -> Option<Hit> {
-    let Ray { place, n, t, .. } = *ray;
-    let direction = [end[0] - start[0], end[1] - start[1]];
-    let length = direction[0].hypot(direction[1]);
-    let across = direction[0] * t[0] + direction[1] * t[1];
-    if across.abs() <= ROUNDING * length {
-        return None; // seen end on
-    }
-    let towards = [place[0] - start[0], place[1] - start[1]];
-    let part = (towards[0] * t[0] + towards[1] * t[1]) / across;
-    let slack = rounding / length;
-    if part < least - slack || part > most + slack {
-        return None;
-    }
-    let meet = [
-        start[0] + part * direction[0] - place[0],
-        start[1] + part * direction[1] - place[1],
-    ];
-    Some(Hit {
-        profile: Profile {
-            distance: meet[0] * n[0] + meet[1] * n[1],
-            slope: (direction[0] * n[0] + direction[1] * n[1]) / across,
-        },
-        pieces: [piece; 2],
-    })
-}
-
-/// The spline through points of a plane, by the length of the chords.
-fn curve(points: &[[f64; 2]]) -> Vec<Bezier> {
-    let mut length = vec![0.0];
-    for pair in points.windows(2) {
-        let chord = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
-        length.push(length[length.len() - 1] + chord);
-    }
-    let splines = [0, 1].map(|a| {
-        Spline::new(
-            length.clone(),
-            points.iter().map(|point| point[a]).collect(),
-        )
-    });
-    let cubic = |k: usize| {
-        let [from, to] = splines[0].ends(k);
-        let third = (to - from) / 3.0;
-        let [x, y] = [&splines[0], &splines[1]].map(|spline| {
-            let ([start, before], [end, after]) =
-                (spline.on_piece(k, from), spline.on_piece(k, to));
-            [start, start + third * before, end - third * after, end]
-        });
-        std::array::from_fn(|i| [x[i], y[i]])
-    };
-    (0..splines[0].pieces()).map(cubic).collect()
-}
-
-/// Slopes of a curve in space up to this are rounding: a symmetric one is flat in its middle.
-const FLAT: f64 = 1e-12;
-
-/// Parts of a cubic, in each of which it crosses a normal at most once.
-const PARTS: usize = 8;
-
-/// Halvings of such a part: to rounding.
-const HALVINGS: usize = 50;
-
-/// Where a normal meets one cubic of a curve.
-fn on_cubic(ray: &Ray, cubic: &Bezier, k: usize, rounding: f64, hits: &mut Vec<Hit>) {
-    let Ray { place, n, t, .. } = *ray;
-    let part_along = |axis: [f64; 2]| cubic.map(|p| dot([p[0] - place[0], p[1] - place[1]], axis));
-    // a cubic lies between its Bézier points
-    let beside = part_along(t);
-    if beside.iter().all(|b| *b > rounding) || beside.iter().all(|b| *b < -rounding) {
-        return;
-    }
-    let ahead = part_along(n);
-    // value and change of a component
-    let at = |[a, b, c, d]: [f64; 4], u: f64| {
-        let v = 1.0 - u;
-        let value = v * v * (v * a + 3.0 * u * b) + u * u * (3.0 * v * c + u * d);
-        let change = 3.0 * (v * v * (b - a) + 2.0 * u * v * (c - b) + u * u * (d - c));
-        [value, change]
-    };
-    let mut add = |u: f64| {
-        let ([distance, rise], [_, across]) = (at(ahead, u), at(beside, u));
-        if across.abs() > ROUNDING * rise.hypot(across) {
-            let slope = match rise / across {
-                slope if slope.abs() <= FLAT => 0.0,
-                slope => slope,
-            };
-            hits.push(Hit {
-                profile: Profile { distance, slope },
-                pieces: [k; 2],
-            });
-        }
-    };
-    // an end counts within rounding
-    let at_end = [beside[0], beside[3]].map(|b| b.abs() <= rounding);
-    for (u, _) in [0.0, 1.0].into_iter().zip(at_end).filter(|(_, is)| *is) {
-        add(u);
-    }
-    let side = |u: f64| at(beside, u)[0] <= 0.0;
-    for i in 0..PARTS {
-        if (i == 0 && at_end[0]) || (i + 1 == PARTS && at_end[1]) {
-            continue;
-        }
-        let [mut low, mut high] = [i, i + 1].map(|i| i as f64 / PARTS as f64);
-        let rises = side(low);
-        if rises == side(high) {
-            continue;
-        }
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if side(middle) == rises {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        add(0.5 * (low + high));
-    }
-}
-
-fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
 }
 
 #[cfg(test)]
