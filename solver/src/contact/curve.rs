@@ -224,8 +224,8 @@ fn near(blocks: &[Block], ray: &Ray, rounding: f64) -> impl Iterator<Item = usiz
     let passes = move |block: &&Block| {
         let [x, y] = block.center;
         let aside = dot([x - place[0], y - place[1]], t).abs();
-        // not `<=`: what is not a number is not left out
-        !(aside > block.radius * (1.0 + ROUNDING) + 2.0 * rounding)
+        // what is not a number is not left out
+        aside.is_nan() || aside <= block.radius * (1.0 + ROUNDING) + 2.0 * rounding
     };
     blocks
         .iter()

@@ -76,7 +76,7 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
         );
         let within = least >= low - rounding && most <= high + rounding;
         let touches = most > low + rounding && least < high - rounding;
-        let seen = nodes.map(|node| view.from_node(node));
+        let seen = nodes.map(|node| view.seen_from_node(node));
         if touches && (!within || view.ends_inside(k, &seen)) {
             found.cut.push([least, most]);
         }
@@ -155,12 +155,12 @@ impl<'a> View<'a> {
         }
     }
 
-    fn from_node(&self, node: usize) -> Option<Seen> {
+    fn seen_from_node(&self, node: usize) -> Option<Seen> {
         let (place, n) = (self.whole.positions[node], self.whole.normals[node]);
-        self.from_place(place, n, self.coordinate(node))
+        self.seen_from_place(place, n, self.coordinate(node))
     }
 
-    fn from_place(&self, place: [f64; 2], n: [f64; 2], c: f64) -> Option<Seen> {
+    fn seen_from_place(&self, place: [f64; 2], n: [f64; 2], c: f64) -> Option<Seen> {
         let t = tangent(n);
         if let Some(curve) = self.shape.in_space() {
             let depth = depth(self.mesh, &self.surface, place, n, self.rounding);
@@ -200,9 +200,9 @@ impl<'a> View<'a> {
         )
     }
 
-    fn from_edge(&self, edge: usize, xi: f64) -> Option<Seen> {
+    fn seen_from_edge(&self, edge: usize, xi: f64) -> Option<Seen> {
         let (place, n, c) = self.place(edge, xi);
-        self.from_place(place, n, c)
+        self.seen_from_place(place, n, c)
     }
 
     /// Whether a curve in space ends inside an edge: some of its nodes face it and others do not. Where it ends exactly
@@ -213,7 +213,7 @@ impl<'a> View<'a> {
             return false;
         }
         let [start, end, middle] = seen.map(|seen| seen.is_some());
-        let beside = |is_seen: bool, xi: f64| is_seen && self.from_edge(edge, xi).is_some();
+        let beside = |is_seen: bool, xi: f64| is_seen && self.seen_from_edge(edge, xi).is_some();
         middle || beside(start, -1.0 + BESIDE) || beside(end, 1.0 - BESIDE)
     }
 
@@ -233,7 +233,7 @@ impl<'a> View<'a> {
         let [start, end, middle] = nodes;
         let mut sight = vec![(-1.0, start), (0.0, middle), (1.0, end)];
         for xi in BETWEEN {
-            if let Some(seen) = self.from_edge(edge, xi) {
+            if let Some(seen) = self.seen_from_edge(edge, xi) {
                 let (_, n, _) = self.place(edge, xi);
                 found.push(place(xi, n, seen.profile, 0.0));
                 sight.push((xi, seen));
@@ -243,7 +243,7 @@ impl<'a> View<'a> {
         for (xi, corner) in self.corners_in(edge) {
             let (position, n, _) = self.place(edge, xi);
             let kink = corner.change * self.per_length(tangent(n)).abs();
-            let seen = self.from_place(position, n, corner.c);
+            let seen = self.seen_from_place(position, n, corner.c);
             found.extend(seen.map(|seen| place(xi, n, seen.profile, kink)));
         }
         let joints = match self.shape.in_space() {
@@ -253,7 +253,7 @@ impl<'a> View<'a> {
         for (xi, point, change) in joints {
             let (position, n, _) = self.place(edge, xi);
             let ahead = (0..2).map(|a| (point[a] - position[a]) * n[a]).sum::<f64>();
-            if let Some(seen) = self.from_edge(edge, xi) {
+            if let Some(seen) = self.seen_from_edge(edge, xi) {
                 // another part of the line may lie before it
                 let hidden = (ahead - seen.profile.distance).abs() > 1e3 * self.rounding;
                 let kink = if hidden { 0.0 } else { change };
@@ -315,10 +315,9 @@ impl<'a> View<'a> {
         let mut found: Vec<(f64, usize)> = Vec::new();
         for (xi, seen) in sight {
             // that at the end belongs to the next edge
-            if *xi < 1.0 || last {
-                if seen.pieces[1] == seen.pieces[0] + 1 {
-                    found.push((*xi, seen.pieces[1]));
-                }
+            let joint = seen.pieces[1] == seen.pieces[0] + 1;
+            if joint && (*xi < 1.0 || last) {
+                found.push((*xi, seen.pieces[1]));
             }
         }
         for pair in sight.windows(2) {
