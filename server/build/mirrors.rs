@@ -71,6 +71,8 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     names("NormalOf", "problem::NormalOf").defaulted(),
     names("Condition", "problem::Condition").defaulted(),
     kinds("Obstacle", "problem::Obstacle"),
+    names("Interpolation", "problem::Interpolation").defaulted(),
+    fields("Smoothing", "problem::Smoothing"),
     names("Along", "problem::Along").defaulted(),
     fields("Friction", "problem::Friction"),
     fields("BoundTable", "problem::BoundTable"),

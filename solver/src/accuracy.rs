@@ -103,6 +103,7 @@ pub fn assess(
         let error = bounds.as_ref().map(|bounds| bounds[i]);
         let (error, method) = match (error, quantity.name) {
             _ if quantity.unlimited => (None, ErrorMethod::NoLimit),
+            _ if quantity.unseen => (None, ErrorMethod::Unknown),
             (Some(error), QuantityName::ContactStart | QuantityName::ContactEnd) => {
                 (Some(error), ErrorMethod::NodeSpacing)
             }
@@ -122,7 +123,8 @@ pub fn assess(
             method,
         });
     }
-    conclude(reported.summary.outcome, found)
+    let unseen: Vec<bool> = quantities.iter().map(|quantity| quantity.unseen).collect();
+    conclude(reported.summary.outcome, found, &unseen)
 }
 
 /// What the error of a quantity is compared with.
@@ -291,8 +293,8 @@ fn gap_between_nodes(system: &System<'_>, finished: &Finished, force: &[f64]) ->
     sum
 }
 
-/// The verdict and its reasons.
-fn conclude(outcome: Outcome, quantities: Vec<EstimatedQuantity>) -> Accuracy {
+/// The verdict and its reasons; `unseen`: quantities of obstacles that reach into the body between the nodes.
+fn conclude(outcome: Outcome, quantities: Vec<EstimatedQuantity>, unseen: &[bool]) -> Accuracy {
     let mut verdict = Verdict::Good;
     let mut reasons: Vec<(f64, String)> = Vec::new();
     if outcome != Outcome::Converged {
@@ -300,7 +302,8 @@ fn conclude(outcome: Outcome, quantities: Vec<EstimatedQuantity>) -> Accuracy {
         let reason = "The iterations did not converge: nothing is known of the errors.";
         reasons.push((f64::INFINITY, reason.to_owned()));
     }
-    for q in quantities.iter().filter(|_| outcome == Outcome::Converged) {
+    let assessed = quantities.iter().zip(unseen);
+    for (q, unseen) in assessed.filter(|_| outcome == Outcome::Converged) {
         let (name, contact) = (<&str>::from(q.quantity), &q.contact);
         let [good, fair] = match q.quantity {
             QuantityName::NormalForce
@@ -351,6 +354,15 @@ fn conclude(outcome: Outcome, quantities: Vec<EstimatedQuantity>) -> Accuracy {
                         "`{name}` of contact `{contact}`, {:.5e}, may be off by {}, that is {error:.1e}: the mesh is too coarse for it.",
                         q.value,
                         percent(relative)
+                    ),
+                ),
+            ),
+            _ if *unseen => (
+                Verdict::Poor,
+                (
+                    f64::INFINITY,
+                    format!(
+                        "Of `{name}` of contact `{contact}` the error is not known: the obstacle reaches into the body between the nodes."
                     ),
                 ),
             ),

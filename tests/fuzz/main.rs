@@ -38,7 +38,7 @@ const MESHES: [&str; 24] = [
 ];
 
 /// Words that mean something to the parser of problems.
-const PROBLEMS: [&str; 26] = [
+const PROBLEMS: [&str; 28] = [
     "{",
     "]",
     "[[[[[[[[",
@@ -49,6 +49,8 @@ const PROBLEMS: [&str; 26] = [
     "-0",
     "\"kind\": \"table\", \"x\": [0, 1], \"gap\": [0, 1]",
     "\"kind\": \"polyline\", \"points\": [[0, 0], [1, 0]]",
+    "\"interpolation\": \"cubic\"",
+    "\"smoothing\": {\"standard_deviation\": 1e-3}",
     "\"kind\": \"power\"",
     "\"inline\": {\"nodes\": [], \"elements\": []}",
     "\"boundaries\": {\"a\": {\"normal\": [1, 0]}}",

@@ -201,13 +201,28 @@ fn obstacle(dice: &mut Rng, round: bool, center: f64) -> (Value, Shape, f64) {
         }
         _ => {
             let radius = between(dice, 6.0, 40.0);
-            (
-                json!({"kind": "parabola", "radius": radius, "center": center}),
-                Shape::Smooth,
-                loads / radius,
-            )
+            // dice of their own, so that all other problems stay as they are
+            let mut dice = Rng::with_seed(radius.to_bits());
+            let parabola = json!({"kind": "parabola", "radius": radius, "center": center});
+            let obstacle = match dice.u32(0..2) {
+                0 => parabola,
+                _ => smooth_table(&mut dice, radius, center),
+            };
+            (obstacle, Shape::Smooth, loads / radius)
         }
     }
+}
+
+/// Points of a curve between a parabola and one of fourth order, joined smoothly.
+fn smooth_table(dice: &mut Rng, radius: f64, center: f64) -> Value {
+    let (count, reach) = (dice.u32(5..30), 2.5);
+    let higher = between(dice, 0.0, 0.5);
+    let gap = |x: f64| x * x / (2.0 * radius) * (1.0 + higher * x * x);
+    // on both sides of the middle, also of half a body: its slope there is 0
+    let place = |i: u32| reach * (2.0 * f64::from(i) / f64::from(count - 1) - 1.0);
+    let x: Vec<f64> = (0..count).map(|i| center + place(i)).collect();
+    let gap: Vec<f64> = (0..count).map(|i| gap(place(i))).collect();
+    json!({"kind": "table", "x": x, "gap": gap, "interpolation": "cubic"})
 }
 
 /// An obstacle of half a body begins on its axis.

@@ -30,6 +30,7 @@ mod manufactured;
 mod nearly_incompressible;
 mod oblique;
 mod obstacle_normals;
+mod obstacle_points;
 mod patch;
 mod profiles;
 mod random;

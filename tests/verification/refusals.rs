@@ -321,6 +321,68 @@ fn every_obstacle_has_its_numbers_checked() {
         json!({"kind": "table", "x": [0], "gap": [0]}),
         &[("x", "too_few")],
     );
+    let table = |count: usize| {
+        let x: Vec<usize> = (0..count).collect();
+        json!({"kind": "table", "x": x, "gap": vec![0; count], "interpolation": "cubic"})
+    };
+    let smoothed = |mut table: Value, deviation: f64| {
+        table["smoothing"] = json!({"standard_deviation": deviation});
+        table
+    };
+    let deviation = "smoothing/standard_deviation";
+    refused(smoothed(table(3), 1.0), &[("x", "too_few")]);
+    refused(smoothed(table(4), 0.0), &[(deviation, range)]);
+    refused(smoothed(table(4), -1e-3), &[(deviation, range)]);
+    refused(table(100_001), &[("x", "too_many")]);
+    let mut linear = smoothed(table(4), 1.0);
+    linear["interpolation"] = json!("linear");
+    refused(linear.clone(), &[("interpolation", "not_used")]);
+    linear.as_object_mut().unwrap().remove("interpolation");
+    refused(linear, &[("interpolation", "not_used")]);
+    // all at once
+    refused(
+        json!({"kind": "table", "x": [1, 0], "gap": [0], "smoothing": {"standard_deviation": 0}}),
+        &[
+            ("x/1", "not_increasing"),
+            ("gap", "wrong_length"),
+            (deviation, range),
+            ("interpolation", "not_used"),
+            ("x", "too_few"),
+        ],
+    );
+    refused(
+        json!({"kind": "table", "x": [0, 1], "gap": [0, 1], "interpolation": "quadratic"}),
+        &[("interpolation", "unknown_alternative")],
+    );
+    refused(
+        smoothed(table(4), 1.0)
+            .as_object()
+            .map(|table| {
+                let mut table = table.clone();
+                table["smoothing"] = json!({});
+                json!(table)
+            })
+            .unwrap(),
+        &[(deviation, "missing")],
+    );
+    refused(
+        json!({"kind": "polyline", "points": [[0, 3], [1, 3]], "smoothing": {"standard_deviation": 1}}),
+        &[("smoothing", "unknown_name")],
+    );
+    // differences that overflow
+    let huge = |interpolation: &str| json!({"kind": "table", "x": [0, 1, 2, 3], "gap": [1e308, -1e308, 1e308, -1e308], "interpolation": interpolation});
+    for interpolation in ["linear", "cubic"] {
+        let contact = json!({"boundary": "top", "obstacle": huge(interpolation)});
+        self::refused(
+            &[("/contacts", json!([contact]))],
+            &[("/contacts/0/obstacle", "not_finite")],
+        );
+    }
+    let many: Vec<[usize; 2]> = (0..10_001).map(|i| [i, 3]).collect();
+    refused(
+        json!({"kind": "polyline", "points": many}),
+        &[("points", "too_many")],
+    );
     refused(
         json!({"kind": "polyline", "points": [[0, 3]]}),
         &[("points", "too_few")],

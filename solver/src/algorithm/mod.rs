@@ -19,7 +19,7 @@ mod uniqueness;
 pub use adjoint::{Gradient, influences};
 pub use convex::{Minimum, minimise};
 pub use finished::Finished;
-pub use profile::Quantity;
+pub use profile::{Missed, Quantity};
 pub use report::{Reported, report};
 pub use system::{ContactNode, Patch, Point, State, System, Work};
 pub use track::{Cycle, Place};

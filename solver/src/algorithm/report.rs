@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::algorithm::finished::Finished;
-use crate::algorithm::profile::Quantity;
-use crate::algorithm::profile::{Forces, PatchView};
+use crate::algorithm::profile::{Forces, Missed, PatchView, Quantity};
 use crate::algorithm::small_strain::warn_of_large_strain;
 use crate::algorithm::system::System;
 use crate::body::ElasticBody;
@@ -41,6 +40,8 @@ pub struct Reported {
     pub fields: Fields,
     /// The quantities for which an error is stated.
     pub quantities: Vec<Quantity>,
+    /// Places between the nodes at which the obstacle reaches into the body, of all contacts: where a mesh needs nodes.
+    pub missed: Vec<Missed>,
     /// What recovered stresses differ by from those of the elements.
     pub difference: StressDifference,
 }
@@ -74,7 +75,7 @@ pub fn report(
     let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
     let difference = StressDifference::new(mesh, order, &recovered);
     let error = difference.norms(mesh, section, order);
-    let mut quantities = Vec::new();
+    let (mut quantities, mut missed) = (Vec::new(), Vec::new());
     let circumference = system.circumference;
 
     let mut contact_state = vec![-1; model.mesh.nodes.len()];
@@ -86,6 +87,7 @@ pub fn report(
         let summary = view.summary();
         view.warn(&mut warnings);
         quantities.extend(view.quantities());
+        missed.extend(view.missed());
         let profile = view.profile();
         for (&node, state) in patch.contact.boundary.nodes.iter().zip(&profile.state) {
             let seen: &mut i8 = &mut contact_state[node as usize];
@@ -199,6 +201,7 @@ pub fn report(
         friction_profiles,
         fields,
         quantities,
+        missed,
         difference,
     })
 }

@@ -1,11 +1,26 @@
 //! The geometry of Γ_C, thesis 1.3(c) and 3.3.1: a chain of edges in order of arc length, with
 //! normals, weights and the points where friction is evaluated.
 
+mod curve;
 pub mod obstacle;
+mod shape;
+mod spline;
 
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::mesh::{Edge, Mesh};
+
+/// Positions count as equal within this part of a length: they coincide with grid lines only up to rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Distance and slope of an obstacle at a place on the boundary.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Profile {
+    /// Distance along the body's normal (length); the indentation is not yet subtracted.
+    pub distance: f64,
+    /// Its change per length along t; the mean of both sides at a kink.
+    pub slope: f64,
+}
 
 /// Γ_C as points in arc-length order.
 ///

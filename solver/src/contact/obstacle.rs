@@ -1,19 +1,18 @@
-//! Rigid obstacles: the part of a boundary that faces one, and its distance.
+//! Rigid obstacles: the part of a boundary that faces one, its distance at the nodes, and what lies between them.
 
-use crate::contact::ContactBoundary;
+use super::curve::{Curve, Hit, Ray};
+use super::shape::{Corner, Shape};
+use super::{ContactBoundary, Profile, ROUNDING, edge_nodes};
+use crate::element::edge3;
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{Along, Obstacle};
-
-/// Positions count as equal to `from`, `to`, a circle's edge and the ends of a polyline within this
-/// part of the boundary's length: they coincide with grid lines only up to rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// The part of a boundary that faces an obstacle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Facing {
     /// Edges whose three nodes all face the obstacle, in connected runs.
     pub runs: Vec<FacingRun>,
-    /// Coordinates c of edges that `from` or `to` cut and that were therefore left out.
+    /// Coordinates c of edges inside which the obstacle ends, and that were therefore left out.
     pub cut: Vec<[f64; 2]>,
 }
 
@@ -26,101 +25,79 @@ pub struct FacingRun {
     pub profile: Vec<Profile>,
     /// The coordinate c there.
     pub coordinate: Vec<f64>,
+    /// The obstacle between the nodes, and at its corners.
+    pub places: Vec<Place>,
 }
 
-/// Distance and slope of an obstacle at a place on the boundary.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Profile {
-    /// Distance along the body's normal (length); the indentation is not yet subtracted.
-    pub distance: f64,
-    /// Its change per length along t; the mean of both sides at a kink.
-    pub slope: f64,
+/// A place of an edge at which the obstacle is known: between the nodes, or at a corner of the obstacle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// The edge, by its number in the chain.
+    pub edge: usize,
+    /// Where on the edge, −1 … 1.
+    pub xi: f64,
+    /// The body's normal there.
+    pub normal: [f64; 2],
+    /// The obstacle there.
+    pub profile: Profile,
+    /// The change of its slope along t; positive at a kink that points at the body, 0 where it is smooth.
+    pub kink: f64,
+    /// How much nearer it is than the parabola through the profile at the edge's nodes (length, either sign).
+    pub nearer: f64,
 }
+
+/// Where an edge is looked at between its nodes.
+const BETWEEN: [f64; 6] = [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75];
+
+/// Most places that are kept of one edge: those where the obstacle is nearest, and the sharpest kinks.
+const MOST_PLACES: usize = 32;
 
 /// Finds the part of `boundary` (edges that follow one another) that faces the obstacle.
 pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
-    let (from, to, along) = obstacle.span();
-    // geometry only: the depth of the section does not matter
-    let whole = ContactBoundary::new(mesh, boundary, |_| 1.0);
-    let coordinate = |node: usize| match along {
-        Along::X => whole.positions[node][0],
-        Along::ArcLength => whole.s[node],
-    };
-    let rounding = ROUNDING * whole.s[whole.s.len() - 1];
-    let in_space = matches!(obstacle, Obstacle::Polyline { .. } | Obstacle::Line { .. });
-    let surface = if in_space { mesh.surface() } else { Vec::new() };
-    let seen_from = |node: usize| {
-        let (place, n, t) = (
-            whole.positions[node],
-            whole.normals[node],
-            whole.tangent(node),
-        );
-        match obstacle {
-            Obstacle::Polyline { points, .. } => {
-                let segments = points.windows(2).map(|pair| (pair[0], pair[1], [0.0, 1.0]));
-                let depth = depth(mesh, &surface, place, n, rounding);
-                along_normal(place, n, t, segments, depth, rounding)
-            }
-            Obstacle::Line { point, angle, .. } => {
-                let (sine, cosine) = angle.to_radians().sin_cos();
-                let end = [point[0] + cosine, point[1] + sine];
-                let endless = [f64::NEG_INFINITY, f64::INFINITY];
-                let depth = depth(mesh, &surface, place, n, rounding);
-                along_normal(
-                    place,
-                    n,
-                    t,
-                    std::iter::once((*point, end, endless)),
-                    depth,
-                    rounding,
-                )
-            }
-            _ => {
-                let (distance, slope) = profile(obstacle, coordinate(node), rounding)?;
-                let per_length = match along {
-                    Along::X => t[0],
-                    Along::ArcLength => 1.0,
-                };
-                Some(Profile {
-                    distance,
-                    slope: slope * per_length,
-                })
-            }
-        }
-    };
+    let view = View::new(mesh, boundary, obstacle);
+    let (from, to, _) = obstacle.span();
+    let [first, last] = view.shape.ends();
     let (low, high) = (
-        from.unwrap_or(f64::NEG_INFINITY),
-        to.unwrap_or(f64::INFINITY),
+        from.unwrap_or(f64::NEG_INFINITY).max(first),
+        to.unwrap_or(f64::INFINITY).min(last),
     );
+    let rounding = view.rounding;
     let mut found = Facing {
         runs: Vec::new(),
         cut: Vec::new(),
     };
     let mut continues = false;
     for (k, edge) in boundary.iter().enumerate() {
-        let nodes = crate::contact::edge_nodes(k);
-        let c = nodes.map(coordinate);
+        let nodes = edge_nodes(k);
+        let c = nodes.map(|node| view.coordinate(node));
         let (least, most) = (
             c.iter().fold(f64::INFINITY, |a, &b| a.min(b)),
             c.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b)),
         );
         let within = least >= low - rounding && most <= high + rounding;
         let touches = most > low + rounding && least < high - rounding;
-        if touches && !within {
+        let seen = nodes.map(|node| view.seen_from_node(node));
+        if touches && (!within || view.ends_inside(k, &seen)) {
             found.cut.push([least, most]);
         }
-        match nodes.map(seen_from) {
+        match seen {
             [Some(a), Some(b), Some(m)] if within => {
                 if !continues {
                     found.runs.push(FacingRun {
-                        chain: Vec::new(),
-                        profile: vec![a],
+                        profile: vec![a.profile],
                         coordinate: vec![c[0]],
+                        ..FacingRun::default()
                     });
                 }
                 if let Some(run) = found.runs.last_mut() {
+                    let places = view.places(k, [a, b, m]).into_iter();
+                    let edge_of_run = run.chain.len();
+                    run.places.extend(places.map(|place| Place {
+                        edge: edge_of_run,
+                        ..place
+                    }));
                     run.chain.push(*edge);
-                    run.profile.extend([m, b]);
+                    run.profile.extend([m.profile, b.profile]);
                     run.coordinate.extend([c[2], c[1]]);
                 }
                 continues = true;
@@ -131,70 +108,274 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
     found
 }
 
-/// Distance before the obstacle is pushed, and its change with c, at coordinate c; `None` where there
-/// is no obstacle.
-fn profile(obstacle: &Obstacle, c: f64, rounding: f64) -> Option<(f64, f64)> {
-    // a circle of radius R that leaves the surface at x = 0
-    let round = |radius: f64, x: f64| {
-        let root = (radius * radius - x * x).max(0.0).sqrt();
-        let slope = x / root.max(ROUNDING * radius);
-        (x.abs() <= radius + rounding).then_some((radius - root, slope))
-    };
-    // 0 at 0: the mean of both sides
-    let sign = |x: f64| if x == 0.0 { 0.0 } else { x.signum() };
-    match *obstacle {
-        Obstacle::Flat { .. } => Some((0.0, 0.0)),
-        Obstacle::Circle { radius, center, .. } => round(radius, c - center),
-        Obstacle::Parabola { radius, center, .. } => {
-            let x = c - center;
-            Some((x * x / (2.0 * radius), x / radius))
+/// A boundary and the obstacle as seen from it.
+struct View<'a> {
+    mesh: &'a Mesh,
+    shape: Shape<'a>,
+    along: Along,
+    /// Geometry only: the depth of the section does not matter.
+    whole: ContactBoundary,
+    /// The body's surface, for curves in space.
+    surface: Vec<Edge>,
+    corners: Vec<Corner>,
+    rounding: f64,
+}
+
+/// The obstacle as seen from a place.
+#[derive(Clone, Copy)]
+struct Seen {
+    profile: Profile,
+    /// The first and the last piece of a curve in space that meet there.
+    pieces: [usize; 2],
+}
+
+impl<'a> View<'a> {
+    fn new(mesh: &'a Mesh, boundary: &[Edge], obstacle: &'a Obstacle) -> Self {
+        let shape = Shape::new(obstacle);
+        let whole = ContactBoundary::new(mesh, boundary, |_| 1.0);
+        View {
+            mesh,
+            along: obstacle.span().2,
+            surface: match shape.in_space() {
+                Some(_) => mesh.surface(),
+                None => Vec::new(),
+            },
+            corners: shape.corners(),
+            rounding: ROUNDING * whole.s[whole.s.len() - 1],
+            shape,
+            whole,
         }
-        Obstacle::Wedge { angle, center, .. } | Obstacle::Cone { angle, center, .. } => {
-            let (x, tangent) = (c - center, angle.to_radians().tan());
-            Some((x.abs() * tangent, sign(x) * tangent))
+    }
+
+    /// The coordinate c of a node.
+    fn coordinate(&self, node: usize) -> f64 {
+        match self.along {
+            Along::X => self.whole.positions[node][0],
+            Along::ArcLength => self.whole.s[node],
         }
-        Obstacle::Tilted { slope, center, .. } => Some((slope * (c - center), slope)),
-        Obstacle::Power {
-            coefficient,
-            exponent,
-            center,
-            ..
-        } => {
-            let x = c - center;
-            let slope = coefficient * exponent * x.abs().powf(exponent - 1.0) * sign(x);
-            Some((coefficient * x.abs().powf(exponent), slope))
+    }
+
+    fn seen_from_node(&self, node: usize) -> Option<Seen> {
+        let (place, n) = (self.whole.positions[node], self.whole.normals[node]);
+        self.seen_from_place(place, n, self.coordinate(node))
+    }
+
+    fn seen_from_place(&self, place: [f64; 2], n: [f64; 2], c: f64) -> Option<Seen> {
+        let t = tangent(n);
+        if let Some(curve) = self.shape.in_space() {
+            let depth = depth(self.mesh, &self.surface, place, n, self.rounding);
+            let ray = Ray { place, n, t, depth };
+            let Hit { profile, pieces } = curve.met_by(&ray, self.rounding)?;
+            return Some(Seen { profile, pieces });
         }
-        Obstacle::RoundedFlat {
-            half_width,
-            radius,
-            center,
-            ..
-        } => {
-            let x = c - center;
-            let beyond = (x.abs() - half_width).max(0.0);
-            round(radius, beyond).map(|(distance, slope)| (distance, sign(x) * slope))
+        let (distance, slope) = self.shape.at(c, self.rounding)?;
+        let profile = Profile {
+            distance,
+            slope: slope * self.per_length(t),
+        };
+        Some(Seen {
+            profile,
+            pieces: [0; 2],
+        })
+    }
+
+    /// Change of the coordinate c per length along t.
+    fn per_length(&self, t: [f64; 2]) -> f64 {
+        match self.along {
+            Along::X => t[0],
+            Along::ArcLength => 1.0,
         }
-        Obstacle::Table { ref x, ref gap, .. } => tabulated(x, gap, c, rounding),
-        // curves in space are met along the normal instead
-        Obstacle::Polyline { .. } | Obstacle::Line { .. } => None,
+    }
+
+    /// Position, normal and coordinate c at a place of an edge.
+    fn place(&self, edge: usize, xi: f64) -> ([f64; 2], [f64; 2], f64) {
+        let (h, nodes) = (edge3::shape(xi), edge_nodes(edge));
+        let along = |f: &dyn Fn(usize) -> f64| edge3::interpolate(&h, &nodes.map(f));
+        let n = [0, 1].map(|a| along(&|i| self.whole.normals[i][a]));
+        let length = n[0].hypot(n[1]);
+        (
+            [0, 1].map(|a| along(&|i| self.whole.positions[i][a])),
+            n.map(|x| x / length),
+            along(&|i| self.coordinate(i)),
+        )
+    }
+
+    fn seen_from_edge(&self, edge: usize, xi: f64) -> Option<Seen> {
+        let (place, n, c) = self.place(edge, xi);
+        self.seen_from_place(place, n, c)
+    }
+
+    /// Whether a curve in space ends inside an edge: some of its nodes face it and others do not. Where it ends exactly
+    /// at a node, nothing of it is seen beside that node.
+    fn ends_inside(&self, edge: usize, seen: &[Option<Seen>; 3]) -> bool {
+        const BESIDE: f64 = 1.0 / 64.0;
+        if self.shape.in_space().is_none() || seen.iter().all(Option::is_some) {
+            return false;
+        }
+        let [start, end, middle] = seen.map(|seen| seen.is_some());
+        let beside = |is_seen: bool, xi: f64| is_seen && self.seen_from_edge(edge, xi).is_some();
+        middle || beside(start, -1.0 + BESIDE) || beside(end, 1.0 - BESIDE)
+    }
+
+    /// The obstacle between the nodes of an edge, and at its corners there, in order of s. `nodes`: as seen from its
+    /// start, end and midside.
+    fn places(&self, edge: usize, nodes: [Seen; 3]) -> Vec<Place> {
+        let mut found: Vec<Place> = Vec::new();
+        let at_nodes = nodes.map(|seen| seen.profile.distance);
+        let place = |xi: f64, normal: [f64; 2], profile: Profile, kink: f64| Place {
+            edge,
+            xi,
+            normal,
+            profile,
+            kink,
+            nearer: edge3::interpolate(&edge3::shape(xi), &at_nodes) - profile.distance,
+        };
+        let [start, end, middle] = nodes;
+        let mut sight = vec![(-1.0, start), (0.0, middle), (1.0, end)];
+        for xi in BETWEEN {
+            if let Some(seen) = self.seen_from_edge(edge, xi) {
+                let (_, n, _) = self.place(edge, xi);
+                found.push(place(xi, n, seen.profile, 0.0));
+                sight.push((xi, seen));
+            }
+        }
+        sight.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (xi, corner) in self.corners_in(edge) {
+            let (position, n, _) = self.place(edge, xi);
+            let kink = corner.change * self.per_length(tangent(n)).abs();
+            let seen = self.seen_from_place(position, n, corner.c);
+            found.extend(seen.map(|seen| place(xi, n, seen.profile, kink)));
+        }
+        let joints = match self.shape.in_space() {
+            Some(curve) => self.joints_in(curve, edge, &sight),
+            None => Vec::new(),
+        };
+        for (xi, point, change) in joints {
+            let (position, n, _) = self.place(edge, xi);
+            let ahead = (0..2).map(|a| (point[a] - position[a]) * n[a]).sum::<f64>();
+            if let Some(seen) = self.seen_from_edge(edge, xi) {
+                // another part of the line may lie before it
+                let hidden = (ahead - seen.profile.distance).abs() > 1e3 * self.rounding;
+                let kink = if hidden { 0.0 } else { change };
+                found.push(place(xi, n, seen.profile, kink));
+            }
+        }
+        if found.len() > MOST_PLACES {
+            let half = MOST_PLACES / 2;
+            found.sort_by(|a, b| b.nearer.total_cmp(&a.nearer));
+            found[half..].sort_by(|a, b| b.kink.total_cmp(&a.kink));
+            found.truncate(MOST_PLACES);
+        }
+        found.sort_by(|a, b| a.xi.total_cmp(&b.xi));
+        found
+    }
+
+    /// Corners of the obstacle on an edge; one at its end belongs to the next edge, if there is one.
+    fn corners_in(&self, edge: usize) -> Vec<(f64, Corner)> {
+        let mut c = edge_nodes(edge).map(|node| self.coordinate(node));
+        let falls = c[1] < c[0];
+        let sign = if falls { -1.0 } else { 1.0 };
+        c = c.map(|c| sign * c);
+        let (low, high) = match falls {
+            false => (c[0], c[1]),
+            true => (-c[1], -c[0]),
+        };
+        let last = edge + 1 == self.whole.edge_count();
+        let first = self
+            .corners
+            .partition_point(|corner| corner.c < low - self.rounding);
+        let near = |a: f64, b: f64| (a - b).abs() <= self.rounding;
+        let mut found = Vec::new();
+        for corner in &self.corners[first..] {
+            if corner.c > high + self.rounding {
+                break;
+            }
+            let at = sign * corner.c;
+            let xi = match () {
+                () if near(at, c[0]) => -1.0,
+                () if near(at, c[1]) && !last => continue,
+                () if near(at, c[1]) => 1.0,
+                () if near(at, c[2]) => 0.0,
+                () => edge3::invert(&c, at),
+            };
+            found.push((xi, *corner));
+        }
+        found
+    }
+
+    /// Joints of the pieces of a curve in space that an edge faces: where on the edge, the point, and the change of slope.
+    /// `sight`: the obstacle from places of the edge, in their order.
+    fn joints_in(
+        &self,
+        curve: &Curve<'_>,
+        edge: usize,
+        sight: &[(f64, Seen)],
+    ) -> Vec<(f64, [f64; 2], f64)> {
+        let last = edge + 1 == self.whole.edge_count();
+        let mut found: Vec<(f64, usize)> = Vec::new();
+        for (xi, seen) in sight {
+            // that at the end belongs to the next edge
+            let joint = seen.pieces[1] == seen.pieces[0] + 1;
+            if joint && (*xi < 1.0 || last) {
+                found.push((*xi, seen.pieces[1]));
+            }
+        }
+        for pair in sight.windows(2) {
+            let [(low, a), (high, b)] = [pair[0], pair[1]];
+            let between = match () {
+                () if b.pieces[0] > a.pieces[1] => a.pieces[1] + 1..=b.pieces[0],
+                () if b.pieces[1] < a.pieces[0] => b.pieces[1] + 1..=a.pieces[0],
+                () => continue,
+            };
+            let facing = |joint| Some((self.faces(curve, edge, joint, [low, high])?, joint));
+            found.extend(between.filter_map(facing));
+        }
+        let with_change = |(xi, joint)| {
+            let (_, n, _) = self.place(edge, xi);
+            let (point, change) = curve.joint(joint, n, tangent(n));
+            (xi, point, change)
+        };
+        found.into_iter().map(with_change).collect()
+    }
+
+    /// Where between two places of an edge its normal meets a joint, if it does.
+    fn faces(
+        &self,
+        curve: &Curve<'_>,
+        edge: usize,
+        joint: usize,
+        [mut low, mut high]: [f64; 2],
+    ) -> Option<f64> {
+        let ahead = |xi: f64| {
+            let (place, n, _) = self.place(edge, xi);
+            let t = tangent(n);
+            let (point, _) = curve.joint(joint, n, t);
+            (point[0] - place[0]) * t[0] + (point[1] - place[1]) * t[1]
+        };
+        for end in [low, high] {
+            if ahead(end).abs() <= self.rounding {
+                return Some(end);
+            }
+        }
+        if ahead(low) < 0.0 || ahead(high) > 0.0 {
+            return None;
+        }
+        // to rounding
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if ahead(middle) > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(0.5 * (low + high))
     }
 }
 
-/// Linear between the points of a table; at a point the mean of both slopes.
-fn tabulated(x: &[f64], y: &[f64], at: f64, rounding: f64) -> Option<(f64, f64)> {
-    let last = x.len() - 1;
-    if at < x[0] - rounding || at > x[last] + rounding {
-        return None;
-    }
-    let slope = |k: usize| (y[k + 1] - y[k]) / (x[k + 1] - x[k]);
-    let k = (x.partition_point(|x| *x <= at).max(1) - 1).min(last - 1);
-    let distance = y[k] + slope(k) * (at - x[k]);
-    let mean = if k > 0 && at - x[k] <= rounding {
-        0.5 * (slope(k - 1) + slope(k))
-    } else {
-        slope(k)
-    };
-    Some((distance, mean))
+/// n turned clockwise.
+fn tangent([x, y]: [f64; 2]) -> [f64; 2] {
+    [y, -x]
 }
 
 /// How far the body reaches from a place of its surface along −n (length), by the chords of its sides.
@@ -217,57 +398,11 @@ fn depth(mesh: &Mesh, surface: &[Edge], place: [f64; 2], n: [f64; 2], rounding: 
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Where the straight line along the normal n through `place` meets the nearest of the segments
-/// (start, end, range of the parameter between them).
-fn along_normal(
-    place: [f64; 2],
-    n: [f64; 2],
-    t: [f64; 2],
-    segments: impl Iterator<Item = ([f64; 2], [f64; 2], [f64; 2])>,
-    depth: f64,
-    rounding: f64,
-) -> Option<Profile> {
-    let mut hits: Vec<Profile> = Vec::new();
-    for (start, end, [least, most]) in segments {
-        let direction = [end[0] - start[0], end[1] - start[1]];
-        let length = direction[0].hypot(direction[1]);
-        let across = direction[0] * t[0] + direction[1] * t[1];
-        if across.abs() <= ROUNDING * length {
-            continue; // seen end on
-        }
-        let towards = [place[0] - start[0], place[1] - start[1]];
-        let part = (towards[0] * t[0] + towards[1] * t[1]) / across;
-        let slack = rounding / length;
-        if part < least - slack || part > most + slack {
-            continue;
-        }
-        let meet = [
-            start[0] + part * direction[0] - place[0],
-            start[1] + part * direction[1] - place[1],
-        ];
-        hits.push(Profile {
-            distance: meet[0] * n[0] + meet[1] * n[1],
-            slope: (direction[0] * n[0] + direction[1] * n[1]) / across,
-        });
-    }
-    // an obstacle behind the body faces its other side
-    hits.retain(|hit| hit.distance >= -depth);
-    let nearest = hits
-        .iter()
-        .map(|hit| hit.distance.abs())
-        .fold(f64::INFINITY, f64::min);
-    // two segments meet in a kink: the mean of their slopes
-    hits.retain(|hit| hit.distance.abs() <= nearest + rounding);
-    let count = hits.len() as f64;
-    let slope = hits.iter().map(|hit| hit.slope).sum::<f64>() / count;
-    hits.first().map(|hit| Profile { slope, ..*hit })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::mesh::grid_mesh;
-    use crate::problem::Grid;
+    use crate::problem::{Along, Grid, Interpolation};
 
     fn face(x: &[f64], obstacle: &Obstacle) -> Facing {
         let mesh = grid_mesh(&Grid {
@@ -344,98 +479,6 @@ mod tests {
         assert_eq!(found.runs[0].chain.len(), 1);
     }
 
-    #[test]
-    fn every_profile_has_the_slope_of_its_distance() {
-        let (from, to, along) = (None, None, Along::X);
-        let kinds = [
-            Obstacle::Circle {
-                radius: 5.0,
-                center: 0.7,
-                from,
-                to,
-                along,
-            },
-            Obstacle::Wedge {
-                angle: 20.0,
-                center: 0.7,
-                from,
-                to,
-                along,
-            },
-            Obstacle::Cone {
-                angle: 5.0,
-                center: -0.2,
-                from,
-                to,
-                along,
-            },
-            Obstacle::Tilted {
-                slope: 0.3,
-                center: 0.1,
-                from,
-                to,
-                along,
-            },
-            Obstacle::Power {
-                coefficient: 0.4,
-                exponent: 3.0,
-                center: 0.6,
-                from,
-                to,
-                along,
-            },
-            Obstacle::RoundedFlat {
-                half_width: 0.5,
-                radius: 2.0,
-                center: 0.9,
-                from,
-                to,
-                along,
-            },
-            Obstacle::Table {
-                x: vec![0.0, 0.8, 2.0],
-                gap: vec![1.0, 0.0, 3.0],
-                from,
-                to,
-                along,
-            },
-        ];
-        let step = 1e-6;
-        for obstacle in kinds {
-            for c in [0.05, 0.5, 1.1, 1.9] {
-                let at = |c| profile(&obstacle, c, 0.0).unwrap();
-                let difference = (at(c + step).0 - at(c - step).0) / (2.0 * step);
-                assert!((at(c).1 - difference).abs() < 1e-8, "{obstacle:?} at {c}");
-            }
-        }
-        let rounded = Obstacle::RoundedFlat {
-            half_width: 0.5,
-            radius: 2.0,
-            center: 0.0,
-            from,
-            to,
-            along,
-        };
-        assert_eq!(profile(&rounded, 0.4, 0.0), Some((0.0, 0.0)));
-        assert_eq!(profile(&rounded, 2.6, 0.0), None);
-        let wedge = Obstacle::Wedge {
-            angle: 45.0,
-            center: 1.0,
-            from,
-            to,
-            along,
-        };
-        assert_eq!(profile(&wedge, 1.0, 0.0), Some((0.0, 0.0)));
-    }
-
-    #[test]
-    fn a_table_has_ends_and_the_mean_slope_at_kinks() {
-        let (x, y) = ([0.0, 1.0, 3.0], [1.0, 0.0, 4.0]);
-        assert_eq!(tabulated(&x, &y, 1.0, 1e-12), Some((0.0, 0.5)));
-        assert_eq!(tabulated(&x, &y, 3.0, 1e-12), Some((4.0, 2.0)));
-        assert_eq!(tabulated(&x, &y, 3.1, 1e-12), None);
-    }
-
     /// A roof over a flat top: distances and slopes along its normal, no obstacle beside it.
     #[test]
     fn curves_in_space_are_met_along_the_normal() {
@@ -443,6 +486,7 @@ mod tests {
         let points = vec![[0.5, 1.0], [1.5, 2.0], [2.5, 1.0]];
         let roof = Obstacle::Polyline {
             points,
+            interpolation: Interpolation::Linear,
             from,
             to,
             along,

@@ -2,6 +2,7 @@
 
 use super::level::Level;
 use crate::contact::ContactBoundary;
+use crate::contact::obstacle::Place;
 use crate::friction::{Average, FrictionLaw};
 use crate::problem::{Condition, NormalOf};
 
@@ -16,6 +17,10 @@ pub struct ContactModel {
     pub boundary: ContactBoundary,
     /// Profile of the obstacle at each node, along the contact's normal (length).
     pub profile: Vec<f64>,
+    /// The obstacle between the nodes and at its corners, in order of s.
+    pub places: Vec<Place>,
+    /// Slope of the obstacle along the body's t at the first and at the last node.
+    pub end_slopes: [f64; 2],
     /// How far the obstacle is pushed against the body (length).
     pub indentation: f64,
     /// The parts of that push along the contact's normal and along its t, at each node: 1 and 0 with

@@ -7,8 +7,8 @@ use super::checks::{ALIGNED, Checks};
 use super::contact_model::ContactModel;
 use super::level::Level;
 use super::supports::Held;
-use crate::contact::ContactBoundary;
-use crate::contact::obstacle::{self, FacingRun, Profile};
+use crate::contact::obstacle::{self, FacingRun};
+use crate::contact::{ContactBoundary, Profile};
 use crate::elasticity::Section;
 use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, FrictionLaw};
@@ -80,12 +80,15 @@ impl Checks {
         let radius = friction.as_ref().and_then(|law| law.bound.radius());
         self.sound(&boundary, axis, contact, radius, &run, &pointer)?;
         let push = turn_normals(&mut boundary, &run, contact.normal);
+        let end_slopes = [0, run.profile.len() - 1].map(|i| run.profile[i].slope);
         let along = |(profile, push): (&Profile, &[f64; 2])| profile.distance * push[0];
         Ok(ContactModel {
             name: contact.boundary.clone(),
             pointer,
             boundary,
             profile: run.profile.iter().zip(&push).map(along).collect(),
+            places: run.places,
+            end_slopes,
             indentation: contact.indentation,
             push,
             tangential_displacement: contact.tangential_displacement,
@@ -226,7 +229,21 @@ impl Checks {
         }
         let pieces = facing.runs.len();
         if let (Some(run), 1) = (facing.runs.pop(), pieces) {
-            return Ok(run);
+            let finite =
+                |profile: &Profile| profile.distance.is_finite() && profile.slope.is_finite();
+            let Some(i) = run.profile.iter().position(|profile| !finite(profile)) else {
+                return Ok(run);
+            };
+            return Err(self.report(
+                format!("{pointer}/obstacle"),
+                Reason::NotFinite,
+                format!(
+                    "a distance of {} at c = {}",
+                    run.profile[i].distance, run.coordinate[i]
+                ),
+                "an obstacle at a finite distance",
+                "Its numbers are too large to compute with; choose other units.",
+            ));
         }
         let s = crate::contact::arc_lengths(mesh, run);
         let ([x0, y0], [x1, y1]) = (

@@ -5,9 +5,22 @@ use super::checks::Checks;
 use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, BoundLaw, FrictionLaw};
 use crate::problem::{
-    Analysis, Condition, Contact, Friction, History, Measure, Normalization, Obstacle,
-    PrescribedBound, Transition,
+    Analysis, Condition, Contact, Friction, History, Interpolation, Measure, Normalization,
+    Obstacle, PrescribedBound, Smoothing, Transition,
 };
+use crate::solution::WarningCode;
+
+/// Most points of a table.
+const MOST_TABLE_POINTS: usize = 100_000;
+
+/// Most points of a polyline: each is looked at from every place of the boundary.
+const MOST_LINE_POINTS: usize = 10_000;
+
+/// Fewest points that are smoothed.
+const FEWEST_SMOOTHED: usize = 4;
+
+/// A standard deviation above this part of the range of all values is hardly the error of one of them.
+const LARGE_DEVIATION: f64 = 0.1;
 
 impl Checks {
     /// The numbers of an obstacle.
@@ -46,10 +59,24 @@ impl Checks {
                 ));
                 all.check(self.require(*exponent >= 1.0, at("exponent"), *exponent, "≥ 1", hint));
             }
-            Obstacle::Table { x, gap, .. } => {
-                all.check(self.table(&at("x"), x, &at("gap"), gap, "profile"));
+            Obstacle::Table {
+                x,
+                gap,
+                interpolation,
+                smoothing,
+                ..
+            } => {
+                all.check(self.few_enough(&at("x"), x.len(), MOST_TABLE_POINTS));
+                let sound = all.check(self.table(&at("x"), x, &at("gap"), gap, "profile"));
+                if let Some(smoothing) = smoothing {
+                    all.check(self.smoothing(pointer, x, *interpolation, smoothing));
+                    if sound.is_some() {
+                        self.warn_of_smoothing(pointer, gap, smoothing);
+                    }
+                }
             }
             Obstacle::Polyline { points, .. } => {
+                all.check(self.few_enough(&at("points"), points.len(), MOST_LINE_POINTS));
                 if points.len() < 2 {
                     all.fail(self.report(
                         at("points"),
@@ -94,6 +121,71 @@ impl Checks {
         all.finish(())
     }
 
+    fn few_enough(&mut self, pointer: &str, count: usize, most: usize) -> Checked {
+        match count <= most {
+            true => Ok(()),
+            false => Err(self.report(
+                pointer,
+                Reason::TooMany,
+                format!("{count} points"),
+                format!("at most {most}"),
+                "Give every second or tenth point: a mesh resolves far fewer.",
+            )),
+        }
+    }
+
+    /// The smoothing of a table.
+    fn smoothing(
+        &mut self,
+        pointer: &str,
+        x: &[f64],
+        interpolation: Interpolation,
+        smoothing: &Smoothing,
+    ) -> Checked {
+        let mut all = AllChecks::default();
+        let deviation = smoothing.standard_deviation;
+        all.check(self.require(
+            deviation > 0.0,
+            format!("{pointer}/smoothing/standard_deviation"),
+            deviation,
+            "a length > 0",
+            "The standard deviation of the error of one measured point, in the unit of `gap`; without errors remove `smoothing`.",
+        ));
+        if interpolation != Interpolation::Cubic {
+            all.fail(self.report(
+                format!("{pointer}/interpolation"),
+                Reason::NotUsed,
+                "`linear` (the default) with `smoothing`",
+                "`cubic`",
+                "Between smoothed points straight lines still have kinks: write \"interpolation\": \"cubic\".",
+            ));
+        }
+        if x.len() < FEWEST_SMOOTHED {
+            all.fail(self.report(
+                format!("{pointer}/x"),
+                Reason::TooFew,
+                format!("{} point(s)", x.len()),
+                format!("at least {FEWEST_SMOOTHED} points to smooth"),
+                "A parabola passes through any three: remove `smoothing`, or give more points.",
+            ));
+        }
+        all.finish(())
+    }
+
+    /// A deviation in another unit leaves a parabola of any profile.
+    fn warn_of_smoothing(&mut self, pointer: &str, gap: &[f64], smoothing: &Smoothing) {
+        let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = gap.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (deviation, range) = (smoothing.standard_deviation, most - least);
+        if deviation > LARGE_DEVIATION * range {
+            self.warn(
+                WarningCode::SmoothingFlattens,
+                &format!("{pointer}/smoothing/standard_deviation"),
+                format!("The standard deviation {deviation:.3e} is more than {:.0} % of the range of all values, {range:.3e}: smoothing leaves little of the profile. It is the error of one point, in the unit of `gap`.", 100.0 * LARGE_DEVIATION),
+            );
+        }
+    }
+
     /// Increasing places, and one value for each.
     fn table(&mut self, x_at: &str, x: &[f64], y_at: &str, y: &[f64], what: &str) -> Checked {
         let mut all = AllChecks::default();
@@ -103,7 +195,7 @@ impl Checks {
                 Reason::TooFew,
                 format!("{} point(s)", x.len()),
                 "at least two points",
-                format!("The {what} is linear between them."),
+                format!("Two points give a {what} that is a straight line."),
             ));
         }
         if let Some(i) = (1..x.len()).find(|&i| x[i] <= x[i - 1]) {

@@ -151,17 +151,27 @@ obstacles! {
         #[serde(default)]
         center: f64,
     }
-    /// Profile by a table, linear between its points; there is no obstacle outside of it.
+    /// Profile by a table of points; there is no obstacle outside of it.
     Table {
-        /// Coordinates c, strictly increasing.
+        /// Coordinates c, strictly increasing; at most 100,000.
         x: Vec<f64>,
         /// Profile there (length, any sign).
         gap: Vec<f64>,
+        /// Between the points.
+        #[serde(default, skip_serializing_if = "Interpolation::is_linear")]
+        interpolation: Interpolation,
+        /// For a measured profile: the curve passes near the points instead of through them. Needs the
+        /// interpolation `cubic`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        smoothing: Option<Smoothing>,
     }
-    /// A broken line in space; the profile is the distance along the body's normal.
+    /// A line in space through points; the profile is the distance along the body's normal.
     Polyline {
-        /// Its points `[x, y]`.
+        /// Its points `[x, y]`; at most 10,000.
         points: Vec<[f64; 2]>,
+        /// Between the points.
+        #[serde(default, skip_serializing_if = "Interpolation::is_linear")]
+        interpolation: Interpolation,
     }
     /// A straight line in space, infinitely long; the profile is the distance along the body's normal.
     Line {
@@ -170,6 +180,33 @@ obstacles! {
         /// Angle from x to the line, counter-clockwise (degrees).
         angle: f64,
     }
+}
+
+/// What lies between the points of an obstacle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Interpolation {
+    /// Straight lines. Every point is a kink, at which the pressure has no limit as the mesh is refined.
+    #[default]
+    Linear,
+    /// A cubic spline, whose slope and curvature have no jumps. Of a table it reproduces parabolas and cubics
+    /// exactly (its ends are not-a-knot); of a polyline it runs by the length of the chords.
+    Cubic,
+}
+
+impl Interpolation {
+    fn is_linear(&self) -> bool {
+        *self == Interpolation::Linear
+    }
+}
+
+/// How far the points of a measured profile may be from the curve. Among all curves with
+/// Σ((gap − curve)/standard_deviation)² ≤ number of points, the one whose curvature changes least is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Smoothing {
+    /// Standard deviation of the error of one point, > 0 (length).
+    pub standard_deviation: f64,
 }
 
 /// The coordinate c along a contact boundary.

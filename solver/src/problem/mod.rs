@@ -12,8 +12,8 @@ mod solver;
 mod support;
 
 pub use contact::{
-    Along, BoundTable, Condition, Contact, Friction, FrictionPoints, History, Kernel, Measure,
-    NormalOf, Normalization, Obstacle, PrescribedBound, Transition,
+    Along, BoundTable, Condition, Contact, Friction, FrictionPoints, History, Interpolation,
+    Kernel, Measure, NormalOf, Normalization, Obstacle, PrescribedBound, Smoothing, Transition,
 };
 pub use load::{Load, LoadFields};
 pub use material::{Elasticity, Material, MaterialFields, Orthotropic};

@@ -277,6 +277,8 @@ pub enum WarningCode {
     StripCutsPolyline,
     /// An obstacle that ends inside an edge.
     ObstacleCutsEdge,
+    /// A standard deviation that leaves little of a measured profile.
+    SmoothingFlattens,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
     /// Edges longer than the nonlocal radius.
@@ -289,6 +291,10 @@ pub enum WarningCode {
     ContactReachesObstacleEnd,
     /// An averaged pressure, and friction with it, that reaches beyond an end of the contact boundary and is lost.
     FrictionLostAtEnd,
+    /// An obstacle that reaches into the body between two nodes.
+    ObstacleBetweenNodes,
+    /// A kink of the obstacle in the contact.
+    KinkInContact,
     /// A nonlocal radius larger than the contact.
     RadiusExceedsContact,
     /// A prescribed friction bound that acts where the body does not touch.

@@ -1,10 +1,12 @@
 //! One contact in the final state: its columns; its forces, extents, peaks and warnings are in files of
 //! their own.
 
+mod between;
 mod extents;
 mod quantities;
 mod warnings;
 
+pub use between::Missed;
 pub use quantities::Quantity;
 
 use super::system::{Patch, System};

@@ -26,6 +26,8 @@ pub struct Quantity {
     pub between: f64,
     /// No finer mesh approaches a limit of it.
     pub unlimited: bool,
+    /// The obstacle reaches into the body between the nodes: what that changes is not known.
+    pub unseen: bool,
 }
 
 /// Ends of stick with an error: each costs as much as another recovery of the stresses, and a rough obstacle has
@@ -45,6 +47,10 @@ impl PatchView<'_> {
         let mut found = self.forces();
         found.extend(self.peaks());
         found.extend(self.ends());
+        let unseen = !self.missed().is_empty();
+        found
+            .iter_mut()
+            .for_each(|quantity| quantity.unseen = unseen);
         found
     }
 
@@ -58,6 +64,7 @@ impl PatchView<'_> {
             spacing: 0.0,
             between: 0.0,
             unlimited: false,
+            unseen: false,
         }
     }
 
@@ -170,11 +177,10 @@ impl PatchView<'_> {
         found
     }
 
-    /// The pressure grows without limit at a sharp end of the obstacle and, slowly, at a tip.
+    /// The pressure grows without limit at a sharp end of the obstacle and, slowly, at a kink.
     fn pressure_without_limit(&self) -> bool {
         let sharp = |i: usize| self.active(i) && !self.symmetric(i);
-        let tip = self.patch.contact.power == Some(1.0);
-        tip || sharp(0) || sharp(self.count() - 1)
+        sharp(0) || sharp(self.count() - 1) || !self.kinks().is_empty()
     }
 
     /// The bound follows the pressure itself, and not its average.

@@ -25,6 +25,8 @@ const FEWEST_EDGES: usize = 6;
 impl PatchView<'_> {
     pub(in crate::algorithm) fn warn(&self, warnings: &mut Vec<Warning>) {
         self.warn_of_oscillation(warnings);
+        self.warn_of_missed(warnings);
+        self.warn_of_kinks(warnings);
         self.warn_of_contact(warnings);
     }
 
@@ -74,12 +76,15 @@ impl PatchView<'_> {
                 (contact.profile[i] - moved) / contact.push[i][0]
             };
             let needed = (0..self.count()).map(engages).fold(f64::INFINITY, f64::min);
-            warn(
-                WarningCode::NoContact,
-                format!(
+            let message = match self.missed().is_empty() {
+                true => format!(
                     "The body never touches the obstacle: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
                 ),
-            );
+                false => format!(
+                    "No node touches the obstacle, which reaches into the body between two of them: the smallest gap at a node is {smallest:.6e}. One touches if the indentation is above {needed:.6e}."
+                ),
+            };
+            warn(WarningCode::NoContact, message);
             return;
         }
         if let Some(tau) = self.bound_beyond_contact() {

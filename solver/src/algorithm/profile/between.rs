@@ -1,0 +1,319 @@
+//! What the nodes of a contact do not see: an obstacle that reaches into the body between them, and kinks at which the
+//! pressure has no limit.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{LN_2, PI};
+
+use super::PatchView;
+use crate::contact::edge_nodes;
+use crate::contact::obstacle::Place;
+use crate::elasticity::Dof;
+use crate::element::edge3;
+use crate::problem::{Condition, NormalOf};
+use crate::solution::{Outcome, Warning, WarningCode};
+
+/// A place between nodes at which the obstacle reaches into the body, and nothing resists it: a node is needed there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Missed {
+    /// The contact, by its place in the model.
+    pub patch: usize,
+    /// Arc length from the first node of Γ_C.
+    pub s: f64,
+    /// How far the obstacle reaches into the body there (length).
+    pub penetration: f64,
+    /// Distance between the nodes on either side (length).
+    pub spacing: f64,
+    /// The force that would push a node out of the obstacle there / largest nodal reaction; infinite where nothing
+    /// touches.
+    pub severity: f64,
+}
+
+/// Severity from which a place is reported. A kink that points at the body between the nodes of a contact that is
+/// resolved has up to 0.4, a smooth obstacle up to 0.11 (the random problems of `tests/verification`).
+const SERIOUS: f64 = 0.5;
+
+/// Most places that are reported of one contact.
+const MOST_MISSED: usize = 20;
+
+/// Penetration counts as more than rounding above this part of the length of the contact.
+const ROUNDING: f64 = 1e-9;
+
+/// A kink shapes the pressure if each halving of the mesh adds more than this part to its peak.
+const SHAPING: f64 = 0.01;
+
+/// A kink of the obstacle in contact.
+pub(super) struct Kink {
+    s: f64,
+    /// Change of slope, > 0; infinite at an edge.
+    change: f64,
+    /// What each halving of the mesh adds to the pressure there (stress).
+    growth: f64,
+    /// Distance between the nodes on either side (length).
+    spacing: f64,
+    /// At a line of symmetry, and at least in part by the mirror image.
+    mirrored: bool,
+}
+
+impl PatchView<'_> {
+    /// Where the obstacle reaches into the body between the nodes, at most one place for each edge, the deepest
+    /// first. Only of what the nodes do not see: a smooth obstacle is a parabola between them, and what that leaves open
+    /// at the ends of contact belongs to the errors of the mesh.
+    pub(in crate::algorithm) fn missed(&self) -> Vec<Missed> {
+        let contact = self.patch.contact;
+        let mut found: Vec<(usize, Missed)> = Vec::new();
+        if contact.condition != Condition::Unilateral || self.finished.outcome != Outcome::Converged
+        {
+            return Vec::new();
+        }
+        let s = &contact.boundary.s;
+        let least = ROUNDING * s[s.len() - 1];
+        let reactions = &self.forces.reactions[self.system.range(self.patch)];
+        let largest = reactions.iter().fold(0.0f64, |most, r| most.max(*r));
+        for place in &contact.places {
+            let penetration = self.penetration(place);
+            let unseen = penetration.min(place.nearer);
+            if unseen <= least {
+                continue;
+            }
+            let severity = self.stiffness(place.edge) * unseen / largest;
+            if severity < SERIOUS {
+                continue;
+            }
+            let missed = Missed {
+                patch: self.p,
+                s: self.arc(place),
+                penetration,
+                spacing: self.spacing(place),
+                severity,
+            };
+            match found.last_mut() {
+                Some((edge, deepest)) if *edge == place.edge => {
+                    if deepest.penetration < penetration {
+                        *deepest = missed;
+                    }
+                }
+                _ => found.push((place.edge, missed)),
+            }
+        }
+        let mut found: Vec<Missed> = found.into_iter().map(|(_, missed)| missed).collect();
+        found.sort_by(|a, b| b.penetration.total_cmp(&a.penetration));
+        found.truncate(MOST_MISSED);
+        found
+    }
+
+    pub(super) fn warn_of_missed(&self, warnings: &mut Vec<Warning>) {
+        let missed = self.missed();
+        let Some(worst) = missed.first() else { return };
+        let others = match missed.len() {
+            1 => String::new(),
+            MOST_MISSED => format!(", and at {MOST_MISSED} other places or more"),
+            count => format!(", and at {} other places", count - 1),
+        };
+        let Missed {
+            s,
+            penetration,
+            spacing,
+            ..
+        } = worst;
+        warnings.push(Warning {
+            code: WarningCode::ObstacleBetweenNodes,
+            pointer: self.patch.contact.pointer.clone(),
+            message: format!(
+                "The obstacle reaches {penetration:.3e} into the body between two nodes, at s = {s:.4}{others}: they are {spacing:.3e} apart, and nothing resists it there. Forces and peaks are not those of this obstacle. Put a grid line there, or refine the mesh until the nodes see it."
+            ),
+        });
+    }
+
+    pub(super) fn warn_of_kinks(&self, warnings: &mut Vec<Warning>) {
+        let kinks = self.kinks();
+        let Some(sharpest) = kinks.iter().max_by(|a, b| a.growth.total_cmp(&b.growth)) else {
+            return;
+        };
+        let Kink {
+            s,
+            change,
+            growth,
+            spacing,
+            mirrored,
+        } = sharpest;
+        let (peak, _, _) = self.highest_pressure().unwrap_or((0.0, 0, 0.0));
+        let count = match kinks.len() {
+            1 => String::new(),
+            count => format!("; it is the sharpest of {count}"),
+        };
+        let part = match growth / peak {
+            part if part < 1.0 => format!("{:.1} % of the peak", 100.0 * part),
+            _ => "more than the whole peak now".to_owned(),
+        };
+        let (size, growth) = match change.is_finite() {
+            true => (
+                format!("its slope changes by {change:.3e}"),
+                format!(
+                    "each halving of the mesh, whose nodes are {spacing:.3e} apart there, adds about {growth:.3e}, {part}"
+                ),
+            ),
+            false => (
+                "it has an edge there".to_owned(),
+                format!(
+                    "it grows with each halving of the mesh, whose nodes are {spacing:.3e} apart there"
+                ),
+            ),
+        };
+        let (mirrored, symmetric) = match mirrored {
+            true => (
+                ", where it meets its mirror image",
+                " At a line of symmetry give the points on both sides of it.",
+            ),
+            false => ("", ""),
+        };
+        warnings.push(Warning {
+            code: WarningCode::KinkInContact,
+            pointer: self.patch.contact.pointer.clone(),
+            message: format!(
+                "The obstacle has a kink in the contact, at s = {s:.4}{mirrored}: {size}{count}. The pressure has no limit at a kink: {growth}. If the kinks only come from the points of a table or a polyline, choose \"interpolation\": \"cubic\", with `smoothing` if they were measured; else round the edge.{symmetric}"
+            ),
+        });
+    }
+
+    /// Kinks in contact that shape the pressure, those of an obstacle that is mirrored at a line of symmetry included.
+    /// Beside a kink with the change of slope Δ the pressure of a half-plane with the contact modulus E* grows like
+    /// E* Δ/(2π) · ln(1/distance); on the axis of a cone like E* Δ/4 · ln(1/distance).
+    pub(super) fn kinks(&self) -> Vec<Kink> {
+        let contact = self.patch.contact;
+        if contact.condition != Condition::Unilateral {
+            return Vec::new();
+        }
+        let last = self.count() - 1;
+        let mut found: Vec<(Place, f64)> = Vec::new();
+        for place in contact.places.iter().filter(|place| place.kink > 0.0) {
+            let nodes = self.beside(place);
+            let at_end = nodes == [0; 2] || nodes == [last; 2];
+            if !at_end && nodes.iter().any(|&i| self.active(i)) {
+                found.push((*place, place.kink));
+            }
+        }
+        for (end, slope) in [(0, contact.end_slopes[0]), (last, -contact.end_slopes[1])] {
+            let xi = if end == 0 { -1.0 } else { 1.0 };
+            let edge = if end == 0 { 0 } else { last / 2 - 1 };
+            let own = contact.places.iter().filter(|place| {
+                place.kink != 0.0 && self.beside(place) == [end; 2] && place.edge == edge
+            });
+            let change = 2.0 * slope + own.map(|place| place.kink).sum::<f64>();
+            if change > 0.0 && self.symmetric(end) && self.active(end) {
+                let place = Place {
+                    edge,
+                    xi,
+                    normal: contact.boundary.normals[end],
+                    profile: Default::default(),
+                    kink: change,
+                    nearer: 0.0,
+                };
+                found.push((place, change));
+            }
+        }
+        let peak = match self.highest_pressure() {
+            Some((peak, _, _)) if !found.is_empty() && peak > 0.0 => peak,
+            _ => return Vec::new(),
+        };
+        let moduli = self.contact_moduli();
+        let kink = |(place, change): (Place, f64)| {
+            let node = self.patch.first + self.beside(&place)[0];
+            let on_axis = place.xi.abs() == 1.0 && self.system.nodes[node].on_axis;
+            let part = if on_axis { 0.25 } else { 0.5 / PI };
+            Kink {
+                s: self.arc(&place),
+                change,
+                growth: part * LN_2 * moduli[place.edge] * change,
+                spacing: self.spacing(&place),
+                mirrored: [0, last].contains(&self.beside(&place)[0]),
+            }
+        };
+        let kinks = found.into_iter().map(kink);
+        kinks.filter(|kink| kink.growth > SHAPING * peak).collect()
+    }
+
+    /// How far the obstacle reaches into the body at a place, along the contact's normal.
+    fn penetration(&self, place: &Place) -> f64 {
+        let contact = self.patch.contact;
+        let boundary = &contact.boundary;
+        let h = edge3::shape(place.xi);
+        let displacement = [0, 1].map(|a| {
+            let at = |i: usize| {
+                let (n, t) = (boundary.normals[i], boundary.tangent(i));
+                let u_n = self
+                    .system
+                    .normal_displacement(self.v, self.patch.first + i);
+                u_n * n[a] + self.u_t(i) * t[a]
+            };
+            edge3::interpolate(&h, &edge_nodes(place.edge).map(at))
+        });
+        let (slope, n) = (place.profile.slope, place.normal);
+        let slope = match contact.normal {
+            NormalOf::Body => 0.0,
+            NormalOf::Obstacle => slope,
+        };
+        let cosine = 1.0 / slope.hypot(1.0);
+        let t = [n[1], -n[0]];
+        let along = |a: usize| displacement[a] * cosine * (n[a] - slope * t[a]);
+        let pushed = self.system.level.indentation * contact.indentation;
+        along(0) + along(1) - cosine * (place.profile.distance - pushed)
+    }
+
+    /// The largest stiffness of a node of an edge against its normal displacement.
+    fn stiffness(&self, edge: usize) -> f64 {
+        let own = edge_nodes(edge).map(|i| match self.system.nodes[self.patch.first + i].normal {
+            Dof::Free(dof) => self.system.stiffness.at(dof, dof),
+            Dof::Fixed(_) => 0.0,
+        });
+        own.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The nodes on either side of a place; twice the same at a node.
+    fn beside(&self, place: &Place) -> [usize; 2] {
+        let [start, end, middle] = edge_nodes(place.edge);
+        match place.xi {
+            -1.0 => [start; 2],
+            0.0 => [middle; 2],
+            1.0 => [end; 2],
+            xi if xi < 0.0 => [start, middle],
+            _ => [middle, end],
+        }
+    }
+
+    /// Distance between the nodes on either side of a place.
+    fn spacing(&self, place: &Place) -> f64 {
+        let [start, end, middle] = self.patch.contact.boundary.edge_arc(place.edge);
+        match place.xi {
+            xi if xi < 0.0 => middle - start,
+            _ => end - middle,
+        }
+    }
+
+    fn arc(&self, place: &Place) -> f64 {
+        let arc = self.patch.contact.boundary.edge_arc(place.edge);
+        edge3::interpolate(&edge3::shape(place.xi), &arc)
+    }
+
+    /// E* of the material below every edge (stress): E/(1 − ν²), and E in plane stress.
+    fn contact_moduli(&self) -> Vec<f64> {
+        let boundary = &self.patch.contact.boundary;
+        let model = self.system.model;
+        // a midside node on the surface belongs to one element
+        let midsides = (0..boundary.edge_count()).map(|k| (boundary.nodes[2 * k + 1], k));
+        let edges: BTreeMap<u32, usize> = midsides.collect();
+        let mut moduli = vec![0.0; edges.len()];
+        for (e, element) in model.mesh.elements.iter().enumerate() {
+            for edge in element.iter().filter_map(|node| edges.get(node)) {
+                let d = model.section.materials()[model.section.material_of(e)];
+                let n = boundary.normals[2 * edge + 1];
+                let (across, along) = if n[1].abs() > n[0].abs() {
+                    (1, 0)
+                } else {
+                    (0, 1)
+                };
+                moduli[*edge] = d[across][across] - d[across][along].powi(2) / d[along][along];
+            }
+        }
+        moduli
+    }
+}

@@ -1,0 +1,313 @@
+//! Curves in space that are met along the body's normal.
+
+use super::spline::Spline;
+use super::{Profile, ROUNDING};
+use crate::problem::Interpolation;
+
+/// A curve in space.
+pub(super) enum Curve<'a> {
+    /// A broken line.
+    Segments(&'a [[f64; 2]], Vec<Block>),
+    /// A smooth line: the Bézier points of its cubics.
+    Smooth(Vec<Bezier>, Vec<Block>),
+    /// A straight line through two points, without ends.
+    Line([f64; 2], [f64; 2]),
+}
+
+/// The four points of a cubic: its ends, and two between that its tangents there point at.
+type Bezier = [[f64; 2]; 4];
+
+/// Pieces of a curve in space, one after the other, and a disc that holds them.
+pub(super) struct Block {
+    pieces: std::ops::Range<usize>,
+    center: [f64; 2],
+    radius: f64,
+}
+
+/// Pieces in a block.
+const BLOCK: usize = 32;
+
+/// Where a normal meets a curve in space.
+pub(super) struct Hit {
+    pub(super) profile: Profile,
+    /// The first and the last of the pieces that meet there.
+    pub(super) pieces: [usize; 2],
+}
+
+/// A normal of the body: its foot n, t, and how far the body reaches along −n.
+pub(super) struct Ray {
+    pub(super) place: [f64; 2],
+    pub(super) n: [f64; 2],
+    pub(super) t: [f64; 2],
+    pub(super) depth: f64,
+}
+
+impl<'a> Curve<'a> {
+    /// Through points, of which no two that follow one another are equal.
+    pub(super) fn through(points: &'a [[f64; 2]], interpolation: Interpolation) -> Self {
+        match interpolation {
+            Interpolation::Linear => {
+                let ends = |k: usize| vec![points[k], points[k + 1]];
+                Curve::Segments(points, blocks(points.len() - 1, ends))
+            }
+            Interpolation::Cubic => {
+                let cubics = spline(points);
+                let blocks = blocks(cubics.len(), |k| cubics[k].to_vec());
+                Curve::Smooth(cubics, blocks)
+            }
+        }
+    }
+
+    /// Through a point at an angle from x (degrees).
+    pub(super) fn line(point: [f64; 2], angle: f64) -> Self {
+        let (sine, cosine) = angle.to_radians().sin_cos();
+        Curve::Line(point, [point[0] + cosine, point[1] + sine])
+    }
+
+    /// Where a normal of the body meets a curve in space.
+    pub(super) fn met_by(&self, ray: &Ray, rounding: f64) -> Option<Hit> {
+        let mut hits: Vec<Hit> = Vec::new();
+        match self {
+            Curve::Segments(points, blocks) => {
+                for k in near(blocks, ray, rounding) {
+                    let (start, end) = (points[k], points[k + 1]);
+                    hits.extend(on_segment(ray, start, end, [0.0, 1.0], k, rounding));
+                }
+            }
+            Curve::Line(start, end) => {
+                let endless = [f64::NEG_INFINITY, f64::INFINITY];
+                hits.extend(on_segment(ray, *start, *end, endless, 0, rounding));
+            }
+            Curve::Smooth(cubics, blocks) => {
+                for k in near(blocks, ray, rounding) {
+                    on_cubic(ray, &cubics[k], k, rounding, &mut hits);
+                }
+            }
+        }
+        // an obstacle behind the body faces its other side
+        hits.retain(|hit| hit.profile.distance >= -ray.depth);
+        let nearest = hits
+            .iter()
+            .map(|hit| hit.profile.distance.abs())
+            .fold(f64::INFINITY, f64::min);
+        // two segments meet in a kink: the mean of their slopes
+        hits.retain(|hit| hit.profile.distance.abs() <= nearest + rounding);
+        let count = hits.len() as f64;
+        let slope = hits.iter().map(|hit| hit.profile.slope).sum::<f64>() / count;
+        let (first, last) = (hits.first()?, hits.last()?);
+        Some(Hit {
+            profile: Profile {
+                slope,
+                ..first.profile
+            },
+            pieces: [first.pieces[0], last.pieces[0]],
+        })
+    }
+
+    /// The point between piece `k − 1` and piece `k` of a curve in space, and the change of the profile's slope there,
+    /// seen along the normal `n`.
+    pub(super) fn joint(&self, k: usize, n: [f64; 2], t: [f64; 2]) -> ([f64; 2], f64) {
+        match self {
+            Curve::Segments(points, _) => {
+                let side = |k: usize| {
+                    let direction = [0, 1].map(|a| points[k + 1][a] - points[k][a]);
+                    (dot(direction, n), dot(direction, t))
+                };
+                let ((rise, along), (next_rise, next_along)) = (side(k - 1), side(k));
+                let upright = |rise: f64, along: f64| along.abs() <= ROUNDING * rise.abs();
+                let change = match (upright(rise, along), upright(next_rise, next_along)) {
+                    // the edge of a face that overhangs
+                    (false, false) if along * next_along < 0.0 => f64::INFINITY,
+                    (false, false) => (next_rise / next_along - rise / along) * along.signum(),
+                    (false, true) => next_rise * f64::INFINITY,
+                    (true, false) => -rise * f64::INFINITY,
+                    (true, true) => 0.0,
+                };
+                (points[k], change)
+            }
+            Curve::Smooth(cubics, _) => (cubics[k][0], 0.0),
+            // it has no joints
+            Curve::Line(start, _) => (*start, 0.0),
+        }
+    }
+}
+
+/// Where a normal meets the straight line from `start` to `end`, if the parameter between them is in its range.
+fn on_segment(
+    ray: &Ray,
+    start: [f64; 2],
+    end: [f64; 2],
+    [least, most]: [f64; 2],
+    piece: usize,
+    rounding: f64,
+) -> Option<Hit> {
+    let Ray { place, n, t, .. } = *ray;
+    let direction = [end[0] - start[0], end[1] - start[1]];
+    let length = direction[0].hypot(direction[1]);
+    let across = direction[0] * t[0] + direction[1] * t[1];
+    if across.abs() <= ROUNDING * length {
+        return None; // seen end on
+    }
+    let towards = [place[0] - start[0], place[1] - start[1]];
+    let part = (towards[0] * t[0] + towards[1] * t[1]) / across;
+    let slack = rounding / length;
+    if part < least - slack || part > most + slack {
+        return None;
+    }
+    let meet = [
+        start[0] + part * direction[0] - place[0],
+        start[1] + part * direction[1] - place[1],
+    ];
+    Some(Hit {
+        profile: Profile {
+            distance: meet[0] * n[0] + meet[1] * n[1],
+            slope: (direction[0] * n[0] + direction[1] * n[1]) / across,
+        },
+        pieces: [piece; 2],
+    })
+}
+
+/// The spline through points of a plane, by the length of the chords.
+fn spline(points: &[[f64; 2]]) -> Vec<Bezier> {
+    let mut length = vec![0.0];
+    for pair in points.windows(2) {
+        let chord = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+        length.push(length[length.len() - 1] + chord);
+    }
+    let splines = [0, 1].map(|a| {
+        Spline::new(
+            length.clone(),
+            points.iter().map(|point| point[a]).collect(),
+        )
+    });
+    let cubic = |k: usize| {
+        let [from, to] = splines[0].ends(k);
+        let third = (to - from) / 3.0;
+        let [x, y] = [&splines[0], &splines[1]].map(|spline| {
+            let ([start, before], [end, after]) =
+                (spline.on_piece(k, from), spline.on_piece(k, to));
+            [start, start + third * before, end - third * after, end]
+        });
+        std::array::from_fn(|i| [x[i], y[i]])
+    };
+    (0..splines[0].pieces()).map(cubic).collect()
+}
+
+/// Slopes of a curve in space up to this are rounding: a symmetric one is flat in its middle.
+const FLAT: f64 = 1e-12;
+
+/// Pieces in blocks; `points`: those that a piece lies between.
+fn blocks(count: usize, points: impl Fn(usize) -> Vec<[f64; 2]>) -> Vec<Block> {
+    let block = |first: usize| {
+        let pieces = first..count.min(first + BLOCK);
+        let all: Vec<[f64; 2]> = pieces.clone().flat_map(&points).collect();
+        let middle = |a: usize| {
+            let along = all.iter().map(|point| point[a]);
+            let low = along.clone().fold(f64::INFINITY, f64::min);
+            0.5 * (low + along.fold(f64::NEG_INFINITY, f64::max))
+        };
+        let center = [middle(0), middle(1)];
+        let distance = |point: &[f64; 2]| (point[0] - center[0]).hypot(point[1] - center[1]);
+        let radius = all.iter().map(distance).fold(0.0, f64::max);
+        Block {
+            pieces,
+            center,
+            radius,
+        }
+    };
+    (0..count).step_by(BLOCK).map(block).collect()
+}
+
+/// The pieces of the blocks that a normal of the body passes through.
+fn near(blocks: &[Block], ray: &Ray, rounding: f64) -> impl Iterator<Item = usize> {
+    let Ray { place, t, .. } = *ray;
+    let passes = move |block: &&Block| {
+        let [x, y] = block.center;
+        let aside = dot([x - place[0], y - place[1]], t).abs();
+        // what is not a number is not left out
+        aside.is_nan() || aside <= block.radius * (1.0 + ROUNDING) + 2.0 * rounding
+    };
+    blocks
+        .iter()
+        .filter(passes)
+        .flat_map(|block| block.pieces.clone())
+}
+
+/// Parts of a cubic, in each of which it crosses a normal at most once.
+const PARTS: usize = 8;
+
+/// Most steps to a crossing.
+const STEPS: usize = 60;
+
+/// Where a normal meets one cubic of a curve.
+fn on_cubic(ray: &Ray, cubic: &Bezier, k: usize, rounding: f64, hits: &mut Vec<Hit>) {
+    let Ray { place, n, t, .. } = *ray;
+    let part_along = |axis: [f64; 2]| cubic.map(|p| dot([p[0] - place[0], p[1] - place[1]], axis));
+    // a cubic lies between its Bézier points
+    let beside = part_along(t);
+    if beside.iter().all(|b| *b > rounding) || beside.iter().all(|b| *b < -rounding) {
+        return;
+    }
+    let ahead = part_along(n);
+    // value and change of a component
+    let at = |[a, b, c, d]: [f64; 4], u: f64| {
+        let v = 1.0 - u;
+        let value = v * v * (v * a + 3.0 * u * b) + u * u * (3.0 * v * c + u * d);
+        let change = 3.0 * (v * v * (b - a) + 2.0 * u * v * (c - b) + u * u * (d - c));
+        [value, change]
+    };
+    let mut add = |u: f64| {
+        let ([distance, rise], [_, across]) = (at(ahead, u), at(beside, u));
+        if across.abs() > ROUNDING * rise.hypot(across) {
+            let slope = match rise / across {
+                slope if slope.abs() <= FLAT => 0.0,
+                slope => slope,
+            };
+            hits.push(Hit {
+                profile: Profile { distance, slope },
+                pieces: [k; 2],
+            });
+        }
+    };
+    // an end counts within rounding
+    let at_end = [beside[0], beside[3]].map(|b| b.abs() <= rounding);
+    for (u, _) in [0.0, 1.0].into_iter().zip(at_end).filter(|(_, is)| *is) {
+        add(u);
+    }
+    let side = |u: f64| at(beside, u)[0] <= 0.0;
+    for i in 0..PARTS {
+        if (i == 0 && at_end[0]) || (i + 1 == PARTS && at_end[1]) {
+            continue;
+        }
+        let [mut low, mut high] = [i, i + 1].map(|i| i as f64 / PARTS as f64);
+        let rises = side(low);
+        if rises == side(high) {
+            continue;
+        }
+        // Newton's method, and a halving where it leaves the interval
+        let mut u = 0.5 * (low + high);
+        for _ in 0..STEPS {
+            let [value, change] = at(beside, u);
+            if (value <= 0.0) == rises {
+                low = u;
+            } else {
+                high = u;
+            }
+            let newton = u - value / change;
+            let next = match newton > low && newton < high {
+                true => newton,
+                false => 0.5 * (low + high),
+            };
+            let settled = (next - u).abs() <= f64::EPSILON;
+            u = next;
+            if settled {
+                break;
+            }
+        }
+        add(u);
+    }
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
