@@ -17,6 +17,7 @@ mod error_estimate;
 mod even_profiles;
 mod examples;
 mod flat_punch;
+mod free_bodies;
 mod gmsh_files;
 mod held_by_contact;
 mod hertz_sphere;

@@ -207,10 +207,7 @@ fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), S
     }
     match model.free_motion(&hindered) {
         None => Ok(()),
-        Some((motion, node)) => Err(SolveError::Unheld {
-            motion: motion.to_owned(),
-            node,
-        }),
+        Some((motion, node)) => Err(SolveError::Unheld { motion, node }),
     }
 }
 

@@ -9,6 +9,7 @@ mod checks;
 mod contact_model;
 mod contacts;
 pub mod estimate;
+mod freedom;
 mod laws;
 mod level;
 mod loads;
@@ -68,8 +69,8 @@ impl Model {
 
     /// A rigid motion that neither the supports nor the given nodes and directions prevent, in words, and a node
     /// that moves.
-    pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(&'static str, u32)> {
-        supports::motion_left(&self.mesh, &self.section, &self.fixed, hindered)
+    pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(String, u32)> {
+        freedom::motion_left(&self.mesh, &self.section, &self.fixed, hindered)
     }
 }
 
