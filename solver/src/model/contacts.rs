@@ -177,7 +177,7 @@ impl Checks {
             ));
         }
         if let Some(radius) = radius {
-            let most = LARGEST_RADIUS * boundary.s[last];
+            let most = LARGEST_RADIUS * boundary.length();
             all.check(self.require(
                 radius <= most,
                 format!("{pointer}/friction/nonlocal_radius"),
