@@ -11,6 +11,7 @@ mod calibration;
 mod catalogue;
 mod contact_patch;
 mod cook;
+mod corner;
 mod cylinder;
 mod disc_pressure;
 mod error_estimate;

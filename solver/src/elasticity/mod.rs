@@ -6,7 +6,8 @@ mod material;
 mod recovery;
 
 pub use assembly::{
-    Dof, DofMap, EdgeLoad, LoadAxes, Loads, assemble_element, assemble_loads, assemble_stiffness,
+    Axes, Dof, DofMap, EdgeLoad, LoadAxes, Loads, assemble_element, assemble_loads,
+    assemble_stiffness,
 };
 pub use error_estimate::{StressDifference, StressError};
 pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic, stress};

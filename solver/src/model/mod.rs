@@ -49,6 +49,9 @@ pub struct Model {
     pub loads: Loads,
     /// Contact boundaries with their obstacles.
     pub contacts: Vec<ContactModel>,
+    /// Contact nodes whose displacement is measured along two directions that are not perpendicular: the normals of two
+    /// contacts that meet there, or the normal and the direction of a support.
+    pub oblique: BTreeMap<u32, [[f64; 2]; 2]>,
     /// The supports leave a rigid motion free, which contact must prevent.
     pub held_by_contact: bool,
     /// Load steps; none: one step to the values as given.
@@ -115,6 +118,7 @@ impl Checks {
             section,
             axis,
             quadrature: problem.quadrature,
+            oblique: contacts::oblique(&contacts, &fixed),
             fixed,
             loads: loads?,
             contacts,

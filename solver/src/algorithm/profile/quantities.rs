@@ -170,7 +170,7 @@ impl PatchView<'_> {
 
     /// The pressure grows without limit at a sharp end of the obstacle and, slowly, at a tip.
     fn pressure_without_limit(&self) -> bool {
-        let sharp = |i: usize| self.active(i) && !self.symmetric(i);
+        let sharp = |i: usize| self.active(i) && self.may_be_sharp(i);
         let tip = self.patch.contact.power == Some(1.0);
         tip || sharp(0) || sharp(self.count() - 1)
     }
