@@ -4,7 +4,7 @@
 //! contact and friction iteration runs on it; [`ElasticBody::displacements`] computes
 //! the whole field by one back-substitution. The factor is private to this module.
 
-use crate::elasticity::{self, Dof, DofMap};
+use crate::elasticity::{self, Axes, Dof, DofMap};
 use crate::error::SolveError;
 use crate::linear::{Breaks, Dense, Factor, FactorError, Graph, Ordering, SparseSymmetric};
 use crate::model::{Held, Level, Model};
@@ -19,8 +19,10 @@ pub struct ElasticBody {
     /// f̂ of the prescribed displacements.
     load_of_supports: Vec<f64>,
     /// Normal and tangential displacement of every contact node, all contacts in a row; free ones
-    /// count from 0 in Ŝ.
+    /// count from 0 in Ŝ. Where the node's axes are oblique: u_n and its other component.
     pub contact_dofs: Vec<[Dof; 2]>,
+    /// Where the axes of a contact node are oblique: the coefficients of these two in u_t.
+    pub tangents: Vec<Option<[f64; 2]>>,
     /// External forces at every node along x and y, without those of contact.
     pub nodal_loads: Vec<[f64; 2]>,
     /// Which displacements are unknown.
@@ -125,9 +127,22 @@ impl ElasticBody {
             Dof::Free(i) => Dof::Free(i - interior),
             fixed => fixed,
         };
-        let contact_dofs: Vec<[Dof; 2]> = contact_nodes(model)
-            .map(|node| map.dofs[node as usize].map(to_contact))
-            .collect();
+        let (mut contact_dofs, mut tangents) = (Vec::new(), Vec::new());
+        for contact in &model.contacts {
+            for (i, &node) in contact.boundary.nodes.iter().enumerate() {
+                let mut dofs = map.dofs[node as usize].map(to_contact);
+                let oblique = map.axes[node as usize].filter(|_| model.oblique.contains_key(&node));
+                tangents.push(oblique.map(|mut axes| {
+                    if axes.along[0] != contact.boundary.normals[i] {
+                        dofs.reverse();
+                        axes.moves.reverse();
+                    }
+                    let [x, y] = contact.boundary.tangent(i);
+                    axes.moves.map(|[a, b]| x * a + y * b)
+                }));
+                contact_dofs.push(dofs);
+            }
+        }
         let axis_ends = axis_ends(model, &contact_dofs);
         let (mut load_of_loads, mut load_of_supports) = (load_of_loads, load_of_supports);
         for &[end, beside] in &axis_ends {
@@ -146,6 +161,7 @@ impl ElasticBody {
             load_of_loads,
             load_of_supports,
             contact_dofs,
+            tangents,
             nodal_loads,
             map,
             matrix,
@@ -303,13 +319,17 @@ fn number(model: &Model) -> (DofMap, usize) {
             && x != 0.0
             && y != 0.0
         {
-            axes[node as usize] = Some([[x, y], [y, -x]]);
+            axes[node as usize] = Some(Axes::perpendicular([[x, y], [y, -x]]));
         }
     }
     let mut in_contact = vec![false; count];
     for contact in &model.contacts {
         for (i, &node) in contact.boundary.nodes.iter().enumerate() {
-            axes[node as usize] = Some([contact.boundary.normals[i], contact.boundary.tangent(i)]);
+            let (n, t) = (contact.boundary.normals[i], contact.boundary.tangent(i));
+            axes[node as usize] = Some(match model.oblique.get(&node) {
+                Some(along) => Axes::oblique(*along),
+                None => Axes::perpendicular([n, t]),
+            });
             in_contact[node as usize] = true;
         }
     }
@@ -319,7 +339,7 @@ fn number(model: &Model) -> (DofMap, usize) {
         unknowns: 0,
     };
     let assign = |map: &mut DofMap, node: u32| {
-        let axes = map.axes[node as usize].unwrap_or([[1.0, 0.0], [0.0, 1.0]]);
+        let axes = map.axes[node as usize].map_or([[1.0, 0.0], [0.0, 1.0]], |axes| axes.along);
         let held = model.fixed.get(&node);
         for a in 0..2 {
             // Model::new checks that a single direction is one of the node's axes
@@ -336,7 +356,11 @@ fn number(model: &Model) -> (DofMap, usize) {
         .filter(|&node| !in_contact[node as usize])
         .for_each(|node| assign(&mut map, node));
     let interior = map.unknowns;
-    contact_nodes(model).for_each(|node| assign(&mut map, node));
+    // a node of two contacts is numbered once
+    let new = |node: &u32| std::mem::replace(&mut in_contact[*node as usize], false);
+    contact_nodes(model)
+        .filter(new)
+        .for_each(|node| assign(&mut map, node));
     (map, interior)
 }
 

@@ -290,6 +290,36 @@ fn boundaries_are_found_by_box_and_by_normal() {
     );
 }
 
+/// The length of a boundary is that of its arcs: the fillet is a quarter of a circle of radius ½, whose sides are
+/// parabolas; each is longer or shorter by less than 1e-4 of it, and its chord is shorter by more.
+#[test]
+fn lengths_of_boundaries_are_those_of_their_arcs() {
+    let text = bytes("fillet-mixed-msh41-binary");
+    let Ok(found) = gmsh::read(&text[..]) else {
+        panic!("it is a good file");
+    };
+    let mesh = found.0;
+    let length = |name: &str| -> f64 {
+        let edges = mesh.boundaries[name].iter();
+        edges
+            .map(|edge| solver::contact::edge_length(&mesh, edge))
+            .sum()
+    };
+    assert_eq!(length("top"), 2.0);
+    let quarter = std::f64::consts::FRAC_PI_4;
+    assert!(
+        (length("fillet") / quarter - 1.0).abs() < 1e-4,
+        "{}",
+        length("fillet")
+    );
+    let chord = |edge: &[u32; 3]| {
+        let [[x0, y0], [x1, y1], _] = mesh.edge_nodes(edge);
+        (x1 - x0).hypot(y1 - y0)
+    };
+    let chords: f64 = mesh.boundaries["fillet"].iter().map(chord).sum();
+    assert!(chords < (1.0 - 1e-3) * quarter, "{chords}");
+}
+
 /// A fault of a file is reported with its line, its numbers and what is expected.
 #[test]
 fn a_broken_file_is_refused_with_its_line() {

@@ -224,17 +224,15 @@ fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), S
     let points = system.points.iter().zip(&finished.bound);
     for (point, _) in points.filter(|(_, tau)| **tau > 0.0) {
         let patch = &system.patches[point.patch];
-        for node in point.nodes {
+        let moved = point.nodes.into_iter().zip(point.shape);
+        for (node, _) in moved.filter(|(_, shape)| *shape != 0.0) {
             let (boundary, i) = (&patch.contact.boundary, node - patch.first);
             hindered.push((boundary.nodes[i], boundary.tangent(i)));
         }
     }
     match model.free_motion(&hindered) {
         None => Ok(()),
-        Some((motion, node)) => Err(SolveError::Unheld {
-            motion: motion.to_owned(),
-            node,
-        }),
+        Some((motion, node)) => Err(SolveError::Unheld { motion, node }),
     }
 }
 
@@ -290,10 +288,13 @@ fn equilibrium(
         });
         let [fx, fy] = match body.map.axes[node] {
             None => external,
-            Some([n, t]) => [
-                n[0] * external[0] + t[0] * external[1],
-                n[1] * external[0] + t[1] * external[1],
-            ],
+            Some(axes) => {
+                let [n, t] = axes.along;
+                [
+                    n[0] * external[0] + t[0] * external[1],
+                    n[1] * external[0] + t[1] * external[1],
+                ]
+            }
         };
         for (a, f) in [fx, fy].into_iter().enumerate().skip(first) {
             sum[a] += f;

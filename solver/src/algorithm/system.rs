@@ -49,8 +49,10 @@ pub struct System<'a> {
 pub struct ContactNode {
     /// u_n; of a node beside the axis what [`AXIS_SHARE`] leaves of it.
     pub normal: Dof,
-    /// u_t.
+    /// u_t, where it is a component of its own; at a node with oblique axes it counts as held, and `oblique` gives it.
     pub tangent: Dof,
+    /// Present where the axes of the node are oblique.
+    pub oblique: Option<Oblique>,
     /// `normal` ≤ gap; infinite where there is no obstacle.
     pub gap: f64,
     /// u_n = gap, whatever the reaction.
@@ -75,6 +77,29 @@ impl ContactNode {
             None => 1.0,
         }
     }
+
+    /// Held at 0 along the surface: a line of symmetry.
+    pub fn symmetric(&self) -> bool {
+        match self.oblique {
+            None => matches!(self.tangent, Dof::Fixed(value) if value == 0.0),
+            Some(oblique) => oblique.symmetric,
+        }
+    }
+}
+
+/// A node whose displacement is measured along its normal and another direction, not perpendicular to it: the normal
+/// of another contact, or that of a support. No friction acts on it: slip is continued to it from the other two nodes of
+/// its edge, and friction forces are passed on to these (formulation 3.3).
+#[derive(Clone, Copy, Debug)]
+pub struct Oblique {
+    /// The displacement along the other direction.
+    pub other: Dof,
+    /// u_t by u_n and the other.
+    part: [f64; 2],
+    /// A line of symmetry passes through it.
+    pub symmetric: bool,
+    /// Another contact begins where this one ends.
+    pub shared: bool,
 }
 
 /// One friction point.
@@ -177,9 +202,27 @@ impl<'a> System<'a> {
         let on_axis = |i: usize| model.axis.holds(boundary.positions[i]);
         for i in 0..count {
             let [normal, tangent] = self.body.contact_dofs[first + i];
+            let oblique = self.body.tangents[first + i].map(|part| {
+                let node = boundary.nodes[i];
+                let with_it = |contact: &&ContactModel| contact.boundary.nodes.contains(&node);
+                let shared = model.contacts.iter().filter(with_it).count() > 1;
+                let held = matches!(tangent, Dof::Fixed(value) if value == 0.0);
+                Oblique {
+                    other: tangent,
+                    part,
+                    symmetric: held
+                        && !shared
+                        && contact.held_along_surface(i, &model.oblique[&node]),
+                    shared,
+                }
+            });
             self.nodes.push(ContactNode {
                 normal,
-                tangent,
+                tangent: match oblique {
+                    None => tangent,
+                    Some(_) => Dof::Fixed(0.0),
+                },
+                oblique,
                 gap: 0.0,
                 bonded: contact.condition == Condition::Bonded,
                 drag: 0.0,
@@ -202,8 +245,11 @@ impl<'a> System<'a> {
         // over a surface the rings already include the other side of the axis
         let round = contact.friction.as_ref().is_some_and(surface);
         let symmetric = |i: usize| {
-            let held = matches!(self.nodes[first + i].tangent, Dof::Fixed(value) if value == 0.0);
-            if on_axis(i) { !round } else { held }
+            if on_axis(i) {
+                !round
+            } else {
+                self.nodes[first + i].symmetric()
+            }
         };
         let chain = Chain {
             s: boundary.s.clone(),
@@ -235,14 +281,25 @@ impl<'a> System<'a> {
             match law.points {
                 FrictionPoints::Gauss3 => {
                     for p in &boundary.friction_points {
-                        add(point(p.s, p.nodes, p.shape, p.weight))?;
+                        let shape = shape_without_oblique(&self.nodes[first..], p.nodes, p.shape);
+                        add(point(p.s, p.nodes, shape, p.weight))?;
                     }
                 }
                 // a node on the axis has no weight, and no friction
                 FrictionPoints::Nodal => {
                     for i in (0..count).filter(|&i| !on_axis(i)) {
                         let (s, weight) = (boundary.s[i], boundary.weights[i]);
-                        add(point(s, [i; 3], [1.0, 0.0, 0.0], weight))?;
+                        let nodes = match self.nodes[first + i].oblique {
+                            None => [i; 3],
+                            Some(_) if i == 0 => [0, 2, 1],
+                            Some(_) => [i, i - 2, i - 1],
+                        };
+                        let shape = [1.0, 0.0, 0.0];
+                        let shape = match nodes[0] == nodes[1] {
+                            true => shape,
+                            false => shape_without_oblique(&self.nodes[first..], nodes, shape),
+                        };
+                        add(point(s, nodes, shape, weight))?;
                     }
                 }
             }
@@ -269,7 +326,7 @@ impl<'a> System<'a> {
             patch,
             s,
             nodes,
-            shape,
+            shape: shape_without_oblique(&self.nodes, nodes, shape),
             weight: 0.0,
             source: match law {
                 Some(law) => law.bound.source(s).shifted(first),
@@ -303,7 +360,11 @@ impl<'a> System<'a> {
                         Dof::Fixed(value) => Dof::Fixed(level.supports * value),
                         free => free,
                     });
-                (node.normal, node.tangent) = (normal, tangent);
+                node.normal = normal;
+                match &mut node.oblique {
+                    None => node.tangent = tangent,
+                    Some(oblique) => oblique.other = tangent,
+                }
                 node.gap = match contact.condition {
                     Condition::None => f64::INFINITY,
                     _ => contact.gap(i, level.indentation),
@@ -409,7 +470,13 @@ impl<'a> System<'a> {
 
     /// u_t of a node.
     pub fn tangential_displacement(&self, v: &[f64], node: usize) -> f64 {
-        value(self.nodes[node].tangent, v)
+        let node = &self.nodes[node];
+        match node.oblique {
+            None => value(node.tangent, v),
+            Some(Oblique { other, part, .. }) => {
+                part[0] * value(node.normal, v) + part[1] * value(other, v)
+            }
+        }
     }
 
     /// u_t − d at a friction point.
@@ -566,6 +633,21 @@ impl<'a> System<'a> {
         } else {
             defect / scale.max(f64::MIN_POSITIVE)
         }
+    }
+}
+
+/// Shape functions of an edge (start, end, midside) where its ends with oblique axes take no part: there the straight
+/// line through the other two continues. They still add up to 1.
+pub(super) fn shape_without_oblique(
+    nodes: &[ContactNode],
+    edge: [usize; 3],
+    [a, b, m]: [f64; 3],
+) -> [f64; 3] {
+    match [edge[0], edge[1]].map(|i| nodes[i].oblique.is_some()) {
+        [false, false] => [a, b, m],
+        [true, false] => [0.0, b - a, m + 2.0 * a],
+        [false, true] => [a - b, 0.0, m + 2.0 * b],
+        [true, true] => [0.0, 0.0, a + b + m],
     }
 }
 

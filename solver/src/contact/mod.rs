@@ -101,6 +101,11 @@ impl ContactBoundary {
         boundary
     }
 
+    /// Arc length from the first node to the last.
+    pub fn length(&self) -> f64 {
+        self.s[self.s.len() - 1] - self.s[0]
+    }
+
     /// Number of edges.
     pub fn edge_count(&self) -> usize {
         self.nodes.len() / 2
@@ -136,20 +141,30 @@ pub fn edge_normals(positions: &[[f64; 2]; 3]) -> [[f64; 2]; 3] {
 pub fn arc_lengths(mesh: &Mesh, chain: &[Edge]) -> Vec<f64> {
     let mut s = vec![0.0];
     for edge in chain {
-        let positions = mesh.edge_nodes(edge);
-        // each half by three points: exact for a straight edge, enough for a gently curved one
-        for centre in [-0.5, 0.5] {
-            let half: f64 = GAUSS_3
-                .iter()
-                .map(|(xi, w)| {
-                    let [dx, dy] = edge3::map(&positions, centre + 0.5 * xi).1;
-                    0.5 * w * dx.hypot(dy)
-                })
-                .sum();
+        for half in halves(mesh, edge) {
             s.push(s[s.len() - 1] + half);
         }
     }
     s
+}
+
+/// Arc length of an edge.
+pub fn edge_length(mesh: &Mesh, edge: &Edge) -> f64 {
+    let [first, second] = halves(mesh, edge);
+    first + second
+}
+
+/// Arc lengths of an edge from its start to its midside, and on to its end.
+fn halves(mesh: &Mesh, edge: &Edge) -> [f64; 2] {
+    let positions = mesh.edge_nodes(edge);
+    // each half by three points: exact for a straight edge, enough for a gently curved one
+    [-0.5, 0.5].map(|centre| {
+        let part = |(xi, w): &(f64, f64)| {
+            let [dx, dy] = edge3::map(&positions, centre + 0.5 * xi).1;
+            0.5 * w * dx.hypot(dy)
+        };
+        GAUSS_3.iter().map(part).sum()
+    })
 }
 
 #[cfg(test)]
@@ -216,5 +231,9 @@ mod tests {
         let (mesh, chain) = top(&points);
         let s = arc_lengths(&mesh, &chain);
         assert!((s[4] - std::f64::consts::FRAC_PI_2).abs() < 2e-3);
+        let edges: f64 = chain.iter().map(|edge| edge_length(&mesh, edge)).sum();
+        assert!((edges - s[4]).abs() < 1e-15);
+        // the chords are 2.5 % shorter
+        assert!(edges > 1.02 * 4.0 * (std::f64::consts::FRAC_PI_4 / 2.0).sin());
     }
 }

@@ -17,13 +17,43 @@ pub enum Dof {
     Fixed(f64),
 }
 
+/// Axes of a node's two components.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axes {
+    /// The unit vectors along which its displacement is measured.
+    pub along: [[f64; 2]; 2],
+    /// How the node moves where one component is 1 and the other 0: the same vectors if they are perpendicular, else
+    /// those of the dual basis. A force has its components along these.
+    pub moves: [[f64; 2]; 2],
+}
+
+impl Axes {
+    /// Perpendicular unit vectors.
+    pub fn perpendicular(along: [[f64; 2]; 2]) -> Self {
+        Axes {
+            along,
+            moves: along,
+        }
+    }
+
+    /// Unit vectors that are not parallel.
+    pub fn oblique(along: [[f64; 2]; 2]) -> Self {
+        let [[a, b], [c, d]] = along;
+        let det = a * d - b * c;
+        Axes {
+            along,
+            moves: [[d / det, -c / det], [-b / det, a / det]],
+        }
+    }
+}
+
 /// Which displacements are unknown, and along which axes each node's two components are measured.
 #[derive(Clone, Debug)]
 pub struct DofMap {
     /// Two components of every node.
     pub dofs: Vec<[Dof; 2]>,
-    /// Axes of a node's two components as rows of a rotation; absent: x and y.
-    pub axes: Vec<Option<[[f64; 2]; 2]>>,
+    /// Axes of a node's two components; absent: x and y.
+    pub axes: Vec<Option<Axes>>,
     /// Number of unknowns.
     pub unknowns: usize,
 }
@@ -31,14 +61,17 @@ pub struct DofMap {
 impl DofMap {
     /// Displacements along x and y of every node, from the unknowns; prescribed ones times `supports`.
     pub fn displacements(&self, unknowns: &[f64], supports: f64) -> Vec<[f64; 2]> {
-        let node = |(dofs, axes): (&[Dof; 2], &Option<[[f64; 2]; 2]>)| {
+        let node = |(dofs, axes): (&[Dof; 2], &Option<Axes>)| {
             let [a, b] = dofs.map(|dof| match dof {
                 Dof::Free(i) => unknowns[i],
                 Dof::Fixed(value) => supports * value,
             });
             match axes {
                 None => [a, b],
-                Some([n, t]) => [n[0] * a + t[0] * b, n[1] * a + t[1] * b],
+                Some(axes) => {
+                    let [n, t] = axes.moves;
+                    [n[0] * a + t[0] * b, n[1] * a + t[1] * b]
+                }
             }
         };
         self.dofs.iter().zip(&self.axes).map(node).collect()
@@ -49,7 +82,7 @@ impl DofMap {
         let is_it = |dof: &Dof| matches!(dof, Dof::Free(i) if *i == unknown);
         let places = self.dofs.iter().zip(&self.axes).enumerate();
         let found = places.flat_map(|(node, (dofs, axes))| {
-            let axes = axes.unwrap_or([[1.0, 0.0], [0.0, 1.0]]);
+            let axes = axes.map_or([[1.0, 0.0], [0.0, 1.0]], |axes| axes.along);
             let free = dofs.iter().zip(axes).filter(|(dof, _)| is_it(dof));
             free.map(move |(_, axis)| (node as u32, axis))
         });
@@ -59,11 +92,14 @@ impl DofMap {
         }
     }
 
-    /// A vector per node along x and y, turned to the node's own axes.
+    /// A force on a node along x and y, as forces on its two components.
     pub fn to_axes(&self, node: usize, [x, y]: [f64; 2]) -> [f64; 2] {
         match self.axes[node] {
             None => [x, y],
-            Some([n, t]) => [n[0] * x + n[1] * y, t[0] * x + t[1] * y],
+            Some(axes) => {
+                let [n, t] = axes.moves;
+                [n[0] * x + n[1] * y, t[0] * x + t[1] * y]
+            }
         }
     }
 }
@@ -153,7 +189,7 @@ pub fn assemble_stiffness(
         );
         for (i, &node) in element.iter().enumerate() {
             if let Some(axes) = map.axes[node as usize] {
-                rotate(&mut k, i, axes);
+                rotate(&mut k, i, axes.moves);
             }
         }
         let dof = |local: usize| map.dofs[element[local / 2] as usize][local % 2];

@@ -7,8 +7,8 @@ mod mixed;
 mod recovery;
 
 pub use assembly::{
-    Dof, DofMap, EdgeLoad, LoadAxes, Loads, assemble_element, assemble_loads, assemble_stiffness,
-    condense_body_force,
+    Axes, Dof, DofMap, EdgeLoad, LoadAxes, Loads, assemble_element, assemble_loads,
+    assemble_stiffness, condense_body_force,
 };
 pub use error_estimate::{StressDifference, StressError};
 pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic, stress};

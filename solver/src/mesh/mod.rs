@@ -146,23 +146,25 @@ impl Mesh {
             }
         }
         let mut number = vec![usize::MAX; self.elements.len()];
-        let mut parts: Vec<Vec<u32>> = Vec::new();
-        let mut seen_by = vec![usize::MAX; self.nodes.len()];
-        for (e, element) in self.elements.iter().enumerate() {
-            let root = find(&mut parent, e as u32) as usize;
+        let mut members: Vec<Vec<u32>> = Vec::new();
+        for e in 0..self.elements.len() as u32 {
+            let root = find(&mut parent, e) as usize;
             if number[root] == usize::MAX {
-                number[root] = parts.len();
-                parts.push(Vec::new());
+                number[root] = members.len();
+                members.push(Vec::new());
             }
-            let part = number[root];
-            for &node in element.iter() {
-                if seen_by[node as usize] != part {
-                    seen_by[node as usize] = part;
-                    parts[part].push(node);
-                }
-            }
+            members[number[root]].push(e);
         }
-        parts
+        // part by part: a node that several parts share comes once in each
+        let mut seen_by = vec![usize::MAX; self.nodes.len()];
+        let nodes = |(part, members): (usize, Vec<u32>)| {
+            let nodes = members
+                .iter()
+                .flat_map(|e| self.elements[*e as usize].iter());
+            let new = |node: &u32| std::mem::replace(&mut seen_by[*node as usize], part) != part;
+            nodes.copied().filter(new).collect()
+        };
+        members.into_iter().enumerate().map(nodes).collect()
     }
 }
 
@@ -233,6 +235,13 @@ mod tests {
         mesh.elements = vec![first, second];
         let parts = mesh.connected_parts();
         assert_eq!(parts.iter().map(Vec::len).collect::<Vec<_>>(), [8, 8]);
+        // a third square beside the first, after the second: the shared node still comes once in each part
+        mesh.nodes
+            .extend([[1.5, 1.0], [2.0, 0.5], [2.0, 0.0], [1.5, 0.0], [2.0, 1.0]]);
+        mesh.elements
+            .push(Element::Quad([1, 17, 19, 2, 18, 16, 15, 5]));
+        let parts = mesh.connected_parts();
+        assert_eq!(parts.iter().map(Vec::len).collect::<Vec<_>>(), [13, 8]);
         let strip = crate::problem::Grid {
             x: vec![0.0, 1.0, 2.0],
             y: vec![0.0, 1.0],

@@ -1,5 +1,6 @@
 //! A checked contact, ready to be solved.
 
+use super::checks::ALIGNED;
 use super::level::Level;
 use crate::contact::ContactBoundary;
 use crate::contact::obstacle::Place;
@@ -42,6 +43,18 @@ impl ContactModel {
     /// Gap at a node (length) when the obstacle is pushed by `factor` times its indentation.
     pub fn gap(&self, node: usize, factor: f64) -> f64 {
         self.profile[node] - factor * self.indentation * self.push[node][0]
+    }
+
+    /// Whether the second of the oblique axes of a node lies along the surface of the body.
+    pub fn held_along_surface(&self, node: usize, [_, held]: &[[f64; 2]; 2]) -> bool {
+        // the body's own normal: the push is against it
+        let ([a, b], n, t) = (
+            self.push[node],
+            self.boundary.normals[node],
+            self.boundary.tangent(node),
+        );
+        let across = (0..2).map(|i| held[i] * (a * n[i] - b * t[i])).sum::<f64>();
+        across.abs() <= ALIGNED
     }
 
     /// d: the obstacle's displacement along the contact's t at a node (length).

@@ -13,7 +13,7 @@ use crate::elasticity::Section;
 use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, FrictionLaw};
 use crate::mesh::{self, Edge, Mesh};
-use crate::problem::{Condition, Contact, NormalOf, Obstacle, Problem, Step};
+use crate::problem::{Algorithm, Condition, Contact, NormalOf, Obstacle, Problem, Step};
 use crate::solution::WarningCode;
 
 /// Cosine of the sharpest turn between two contact edges without a warning: 20°.
@@ -25,6 +25,10 @@ const SHARPEST_CORNER: f64 = 0.7;
 /// Largest nonlocal radius, in lengths of the contact boundary. Beyond it the average hardly depends
 /// on the contact, and between two lines of symmetry its cost grows with the radius.
 const LARGEST_RADIUS: f64 = 10.0;
+
+/// Sine of the least angle between two normals at a common node, or a normal and a support: 6°. Below it the two
+/// directions are hardly independent.
+const LEAST_ANGLE: f64 = 0.1;
 
 impl Checks {
     /// The valid contacts, and whether all are valid. `numbers`: for each contact the check of its obstacle's
@@ -45,10 +49,11 @@ impl Checks {
             let Some(model) = all.check(contact) else {
                 continue;
             };
-            all.check(self.shared_nodes(&model, &models));
+            all.check(self.shared_nodes(&model, &models, problem));
             all.check(self.supported_contact_nodes(&model, &problem.steps, fixed));
             models.push(model);
         }
+        all.check(self.oblique_supports(&models, fixed, problem));
         (models, all.finish(()))
     }
 
@@ -99,23 +104,87 @@ impl Checks {
         })
     }
 
-    /// Every node belongs to one contact.
-    fn shared_nodes(&mut self, model: &ContactModel, others: &[ContactModel]) -> Checked {
-        let shared = others.iter().find_map(|other| {
-            let nodes = &model.boundary.nodes;
-            let node = other.boundary.nodes.iter().find(|n| nodes.contains(n))?;
-            Some((&other.name, node))
-        });
-        match shared {
-            None => Ok(()),
-            Some((other, node)) => Err(self.report(
-                format!("{}/boundary", model.pointer),
-                Reason::SharedNode,
-                format!("node {node}, also in contact `{other}`"),
-                "contacts without common nodes",
-                "End one of them an edge earlier with `from` or `to`.",
-            )),
+    /// Two contacts may have a common end, a corner, where the two normals are its axes; no other node belongs to
+    /// two of them.
+    fn shared_nodes(
+        &mut self,
+        model: &ContactModel,
+        others: &[ContactModel],
+        problem: &Problem,
+    ) -> Checked {
+        let places: BTreeMap<u32, usize> = model.boundary.nodes.iter().copied().zip(0..).collect();
+        let mut corners: Vec<u32> = Vec::new();
+        for other in others {
+            for (j, node) in other.boundary.nodes.iter().enumerate() {
+                let Some(&i) = places.get(node) else { continue };
+                let end = |contact: &ContactModel, i: usize| {
+                    (i == 0 || i + 1 == contact.boundary.nodes.len())
+                        && contact.boundary.weights[i] > 0.0
+                        && contact.condition != Condition::Bonded
+                };
+                let angle = cross(model.boundary.normals[i], other.boundary.normals[j]);
+                let corner = end(model, i)
+                    && end(other, j)
+                    && angle.abs() >= LEAST_ANGLE
+                    && !corners.contains(node)
+                    && problem.solver.algorithm != Algorithm::Thesis;
+                if !corner {
+                    let [x, y] = model.boundary.positions[i];
+                    return Err(self.report(
+                        format!("{}/boundary", model.pointer),
+                        Reason::SharedNode,
+                        format!("node {node} at ({x}, {y}), also in contact `{}`", other.name),
+                        "contacts without common nodes, or with a common end at which two normals differ by more than 6°; none bonded, and not with algorithm `thesis`",
+                        "End one of them an edge earlier with `from` or `to`.",
+                    ));
+                }
+                corners.push(*node);
+            }
         }
+        Ok(())
+    }
+
+    /// A support along neither normal nor tangent: the normal and its direction become the axes of the node, if they
+    /// can. At a common end of two contacts the axes are their normals, and a support has to lie along one of them.
+    fn oblique_supports(
+        &mut self,
+        contacts: &[ContactModel],
+        fixed: &BTreeMap<u32, Held>,
+        problem: &Problem,
+    ) -> Checked {
+        let mut all = AllChecks::default();
+        let oblique = oblique(contacts, fixed);
+        for contact in contacts {
+            let boundary = &contact.boundary;
+            for (i, node) in boundary.nodes.iter().enumerate() {
+                let (Some(held), Some([first, second])) = (fixed.get(node), oblique.get(node))
+                else {
+                    continue;
+                };
+                let along_an_axis = [*first, *second].map(|axis| held.along(axis).is_some());
+                let corner = contacts
+                    .iter()
+                    .filter(|other| other.boundary.nodes.contains(node))
+                    .count()
+                    > 1;
+                let accepted = along_an_axis.contains(&true)
+                    && (corner
+                        || cross(*first, *second).abs() >= LEAST_ANGLE
+                            && contact.condition != Condition::Bonded
+                            && problem.solver.algorithm != Algorithm::Thesis);
+                if !accepted {
+                    let (n, [x, y]) = (boundary.normals[i], boundary.positions[i]);
+                    all.fail(self.report(
+                        format!("{}/boundary", contact.pointer),
+                        Reason::ObliqueSupport,
+                        format!("node {node} at ({x}, {y}), normal ({:.4}, {:.4}), supported along one axis", n[0], n[1]),
+                        "a support along the contact's normal or tangent, or along both axes; or at more than 6° to the normal, where the contact is not bonded, ends at no other contact and the algorithm is not `thesis`",
+                        "End the contact an edge before the support with `from` or `to`.",
+                    ));
+                }
+            }
+        }
+        all.finish(())
     }
 
     /// Whether the chain can carry a pressure, and its obstacle and friction are valid on it.
@@ -180,7 +249,7 @@ impl Checks {
             ));
         }
         if let Some(radius) = radius {
-            let most = LARGEST_RADIUS * boundary.s[last];
+            let most = LARGEST_RADIUS * boundary.length();
             all.check(self.require(
                 radius <= most,
                 format!("{pointer}/friction/nonlocal_radius"),
@@ -270,15 +339,14 @@ impl Checks {
         Err(self.report(place, reason, got, expected, extent))
     }
 
-    /// The two unknowns of a supported contact node are independent only where the support acts along the
-    /// normal or along the tangent; and it must not be held inside the obstacle, at the end of any step.
+    /// A supported contact node must not be held inside the obstacle, at the end of any step; and a bonded one not
+    /// elsewhere than by its obstacle.
     fn supported_contact_nodes(
         &mut self,
         contact: &ContactModel,
         steps: &[Step],
         fixed: &BTreeMap<u32, Held>,
     ) -> Checked {
-        let mut all = AllChecks::default();
         let (boundary, pointer) = (&contact.boundary, &contact.pointer);
         let ends: Vec<Level> = match steps {
             [] => vec![Level::FULL],
@@ -295,15 +363,6 @@ impl Checks {
                 boundary.positions[i],
             );
             let (along_n, along_t) = (held.along(n), held.along(t));
-            if along_n.is_none() && along_t.is_none() {
-                all.fail(self.report(
-                    format!("{pointer}/boundary"),
-                    Reason::ObliqueSupport,
-                    format!("node {node} at ({x}, {y}), normal ({:.4}, {:.4}), supported along one axis", n[0], n[1]),
-                    "a support along the contact's normal or tangent, or along both axes",
-                    "End the contact an edge before the support with `from` or `to`.",
-                ));
-            }
             for level in ends.iter().filter(|_| bonded) {
                 let wanted = [contact.gap(i, level.indentation), contact.drag(i, level)];
                 for (prescribed, wanted) in [along_n, along_t].into_iter().zip(wanted) {
@@ -336,7 +395,7 @@ impl Checks {
                 }
             }
         }
-        all.finish(())
+        Ok(())
     }
 
     /// Warns of contacts whose results may be inaccurate.
@@ -382,6 +441,37 @@ impl Checks {
             );
         }
     }
+}
+
+/// The contact nodes with oblique axes: where two contacts meet their normals, else the normal and the direction of a
+/// support that is neither normal nor tangent.
+pub(super) fn oblique(
+    contacts: &[ContactModel],
+    fixed: &BTreeMap<u32, Held>,
+) -> BTreeMap<u32, [[f64; 2]; 2]> {
+    let mut first: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
+    let mut axes = BTreeMap::new();
+    for contact in contacts {
+        let boundary = &contact.boundary;
+        for (&node, &n) in boundary.nodes.iter().zip(&boundary.normals) {
+            if let Some(other) = first.insert(node, n) {
+                axes.insert(node, [other, n]);
+            }
+        }
+    }
+    for (node, n) in first {
+        if let Some(held @ Held::Along { direction, .. }) = fixed.get(&node)
+            && held.along(n).is_none()
+            && held.along([n[1], -n[0]]).is_none()
+        {
+            axes.entry(node).or_insert([n, *direction]);
+        }
+    }
+    axes
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
 }
 
 /// Turns the normals to those of the obstacle if the contact uses them; returns the parts of a push against

@@ -9,6 +9,7 @@ mod checks;
 mod contact_model;
 mod contacts;
 pub mod estimate;
+mod freedom;
 mod laws;
 mod level;
 mod loads;
@@ -48,6 +49,9 @@ pub struct Model {
     pub loads: Loads,
     /// Contact boundaries with their obstacles.
     pub contacts: Vec<ContactModel>,
+    /// Contact nodes whose displacement is measured along two directions that are not perpendicular: the normals of two
+    /// contacts that meet there, or the normal and the direction of a support.
+    pub oblique: BTreeMap<u32, [[f64; 2]; 2]>,
     /// The supports leave a rigid motion free, which contact must prevent.
     pub held_by_contact: bool,
     /// Load steps; none: one step to the values as given.
@@ -73,8 +77,8 @@ impl Model {
 
     /// A rigid motion that neither the supports nor the given nodes and directions prevent, in words, and a node
     /// that moves.
-    pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(&'static str, u32)> {
-        supports::motion_left(&self.mesh, &self.section, &self.fixed, hindered)
+    pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(String, u32)> {
+        freedom::motion_left(&self.mesh, &self.section, &self.fixed, hindered)
     }
 }
 
@@ -119,6 +123,7 @@ impl Checks {
             section,
             axis,
             quadrature: problem.quadrature,
+            oblique: contacts::oblique(&contacts, &fixed),
             fixed,
             loads: loads?,
             contacts,

@@ -1,15 +1,12 @@
-//! Supports, and whether they (or contacts) hold the body.
+//! Supports: the displacements that they prescribe at nodes.
 
 use std::collections::BTreeMap;
 
 use super::axis::Axis;
 use super::checks::{ALIGNED, Checks};
-use super::contact_model::ContactModel;
-use crate::elasticity::Section;
 use crate::error::{AllChecks, Checked, Reason};
-use crate::friction::{Average, FrictionLaw};
 use crate::mesh::{Edge, Mesh};
-use crate::problem::{BoundaryValue, Condition, Support};
+use crate::problem::{BoundaryValue, Support};
 
 /// Where a support holds.
 enum Place<'a> {
@@ -290,72 +287,6 @@ impl Checks {
         }
         Ok(normals)
     }
-
-    /// Every part of the body must be held against rigid motions, by supports or by contacts (if they touch).
-    /// True if a contact is needed for that.
-    pub(super) fn freedom(
-        &mut self,
-        mesh: &Mesh,
-        section: &Section,
-        fixed: &BTreeMap<u32, Held>,
-        contacts: &[ContactModel],
-    ) -> Checked<bool> {
-        let mut all = AllChecks::default();
-        let held = directions(fixed);
-        let touched: Vec<(u32, [f64; 2])> = contacts.iter().flat_map(hindered).collect();
-        let mut by_contact = false;
-        for part in mesh.connected_parts() {
-            if free_motion(mesh, section, &held, &part).is_none() {
-                continue;
-            }
-            let both: Vec<_> = held.iter().chain(&touched).copied().collect();
-            match free_motion(mesh, section, &both, &part) {
-                None => by_contact = true,
-                Some((direction, node)) => {
-                    let [x, y] = mesh.nodes[node as usize];
-                    all.fail(self.report(
-                        "/supports",
-                        Reason::FreeBody,
-                        format!("a body free to move: {direction}, e.g. node {node} at ({x}, {y})"),
-                        "supports or contacts against every rigid motion",
-                        "Add a support with `ux` or `uy`. Parts that touch only in a corner do not hold each other.",
-                    ));
-                }
-            }
-        }
-        all.finish(by_contact)
-    }
-}
-
-/// Nodes and the directions they are held along.
-fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<(u32, [f64; 2])> {
-    let mut held = Vec::new();
-    for (&node, what) in fixed {
-        match what {
-            Held::Along { direction, .. } => held.push((node, *direction)),
-            Held::Both(_) => held.extend([(node, [1.0, 0.0]), (node, [0.0, 1.0])]),
-        }
-    }
-    held
-}
-
-/// The motions of its nodes that a contact prevents while it touches.
-fn hindered(contact: &ContactModel) -> Vec<(u32, [f64; 2])> {
-    let holds = |law: &FrictionLaw<Average>| law.bound.holds();
-    let normal = contact.condition != Condition::None;
-    let tangent =
-        contact.condition == Condition::Bonded || contact.friction.as_ref().is_some_and(holds);
-    let boundary = &contact.boundary;
-    let mut hindered = Vec::new();
-    for (i, &node) in boundary.nodes.iter().enumerate() {
-        if normal {
-            hindered.push((node, boundary.normals[i]));
-        }
-        if tangent {
-            hindered.push((node, boundary.tangent(i)));
-        }
-    }
-    hindered
 }
 
 fn largest(value: BoundaryValue) -> f64 {
@@ -363,97 +294,4 @@ fn largest(value: BoundaryValue) -> f64 {
         BoundaryValue::Constant(value) => value.abs(),
         BoundaryValue::Linear([start, end]) => start.abs().max(end.abs()),
     }
-}
-
-/// Displacement of a node.
-type Motion<'a> = Box<dyn Fn(u32) -> [f64; 2] + 'a>;
-
-/// A rigid motion of a part of the body that neither the supports nor the given nodes and directions prevent, in
-/// words, and a node that moves.
-pub(super) fn motion_left(
-    mesh: &Mesh,
-    section: &Section,
-    fixed: &BTreeMap<u32, Held>,
-    hindered: &[(u32, [f64; 2])],
-) -> Option<(&'static str, u32)> {
-    let mut held = directions(fixed);
-    held.extend(hindered);
-    let parts = mesh.connected_parts();
-    parts
-        .iter()
-        .find_map(|part| free_motion(mesh, section, &held, part))
-}
-
-/// A rigid motion of the nodes `part` that is not `held` (nodes and directions), and the node that it moves most.
-fn free_motion(
-    mesh: &Mesh,
-    section: &Section,
-    held: &[(u32, [f64; 2])],
-    part: &[u32],
-) -> Option<(&'static str, u32)> {
-    // rotation about the centre of the part, scaled by its size: the motions are comparable
-    let mean =
-        |a: usize| part.iter().map(|&n| mesh.nodes[n as usize][a]).sum::<f64>() / part.len() as f64;
-    let centre = [mean(0), mean(1)];
-    let arm = |n: u32| {
-        let [x, y] = mesh.nodes[n as usize];
-        [x - centre[0], y - centre[1]]
-    };
-    let size = part
-        .iter()
-        .map(|&n| {
-            let [x, y] = arm(n);
-            x.hypot(y)
-        })
-        .fold(0.0, f64::max);
-    let motions: Vec<(&'static str, Motion<'_>)> = if section.axisymmetric() {
-        vec![("along the axis", Box::new(|_| [0.0, 1.0]))]
-    } else {
-        vec![
-            ("along x", Box::new(|_| [1.0, 0.0])),
-            ("along y", Box::new(|_| [0.0, 1.0])),
-            (
-                "in rotation",
-                Box::new(|n| {
-                    let [x, y] = arm(n);
-                    [-y / size, x / size]
-                }),
-            ),
-        ]
-    };
-    let own: std::collections::HashSet<u32> = part.iter().copied().collect();
-    // Gram–Schmidt on the displacements along the held directions: a motion without a remainder is free
-    let mut seen: Vec<(Vec<f64>, &'static str)> = Vec::new();
-    for (name, motion) in &motions {
-        let mut values: Vec<f64> = held
-            .iter()
-            .filter(|(node, _)| own.contains(node))
-            .map(|(node, [a, b])| {
-                let [x, y] = motion(*node);
-                a * x + b * y
-            })
-            .collect();
-        for (other, _) in &seen {
-            let dot: f64 = values.iter().zip(other).map(|(a, b)| a * b).sum();
-            values
-                .iter_mut()
-                .zip(other)
-                .for_each(|(a, b)| *a -= dot * b);
-        }
-        let norm = values.iter().map(|v| v * v).sum::<f64>().sqrt();
-        if norm < ALIGNED {
-            let moved = |n: &u32| {
-                let [x, y] = motion(*n);
-                x.hypot(y)
-            };
-            let node = part
-                .iter()
-                .copied()
-                .max_by(|a, b| moved(a).total_cmp(&moved(b)))?;
-            return Some((name, node));
-        }
-        values.iter_mut().for_each(|v| *v /= norm);
-        seen.push((values, name));
-    }
-    None
 }

@@ -9,7 +9,7 @@ mod warnings;
 pub use between::Missed;
 pub use quantities::Quantity;
 
-use super::system::{Patch, System};
+use super::system::{Patch, System, shape_without_oblique};
 use crate::algorithm::finished::Finished;
 use crate::contact::edge_nodes;
 use crate::element::edge3;
@@ -140,7 +140,10 @@ impl<'a> PatchView<'a> {
         let drag = |i: usize| self.system.nodes[self.patch.first + i].drag;
         let relative = edge_nodes(edge).map(|i| self.u_t(i) - drag(i));
         let h = edge3::shape(xi);
-        edge3::interpolate(&h, &relative) - edge3::interpolate(&h, &self.anchors[edge])
+        // as at the friction points
+        let own = &self.system.nodes[self.system.range(self.patch)];
+        let moved = shape_without_oblique(own, edge_nodes(edge), h);
+        edge3::interpolate(&moved, &relative) - edge3::interpolate(&h, &self.anchors[edge])
     }
 
     fn own_pressures(&self) -> &[f64] {

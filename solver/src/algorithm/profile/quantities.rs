@@ -179,7 +179,7 @@ impl PatchView<'_> {
 
     /// The pressure grows without limit at a sharp end of the obstacle and, slowly, at a kink.
     fn pressure_without_limit(&self) -> bool {
-        let sharp = |i: usize| self.active(i) && !self.symmetric(i);
+        let sharp = |i: usize| self.active(i) && self.may_be_sharp(i);
         sharp(0) || sharp(self.count() - 1) || !self.kinks().is_empty()
     }
 

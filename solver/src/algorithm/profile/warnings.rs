@@ -2,7 +2,6 @@
 
 use super::PatchView;
 use crate::contact::edge_nodes;
-use crate::elasticity::Dof;
 use crate::friction::{Average, BoundLaw, FrictionLaw};
 use crate::problem::{Condition, Measure, Normalization};
 use crate::solution::{Outcome, Warning, WarningCode};
@@ -116,7 +115,7 @@ impl PatchView<'_> {
             );
         }
         let s = &contact.boundary.s;
-        let ends = [0, self.count() - 1].map(|i| (s[i], self.active(i) && !self.symmetric(i)));
+        let ends = [0, self.count() - 1].map(|i| (s[i], self.active(i) && self.may_be_sharp(i)));
         for (s, _) in ends.into_iter().filter(|(_, pressed)| *pressed) {
             warn(
                 WarningCode::ContactReachesObstacleEnd,
@@ -188,7 +187,8 @@ impl PatchView<'_> {
     /// of Hertz's cylinder is .28/n², n elements across the whole contact (`tests/verification`).
     fn peak_uncertainty(&self, edges: usize) -> String {
         let count = self.count();
-        let pressed = [0, count - 1].into_iter().filter(|&i| self.active(i));
+        let ends = |i: &usize| self.active(*i) && (self.symmetric(*i) || self.may_be_sharp(*i));
+        let pressed = [0, count - 1].into_iter().filter(ends);
         let (mirrored, sharp): (Vec<usize>, Vec<usize>) = pressed.partition(|&i| self.symmetric(i));
         let across = edges * (1 + mirrored.len());
         if across == 0 {
@@ -259,7 +259,13 @@ impl PatchView<'_> {
     /// A node on a line of symmetry: on the axis, or held along the tangent.
     pub(super) fn symmetric(&self, i: usize) -> bool {
         let node = &self.system.nodes[self.patch.first + i];
-        node.on_axis || matches!(node.tangent, Dof::Fixed(value) if value == 0.0)
+        node.on_axis || node.symmetric()
+    }
+
+    /// A node at which the obstacle may end: neither on a line of symmetry nor in a corner, where another contact begins.
+    pub(super) fn may_be_sharp(&self, i: usize) -> bool {
+        let node = &self.system.nodes[self.patch.first + i];
+        !self.symmetric(i) && node.oblique.is_none_or(|oblique| !oblique.shared)
     }
 
     /// The largest |σ_t| that a prescribed bound exerts on edges of which no node touches.
