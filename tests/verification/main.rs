@@ -19,6 +19,7 @@ mod examples;
 mod flat_punch;
 mod gmsh_files;
 mod held_by_contact;
+mod graded;
 mod hertz_sphere;
 mod input;
 mod invariance;
