@@ -31,6 +31,7 @@ fn main() {
     text += &table::rows(&records);
     text += &table::robustness(&records);
     text += &table::dragged_sheet(&records);
+    text += &table::adaptive(&records);
     text += &examples::section(&figures);
     text += &studies::section();
     std::fs::write(out.join("verification.md"), text).unwrap();

@@ -15,6 +15,8 @@ pub struct Facing {
     pub runs: Vec<FacingRun>,
     /// Coordinates c of edges that `from` or `to` cut and that were therefore left out.
     pub cut: Vec<[f64; 2]>,
+    /// The same edges, each with the length of it that the obstacle covers.
+    pub cut_edges: Vec<(Edge, f64)>,
 }
 
 /// A chain of edges and the obstacle's profile at its nodes.
@@ -95,6 +97,7 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
     let mut found = Facing {
         runs: Vec::new(),
         cut: Vec::new(),
+        cut_edges: Vec::new(),
     };
     let mut continues = false;
     for (k, edge) in boundary.iter().enumerate() {
@@ -108,6 +111,9 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
         let touches = most > low + rounding && least < high - rounding;
         if touches && !within {
             found.cut.push([least, most]);
+            found
+                .cut_edges
+                .push((*edge, most.min(high) - least.max(low)));
         }
         match nodes.map(seen_from) {
             [Some(a), Some(b), Some(m)] if within => {

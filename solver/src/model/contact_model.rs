@@ -3,6 +3,7 @@
 use super::level::Level;
 use crate::contact::ContactBoundary;
 use crate::friction::{Average, FrictionLaw};
+use crate::mesh::Edge;
 use crate::problem::{Condition, NormalOf};
 
 /// A contact boundary, its obstacle and its friction law.
@@ -16,6 +17,8 @@ pub struct ContactModel {
     pub boundary: ContactBoundary,
     /// Profile of the obstacle at each node, along the contact's normal (length).
     pub profile: Vec<f64>,
+    /// Edges that an end of the obstacle cuts, which are no part of Γ_C, and the length of each that it covers.
+    pub cut: Vec<(Edge, f64)>,
     /// How far the obstacle is pushed against the body (length).
     pub indentation: f64,
     /// The parts of that push along the contact's normal and along its t, at each node: 1 and 0 with

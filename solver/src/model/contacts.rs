@@ -75,7 +75,7 @@ impl Checks {
         }
         let edges = self.boundary(mesh, &contact.boundary, format!("{pointer}/boundary"))?;
         obstacle?;
-        let run = self.facing_run(mesh, edges, contact, &pointer)?;
+        let (run, cut) = self.facing_run(mesh, edges, contact, &pointer)?;
         let mut boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
         let radius = friction.as_ref().and_then(|law| law.bound.radius());
         self.sound(&boundary, axis, contact, radius, &run, &pointer)?;
@@ -85,6 +85,7 @@ impl Checks {
             name: contact.boundary.clone(),
             pointer,
             boundary,
+            cut,
             profile: run.profile.iter().zip(&push).map(along).collect(),
             indentation: contact.indentation,
             push,
@@ -189,14 +190,14 @@ impl Checks {
         all.finish(())
     }
 
-    /// The part of the boundary that faces the obstacle: one chain.
+    /// The part of the boundary that faces the obstacle, one chain, and the edges that its ends cut.
     pub(super) fn facing_run(
         &mut self,
         mesh: &Mesh,
         edges: &[Edge],
         contact: &Contact,
         pointer: &str,
-    ) -> Checked<FacingRun> {
+    ) -> Checked<(FacingRun, Vec<(Edge, f64)>)> {
         let runs = mesh::runs(edges);
         let [run] = &runs[..] else {
             return Err(self.report(
@@ -226,7 +227,7 @@ impl Checks {
         }
         let pieces = facing.runs.len();
         if let (Some(run), 1) = (facing.runs.pop(), pieces) {
-            return Ok(run);
+            return Ok((run, facing.cut_edges));
         }
         let s = crate::contact::arc_lengths(mesh, run);
         let ([x0, y0], [x1, y1]) = (
