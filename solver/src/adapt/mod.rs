@@ -155,7 +155,9 @@ fn finer(
         for (part, _) in parts.iter().zip(marked).filter(|(_, marked)| **marked) {
             divided[*part as usize] = true;
         }
-        graded.refine(&divided);
+        if !graded.refine(&divided) {
+            return Err(Unmet::Folded);
+        }
         let (finer, of) = graded.closed();
         *parts = of;
         finer

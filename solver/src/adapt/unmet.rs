@@ -31,7 +31,7 @@ pub(super) enum Unmet {
     Stalled,
     /// The linearised problem has no unique solution.
     Unknown,
-    /// An element of the first mesh is so curved that its parts would be folded.
+    /// An element of the first mesh is so curved or crooked that its parts would be folded.
     Folded,
 }
 
@@ -112,7 +112,7 @@ pub(super) fn unfinished(
             }
             Unmet::Unknown => "the linearised problem has no unique solution".to_owned(),
             Unmet::Folded => {
-                "an element of the first mesh is so curved that its parts would be folded"
+                "an element of the first mesh is so curved or crooked that its parts would be folded"
                     .to_owned()
             }
             Unmet::Nothing => return None,

@@ -22,6 +22,12 @@ use crate::element::Element;
 /// A quadrilateral longer than this many times its width is halved, which brings its sides together.
 const LONG: f64 = 3.0;
 
+/// A division asks for others about as far as it is levels finer than its surroundings; a few passes are usual.
+const MOST_PASSES: u32 = 100;
+
+/// So often folded closures are replaced by divisions; those of an element that is all but folded itself remain.
+const MOST_UNFOLDING: u32 = 4;
+
 /// A mesh whose elements are refined one by one, again and again.
 #[derive(Clone)]
 pub struct GradedMesh {
@@ -52,10 +58,16 @@ impl GradedMesh {
         self.elements.len()
     }
 
-    /// Divides the elements that are marked, and others until the rest can be closed.
-    pub fn refine(&mut self, marked: &[bool]) {
+    /// Divides the elements that are marked, and others until the rest can be closed. Whether that was possible: among
+    /// elements of odd shapes one division may ask for another without end, and `self` is of no use then.
+    pub fn refine(&mut self, marked: &[bool]) -> bool {
         let mut marked = marked.to_vec();
+        let (mut passes, mut unfolding) = (0, 0);
         while marked.contains(&true) {
+            passes += 1;
+            if passes > MOST_PASSES {
+                return false;
+            }
             let elements = std::mem::take(&mut self.elements);
             for ((element, origin), marked) in elements.into_iter().zip(marked) {
                 match marked {
@@ -70,7 +82,8 @@ impl GradedMesh {
             marked = elements
                 .map(|(element, _)| self.must_divide(element))
                 .collect();
-            if !marked.contains(&true) {
+            if !marked.contains(&true) && unfolding < MOST_UNFOLDING {
+                unfolding += 1;
                 marked = self.folded();
             }
         }
@@ -81,6 +94,7 @@ impl GradedMesh {
             }
             *edges = finer;
         }
+        true
     }
 
     /// The mesh without hanging nodes, and for each of its elements that of `self` which it is a part of.
