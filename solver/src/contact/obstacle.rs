@@ -14,6 +14,8 @@ pub struct Facing {
     pub runs: Vec<FacingRun>,
     /// Coordinates c of edges inside which the obstacle ends, and that were therefore left out.
     pub cut: Vec<[f64; 2]>,
+    /// The same edges, each with the length of it that the obstacle covers.
+    pub cut_edges: Vec<(Edge, f64)>,
 }
 
 /// A chain of edges and the obstacle's profile at its nodes.
@@ -65,6 +67,7 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
     let mut found = Facing {
         runs: Vec::new(),
         cut: Vec::new(),
+        cut_edges: Vec::new(),
     };
     let mut continues = false;
     for (k, edge) in boundary.iter().enumerate() {
@@ -79,6 +82,9 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
         let seen = nodes.map(|node| view.seen_from_node(node));
         if touches && (!within || view.ends_inside(k, &seen)) {
             found.cut.push([least, most]);
+            found
+                .cut_edges
+                .push((*edge, most.min(high) - least.max(low)));
         }
         match seen {
             [Some(a), Some(b), Some(m)] if within => {
