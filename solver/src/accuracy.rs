@@ -368,7 +368,7 @@ fn conclude(outcome: Outcome, quantities: Vec<EstimatedQuantity>, unseen: &[bool
                 (
                     0.0,
                     format!(
-                        "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge or a tip of the obstacle: do not use it. Forces have a limit, and so has the averaged pressure."
+                        "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge, a tip or a kink of the obstacle: do not use it. Forces have a limit, and so has the averaged pressure."
                     ),
                 ),
             ),

@@ -121,7 +121,7 @@ fn at_a_sharp_edge_the_peak_without_a_limit_is_named() {
     };
     assert_eq!(
         *message,
-        "`peak_normal_stress` of contact `top` has no limit: it grows at an edge or a tip of the obstacle with every finer mesh, and no tolerance applies to it. Forces have a limit, and so has the averaged pressure."
+        "`peak_normal_stress` of contact `top` has no limit: it grows at an edge, a tip or a kink of the obstacle with every finer mesh, and no tolerance applies to it. Forces have a limit, and so has the averaged pressure."
     );
     assert_eq!(
         messages(&solve(&to(0.02, example("cylinder"))).summary),
@@ -140,16 +140,18 @@ fn a_kink_of_the_obstacle_stands_in_the_way_and_is_named() {
     let [message] = &messages(&summary)[..] else {
         panic!("{:#?}", summary.warnings);
     };
+    let kink = |w: &solver::solution::Warning| w.code == WarningCode::KinkInContact;
+    assert!(summary.warnings.iter().any(kink), "{:#?}", summary.warnings);
     assert!(summary.refinements.len() < 20);
     // the forces are known all the same
     let accuracy = summary.accuracy.as_ref().unwrap();
     let force = &accuracy.quantities[0];
     assert!(force.relative.unwrap() < 0.01, "{force:?}");
     assert!(
-        message.contains("`peak_normal_stress` of contact `top` is known to"),
+        message.starts_with("`peak_normal_stress` of contact `top` has no limit"),
         "{message}"
     );
-    assert!(message.contains("The obstacle of contact `top` is a broken line, and at a kink in the contact the pressure has no limit: use the forces"), "{message}");
+    assert!(message.ends_with("Forces have a limit, and so has the averaged pressure."));
 }
 
 /// The observer learns which mesh is being solved.

@@ -147,7 +147,7 @@ pub(super) fn unfinished(
         .find(|q| q.method == ErrorMethod::NoLimit);
     if let Some(q) = unlimited {
         sentences.push(format!(
-            "{} has no limit: it grows at an edge or a tip of the obstacle with every finer mesh, and no tolerance applies to it. Forces have a limit, and so has the averaged pressure.",
+            "{} has no limit: it grows at an edge, a tip or a kink of the obstacle with every finer mesh, and no tolerance applies to it. Forces have a limit, and so has the averaged pressure.",
             name(q)
         ));
     }

@@ -25,6 +25,8 @@ pub struct FacingRun {
     pub chain: Vec<Edge>,
     /// The obstacle at each node of the chain.
     pub profile: Vec<Profile>,
+    /// Arc length of the first node from the start of the boundary.
+    pub start: f64,
     /// The coordinate c there.
     pub coordinate: Vec<f64>,
     /// The obstacle between the nodes, and at its corners.
@@ -91,6 +93,7 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
                 if !continues {
                     found.runs.push(FacingRun {
                         profile: vec![a.profile],
+                        start: view.whole.s[nodes[0]],
                         coordinate: vec![c[0]],
                         ..FacingRun::default()
                     });
@@ -138,7 +141,7 @@ struct Seen {
 impl<'a> View<'a> {
     fn new(mesh: &'a Mesh, boundary: &[Edge], obstacle: &'a Obstacle) -> Self {
         let shape = Shape::new(obstacle);
-        let whole = ContactBoundary::new(mesh, boundary, |_| 1.0);
+        let whole = ContactBoundary::new(mesh, boundary, 0.0, |_| 1.0);
         View {
             mesh,
             along: obstacle.span().2,

@@ -81,7 +81,7 @@ impl Checks {
         let edges = self.boundary(mesh, &contact.boundary, format!("{pointer}/boundary"))?;
         obstacle?;
         let (run, cut) = self.facing_run(mesh, edges, contact, &pointer)?;
-        let mut boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
+        let mut boundary = ContactBoundary::new(mesh, &run.chain, run.start, |x| section.depth(x));
         let radius = friction.as_ref().and_then(|law| law.bound.radius());
         self.sound(&boundary, axis, contact, radius, &run, &pointer)?;
         let push = turn_normals(&mut boundary, &run, contact.normal);

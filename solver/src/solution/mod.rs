@@ -221,7 +221,7 @@ pub struct ContactSummary {
 pub struct Peak {
     /// The stress, with its sign.
     pub value: f64,
-    /// Arc length from the first node of Γ_C.
+    /// Arc length from the start of the named boundary.
     pub s: f64,
     /// Position.
     pub x: f64,
@@ -436,7 +436,7 @@ pub struct ForcePair {
 /// `Residuals::friction` of the largest); and a point is open if one of the nodes beside it is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactProfile {
-    /// Arc length from the first node of Γ_C.
+    /// Arc length from the start of the named boundary.
     pub s: Vec<f64>,
     /// Position before deformation.
     pub x: Vec<f64>,
