@@ -42,6 +42,16 @@ pub enum Payload {
         /// The phase.
         stage: Phase,
     },
+    /// Adaptive refinement began to solve on a mesh. Its iterations are reported once it is known to be the last.
+    Mesh {
+        /// Number of the mesh, from 1.
+        number: u32,
+        /// Its elements.
+        elements: u64,
+        /// Largest relative error on the mesh before; absent for the first, and where it is not known.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        error: Option<f64>,
+    },
     /// An iteration.
     Iteration(TimedIteration),
     /// A warning about the problem or its solution.
@@ -107,6 +117,11 @@ mod tests {
             Payload::requeued(Requeue::Drain),
             Payload::Stage {
                 stage: Phase::Factor,
+            },
+            Payload::Mesh {
+                number: 2,
+                elements: 1200,
+                error: Some(0.04),
             },
             Payload::Iteration(crate::fake::timed(1)),
         ] {

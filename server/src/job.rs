@@ -415,6 +415,12 @@ pub struct Progress {
     pub rate: Option<f64>,
     /// Estimated seconds to the end, extrapolated from the rate.
     pub eta_s: Option<f64>,
+    /// Number of the mesh that adaptive refinement is on, from 1; absent without it.
+    pub mesh: Option<u32>,
+    /// Elements of that mesh.
+    pub mesh_elements: Option<u64>,
+    /// Largest relative error on the mesh before.
+    pub mesh_error: Option<f64>,
 }
 
 /// Why a job failed, in the form of a problem document.

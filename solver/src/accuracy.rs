@@ -14,6 +14,7 @@ use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
 use crate::model::Model;
+use crate::origins::{Added, Origins};
 use crate::solution::{
     Accuracy, ErrorMethod, EstimatedQuantity, Observer, Outcome, Progress, QuantityName, Verdict,
 };
@@ -91,11 +92,12 @@ pub fn assess(
     system: &System<'_>,
     finished: &Finished,
     reported: &Reported,
+    origins: Option<&mut Origins>,
     observe: &mut Observer<'_>,
 ) -> Accuracy {
     let quantities = &reported.quantities;
     let bounds = match reported.summary.outcome {
-        Outcome::Converged => bounds(model, body, system, finished, reported, observe),
+        Outcome::Converged => bounds(model, body, system, finished, reported, origins, observe),
         _ => None,
     };
     let mut found = Vec::with_capacity(quantities.len());
@@ -157,6 +159,7 @@ fn bounds(
     system: &System<'_>,
     finished: &Finished,
     reported: &Reported,
+    mut origins: Option<&mut Origins>,
     observe: &mut Observer<'_>,
 ) -> Option<Vec<f64>> {
     let quantities = &reported.quantities;
@@ -178,6 +181,7 @@ fn bounds(
             value: quantity.value.abs(),
             ..Parts::default()
         };
+        let mut added = Added::default();
         if let Some(gradient) = &quantity.gradient {
             let (z, errors) = duals.next()?;
             let force = system.stiffness.times(z);
@@ -186,8 +190,16 @@ fn bounds(
             parts.absolute = quantity.factor.abs() * errors.iter().map(|e| e.abs()).sum::<f64>();
             parts.consistency = (quantity.factor * moved.map(|(a, b)| a * b).sum::<f64>()).abs();
             parts.gap = quantity.factor * gap_between_nodes(system, finished, &force);
+            if origins.is_some() {
+                added = by_weight(quantity, system, &errors, &smoothing);
+            }
         }
-        bounds.push(parts.bound(quantity.name));
+        let bound = parts.bound(quantity.name);
+        if let Some(origins) = origins.as_deref_mut().filter(|_| !quantity.unlimited) {
+            by_spacing(quantity, quantities, &parts, &mut added);
+            origins.add(quantity.patch, bound / scale(quantity, quantities), &added);
+        }
+        bounds.push(bound);
     }
     Some(bounds)
 }
@@ -217,16 +229,54 @@ fn weighted_errors(
     Some(errors)
 }
 
+/// What elements and edges add to the bound of a quantity with a gradient: weighted errors, and pressures brought back
+/// to the nodes.
+fn by_weight(quantity: &Quantity, system: &System<'_>, errors: &[f64], smoothing: &[f64]) -> Added {
+    let [signed, absolute, consistency, ..] = factors(quantity.name);
+    let weight = quantity.factor.abs();
+    let elements = errors
+        .iter()
+        .map(|e| (signed + absolute) * weight * e.abs());
+    let mut added = Added {
+        elements: elements.collect(),
+        edges: Vec::new(),
+    };
+    let patch = &system.patches[quantity.patch];
+    let reaction = quantity.gradient.as_ref().map(|g| &g.reaction);
+    for edge in 0..patch.contact.boundary.edge_count() {
+        let at = |i: usize| {
+            let node = patch.first + i;
+            reaction.map_or(0.0, |reaction| (reaction[node] * smoothing[node]).abs())
+        };
+        let moved: f64 = edge_nodes(edge).map(at).iter().sum();
+        added.edges.push((edge, consistency * weight * moved));
+    }
+    added
+}
+
+/// Adds the parts that the distances between nodes and points leave open.
+fn by_spacing(quantity: &Quantity, all: &[Quantity], parts: &Parts, added: &mut Added) {
+    let [_, _, _, gap, ends, spacing, between, _] = factors(quantity.name);
+    let at_ends: Vec<(usize, f64)> = all
+        .iter()
+        .filter(|q| is_end(q, quantity.patch))
+        .flat_map(|q| q.spacing_at.iter().map(|(edge, _)| (*edge, q.spacing)))
+        .collect();
+    added.spread(gap * parts.gap.abs() + ends * parts.ends, &at_ends);
+    added.spread(spacing * parts.spacing, &quantity.spacing_at);
+    added.spread(between * parts.between, &quantity.between_at);
+}
+
+/// Whether a quantity is an end of the contact.
+fn is_end(quantity: &Quantity, patch: usize) -> bool {
+    use QuantityName::{ContactEnd, ContactStart};
+    matches!(quantity.name, ContactStart | ContactEnd) && quantity.patch == patch
+}
+
 /// The largest distance between the nodes at the ends of the contact, in lengths of the contact.
 fn end_spacing(quantity: &Quantity, all: &[Quantity]) -> f64 {
-    let is_end = |q: &&Quantity| {
-        let end = matches!(
-            q.name,
-            QuantityName::ContactStart | QuantityName::ContactEnd
-        );
-        end && q.patch == quantity.patch
-    };
-    let ends: Vec<&Quantity> = all.iter().filter(is_end).collect();
+    let ends = all.iter().filter(|q| is_end(q, quantity.patch));
+    let ends: Vec<&Quantity> = ends.collect();
     let values = |name: QuantityName| {
         let ends = ends.iter().filter(move |q| q.name == name);
         ends.map(|q| q.value)
@@ -318,7 +368,7 @@ fn conclude(outcome: Outcome, quantities: Vec<EstimatedQuantity>, unseen: &[bool
                 (
                     0.0,
                     format!(
-                        "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge or a tip of the obstacle: do not use it. Forces have a limit, and so has the averaged pressure."
+                        "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge, a tip or a kink of the obstacle: do not use it. Forces have a limit, and so has the averaged pressure."
                     ),
                 ),
             ),

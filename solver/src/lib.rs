@@ -40,19 +40,21 @@ pub mod body;
 // Contact and friction on that system.
 pub mod algorithm;
 
-// What the mesh may have done to each number.
+// What the mesh may have done to each number, and where.
 pub mod accuracy;
+pub mod origins;
 
 // Load steps, one after the other.
 pub mod steps;
 
-// Finer grids until the results settle.
+// Finer meshes until the errors are small enough.
 pub mod adapt;
 
 use body::ElasticBody;
 use error::{SolveError, Violation};
-use mesh::External;
+use mesh::{External, Mesh};
 use model::Model;
+use origins::Origins;
 use problem::{Problem, Refine};
 use solution::{Observer, Phase, Progress, Solution, Warning};
 
@@ -70,16 +72,28 @@ pub fn solve_on(
     external: Option<External>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
+    solve_with_mesh(problem, external, observe).map(|(solution, _)| solution)
+}
+
+/// The same, and the mesh that the solution is on: the refined one.
+pub fn solve_with_mesh(
+    problem: &Problem,
+    external: Option<External>,
+    observe: &mut Observer<'_>,
+) -> Result<(Solution, Mesh), SolveError> {
     match problem.mesh.refine {
-        Refine::Times(_) => prepare(problem, external, observe)?.solve(observe),
+        Refine::Times(_) => {
+            let prepared = prepare(problem, external, observe)?;
+            Ok((prepared.solve(observe)?, prepared.model.mesh))
+        }
         Refine::Adaptive(goal) => {
-            let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
-            let contacts = model.contacts;
-            // only grids are refined adaptively, and a grid is part of the problem
-            let solve = |problem: &Problem, observe: &mut Observer<'_>| {
-                prepare(problem, None, observe)?.solve(observe)
+            let first = Model::new(problem, external).map_err(SolveError::Invalid)?;
+            let solve = |model: Model, origins: &mut Origins, observe: &mut Observer<'_>| {
+                notify(observe, Progress::Phase(Phase::Mesh))?;
+                let Prepared { model, body } = prepared(model, observe)?;
+                steps::run(&model, &body, Some(origins), observe)
             };
-            adapt::run(problem, &goal, &contacts, &solve, observe)
+            adapt::run(problem, &goal, first, &solve, observe)
         }
     }
 }
@@ -102,7 +116,24 @@ pub fn prepare(
     observe: &mut Observer<'_>,
 ) -> Result<Prepared, SolveError> {
     notify(observe, Progress::Phase(Phase::Mesh))?;
-    let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
+    prepared(
+        Model::new(problem, external).map_err(SolveError::Invalid)?,
+        observe,
+    )
+}
+
+/// Prepares a problem on another mesh of its body, with all boundaries, groups and node sets of its own.
+pub fn prepare_on_mesh(
+    problem: &Problem,
+    mesh: Mesh,
+    observe: &mut Observer<'_>,
+) -> Result<Prepared, SolveError> {
+    notify(observe, Progress::Phase(Phase::Mesh))?;
+    let model = Model::on_mesh(problem, mesh.into()).map_err(SolveError::Invalid)?;
+    prepared(model, observe)
+}
+
+fn prepared(model: Model, observe: &mut Observer<'_>) -> Result<Prepared, SolveError> {
     for warning in &model.warnings {
         notify(observe, Progress::Warning(warning))?;
     }
@@ -113,7 +144,7 @@ pub fn prepare(
 impl Prepared {
     /// Contact and friction, load step by load step.
     pub fn solve(&self, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
-        steps::run(&self.model, &self.body, observe)
+        steps::run(&self.model, &self.body, None, observe)
     }
 
     /// Solves another problem on this body; `None`: its body is not the same.
@@ -122,7 +153,7 @@ impl Prepared {
         model: &Model,
         observe: &mut Observer<'_>,
     ) -> Option<Result<Solution, SolveError>> {
-        ElasticBody::same(&self.model, model).then(|| steps::run(model, &self.body, observe))
+        ElasticBody::same(&self.model, model).then(|| steps::run(model, &self.body, None, observe))
     }
 }
 

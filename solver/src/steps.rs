@@ -6,6 +6,7 @@ use crate::algorithm::{self, Finished, Place, System, report};
 use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::model::{Level, Model};
+use crate::origins::Origins;
 use crate::problem::{Algorithm, Spacing, Step};
 use crate::solution::{
     Comparison, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution, StepSolution,
@@ -16,9 +17,11 @@ use crate::solution::{
 const MOST_HALVINGS: u32 = 6;
 
 /// Solves all steps; the end of the last one is the solution. After a step that does not converge no other follows.
+/// `origins`: where the errors of its results come from is noted there.
 pub fn run(
     model: &Model,
     body: &ElasticBody,
+    mut origins: Option<&mut Origins>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     let whole = [Step::whole()];
@@ -41,8 +44,12 @@ pub fn run(
         let reported = report(model, body, &load_history.system, &finished)?;
         let last = number + 1 == steps.len() || !can_continue(reported.summary.outcome);
         let accuracy = last.then(|| {
-            let system = &load_history.system;
-            accuracy::assess(model, body, system, &finished, &reported, observe)
+            let (system, mut origins) = (&load_history.system, origins.take());
+            if let Some(origins) = origins.as_deref_mut() {
+                let places = reported.missed.iter();
+                places.for_each(|place| origins.add_place(model, place.patch, place.s));
+            }
+            accuracy::assess(model, body, system, &finished, &reported, origins, observe)
         });
         let mut summary = reported.summary;
         summary.accuracy = accuracy;

@@ -32,6 +32,7 @@ fn main() {
     text += &table::nearly_incompressible(&records);
     text += &table::robustness(&records);
     text += &table::dragged_sheet(&records);
+    text += &table::adaptive(&records);
     text += &examples::section(&figures);
     text += &studies::section();
     std::fs::write(out.join("verification.md"), text).unwrap();

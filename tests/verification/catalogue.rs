@@ -3,7 +3,7 @@
 
 use fastrand::Rng;
 use serde_json::{Value, json};
-use solver::problem::Problem;
+use solver::problem::{Grid, Problem};
 
 use crate::support::{Lattice, problem, union};
 
@@ -289,12 +289,55 @@ fn triangles_of(x: &[f64], y: &[f64]) -> Value {
     let (columns, rows) = (x.len() - 1, y.len() - 1);
     let lattice = Lattice::new(columns, rows, |i, j| [at(x, i), at(y, j)]);
     let (nodes, elements) = lattice.cut(|_| true);
+    inline_of(&lattice, columns, rows, nodes, elements)
+}
+
+fn inline_of(
+    lattice: &Lattice,
+    columns: usize,
+    rows: usize,
+    nodes: Vec<[f64; 2]>,
+    elements: Vec<Vec<usize>>,
+) -> Value {
     json!({"inline": {"nodes": nodes, "elements": elements, "boundaries": {
         "top": lattice.edges(columns, |k| (k, 2 * rows)),
         "bottom": lattice.edges(columns, |k| (k, 0)),
         "left": lattice.edges(rows, |k| (0, k)),
         "right": lattice.edges(rows, |k| (2 * columns, k)),
     }}})
+}
+
+/// The problem of this number on an unstructured mesh: of a grid every inner crossing is moved, and some cells are cut
+/// in two triangles; other meshes stay.
+pub(crate) fn unstructured(number: u64) -> Problem {
+    let mut problem = case(number).problem;
+    let mut dice = Rng::with_seed(number);
+    let Some(Grid { x, y, .. }) = problem.mesh.grid() else {
+        return problem;
+    };
+    let (columns, rows) = (x.len() - 1, y.len() - 1);
+    let mut corners = vec![vec![[0.0; 2]; rows + 1]; columns + 1];
+    for (i, column) in corners.iter_mut().enumerate() {
+        for (j, corner) in column.iter_mut().enumerate() {
+            *corner = [x[i], y[j]];
+            if (1..columns).contains(&i) && (1..rows).contains(&j) {
+                let room = |lines: &[f64], k: usize| {
+                    (lines[k + 1] - lines[k]).min(lines[k] - lines[k - 1])
+                };
+                corner[0] += 0.2 * room(x, i) * between(&mut dice, -1.0, 1.0);
+                corner[1] += 0.2 * room(y, j) * between(&mut dice, -1.0, 1.0);
+            }
+        }
+    }
+    let lattice = Lattice::new(columns, rows, |i, j| {
+        let (low, high) = (corners[i / 2][j / 2], corners[i.div_ceil(2)][j.div_ceil(2)]);
+        [0, 1].map(|a| 0.5 * (low[a] + high[a]))
+    });
+    let cut: Vec<bool> = (0..columns * rows).map(|_| dice.bool()).collect();
+    let (nodes, elements) = lattice.cut(|e| cut[e]);
+    problem.mesh = serde_json::from_value(inline_of(&lattice, columns, rows, nodes, elements))
+        .unwrap_or_else(|error| panic!("{number}: {error}"));
+    problem
 }
 
 fn between(dice: &mut Rng, low: f64, high: f64) -> f64 {

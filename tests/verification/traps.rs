@@ -59,3 +59,62 @@ fn a_peak_that_the_mesh_does_not_resolve_is_told() {
         println!("{verdict:?} {:#?}", accuracy.reasons);
     }
 }
+
+/// s counted from the first node that faces the obstacle: the same plate had its contact elsewhere under a line than under
+/// a polyline that does not reach its corner. s is that of the boundary, whatever faces the obstacle; forces are equal.
+#[test]
+fn arc_length_counts_from_the_start_of_the_boundary() {
+    let x: Vec<f64> = (-20..=20).map(|k| 0.1 * f64::from(k)).collect();
+    let friction = json!({"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4});
+    let table = |from: f64| {
+        let at: Vec<f64> = x.iter().copied().filter(|x| *x >= from - 1e-9).collect();
+        let gap: Vec<f64> = at.iter().map(|x| 0.0625 * x * x).collect();
+        json!({"kind": "table", "x": at, "gap": gap})
+    };
+    let [whole, cut, named] = [
+        (table(-2.0), None),
+        (table(-1.5), None),
+        (table(-2.0), Some(-1.5)),
+    ]
+    .map(|(mut obstacle, from)| {
+        if let Some(from) = from {
+            obstacle["from"] = json!(from);
+        }
+        solve(&block(&x, obstacle, 0.02, friction.clone()))
+    });
+    let profile = &whole.profiles["top"];
+    assert!(
+        profile
+            .s
+            .iter()
+            .zip(&profile.x)
+            .all(|(s, x)| (s - x - 2.0).abs() < 1e-12)
+    );
+    for part in [cut, named] {
+        let (a, b) = (
+            &whole.summary.contacts["top"],
+            &part.summary.contacts["top"],
+        );
+        let ends = a.contact[0].iter().zip(&b.contact[0]);
+        assert!(
+            ends.into_iter().all(|(a, b)| (a - b).abs() < 1e-12),
+            "{a:?} {b:?}"
+        );
+        let (p, q) = (
+            a.peak_tangential_stress.as_ref(),
+            b.peak_tangential_stress.as_ref(),
+        );
+        let (p, q) = (p.unwrap(), q.unwrap());
+        assert!((p.s - q.s).abs() < 1e-9, "{p:?} {q:?}");
+        let profile = &part.profiles["top"];
+        assert!(
+            profile
+                .s
+                .iter()
+                .zip(&profile.x)
+                .all(|(s, x)| (s - x - 2.0).abs() < 1e-12)
+        );
+        let close = (a.normal_force - b.normal_force).abs() < 1e-9 * a.normal_force;
+        assert!(close, "{} {}", a.normal_force, b.normal_force);
+    }
+}

@@ -174,7 +174,10 @@ impl Rest {
                     let failure = failure.map(|failure| failure.detail);
                     return line.end(status == Status::Succeeded, run_s, failure);
                 }
-                Payload::Status { .. } | Payload::Stage { .. } | Payload::Warning(_) => {}
+                Payload::Status { .. }
+                | Payload::Stage { .. }
+                | Payload::Mesh { .. }
+                | Payload::Warning(_) => {}
             }
         }
         bail!("the stream ended before the job")

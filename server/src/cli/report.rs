@@ -11,6 +11,14 @@ use crate::run::Document;
 /// Reasons of a verdict that are shown.
 const MOST_REASONS: usize = 5;
 
+/// The mesh that adaptive refinement is on.
+pub(super) fn mesh(number: u32, elements: u64, error: Option<f64>) -> String {
+    let before = error.map_or(String::new(), |error| {
+        format!("; largest error before {:.2} %", 100.0 * error)
+    });
+    format!("mesh {number}: {elements} elements{before}")
+}
+
 /// One row of history on one line.
 pub(super) fn iteration(row: &Iteration) -> String {
     let mut line = format!(
@@ -96,10 +104,13 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
         let change = mesh
             .change
             .map_or(String::new(), |change| format!(", changed by {change:.1e}"));
+        let error = mesh.error.map_or(String::new(), |error| {
+            format!(", largest error {:.2} %", 100.0 * error)
+        });
         line(
             "  mesh",
             format!(
-                "{:>6} elements: Y {}, T {}, peak σ_t {}{change}",
+                "{:>6} elements: Y {}, T {}, peak σ_t {}{change}{error}",
                 mesh.elements,
                 number(mesh.normal_force),
                 number(mesh.tangential_force),

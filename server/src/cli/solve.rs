@@ -94,6 +94,11 @@ pub(super) fn run(
     let solved = run::run(&problem, parse_s, solve, &mut |update| {
         match update {
             Update::Phase(phase) => eprintln!("{} …", phase.as_str()),
+            Update::Mesh {
+                number,
+                elements,
+                error,
+            } => eprintln!("{}", report::mesh(number, elements, error)),
             Update::Iteration(timed) => eprintln!("{}", report::iteration(&timed.row)),
             Update::Warning(warning) => {
                 eprintln!("warning: {}: {}", warning.pointer, warning.message)

@@ -92,6 +92,15 @@ impl From<Event> for pb::Event {
             Payload::Stage { stage } => Out::Stage(pb::StageEvent {
                 stage: stage.into_message(),
             }),
+            Payload::Mesh {
+                number,
+                elements,
+                error,
+            } => Out::Mesh(pb::MeshEvent {
+                number,
+                elements,
+                error,
+            }),
             Payload::Iteration(row) => Out::Iteration(row.into()),
             Payload::Warning(warning) => Out::Warning(warning.into()),
             Payload::Done { job } => Out::Done(pb::DoneEvent {

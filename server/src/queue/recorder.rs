@@ -165,10 +165,18 @@ fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) 
             progress.stage = stage.as_str().to_owned();
             progress.eta_s = None; // nothing is known about how long a phase takes
         }
+        Payload::Mesh {
+            number,
+            elements,
+            error,
+        } => {
+            progress.mesh = Some(*number);
+            progress.mesh_elements = Some(*elements);
+            progress.mesh_error = *error;
+        }
         Payload::Iteration(timed) => {
             let row = &timed.row;
             *progress = Progress {
-                stage: progress.stage.clone(),
                 iteration: row.k,
                 residual: Some(row.residual.max(row.friction_residual)),
                 tolerance: Some(row.tolerance),
@@ -176,6 +184,7 @@ fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) 
                 rate: row.contraction,
                 // with several levels the end of these iterations is not that of the job
                 eta_s: eta_s(timed).filter(|_| one_level),
+                ..progress.clone()
             }
         }
         Payload::Status { .. } | Payload::Warning(_) | Payload::Done { .. } => {}

@@ -66,6 +66,15 @@ pub(super) fn solve_and_report(
         let told = meter.hand_over(|| {
             let report = match update {
                 Update::Phase(stage) => event(Payload::Stage { stage }),
+                Update::Mesh {
+                    number,
+                    elements,
+                    error,
+                } => event(Payload::Mesh {
+                    number,
+                    elements,
+                    error,
+                }),
                 Update::Iteration(row) => event(Payload::Iteration(row)),
                 Update::Warning(warning) => event(Payload::Warning(warning.clone())),
                 Update::Step(partial) => partials.next(&partial),

@@ -27,6 +27,15 @@ pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Sol
 pub enum Update<'a> {
     /// A phase begins.
     Phase(Phase),
+    /// Adaptive refinement begins to solve on a mesh.
+    Mesh {
+        /// Number of the mesh, from 1.
+        number: u32,
+        /// Its elements.
+        elements: u64,
+        /// Largest relative error on the mesh before.
+        error: Option<f64>,
+    },
     /// An iteration of the solution.
     Iteration(TimedIteration),
     /// A finding.
@@ -83,6 +92,15 @@ pub fn run(
                 watch.enter(phase);
                 Update::Phase(phase)
             }
+            Progress::Refinement {
+                number,
+                elements,
+                error,
+            } => Update::Mesh {
+                number,
+                elements,
+                error,
+            },
             Progress::Tentative(row) => {
                 non_finite |= !is_finite(row);
                 watch.done_tentatively(row);

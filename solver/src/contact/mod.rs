@@ -27,7 +27,7 @@ pub struct Profile {
 /// ```text
 ///        body on the right of the direction of s
 ///   0 ---1--- 2 ---3--- 4        even: corners, odd: midsides; edge k has nodes 2k, 2k+2, 2k+1
-///   s = 0 at node 0; t along growing s; n = t turned counter-clockwise, out of the body
+///   s = 0 at the start of the named boundary; t along growing s; n = t turned counter-clockwise, out of the body
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactBoundary {
@@ -35,7 +35,7 @@ pub struct ContactBoundary {
     pub nodes: Vec<u32>,
     /// Positions.
     pub positions: Vec<[f64; 2]>,
-    /// Arc length from the first node.
+    /// Arc length from the start of the named boundary, whatever part of it faces the obstacle.
     pub s: Vec<f64>,
     /// Unit outward normal; at a corner between two edges the mean of theirs.
     pub normals: Vec<[f64; 2]>,
@@ -59,13 +59,13 @@ pub struct FrictionPoint {
 }
 
 impl ContactBoundary {
-    /// From edges that follow one another; `depth` as in `elasticity::Section`.
-    pub fn new(mesh: &Mesh, chain: &[Edge], depth: impl Fn(f64) -> f64) -> Self {
+    /// From edges that follow one another, the first node at arc length `start`; `depth` as in `elasticity::Section`.
+    pub fn new(mesh: &Mesh, chain: &[Edge], start: f64, depth: impl Fn(f64) -> f64) -> Self {
         let count = 2 * chain.len() + 1;
         let mut boundary = ContactBoundary {
             nodes: vec![0; count],
             positions: vec![[0.0; 2]; count],
-            s: arc_lengths(mesh, chain),
+            s: arc_lengths(mesh, chain).iter().map(|s| start + s).collect(),
             normals: vec![[0.0; 2]; count],
             weights: vec![0.0; count],
             friction_points: Vec::with_capacity(3 * chain.len()),
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn a_top_edge_has_its_normal_up_and_its_tangent_along_x() {
         let (mesh, chain) = top(&[[0.0, 1.0], [1.0, 1.0], [2.0, 1.0], [2.5, 1.0], [3.0, 1.0]]);
-        let boundary = ContactBoundary::new(&mesh, &chain, |_| 1.0);
+        let boundary = ContactBoundary::new(&mesh, &chain, 0.0, |_| 1.0);
         assert_eq!(boundary.s, [0.0, 1.0, 2.0, 2.5, 3.0]);
         for i in 0..5 {
             assert_eq!(
@@ -214,7 +214,7 @@ mod tests {
     #[test]
     fn a_node_on_the_axis_has_no_weight() {
         let (mesh, chain) = top(&[[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]);
-        let boundary = ContactBoundary::new(&mesh, &chain, |r| r);
+        let boundary = ContactBoundary::new(&mesh, &chain, 0.0, |r| r);
         assert!(boundary.weights[0].abs() < 1e-16);
         assert!((boundary.weights.iter().sum::<f64>() - 0.5).abs() < 1e-15);
     }

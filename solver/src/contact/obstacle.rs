@@ -14,6 +14,8 @@ pub struct Facing {
     pub runs: Vec<FacingRun>,
     /// Coordinates c of edges inside which the obstacle ends, and that were therefore left out.
     pub cut: Vec<[f64; 2]>,
+    /// The same edges, each with the length of it that the obstacle covers.
+    pub cut_edges: Vec<(Edge, f64)>,
 }
 
 /// A chain of edges and the obstacle's profile at its nodes.
@@ -23,6 +25,8 @@ pub struct FacingRun {
     pub chain: Vec<Edge>,
     /// The obstacle at each node of the chain.
     pub profile: Vec<Profile>,
+    /// Arc length of the first node from the start of the boundary.
+    pub start: f64,
     /// The coordinate c there.
     pub coordinate: Vec<f64>,
     /// The obstacle between the nodes, and at its corners.
@@ -65,6 +69,7 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
     let mut found = Facing {
         runs: Vec::new(),
         cut: Vec::new(),
+        cut_edges: Vec::new(),
     };
     let mut continues = false;
     for (k, edge) in boundary.iter().enumerate() {
@@ -79,12 +84,16 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
         let seen = nodes.map(|node| view.seen_from_node(node));
         if touches && (!within || view.ends_inside(k, &seen)) {
             found.cut.push([least, most]);
+            found
+                .cut_edges
+                .push((*edge, most.min(high) - least.max(low)));
         }
         match seen {
             [Some(a), Some(b), Some(m)] if within => {
                 if !continues {
                     found.runs.push(FacingRun {
                         profile: vec![a.profile],
+                        start: view.whole.s[nodes[0]],
                         coordinate: vec![c[0]],
                         ..FacingRun::default()
                     });
@@ -132,7 +141,7 @@ struct Seen {
 impl<'a> View<'a> {
     fn new(mesh: &'a Mesh, boundary: &[Edge], obstacle: &'a Obstacle) -> Self {
         let shape = Shape::new(obstacle);
-        let whole = ContactBoundary::new(mesh, boundary, |_| 1.0);
+        let whole = ContactBoundary::new(mesh, boundary, 0.0, |_| 1.0);
         View {
             mesh,
             along: obstacle.span().2,

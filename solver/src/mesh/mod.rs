@@ -1,12 +1,14 @@
 //! The body as nodes, elements and named boundaries.
 
 mod build;
+mod graded;
 mod grid;
 mod inline;
 mod inverted;
 mod refine;
 
 pub use build::{NO_NODE, RawMesh, build};
+pub use graded::GradedMesh;
 pub use grid::{check_grid, grid_mesh, largest_cut};
 pub use inline::inline_mesh;
 pub use inverted::check_inverted;

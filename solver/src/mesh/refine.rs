@@ -15,11 +15,7 @@ const QUARTER: f64 = 0.25;
 /// Every element becomes four, every edge two; new nodes lie on the parent's own map, so that
 /// curved sides keep their shape.
 pub fn refine(mesh: &Mesh) -> Mesh {
-    let mut finer = Finer {
-        nodes: mesh.nodes.clone(),
-        halves: vec![None; mesh.nodes.len()],
-        sets: Sets::new(mesh),
-    };
+    let mut finer = Finer::new(mesh);
     let elements = mesh.elements.iter();
     let elements = elements.flat_map(|parent| finer.children(parent)).collect();
     let mut boundaries = BTreeMap::new();
@@ -41,21 +37,44 @@ pub fn refine(mesh: &Mesh) -> Mesh {
         elements,
         boundaries,
         groups,
-        node_sets: finer.sets.into_named(mesh),
+        node_sets: finer.sets.into_named(mesh.node_sets.keys()),
     }
 }
 
 /// The finer mesh as it grows.
-struct Finer {
-    nodes: Vec<[f64; 2]>,
+#[derive(Clone)]
+pub(super) struct Finer {
+    pub(super) nodes: Vec<[f64; 2]>,
     /// A side is known by its midside node: start corner, midside of the first half, of the second.
     halves: Vec<Option<(u32, u32, u32)>>,
-    sets: Sets,
+    pub(super) sets: Sets,
 }
 
 impl Finer {
+    pub(super) fn new(mesh: &Mesh) -> Self {
+        Finer {
+            nodes: mesh.nodes.clone(),
+            halves: vec![None; mesh.nodes.len()],
+            sets: Sets::new(mesh),
+        }
+    }
+
+    /// The midsides of the halves of a side, from `start` on, if it is split.
+    pub(super) fn halves(&self, mid: u32, start: u32) -> Option<(u32, u32)> {
+        let (from, first, second) = (*self.halves.get(mid as usize)?)?;
+        Some(if from == start {
+            (first, second)
+        } else {
+            (second, first)
+        })
+    }
+
     /// The midsides of a side's two halves, from its start on.
-    fn split(&mut self, [a, b, mid]: Edge) -> (u32, u32) {
+    pub(super) fn split(&mut self, [a, b, mid]: Edge) -> (u32, u32) {
+        // midsides of new sides are not in the list yet
+        if self.halves.len() < self.nodes.len() {
+            self.halves.resize(self.nodes.len(), None);
+        }
         let (start, first, second) = match self.halves[mid as usize] {
             Some(known) => known,
             None => {
@@ -75,7 +94,11 @@ impl Finer {
     }
 
     /// New nodes inside of an element, at places in master coordinates.
-    fn inside<const N: usize>(&mut self, parent: &Element, places: [[f64; 2]; N]) -> [u32; N] {
+    pub(super) fn inside<const N: usize>(
+        &mut self,
+        parent: &Element,
+        places: [[f64; 2]; N],
+    ) -> [u32; N] {
         let (family, positions) = (parent.family(), parent.gather(|n| self.nodes[n as usize]));
         let first = self.nodes.len() as u32;
         for place in places {
@@ -88,7 +111,7 @@ impl Finer {
     }
 
     #[rustfmt::skip]
-    fn children(&mut self, parent: &Element) -> [Element; 4] {
+    pub(super) fn children(&mut self, parent: &Element) -> [Element; 4] {
         match parent {
             Element::Quad(p) => {
                 let [south, east, north, west] =
@@ -124,7 +147,8 @@ impl Finer {
 }
 
 /// Which sets each node is in: a new node is in those that hold all nodes of its side or element.
-struct Sets {
+#[derive(Clone)]
+pub(super) struct Sets {
     of_node: HashMap<u32, Vec<usize>>,
 }
 
@@ -151,13 +175,16 @@ impl Sets {
         }
     }
 
-    fn into_named(self, mesh: &Mesh) -> BTreeMap<String, Vec<u32>> {
-        let mut sets = vec![Vec::new(); mesh.node_sets.len()];
+    pub(super) fn into_named<'a>(
+        self,
+        names: impl ExactSizeIterator<Item = &'a String>,
+    ) -> BTreeMap<String, Vec<u32>> {
+        let mut sets = vec![Vec::new(); names.len()];
         for (node, of) in self.of_node {
             of.into_iter().for_each(|k| sets[k].push(node));
         }
         sets.iter_mut().for_each(|set| set.sort_unstable());
-        mesh.node_sets.keys().cloned().zip(sets).collect()
+        names.cloned().zip(sets).collect()
     }
 }
 

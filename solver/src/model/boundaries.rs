@@ -1,7 +1,7 @@
 //! The mesh with all its names, and values along named boundaries.
 
 use super::checks::{ALIGNED, Checks, known, one_of};
-use super::estimate::{MOST_ADAPTIVE_ELEMENTS, MOST_ADAPTIVE_LINES};
+use super::estimate::MOST_ADAPTIVE_ELEMENTS;
 use crate::error::{AllChecks, Checked, Reason, Refused, escape};
 use crate::mesh::{self, Edge, External, Mesh};
 use crate::problem::{
@@ -14,6 +14,9 @@ const SAME_DIRECTION: f64 = 1.0;
 
 /// More refinements than this exceed any memory; the caller limits the size itself.
 const MOST_REFINEMENTS: u32 = 20;
+
+/// Stated errors are never below this part of a force: a smaller tolerance is never met.
+const LEAST_TOLERANCE: f64 = 1e-4;
 
 impl Checks {
     /// The refined mesh.
@@ -34,7 +37,10 @@ impl Checks {
                 "Each refinement makes four elements of one.",
             )),
             Refine::Times(times) => Ok(times),
-            Refine::Adaptive(goal) => self.adaptive(input, &goal, contacts).map(|()| 0),
+            Refine::Adaptive(goal) => {
+                let elements = mesh.as_ref().map_or(0, |mesh| mesh.elements.len());
+                self.adaptive(&goal, elements, contacts).map(|()| 0)
+            }
         };
         let mut mesh = mesh?;
         let (upright, radii) = (
@@ -89,37 +95,23 @@ impl Checks {
         ))
     }
 
-    /// Adaptive refinement needs a tolerance, a grid, and a contact whose results it compares.
-    fn adaptive(&mut self, input: &MeshInput, goal: &AdaptiveRefine, contacts: usize) -> Checked {
+    /// Adaptive refinement needs a tolerance, a mesh to begin with, and a contact whose results it looks at.
+    fn adaptive(&mut self, goal: &AdaptiveRefine, elements: usize, contacts: usize) -> Checked {
         let mut all = AllChecks::default();
         all.check(self.require(
-            goal.tolerance > 0.0 && goal.tolerance < 1.0,
+            goal.tolerance > LEAST_TOLERANCE && goal.tolerance < 1.0,
             "/mesh/refine/tolerance",
             goal.tolerance,
-            "0 < tolerance < 1",
-            "The remaining relative change; 0.01 is one percent.",
+            "1e-4 < tolerance < 1",
+            "The largest relative error of a force, peak or extent; 0.01 is one percent. No error is known better than 1e-4.",
         ));
-        if input.grid().is_none() {
-            all.fail(self.report(
-                "/mesh/refine",
-                Reason::NotUsed,
-                "adaptive refinement of a mesh that is not a grid",
-                "a `grid`, or a number of refinements",
-                "Only grids can be refined adaptively; give a number of refinements.",
-            ));
-        }
-        let lines = input
-            .grid()
-            .map_or([0; 2], |grid| [grid.x.len(), grid.y.len()]);
-        if lines[0] * lines[1] > MOST_ADAPTIVE_ELEMENTS
-            || lines[0].max(lines[1]) > MOST_ADAPTIVE_LINES
-        {
+        if elements > MOST_ADAPTIVE_ELEMENTS {
             all.fail(self.report(
                 "/mesh/refine",
                 Reason::TooLarge,
-                format!("a first grid of {} × {} lines", lines[0], lines[1]),
-                format!("at most {MOST_ADAPTIVE_ELEMENTS} elements and {MOST_ADAPTIVE_LINES} lines in a direction"),
-                "Adaptive refinement starts from a coarse grid; give a coarser one, or a number of refinements.",
+                format!("a first mesh of {elements} elements"),
+                format!("at most {MOST_ADAPTIVE_ELEMENTS} elements"),
+                "Adaptive refinement starts from a coarse mesh; give a coarser one, or a number of refinements.",
             ));
         }
         if contacts == 0 {
@@ -128,7 +120,7 @@ impl Checks {
                 Reason::NotUsed,
                 "adaptive refinement without a contact",
                 "a contact, or a number of refinements",
-                "Adaptive refinement compares the forces and peak stresses of contacts.",
+                "Adaptive refinement looks at the forces, peak stresses and extents of contacts.",
             ));
         }
         all.finish(())

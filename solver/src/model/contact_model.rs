@@ -5,6 +5,7 @@ use super::level::Level;
 use crate::contact::ContactBoundary;
 use crate::contact::obstacle::Place;
 use crate::friction::{Average, FrictionLaw};
+use crate::mesh::Edge;
 use crate::problem::{Condition, NormalOf};
 
 /// A contact boundary, its obstacle and its friction law.
@@ -22,6 +23,8 @@ pub struct ContactModel {
     pub places: Vec<Place>,
     /// Slope of the obstacle along the body's t at the first and at the last node.
     pub end_slopes: [f64; 2],
+    /// Edges that an end of the obstacle cuts, which are no part of Γ_C, and the length of each that it covers.
+    pub cut: Vec<(Edge, f64)>,
     /// How far the obstacle is pushed against the body (length).
     pub indentation: f64,
     /// The parts of that push along the contact's normal and along its t, at each node: 1 and 0 with

@@ -80,8 +80,8 @@ impl Checks {
         }
         let edges = self.boundary(mesh, &contact.boundary, format!("{pointer}/boundary"))?;
         obstacle?;
-        let run = self.facing_run(mesh, edges, contact, &pointer)?;
-        let mut boundary = ContactBoundary::new(mesh, &run.chain, |x| section.depth(x));
+        let (run, cut) = self.facing_run(mesh, edges, contact, &pointer)?;
+        let mut boundary = ContactBoundary::new(mesh, &run.chain, run.start, |x| section.depth(x));
         let radius = friction.as_ref().and_then(|law| law.bound.radius());
         self.sound(&boundary, axis, contact, radius, &run, &pointer)?;
         let push = turn_normals(&mut boundary, &run, contact.normal);
@@ -91,6 +91,7 @@ impl Checks {
             name: contact.boundary.clone(),
             pointer,
             boundary,
+            cut,
             profile: run.profile.iter().zip(&push).map(along).collect(),
             places: run.places,
             end_slopes,
@@ -261,14 +262,14 @@ impl Checks {
         all.finish(())
     }
 
-    /// The part of the boundary that faces the obstacle: one chain.
+    /// The part of the boundary that faces the obstacle, one chain, and the edges that its ends cut.
     pub(super) fn facing_run(
         &mut self,
         mesh: &Mesh,
         edges: &[Edge],
         contact: &Contact,
         pointer: &str,
-    ) -> Checked<FacingRun> {
+    ) -> Checked<(FacingRun, Vec<(Edge, f64)>)> {
         let runs = mesh::runs(edges);
         let [run] = &runs[..] else {
             return Err(self.report(
@@ -301,7 +302,7 @@ impl Checks {
             let finite =
                 |profile: &Profile| profile.distance.is_finite() && profile.slope.is_finite();
             let Some(i) = run.profile.iter().position(|profile| !finite(profile)) else {
-                return Ok(run);
+                return Ok((run, facing.cut_edges));
             };
             return Err(self.report(
                 format!("{pointer}/obstacle"),

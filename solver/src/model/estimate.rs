@@ -23,8 +23,8 @@ pub struct Estimate {
 /// Most elements of a mesh of adaptive refinement.
 pub const MOST_ADAPTIVE_ELEMENTS: usize = 60_000;
 
-/// Most lines of such a mesh in one direction: the dense system of the contact grows with their square.
-pub const MOST_ADAPTIVE_LINES: usize = 600;
+/// Most elements of such a mesh at one contact: the dense system of the contact grows with their square.
+pub const MOST_ADAPTIVE_CONTACT_ELEMENTS: usize = 600;
 
 /// Size of a stored mesh, for the estimate.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -182,8 +182,8 @@ impl Along {
         let s = &contact.boundary.s;
         let friction = contact.friction.as_ref().filter(|law| law.bound.acts());
         if adaptive {
-            let lines = (MOST_ADAPTIVE_LINES as f64).max(0.5 * s.len() as f64);
-            let (nodes, points) = (2.0 * lines + 1.0, 3.0 * lines);
+            let elements = (MOST_ADAPTIVE_CONTACT_ELEMENTS as f64).max(0.5 * s.len() as f64);
+            let (nodes, points) = (2.0 * elements + 1.0, 3.0 * elements);
             let weights = friction.map_or(0.0, |_| nodes * points);
             return Along {
                 nodes,

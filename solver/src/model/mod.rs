@@ -28,7 +28,7 @@ use checks::Checks;
 
 use crate::elasticity::{Loads, Section};
 use crate::error::{AllChecks, Checked, Violation};
-use crate::mesh::{External, Mesh};
+use crate::mesh::{External, ExternalMesh, Mesh};
 use crate::problem::{Problem, SolverControls, Step};
 use crate::solution::Warning;
 
@@ -66,7 +66,18 @@ impl Model {
     /// Checks and numbers a problem; `external`: its mesh, if the problem only names or quotes one.
     pub fn new(problem: &Problem, external: Option<External>) -> Result<Model, Vec<Violation>> {
         let mut checks = Checks::default();
-        let model = checks.model(problem, external);
+        let model = checks.model(problem, Source::Given(external));
+        checks.found.conclude(model)
+    }
+
+    /// The same problem on another mesh of the body, with all boundaries, groups and node sets of its own mesh:
+    /// adaptive refinement makes one after the other.
+    pub fn on_mesh(problem: &Problem, given: ExternalMesh) -> Result<Model, Vec<Violation>> {
+        let mut checks = Checks {
+            warnings: given.warnings,
+            ..Checks::default()
+        };
+        let model = checks.model(problem, Source::Ready(given.mesh));
         checks.found.conclude(model)
     }
 
@@ -82,8 +93,16 @@ impl Model {
     }
 }
 
+/// Where the mesh of a model comes from.
+enum Source {
+    /// The problem, or its caller.
+    Given(Option<External>),
+    /// An earlier model of the problem, refined.
+    Ready(Mesh),
+}
+
 impl Checks {
-    fn model(&mut self, problem: &Problem, external: Option<External>) -> Checked<Model> {
+    fn model(&mut self, problem: &Problem, source: Source) -> Checked<Model> {
         // the later checks assume finite numbers
         self.finite(problem)?;
         self.counts(problem)?;
@@ -102,8 +121,15 @@ impl Checks {
             all.check(sound);
             numbers.push((obstacle, friction));
         }
-        let mut mesh = self.mesh(&problem.mesh, external, &analysis, problem.contacts.len())?;
-        all.check(self.names(&mut mesh, &problem.mesh));
+        let mesh = match source {
+            Source::Given(external) => {
+                let mut mesh =
+                    self.mesh(&problem.mesh, external, &analysis, problem.contacts.len())?;
+                all.check(self.names(&mut mesh, &problem.mesh));
+                mesh
+            }
+            Source::Ready(mesh) => mesh,
+        };
         all.check(self.thesis_elements(problem, &mesh));
         // faults of materials are reported; the following checks need only the theory
         let section = all

@@ -304,7 +304,7 @@ impl Checks {
                     Reason::OutOfRange,
                     format!("[{s0}, {s1}]"),
                     "a first end below the second",
-                    "Arc length from the first node of Γ_C.",
+                    "Arc length from the start of the named boundary.",
                 ));
             }
         }

@@ -279,7 +279,7 @@ pub enum PrescribedBound {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundTable {
-    /// Arc length from the first node of Γ_C, strictly increasing.
+    /// Arc length from the start of the named boundary, strictly increasing.
     pub s: Vec<f64>,
     /// τ there, ≥ 0 (stress).
     pub bound: Vec<f64>,

@@ -23,7 +23,7 @@ use crate::error::{Reason, Violation, either};
 pub struct MeshInput {
     /// The source of the elements.
     pub source: MeshSource,
-    /// How often every element is split into four, or the tolerance that a grid is refined to.
+    /// How often every element is split into four, or the tolerance that the mesh is refined to.
     pub refine: Refine,
     /// Further names for parts of boundaries.
     pub boundaries: BTreeMap<String, BoundaryPart>,
@@ -103,8 +103,8 @@ struct MeshFields {
     /// The hash of a mesh that was uploaded to the service, `sha256:…`.
     #[serde(default)]
     stored: Option<String>,
-    /// How often every element is split into four (each time that many more unknowns), or the tolerance that a
-    /// grid is refined to.
+    /// How often every element is split into four (each time that many more unknowns), or the tolerance that the
+    /// mesh is refined to.
     #[serde(default)]
     refine: Refine,
     /// Further names for parts of boundaries, e.g. `{"taper": {"side": "top", "x": [1, 3]}}`.
@@ -181,7 +181,7 @@ impl Serialize for MeshInput {
 pub enum Refine {
     /// Every element is split in two in each direction, this many times.
     Times(u32),
-    /// A grid is refined towards the ends of its contacts until the results settle.
+    /// Elements are refined where errors come from until all results are known to a tolerance.
     Adaptive(AdaptiveRefine),
 }
 
@@ -195,8 +195,9 @@ impl Default for Refine {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptiveRefine {
-    /// Largest relative change, from one mesh to the next finer one, of the total forces and of
-    /// the peak stresses that converge (0 < tolerance < 1).
+    /// Largest relative error of the forces, the peak stresses that have a limit, and the ends of contact and stick, as
+    /// in `summary.accuracy` (1e-4 < tolerance < 1): of a force or peak by its value, of a tangential force by the
+    /// friction force, of an end by the length of the contact.
     pub tolerance: f64,
 }
 

@@ -187,6 +187,10 @@ pub struct Refinement {
     pub peak_normal_stress: f64,
     /// Largest relative change from the previous mesh; absent for the first.
     pub change: Option<f64>,
+    /// Largest relative error of the quantities that have a limit, as in `accuracy`; absent where one is not known, and
+    /// in results of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
 }
 
 /// Scalars of one contact boundary.
@@ -217,7 +221,7 @@ pub struct ContactSummary {
 pub struct Peak {
     /// The stress, with its sign.
     pub value: f64,
-    /// Arc length from the first node of Γ_C.
+    /// Arc length from the start of the named boundary.
     pub s: f64,
     /// Position.
     pub x: f64,
@@ -323,7 +327,7 @@ pub enum WarningCode {
     NotUnique,
     /// Twice the increments change the result.
     IncrementsMatter,
-    /// Adaptive refinement that ended before the results settled.
+    /// Adaptive refinement that ended before all errors were within its tolerance, or a quantity without a limit.
     RefinementUnfinished,
 }
 
@@ -432,7 +436,7 @@ pub struct ForcePair {
 /// `Residuals::friction` of the largest); and a point is open if one of the nodes beside it is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactProfile {
-    /// Arc length from the first node of Γ_C.
+    /// Arc length from the start of the named boundary.
     pub s: Vec<f64>,
     /// Position before deformation.
     pub x: Vec<f64>,
@@ -571,8 +575,17 @@ pub enum Progress<'a> {
     Phase(Phase),
     /// An iteration is done.
     Iteration(&'a Iteration),
-    /// An iteration is done on a mesh that is the last only if its results have settled; then all its iterations
-    /// are reported again. The next mesh counts from 1.
+    /// Adaptive refinement begins to solve on a mesh.
+    Refinement {
+        /// Number of the mesh, from 1.
+        number: u32,
+        /// Its elements.
+        elements: u64,
+        /// Largest relative error on the mesh before; absent for the first, and where it is not known.
+        error: Option<f64>,
+    },
+    /// An iteration is done on a mesh that is the last only if its errors are within the tolerance; then all its
+    /// iterations are reported again. The next mesh counts from 1.
     Tentative(&'a Iteration),
     /// A warning, as soon as it is known; all are repeated in the summary.
     Warning(&'a Warning),

@@ -17,7 +17,7 @@ use crate::solution::{Outcome, Warning, WarningCode};
 pub struct Missed {
     /// The contact, by its place in the model.
     pub patch: usize,
-    /// Arc length from the first node of Γ_C.
+    /// Arc length from the start of the named boundary.
     pub s: f64,
     /// How far the obstacle reaches into the body there (length).
     pub penetration: f64,

@@ -24,6 +24,10 @@ pub struct Quantity {
     pub spacing: f64,
     /// What the law has between the points where friction acts, likewise.
     pub between: f64,
+    /// The edges of the contact that `spacing` comes from, with their parts in any unit.
+    pub spacing_at: Vec<(usize, f64)>,
+    /// The edges that `between` comes from, likewise.
+    pub between_at: Vec<(usize, f64)>,
     /// No finer mesh approaches a limit of it.
     pub unlimited: bool,
     /// The obstacle reaches into the body between the nodes: what that changes is not known.
@@ -33,6 +37,10 @@ pub struct Quantity {
 /// Ends of stick with an error: each costs as much as another recovery of the stresses, and a rough obstacle has
 /// hundreds.
 const MOST_STICK_ENDS: usize = 8;
+
+/// A slip that changes by less than this part of ε along an edge is ε on all of it, to rounding, and stick does not end
+/// there: the incremental law leaves it so where the load rests.
+const STEADY: f64 = 1e-6;
 
 /// How far from a peak of σ_t its neighbourhood is looked at, in half edges.
 const NEAR: f64 = 0.25;
@@ -63,6 +71,8 @@ impl PatchView<'_> {
             factor: 1.0,
             spacing: 0.0,
             between: 0.0,
+            spacing_at: Vec::new(),
+            between_at: Vec::new(),
             unlimited: false,
             unseen: false,
         }
@@ -100,7 +110,12 @@ impl PatchView<'_> {
             (QuantityName::FrictionForce, summary.friction_force, size),
         ];
         let (canceling, _) = self.oscillation();
-        let between = self.between_points();
+        let by_edge = self.between_points();
+        let between = [
+            by_edge.iter().sum::<f64>(),
+            by_edge.iter().map(|part| part.abs()).sum(),
+        ];
+        let at = |parts: &[f64]| parts.iter().map(|part| part.abs()).enumerate().collect();
         let quantity = |(name, value, gradient)| Quantity {
             factor: circumference,
             spacing: match name {
@@ -112,20 +127,22 @@ impl PatchView<'_> {
                 QuantityName::TangentialForce => circumference * between[0].abs(),
                 _ => circumference * between[1],
             },
+            spacing_at: at(&self.canceling()),
+            between_at: at(&by_edge),
             ..self.quantity(name, value, Some(gradient))
         };
         forces.into_iter().map(quantity).collect()
     }
 
     /// What the points where friction acts leave out: the differences of ∫σ_t over each edge, by the points and by many
-    /// more; their sum, and that without signs (force, without 2π).
-    fn between_points(&self) -> [f64; 2] {
+    /// more (force, without 2π).
+    fn between_points(&self) -> Vec<f64> {
         const SAMPLES: usize = 16;
         let boundary = &self.patch.contact.boundary;
         if self.patch.law.is_none() {
-            return [0.0; 2];
+            return Vec::new();
         }
-        let mut sum = [0.0; 2];
+        let mut differences = Vec::with_capacity(boundary.edge_count());
         for (edge, places) in boundary.friction_points.chunks(3).enumerate() {
             let weight: f64 = places.iter().map(|place| place.weight).sum();
             let stress = |xi: f64| self.tangential_stress_at(edge, xi);
@@ -138,10 +155,9 @@ impl PatchView<'_> {
                     .sum::<f64>(),
                 false => (stress(-1.0) + 4.0 * stress(0.0) + stress(1.0)) / 6.0,
             };
-            sum[0] += weight * (many - few);
-            sum[1] += weight * (many - few).abs();
+            differences.push(weight * (many - few));
         }
-        sum
+        differences
     }
 
     fn peaks(&self) -> Vec<Quantity> {
@@ -170,6 +186,7 @@ impl PatchView<'_> {
                 [xi - NEAR, xi + NEAR].map(|xi| self.tangential_stress_near(edge, xi).abs());
             found.push(Quantity {
                 spacing: stress.abs() - beside[0].min(beside[1]),
+                spacing_at: vec![(edge, 1.0)],
                 unlimited: self.averages_nothing() && self.pressure_without_limit(),
                 ..self.quantity(QuantityName::PeakTangentialStress, stress, Some(gradient))
             });
@@ -208,17 +225,20 @@ impl PatchView<'_> {
             if !self.active(i) {
                 continue;
             }
-            let end = |name, spacing| Quantity {
+            let end = |name, spacing, edge| Quantity {
                 spacing,
+                spacing_at: vec![(edge, 1.0)],
                 ..self.quantity(name, s[i], None)
             };
             if i == 0 || !self.active(i - 1) {
                 let spacing = if i == 0 { 0.0 } else { s[i] - s[i - 1] };
-                found.push(end(QuantityName::ContactStart, spacing));
+                let edge = i.saturating_sub(1) / 2;
+                found.push(end(QuantityName::ContactStart, spacing, edge));
             }
             if i == last || !self.active(i + 1) {
                 let spacing = if i == last { 0.0 } else { s[i + 1] - s[i] };
-                found.push(end(QuantityName::ContactEnd, spacing));
+                let edge = i.min(last - 1) / 2;
+                found.push(end(QuantityName::ContactEnd, spacing, edge));
             }
         }
         let mut turns = self.turns();
@@ -231,7 +251,8 @@ impl PatchView<'_> {
                 (self.slip_at(edge, xi + step) - self.slip_at(edge, xi - step)) / (2.0 * step);
             let arc = self.patch.contact.boundary.edge_arc(edge);
             let length = 0.5 * (arc[1] - arc[0]);
-            if !touches || slope == 0.0 {
+            let law = self.system.law(&point);
+            if !touches || slope.abs() <= STEADY * law.elastic_slip {
                 continue;
             }
             let mut gradient = Gradient::zero(self.system);
@@ -239,6 +260,7 @@ impl PatchView<'_> {
             found.push(Quantity {
                 factor: length / slope,
                 spacing: length.abs(),
+                spacing_at: vec![(edge, 1.0)],
                 ..self.quantity(QuantityName::StickEnd, point.s, Some(gradient))
             });
         }

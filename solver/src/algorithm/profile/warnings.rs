@@ -229,10 +229,6 @@ impl PatchView<'_> {
         if !self.at_gauss_points() {
             return (0.0, 0.0); // friction at nodes does not oscillate
         }
-        let cancels = |edge: &[f64]| {
-            let size: f64 = edge.iter().map(|force| force.abs()).sum();
-            size - edge.iter().sum::<f64>().abs()
-        };
         let total: f64 = own.iter().map(|force| force.abs()).sum();
         let mut canceling: f64 = own.chunks(3).map(cancels).sum();
         // the motion may turn once, within a coarse edge; but not from the full bound in one direction to
@@ -254,6 +250,19 @@ impl PatchView<'_> {
             canceling -= turn;
         }
         (canceling, total)
+    }
+
+    /// The part of the friction force that cancels inside each edge (force, without 2π).
+    pub(super) fn canceling(&self) -> Vec<f64> {
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        let own = points.filter(|(point, _)| point.patch == self.p);
+        let own: Vec<f64> = own
+            .map(|(point, traction)| point.weight * traction)
+            .collect();
+        match self.at_gauss_points() {
+            true => own.chunks(3).map(cancels).collect(),
+            false => Vec::new(),
+        }
     }
 
     /// A node on a line of symmetry: on the axis, or held along the tangent.
@@ -300,4 +309,10 @@ impl PatchView<'_> {
         // rounding of a grid whose lines are ρ apart
         (length(under) > radius * (1.0 + 1e-9)).then_some((length(under), radius))
     }
+}
+
+/// The part of the forces at the points of an edge that cancels.
+fn cancels(edge: &[f64]) -> f64 {
+    let size: f64 = edge.iter().map(|force| force.abs()).sum();
+    size - edge.iter().sum::<f64>().abs()
 }

@@ -1,0 +1,287 @@
+//! `refine: {"tolerance": …}`: the mesh is refined where errors come from until all quantities are known to a tolerance.
+//!
+//! Solves, divides the elements that hold most of the errors above the tolerance, as `accuracy` states them and
+//! `origins` places them, and repeats. Edges under a peak of σ_t that are wider than a part of ρ are divided in any
+//! case, since the errors of what is not resolved at all are not seen; and edges that an end of the obstacle cuts,
+//! until the part left out of the contact counts no more.
+
+mod unmet;
+mod watched;
+
+use std::ops::ControlFlow;
+
+use crate::error::SolveError;
+use crate::mesh::{self, ExternalMesh, GradedMesh, Mesh};
+use crate::model::estimate::{MOST_ADAPTIVE_CONTACT_ELEMENTS, MOST_ADAPTIVE_ELEMENTS};
+use crate::model::{ContactModel, Model};
+use crate::origins::Origins;
+use crate::problem::{AdaptiveRefine, Algorithm, Problem};
+use crate::solution::{Observer, Progress, Refinement, Solution, Warning};
+use unmet::{Unmet, given_up, unfinished};
+use watched::{WatchedResults, largest_error};
+
+/// The elements to be divided hold this part of the errors above the tolerance.
+const BULK: f64 = 0.6;
+
+/// At least this part of all elements is divided: fewer would not be worth another mesh.
+const LEAST_MARKED: f64 = 0.02;
+
+/// Edges under a peak of σ_t are divided until they are this part of ρ.
+const PART_OF_RADIUS: f64 = 0.25;
+
+/// Solves one model, and notes where the errors of its results come from.
+pub type Solve<'a> =
+    dyn Fn(Model, &mut Origins, &mut Observer<'_>) -> Result<Solution, SolveError> + 'a;
+
+/// Solves on finer and finer meshes; returns the solution on the finest, with the sequence of meshes, and that mesh.
+///
+/// `first`: the problem on its own mesh. `solve`: solves it there, and on the others. The observer sees the phases of
+/// every mesh, its iterations (but no load steps) as tentative ones, and those of the last mesh again once it is known
+/// to be the last.
+pub fn run(
+    problem: &Problem,
+    goal: &AdaptiveRefine,
+    first: Model,
+    solve: &Solve<'_>,
+    observe: &mut Observer<'_>,
+) -> Result<(Solution, Mesh), SolveError> {
+    // what the mesh itself was warned of is told again with each
+    let of_mesh = |warning: &&Warning| warning.pointer.starts_with("/mesh");
+    let notes: Vec<Warning> = first.warnings.iter().filter(of_mesh).cloned().collect();
+    let most_at_contacts: Vec<usize> = first.contacts.iter().map(most_elements).collect();
+    let mut graded = GradedMesh::new(&first.mesh);
+    let mut parts: Vec<u32> = (0..first.mesh.elements.len() as u32).collect();
+    let mut model = first;
+    let mut sequence: Vec<Refinement> = Vec::new();
+    loop {
+        let elements = model.mesh.elements.len() as u64;
+        let answer = observe(Progress::Refinement {
+            number: sequence.len() as u32 + 1,
+            elements,
+            error: sequence.last().and_then(|row| row.error),
+        });
+        if answer.is_break() {
+            return Err(SolveError::Stopped);
+        }
+        let mut origins = Origins::new(&model, goal.tolerance);
+        let (mesh, contacts) = (model.mesh.clone(), model.contacts.clone());
+        let mut warnings: Vec<Warning> = Vec::new();
+        let mut stopped = false;
+        let mut solution = solve(model, &mut origins, &mut |progress| {
+            let answer = match progress {
+                Progress::Iteration(row) => observe(Progress::Tentative(row)),
+                Progress::Step(_) => observe(Progress::Pulse),
+                Progress::Warning(warning) => {
+                    warnings.push(warning.clone());
+                    ControlFlow::Continue(())
+                }
+                other => observe(other),
+            };
+            stopped |= answer.is_break();
+            answer
+        })?;
+        let cut = cut_edges(&contacts, &solution, &mesh, goal.tolerance);
+        let results = WatchedResults::new(&solution);
+        let change = sequence.last().map(|before| results.change(before));
+        let error = largest_error(&solution).max(cut.error);
+        sequence.push(results.row(change, error));
+
+        let mut next = None;
+        let unmet = if stopped || !solution.summary.converged {
+            None
+        } else if error <= goal.tolerance {
+            Some(Unmet::Nothing)
+        } else if let Some(unmet) = given_up(&sequence, goal.tolerance) {
+            Some(unmet)
+        } else {
+            let marked = marks(&contacts, &solution, &origins, &cut.elements);
+            match finer(problem, &mut graded, &mesh, &mut parts, &marked) {
+                Ok(mesh) => {
+                    let warnings = notes.clone();
+                    let given = ExternalMesh { mesh, warnings };
+                    let model = Model::on_mesh(problem, given).map_err(SolveError::Invalid)?;
+                    let at_contacts = model.contacts.iter().zip(&most_at_contacts);
+                    let too_many = at_contacts
+                        .map(|(contact, most)| (contact.boundary.edge_count(), *most))
+                        .find(|(count, most)| count > most);
+                    next = too_many.is_none().then_some(model);
+                    too_many.map(|(count, most)| Unmet::ContactElements(count, most))
+                }
+                Err(unmet) => Some(unmet),
+            }
+        };
+        if let Some(finer) = next {
+            model = finer;
+            continue;
+        }
+        if let Some(warning) = unmet
+            .and_then(|unmet| unfinished(problem, goal, &solution, &sequence, unmet, cut.error))
+        {
+            solution.summary.warnings.push(warning.clone());
+            warnings.push(warning);
+        }
+        solution.summary.refinements = sequence;
+        for warning in &warnings {
+            let _ = observe(Progress::Warning(warning));
+        }
+        for row in &solution.history {
+            let _ = observe(Progress::Iteration(row));
+        }
+        return Ok((solution, mesh));
+    }
+}
+
+/// Most elements at a contact, which are as many as the estimate of the memory assumes.
+fn most_elements(contact: &ContactModel) -> usize {
+    MOST_ADAPTIVE_CONTACT_ELEMENTS.max(contact.boundary.edge_count())
+}
+
+/// The next mesh, whose elements are each a part of one of `graded`: `parts`.
+fn finer(
+    problem: &Problem,
+    graded: &mut GradedMesh,
+    mesh: &Mesh,
+    parts: &mut Vec<u32>,
+    marked: &[bool],
+) -> Result<Mesh, Unmet> {
+    // closures have triangles, which the thesis's own iteration does not know
+    let finer = if problem.solver.algorithm == Algorithm::Thesis {
+        mesh::refine(mesh)
+    } else {
+        if !marked.contains(&true) {
+            return Err(Unmet::Stalled);
+        }
+        let mut divided = vec![false; graded.elements()];
+        for (part, _) in parts.iter().zip(marked).filter(|(_, marked)| **marked) {
+            divided[*part as usize] = true;
+        }
+        if !graded.refine(&divided) {
+            return Err(Unmet::Folded);
+        }
+        let (finer, of) = graded.closed();
+        *parts = of;
+        finer
+    };
+    let elements = finer.elements.len();
+    if elements > MOST_ADAPTIVE_ELEMENTS {
+        return Err(Unmet::Elements(elements));
+    }
+    if !finer.inverted_elements(false).is_empty() {
+        return Err(Unmet::Folded);
+    }
+    Ok(finer)
+}
+
+/// What is left out of contacts because an end of the obstacle lies inside an edge.
+struct Cut {
+    /// The largest such part in lengths of its contact.
+    error: f64,
+    /// Elements at edges where it is above the tolerance.
+    elements: Vec<usize>,
+}
+
+fn cut_edges(contacts: &[ContactModel], solution: &Solution, mesh: &Mesh, tolerance: f64) -> Cut {
+    let mut found = Cut {
+        error: 0.0,
+        elements: Vec::new(),
+    };
+    for contact in contacts.iter().filter(|contact| !contact.cut.is_empty()) {
+        let extents = solution.summary.contacts.get(&contact.name);
+        let extents = extents.map_or(&[][..], |summary| &summary.contact);
+        let ([first, ..], [.., last]) = (extents, extents) else {
+            continue;
+        };
+        let (nodes, s) = (&contact.boundary.nodes, &contact.boundary.s);
+        let end = s.len() - 1;
+        for (edge, covered) in &contact.cut {
+            // a contact that ends before the obstacle does is not changed by it
+            let pressed = (edge.contains(&nodes[0]) && first[0] <= s[0])
+                || (edge.contains(&nodes[end]) && last[1] >= s[end]);
+            let part = covered / (last[1] - first[0]);
+            if !pressed || part <= tolerance {
+                continue;
+            }
+            found.error = found.error.max(part);
+            let at = |element: &crate::element::Element| element.contains(&edge[2]);
+            found.elements.extend(mesh.elements.iter().position(at));
+        }
+    }
+    found
+}
+
+/// The elements to be divided.
+fn marks(
+    contacts: &[ContactModel],
+    solution: &Solution,
+    origins: &Origins,
+    cut: &[usize],
+) -> Vec<bool> {
+    // where no error of a quantity is known, those of the stresses have to do
+    let known = origins.elements.iter().any(|part| *part > 0.0);
+    let mut marked = match known {
+        true => bulk(&origins.elements),
+        false if cut.is_empty() => bulk(&solution.fields.element_error),
+        false => vec![false; origins.elements.len()],
+    };
+    cut.iter().for_each(|e| marked[*e] = true);
+    under_peaks(contacts, solution, &mut marked);
+    marked
+}
+
+/// The fewest entries that together hold `BULK` of the sum, or the largest few where those are fewer.
+fn bulk(parts: &[f64]) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..parts.len()).collect();
+    order.sort_by(|&a, &b| parts[b].total_cmp(&parts[a]).then(a.cmp(&b)));
+    let total: f64 = parts.iter().sum();
+    let least = (LEAST_MARKED * parts.len() as f64) as usize;
+    let mut held = 0.0;
+    let mut chosen = vec![false; parts.len()];
+    for (count, i) in order.into_iter().enumerate() {
+        if held >= BULK * total && count >= least || parts[i] == 0.0 {
+            break;
+        }
+        held += parts[i];
+        chosen[i] = true;
+    }
+    chosen
+}
+
+/// Marks elements with an edge within ρ of a peak of σ_t that is longer than a part of ρ.
+fn under_peaks(contacts: &[ContactModel], solution: &Solution, marked: &mut [bool]) {
+    let fields = &solution.fields;
+    for contact in contacts {
+        let radius = contact.friction.as_ref().and_then(|f| f.bound.radius());
+        let peak = solution
+            .summary
+            .contacts
+            .get(&contact.name)
+            .and_then(|c| c.peak_tangential_stress);
+        let (Some(radius), Some(peak)) = (radius.filter(|r| *r > 0.0), peak) else {
+            continue;
+        };
+        for (element, marked) in fields.elements.iter().zip(&mut *marked) {
+            for [a, b, _] in element.sides() {
+                let place = |node: u32| [fields.x[node as usize], fields.y[node as usize]];
+                let ([x0, y0], [x1, y1]) = (place(a), place(b));
+                let length = (x1 - x0).hypot(y1 - y0);
+                let along =
+                    ((peak.x - x0) * (x1 - x0) + (peak.y - y0) * (y1 - y0)) / (length * length);
+                let nearest = along.clamp(0.0, 1.0);
+                let distance =
+                    (peak.x - x0 - nearest * (x1 - x0)).hypot(peak.y - y0 - nearest * (y1 - y0));
+                *marked |= length > PART_OF_RADIUS * radius && distance < radius;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_elements_with_most_of_the_error_are_marked() {
+        assert_eq!(bulk(&[0.1, 5.0, 0.0, 4.0]), [false, true, false, true]);
+        assert_eq!(bulk(&[0.0, 0.0]), [false, false]);
+    }
+}

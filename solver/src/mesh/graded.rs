@@ -1,0 +1,286 @@
+//! Refinement of single elements, without hanging nodes: red where it is asked for, green beside.
+//!
+//! A *red* division makes four elements of one; a quadrilateral much longer than wide is halved across instead. An
+//! element with a split side of which nothing more is asked is *closed*, for the mesh of one solution only:
+//!
+//! ```text
+//!   +-------+    +-------+    +---+---+    +-------+        +
+//!   |\     /|    |   |   |    |   |   |    |\      |       /|\
+//!   | \   / |    |   |   |    +---+   |    |  +----+      / | \
+//!   |  \ /  |    |   |   |    |   |\  |    |  |    |     /  |  \
+//!   +---+---+    +---+---+    (two sides that meet)    +---+---+
+//! ```
+//!
+//! Closures are undone before the next refinement, so that angles do not shrink from mesh to mesh.
+
+use std::collections::BTreeMap;
+
+use super::refine::Finer;
+use super::{Edge, Mesh};
+use crate::element::Element;
+
+/// A quadrilateral longer than this many times its width is halved, which brings its sides together.
+const LONG: f64 = 3.0;
+
+/// A division asks for others about as far as it is levels finer than its surroundings; a few passes are usual.
+const MOST_PASSES: u32 = 100;
+
+/// So often folded closures are replaced by divisions; those of an element that is all but folded itself remain.
+const MOST_UNFOLDING: u32 = 4;
+
+/// A mesh whose elements are refined one by one, again and again.
+#[derive(Clone)]
+pub struct GradedMesh {
+    /// Nodes, split sides and node sets, without those of closures.
+    finer: Finer,
+    /// Elements, some of them with split sides, and the element of the first mesh that each is a part of.
+    elements: Vec<(Element, u32)>,
+    boundaries: BTreeMap<String, Vec<Edge>>,
+    /// Elements of the first mesh by group.
+    groups: BTreeMap<String, Vec<u32>>,
+    set_names: Vec<String>,
+}
+
+impl GradedMesh {
+    /// From a mesh without hanging nodes.
+    pub fn new(mesh: &Mesh) -> Self {
+        GradedMesh {
+            finer: Finer::new(mesh),
+            elements: mesh.elements.iter().copied().zip(0..).collect(),
+            boundaries: mesh.boundaries.clone(),
+            groups: mesh.groups.clone(),
+            set_names: mesh.node_sets.keys().cloned().collect(),
+        }
+    }
+
+    /// Elements, each of which is one or, closed, a few of the mesh.
+    pub fn elements(&self) -> usize {
+        self.elements.len()
+    }
+
+    /// Divides the elements that are marked, and others until the rest can be closed. Whether that was possible: among
+    /// elements of odd shapes one division may ask for another without end, and `self` is of no use then.
+    pub fn refine(&mut self, marked: &[bool]) -> bool {
+        let mut marked = marked.to_vec();
+        let (mut passes, mut unfolding) = (0, 0);
+        while marked.contains(&true) {
+            passes += 1;
+            if passes > MOST_PASSES {
+                return false;
+            }
+            let elements = std::mem::take(&mut self.elements);
+            for ((element, origin), marked) in elements.into_iter().zip(marked) {
+                match marked {
+                    true => {
+                        let children = self.divided(&element).into_iter();
+                        self.elements.extend(children.map(|child| (child, origin)));
+                    }
+                    false => self.elements.push((element, origin)),
+                }
+            }
+            let elements = self.elements.iter();
+            marked = elements
+                .map(|(element, _)| self.must_divide(element))
+                .collect();
+            if !marked.contains(&true) && unfolding < MOST_UNFOLDING {
+                unfolding += 1;
+                marked = self.folded();
+            }
+        }
+        for edges in self.boundaries.values_mut() {
+            let mut finer = Vec::with_capacity(edges.len());
+            for edge in edges.iter() {
+                pieces(&self.finer, *edge, &mut finer);
+            }
+            *edges = finer;
+        }
+        true
+    }
+
+    /// The mesh without hanging nodes, and for each of its elements that of `self` which it is a part of.
+    pub fn closed(&self) -> (Mesh, Vec<u32>) {
+        let mut finer = self.finer.clone();
+        let (mut elements, mut parts) = (Vec::new(), Vec::new());
+        let mut groups: BTreeMap<&String, Vec<u32>> =
+            self.groups.keys().map(|name| (name, vec![])).collect();
+        let mut groups_of: BTreeMap<u32, Vec<&String>> = BTreeMap::new();
+        for (name, group) in &self.groups {
+            for e in group {
+                groups_of.entry(*e).or_default().push(name);
+            }
+        }
+        for ((element, origin), part) in self.elements.iter().zip(0..) {
+            for closing in closure(&mut finer, element) {
+                for name in groups_of.get(origin).into_iter().flatten() {
+                    let group = groups.entry(name).or_default();
+                    group.push(elements.len() as u32);
+                }
+                elements.push(closing);
+                parts.push(part);
+            }
+        }
+        let mesh = Mesh {
+            nodes: finer.nodes,
+            elements,
+            boundaries: self.boundaries.clone(),
+            groups: groups
+                .into_iter()
+                .map(|(name, group)| (name.clone(), group))
+                .collect(),
+            node_sets: finer.sets.into_named(self.set_names.iter()),
+        };
+        (mesh, parts)
+    }
+
+    /// Four elements, or two halves of a long one.
+    fn divided(&mut self, element: &Element) -> Vec<Element> {
+        if let Element::Quad(p) = element {
+            let side = |a: usize, b: usize| {
+                let [[x0, y0], [x1, y1]] = [p[a], p[b]].map(|n| self.finer.nodes[n as usize]);
+                (x1 - x0).hypot(y1 - y0)
+            };
+            let (along, across) = (side(0, 1) + side(2, 3), side(1, 2) + side(3, 0));
+            if along.max(across) > LONG * along.min(across) {
+                let turned = turned(*p, usize::from(across > along));
+                for i in [0, 2] {
+                    let (a, b) = (turned[i], turned[(i + 1) % 4]);
+                    self.finer.split([a, b, turned[4 + i]]);
+                }
+                return halves(&mut self.finer, turned).unwrap_or_default();
+            }
+        }
+        self.finer.children(element).to_vec()
+    }
+
+    /// A half of a side is split again, or too many sides are.
+    fn must_divide(&self, element: &Element) -> bool {
+        let mut split = 0;
+        for [start, _, mid] in element.sides() {
+            let Some((first, second)) = self.finer.halves(mid, start) else {
+                continue;
+            };
+            split += 1;
+            if [first, second]
+                .iter()
+                .any(|half| self.finer.halves(*half, start).is_some())
+            {
+                return true;
+            }
+        }
+        split + 1 >= element.family().corners()
+    }
+
+    /// The elements that closing would fold: those with sides curved as strongly.
+    fn folded(&self) -> Vec<bool> {
+        let mut finer = self.finer.clone();
+        let mut folds = |(element, _): &(Element, u32)| {
+            let closing = closure(&mut finer, element);
+            closing.len() > 1
+                && closing.iter().any(|part| {
+                    let nodes = part.gather(|n| finer.nodes[n as usize]);
+                    let family = part.family();
+                    let points = family.rule(3).iter().map(|point| point.place);
+                    let mut places = points.chain(family.places().iter().copied());
+                    !places.all(|place| family.map(&nodes, place).det > 0.0)
+                })
+        };
+        let folded: Vec<bool> = self.elements.iter().map(&mut folds).collect();
+        // what is folded itself is no better when it is divided
+        let upright = |(element, _): &(Element, u32)| {
+            let nodes = element.gather(|n| self.finer.nodes[n as usize]);
+            let family = element.family();
+            let mut places = family.places().iter();
+            places.all(|place| family.map(&nodes, *place).det > 0.0)
+        };
+        let pairs = folded.iter().zip(&self.elements);
+        pairs
+            .map(|(folded, element)| *folded && upright(element))
+            .collect()
+    }
+}
+
+/// The unsplit pieces of an edge, in order.
+fn pieces(finer: &Finer, [a, b, mid]: Edge, into: &mut Vec<Edge>) {
+    match finer.halves(mid, a) {
+        None => into.push([a, b, mid]),
+        Some((first, second)) => {
+            pieces(finer, [a, mid, first], into);
+            pieces(finer, [mid, b, second], into);
+        }
+    }
+}
+
+/// An element with some sides split as elements without: itself if none is.
+fn closure(finer: &mut Finer, element: &Element) -> Vec<Element> {
+    let split: Vec<usize> = element
+        .sides()
+        .enumerate()
+        .filter(|(_, [start, _, mid])| finer.halves(*mid, *start).is_some())
+        .map(|(k, _)| k)
+        .collect();
+    let closed = match (element, &split[..]) {
+        (Element::Triangle(p), [k]) => bisected(finer, *p, *k),
+        (Element::Quad(p), [k]) => fan(finer, turned(*p, *k)),
+        (Element::Quad(p), [0, 2]) => halves(finer, *p),
+        (Element::Quad(p), [1, 3]) => halves(finer, turned(*p, 1)),
+        // sides that follow one another, from the first of them
+        (Element::Quad(p), [0, 3]) => three(finer, turned(*p, 3)),
+        (Element::Quad(p), [k, _]) => three(finer, turned(*p, *k)),
+        _ => None,
+    };
+    closed.unwrap_or_else(|| vec![*element])
+}
+
+/// The same quadrilateral, numbered from another corner.
+fn turned(p: [u32; 8], by: usize) -> [u32; 8] {
+    std::array::from_fn(|i| p[i / 4 * 4 + (i + by) % 4])
+}
+
+/// A triangle whose side `k` is split, as two.
+fn bisected(finer: &mut Finer, p: [u32; 6], k: usize) -> Option<Vec<Element>> {
+    let [a, b, c, ab, bc, ca] = std::array::from_fn(|i| p[i / 3 * 3 + (i + k) % 3]);
+    let (first, second) = finer.halves(ab, a)?;
+    let [inner] = finer.inside(&Element::Triangle([a, b, c, ab, bc, ca]), [[0.25, 0.5]]);
+    Some(vec![
+        Element::Triangle([a, ab, c, first, inner, ca]),
+        Element::Triangle([ab, b, c, second, bc, inner]),
+    ])
+}
+
+/// A quadrilateral whose first side is split, as three triangles.
+fn fan(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
+    let [a, b, c, d, ab, bc, cd, da] = p;
+    let (first, second) = finer.halves(ab, a)?;
+    let [to_c, to_d] = finer.inside(&Element::Quad(p), [[0.5, 0.0], [-0.5, 0.0]]);
+    Some(vec![
+        Element::Triangle([a, ab, d, first, to_d, da]),
+        Element::Triangle([ab, c, d, to_c, cd, to_d]),
+        Element::Triangle([ab, b, c, second, bc, to_c]),
+    ])
+}
+
+/// A quadrilateral whose first and third sides are split, as two.
+fn halves(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
+    let [a, b, c, d, ab, bc, cd, da] = p;
+    let (south, north) = (finer.halves(ab, a)?, finer.halves(cd, c)?);
+    let [centre] = finer.inside(&Element::Quad(p), [[0.0, 0.0]]);
+    Some(vec![
+        Element::Quad([a, ab, cd, d, south.0, centre, north.1, da]),
+        Element::Quad([ab, b, c, cd, south.1, bc, north.0, centre]),
+    ])
+}
+
+/// A quadrilateral whose first and second sides are split, as three.
+fn three(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
+    let [a, b, c, d, ab, bc, cd, da] = p;
+    let (south, east) = (finer.halves(ab, a)?, finer.halves(bc, b)?);
+    let [centre, to_south, to_east, to_d] = finer.inside(
+        &Element::Quad(p),
+        [[0.0, 0.0], [0.0, -0.5], [0.5, 0.0], [-0.5, 0.5]],
+    );
+    Some(vec![
+        Element::Quad([a, ab, centre, d, south.0, to_south, to_d, da]),
+        Element::Quad([ab, b, bc, centre, south.1, east.0, to_east, to_south]),
+        Element::Quad([centre, bc, c, d, to_east, east.1, cd, to_d]),
+    ])
+}

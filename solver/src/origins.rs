@@ -1,0 +1,84 @@
+//! Where the errors of quantities come from: the elements that adaptive refinement divides.
+
+use crate::model::Model;
+
+/// A quantity with an error above this many times the tolerance counts no more than one with so much.
+const MOST_EXCESS: f64 = 100.0;
+
+/// The part of every element in the errors above a tolerance.
+pub struct Origins {
+    /// Largest relative error that nothing has to be done about.
+    tolerance: f64,
+    /// The parts: of each quantity they add up to its relative error in tolerances. All 0 if no error is above the
+    /// tolerance, or none is known.
+    pub elements: Vec<f64>,
+    /// The element at every edge of each contact.
+    at_edge: Vec<Vec<u32>>,
+}
+
+/// What each element, and each edge of a contact, adds to the error of a quantity, in one unit.
+#[derive(Default)]
+pub struct Added {
+    /// By element; empty if nothing is known by element.
+    pub elements: Vec<f64>,
+    /// By edge of the contact.
+    pub edges: Vec<(usize, f64)>,
+}
+
+impl Added {
+    /// A `total` that comes from several edges in proportion to their `parts`.
+    pub fn spread(&mut self, total: f64, parts: &[(usize, f64)]) {
+        let sum: f64 = parts.iter().map(|(_, part)| part).sum();
+        if sum > 0.0 {
+            let shares = parts.iter().map(|(edge, part)| (*edge, total * part / sum));
+            self.edges.extend(shares);
+        }
+    }
+}
+
+impl Origins {
+    /// Nothing known yet of a model.
+    pub fn new(model: &Model, tolerance: f64) -> Self {
+        let mut with_side = vec![0; model.mesh.nodes.len()];
+        for (element, e) in model.mesh.elements.iter().zip(0..) {
+            for [_, _, mid] in element.sides() {
+                with_side[mid as usize] = e;
+            }
+        }
+        // a chain has a midside at every odd place
+        let at_edge = model.contacts.iter().map(|contact| {
+            let midsides = contact.boundary.nodes.iter().skip(1).step_by(2);
+            midsides.map(|mid| with_side[*mid as usize]).collect()
+        });
+        Origins {
+            tolerance,
+            elements: vec![0.0; model.mesh.elements.len()],
+            at_edge: at_edge.collect(),
+        }
+    }
+
+    /// Adds a place of a contact at which the obstacle reaches between the nodes: no error is known before there are nodes.
+    pub fn add_place(&mut self, model: &Model, patch: usize, s: f64) {
+        let boundary = &model.contacts[patch].boundary;
+        let covers = |edge: &usize| boundary.edge_arc(*edge)[1] >= s;
+        let last = boundary.edge_count() - 1;
+        let edge = (0..last).find(covers).unwrap_or(last);
+        self.elements[self.at_edge[patch][edge] as usize] += MOST_EXCESS;
+    }
+
+    /// Adds what is known of a quantity of a contact with this relative error.
+    pub fn add(&mut self, patch: usize, relative: f64, added: &Added) {
+        let edges = added.edges.iter().map(|(_, part)| part);
+        let total: f64 = added.elements.iter().chain(edges).sum();
+        if relative <= self.tolerance || !(total > 0.0 && total.is_finite()) {
+            return;
+        }
+        let excess = (relative / self.tolerance).min(MOST_EXCESS);
+        for (sum, part) in self.elements.iter_mut().zip(&added.elements) {
+            *sum += excess * part / total;
+        }
+        for (edge, part) in &added.edges {
+            self.elements[self.at_edge[patch][*edge] as usize] += excess * part / total;
+        }
+    }
+}
