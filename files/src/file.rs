@@ -113,7 +113,7 @@ mod tests {
         };
         let got = &violations[0].got;
         assert!(
-            got.len() < 400 && got.ends_with("at line 1 column 70003"),
+            got.len() < 400 && got.ends_with("at line 1 column 70004"),
             "{got}"
         );
     }

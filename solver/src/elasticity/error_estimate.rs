@@ -231,13 +231,15 @@ mod tests {
         for kind in ["plane_strain", "plane_stress", "axisymmetric"] {
             let problem = serde_json::json!({
                 "analysis": {"kind": kind},
-                "mesh": {
-                    "nodes": [[0, 0], [1, 0], [2, 0], [0, 1], [1.1, 1], [2, 1]],
-                    "elements": [[0, 1, 4, 3], [1, 2, 5], [1, 5, 4]],
+                "mesh": {"inline": {
+                    "nodes": [
+                        [0, 0], [1, 0], [2, 0], [0, 1], [1.1, 1], [2, 1], [0.5, 0], [1.05, 0.5], [0.55, 1], [0, 0.5],
+                        [1.5, 0], [2, 0.5], [1.5, 0.5], [1.55, 1]
+                    ],
+                    "elements": [[0, 1, 4, 3, 6, 7, 8, 9], [1, 2, 5, 10, 11, 12], [1, 5, 4, 12, 13, 7]],
                     "groups": {"left": [0], "right": [1, 2]},
-                    "boundaries": {"low": {"line": [[0, 0], [2, 0]]}, "high": {"line": [[0, 1], [2, 1]]}},
-                    "refine": 1
-                },
+                    "boundaries": {"low": [[0, 1, 6], [1, 2, 10]], "high": [[3, 4, 8], [4, 5, 13]]}
+                }, "refine": 1},
                 "materials": [
                     {"group": "left", "youngs_modulus": 1000, "poissons_ratio": 0.3},
                     {"group": "right", "youngs_modulus": 10, "poissons_ratio": 0.2}

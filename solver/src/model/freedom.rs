@@ -477,7 +477,7 @@ impl<'a> Parts<'a> {
             .filter(|node| self.shared.contains_key(node))
             .collect();
         for node in nodes {
-            let parts: Vec<u32> = self.of(node).iter().copied().collect();
+            let parts: Vec<u32> = self.of(node).to_vec();
             let members: Vec<u32> = parts
                 .into_iter()
                 .filter(|p| place.contains_key(p))
