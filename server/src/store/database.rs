@@ -193,6 +193,11 @@ impl Store {
     pub async fn close(&self) {
         self.lists.close().await;
         self.reader.close().await;
+        // SQLite does this with the last connection only, which may be one for reading whose thread ends late
+        let checkpoint = sqlx::query("pragma wal_checkpoint(truncate)");
+        if let Err(error) = checkpoint.execute(&self.writer).await {
+            tracing::warn!(%error, "the write-ahead log stays and is read at the next start: {error}");
+        }
         self.writer.close().await;
         if let Err(error) = self.progress.stop() {
             tracing::warn!(%error, "{}: {error}", progress::FILE);
