@@ -91,7 +91,7 @@ class Server:
 
     def jobs(self):
         """Succeeded, not converged, canceled."""
-        problem = json.loads((TOP / "examples/rectangular_punch.json").read_text(encoding="utf-8"))
+        problem = json.loads((TOP / "tests/data/thesis/rectangular_punch.json").read_text(encoding="utf-8"))
         hasty = dict(problem, solver={"max_iterations": 1})
         names = [
             self.ask("POST", "/v1/jobs", {"problem": problem, "name": "seed"}, Prefer="wait=60")["id"]

@@ -6,13 +6,19 @@ pub mod harness;
 
 use serde_json::{Value, json};
 
-/// One of the problems in `examples/`, as text.
+/// One of the five problems on meshes of the thesis's size, as text; `examples/` has them on refined meshes.
 pub fn example(name: &str) -> String {
+    let path = format!("{}/data/thesis/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// One of the problems in `examples/`, as text.
+pub fn shipped_example(name: &str) -> String {
     let path = format!("{}/../examples/{name}.json", env!("CARGO_MANIFEST_DIR"));
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// The same as JSON.
+/// One of the five problems on meshes of the thesis's size, as JSON.
 pub fn example_json(name: &str) -> Value {
     serde_json::from_str(&example(name)).unwrap()
 }

@@ -39,7 +39,7 @@ def equal(found, expected, what):
 
 def example(name="rectangular_punch", **mesh):
     """An example of the thesis; `mesh` is laid over its mesh, as in `refine=3`."""
-    problem = json.loads((TOP / "examples" / (name + ".json")).read_text(encoding="utf-8"))
+    problem = json.loads((TOP / "tests/data/thesis" / (name + ".json")).read_text(encoding="utf-8"))
     problem["mesh"].update(mesh)
     return problem
 

@@ -73,7 +73,7 @@ fn stresses(fields: &Fields) -> impl Iterator<Item = Stress> {
 /// Adds the fields to an archive, their names after `prefix`.
 ///
 /// Elements are in two arrays, `quads` and `triangles`, each with an array of their numbers in the mesh;
-/// `error_estimate` has one entry per element of the mesh, `gauss_element` the element of each
+/// `element_error` has one entry per element of the mesh, `gauss_element` the element of each
 /// integration point.
 pub fn add(npz: &mut Npz, prefix: &str, fields: &Fields) -> Result<(), String> {
     check(fields)?;
@@ -86,7 +86,7 @@ pub fn add(npz: &mut Npz, prefix: &str, fields: &Fields) -> Result<(), String> {
             Data::Small(values) => npz.array(&name(array.name), values, width)?,
         }
     }
-    npz.array(&name("error_estimate"), &fields.element_error, 1)?;
+    npz.array(&name("element_error"), &fields.element_error, 1)?;
 
     let (mut quads, mut quad_numbers) = (Vec::new(), Vec::new());
     let (mut triangles, mut triangle_numbers) = (Vec::new(), Vec::new());
@@ -231,7 +231,7 @@ pub(crate) mod tests {
             ("principal_stress", "(11, 3)"),
             ("von_mises", "(11,)"),
             ("contact_state", "(11,)"),
-            ("error_estimate", "(2,)"),
+            ("element_error", "(2,)"),
             ("quads", "(1, 8)"),
             ("quad_numbers", "(1,)"),
             ("triangles", "(1, 6)"),

@@ -46,7 +46,7 @@ fn written(fields: &Fields) -> std::io::Result<Vec<u8>> {
         }
     }
     writeln!(out, "</PointData>\n<CellData>")?;
-    data_array(&mut out, "error_estimate", &[], &fields.element_error)?;
+    data_array(&mut out, "element_error", &[], &fields.element_error)?;
     writeln!(out, "</CellData>\n<Points>")?;
     let points = plane(&fields.x, &fields.y);
     data_array(&mut out, "Points", &["x", "y", "z"], &points)?;

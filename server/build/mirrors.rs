@@ -119,7 +119,6 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("StepResult", "results::StepResult").answer(),
     fields("Summary", "solution::Summary").answer()
         .theirs(&["timings: BTreeMap::new()", "solver_version: String::new()", "input_hash: String::new()", "digest: String::new()"]),
-    fields("ErrorEstimate", "solution::ErrorEstimate").answer(),
     fields("Accuracy", "solution::Accuracy").answer(),
     names("Verdict", "solution::Verdict").answer(),
     fields("EstimatedQuantity", "solution::EstimatedQuantity").answer(),

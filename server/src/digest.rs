@@ -138,6 +138,7 @@ mod tests {
             summary: solution.summary.clone(),
             history: solution.history.clone(),
             profiles: solution.profiles.clone(),
+            node_profiles: solution.node_profiles.clone(),
             friction_profiles: solution.friction_profiles.clone(),
         });
         let mut document = serde_json::to_value(&solution).unwrap();

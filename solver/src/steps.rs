@@ -75,6 +75,7 @@ pub fn run(
             },
             history: rows,
             profiles: reported.profiles.clone(),
+            node_profiles: reported.node_profiles.clone(),
             friction_profiles: reported.friction_profiles.clone(),
         });
         summary.iterations = history.len() as u32;
@@ -83,6 +84,7 @@ pub fn run(
             summary,
             history,
             profiles: reported.profiles,
+            node_profiles: reported.node_profiles,
             friction_profiles: reported.friction_profiles,
             steps: ends,
             fields: Fields::default(),

@@ -104,7 +104,7 @@ const RUNS: usize = 300;
 fn example() -> String {
     let path = concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/../examples/rectangular_punch.json"
+        "/data/thesis/rectangular_punch.json"
     );
     std::fs::read_to_string(path).unwrap()
 }

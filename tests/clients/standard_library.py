@@ -133,6 +133,9 @@ def read_result(client, job):
     # formulation 5.2: example 1 has +14.17
     equal(round(summary["tangential_force"], 2), 14.17, "the tangential force")
     profile = client.get("/v1/jobs/%s/profiles/top" % job)
+    peak = summary["contacts"]["top"]["peak_tangential_stress"]["value"]
+    equal(max(profile["tangential_stress"], key=abs), peak, "the peak of the profile")
+    profile = client.get("/v1/jobs/%s/profiles/top?points=nodes" % job)
     equal(list(profile), PROFILE, "the columns of a profile")
     equal(profile["s"], sorted(profile["s"]), "the arc length")
     equal({len(column) for column in profile.values()}, {11}, "the lengths of the columns")

@@ -194,7 +194,7 @@ fn changed_inline_meshes_are_read_or_refused() {
 /// The whole way of a submitted problem up to the first assembly: parsed and checked.
 #[test]
 fn changed_problems_are_checked_or_refused() {
-    let problems = files("../examples", "json");
+    let problems = files("data/thesis", "json");
     attack("problems", problems, &PROBLEMS, 20_000, |file| {
         match files::parse(&String::from_utf8_lossy(file)) {
             // what would be refused for its size is not meshed

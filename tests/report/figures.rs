@@ -52,7 +52,8 @@ profile; `--theme dark`) and, of a job, from `GET /v1/jobs/{id}/plots/deformed.s
 - **convergence**: each residual against the tolerance; nodes in contact and friction points in slip and stick.
 
 The examples name no units. A problem with `\"units\": {\"length\": \"mm\", \"force\": \"N\", \"stress\": \"MPa\"}` has
-them on its axes. Meshes are of the thesis's size; [verification.md](verification.md) has refined ones.
+them on its axes. The meshes are refined by `\"refine\": {\"tolerance\": 0.002}`; [verification.md](verification.md) has those
+of the thesis's size.
 ";
 
 fn main() {
@@ -66,10 +67,11 @@ fn main() {
 
     let mut text = String::from(INTRODUCTION);
     for (name, seen) in EXAMPLES {
-        let problem = files::parse(&suite::example(name)).unwrap();
+        let problem = files::parse(&suite::shipped_example(name)).unwrap();
         let solution = solver::solve(&problem, &mut |_| ControlFlow::Continue(())).unwrap();
         let parts = Parts {
             history: &solution.history,
+            accuracy: solution.summary.accuracy.as_ref(),
             profiles: &solution.profiles,
             fields: &solution.fields,
             stored: None,

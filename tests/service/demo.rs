@@ -35,6 +35,8 @@ fn the_demo_solves_five_examples_over_both_protocols_and_prints_a_profile() {
         "{text}"
     );
     assert!(text.contains("σ_n") && text.contains("slip"), "{text}");
+    let verdicts = text.lines().filter(|line| line.contains("accuracy good"));
+    assert_eq!(verdicts.count(), 5, "{text}");
     assert!(
         !text.contains('\x1b'),
         "plain lines where there is no terminal"

@@ -348,7 +348,7 @@ async fn finished_load_steps_of_a_running_job_are_served() {
 
 /// Operations: GetProfile
 #[tokio::test]
-async fn a_profile_is_given_at_nodes_at_friction_points_or_at_any_number_of_points() {
+async fn a_profile_is_given_at_all_points_at_nodes_at_friction_points_or_at_any_number() {
     let server = server().await;
     let mut grpc = crate::grpc::connect(&server).await;
     let id = server.submit(&example_json("rectangular_punch")).await;
@@ -356,10 +356,19 @@ async fn a_profile_is_given_at_nodes_at_friction_points_or_at_any_number_of_poin
     let at = |points: &str| format!("/v1/jobs/{id}/profiles/top?points={points}");
     let count = |profile: &Value| profile["s"].as_array().unwrap().len();
     let nodes = server.json(&at("nodes")).await;
+    let all = server.json(&at("all")).await;
     assert_eq!(
-        nodes,
+        all,
         server.json(&format!("/v1/jobs/{id}/profiles/top")).await
     );
+    // it holds the peaks
+    let result = server.json(&format!("/v1/jobs/{id}/result")).await;
+    for name in ["normal_stress", "tangential_stress"] {
+        let sizes = all[name].as_array().unwrap().iter();
+        let largest = sizes.map(|v| v.as_f64().unwrap().abs()).fold(0.0, f64::max);
+        let peak = &result["summary"]["contacts"]["top"][format!("peak_{name}")];
+        assert_eq!(peak["value"].as_f64().unwrap().abs(), largest, "{name}");
+    }
     let friction = server.json(&at("friction")).await;
     assert_eq!(
         count(&friction),
@@ -373,7 +382,12 @@ async fn a_profile_is_given_at_nodes_at_friction_points_or_at_any_number_of_poin
         assert_eq!(nodes[name][0], spaced[name][0], "{name}");
         assert_eq!(nodes[name][first], spaced[name][last], "{name}");
     }
-    for (points, same) in [("nodes", &nodes), ("friction", &friction), ("101", &spaced)] {
+    for (points, same) in [
+        ("all", &all),
+        ("nodes", &nodes),
+        ("friction", &friction),
+        ("101", &spaced),
+    ] {
         let request = pb::GetProfileRequest {
             id: id.clone(),
             boundary: "top".into(),

@@ -36,7 +36,7 @@ fn cone(angle: f64) -> Value {
 
 /// No node pulls, and none that is open carries anything.
 fn only_presses(solution: &Solution, what: &str) {
-    let profile = &solution.profiles["top"];
+    let profile = &solution.node_profiles["top"];
     for (i, stress) in profile.normal_stress.iter().enumerate() {
         let open = profile.state[i] == NodeState::Open;
         assert!(
@@ -109,7 +109,7 @@ fn the_axis_stays_closed_under_a_flat_punch_and_open_under_a_hollow_one() {
         false,
         None,
     );
-    let profile = &flat.profiles["top"];
+    let profile = &flat.node_profiles["top"];
     assert_ne!(profile.state[0], NodeState::Open);
     let exact = E_STAR * 0.05 / (std::f64::consts::PI * 0.8);
     // the block is five times as large as the punch
@@ -125,5 +125,5 @@ fn the_axis_stays_closed_under_a_flat_punch_and_open_under_a_hollow_one() {
         None,
     );
     only_presses(&hollow, "a hollow obstacle");
-    assert_eq!(hollow.profiles["top"].state[0], NodeState::Open);
+    assert_eq!(hollow.node_profiles["top"].state[0], NodeState::Open);
 }

@@ -51,7 +51,7 @@ fn the_pressure_profile_integrates_to_the_reactions_and_vanishes_off_the_contact
         let solution = solve(&problem);
         let (summary, profile) = (
             &solution.summary,
-            solution.profiles.values().next().unwrap(),
+            solution.node_profiles.values().next().unwrap(),
         );
         let depth = |x: f64| match problem.analysis {
             solver::problem::Analysis::PlaneStrain {} => 1.0,

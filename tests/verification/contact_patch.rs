@@ -56,7 +56,7 @@ fn block(kind: &Value, ratio: f64, top: (&str, Value), gap: f64) -> Solution {
 
 /// Largest deviation of the pressure, relative.
 fn unevenness(solution: &Solution, pressure: f64) -> f64 {
-    let stress = &solution.profiles["bottom"].normal_stress;
+    let stress = &solution.node_profiles["bottom"].normal_stress;
     stress
         .iter()
         .map(|s| (s / pressure + 1.0).abs())

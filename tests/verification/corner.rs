@@ -47,7 +47,7 @@ fn a_block_in_a_corner_has_the_uniform_pressure_of_its_load() {
         for normal in ["body", "obstacle"] {
             let solution = solved(&pressed(turn, angle, &json!({"normal": normal})));
             for name in ["floor", "wall"] {
-                let stress = &solution.profiles[name].normal_stress;
+                let stress = &solution.node_profiles[name].normal_stress;
                 let off = stress
                     .iter()
                     .fold(0.0f64, |off, s| off.max((s + 5.0).abs()));
@@ -55,7 +55,7 @@ fn a_block_in_a_corner_has_the_uniform_pressure_of_its_load() {
                 let force = solution.summary.contacts[name].normal_force;
                 assert!((force - 5.0).abs() < 1e-8, "{turn} {angle} {name}: {force}");
                 // (1 + ν)(1 − 2ν)/E · 5 towards the corner
-                let profile = &solution.profiles[name];
+                let profile = &solution.node_profiles[name];
                 for ((x, y), u) in profile
                     .x
                     .iter()
@@ -116,8 +116,8 @@ fn both_walls_of_a_corner_bear_the_same_and_balance_the_load() {
                 "{what}"
             );
             assert!(solution.summary.residuals.equilibrium < 1e-9, "{what}");
-            let profile = &solution.profiles["wall"];
-            let mirrored = &solution.profiles["floor"].normal_stress;
+            let profile = &solution.node_profiles["wall"];
+            let mirrored = &solution.node_profiles["floor"].normal_stress;
             let pairs = profile.normal_stress.iter().zip(mirrored.iter().rev());
             assert!(
                 pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-6),

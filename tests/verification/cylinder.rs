@@ -60,7 +60,7 @@ fn a_cylinder_has_hertzs_solution() {
         let peak = -contact.peak_normal_stress.unwrap().value;
         let mesh = format!("block of 200 a, h = {h} a");
         held(9, "Hertz, cylinder: p₀", &mesh, peak, p0, 0.01);
-        let profile = &solution.profiles["top"];
+        let profile = &solution.node_profiles["top"];
         let inside = (0..profile.s.len()).filter(|&i| profile.x[i] <= 0.8);
         inside
             .map(|i| {

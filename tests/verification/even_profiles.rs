@@ -63,7 +63,7 @@ fn hold(name: &str, obstacle: &Value, load: f64, start: f64, pressure: impl Fn(f
         let solution = at_load(obstacle, load, start, h);
         let [_, a] = solution.summary.contacts["top"].contact[0];
         assert!((a - 1.0).abs() <= h, "{name}: a = {a} with elements of {h}");
-        let profile = &solution.profiles["top"];
+        let profile = &solution.node_profiles["top"];
         (0..profile.s.len())
             .filter(|&i| (0.1..=0.8).contains(&profile.x[i]))
             .map(|i| (-profile.normal_stress[i] / pressure(profile.x[i]) - 1.0).abs())

@@ -51,7 +51,7 @@ fn a_plane_punch_presses_as_the_inverse_root() {
     let error = |refine: u32| {
         let solution = solve(&punch("plane_strain", 200.0 * A, 2e-3, refine, 0.1));
         let load = 2.0 * solution.summary.normal_force;
-        pressure_error(&solution.profiles["top"], |x| {
+        pressure_error(&solution.node_profiles["top"], |x| {
             load / (std::f64::consts::PI * (A * A - x * x).sqrt())
         })
     };
@@ -85,10 +85,10 @@ fn a_round_punch_has_boussinesqs_load() {
         exact,
         0.01,
     );
-    let centre = -large.profiles["top"].normal_stress[0];
+    let centre = -large.node_profiles["top"].normal_stress[0];
     held(11, "round flat punch: p(0)", mesh, centre, 139.916, 0.01);
     let pressure = |r: f64| exact / (2.0 * std::f64::consts::PI * A * (A * A - r * r).sqrt());
-    assert!(pressure_error(&large.profiles["top"], pressure) < 0.01);
+    assert!(pressure_error(&large.node_profiles["top"], pressure) < 0.01);
     let error = |solution: &Solution| (solution.summary.normal_force / exact - 1.0).abs();
     assert!(
         error(&large) < 0.5 * error(&solve(50.0, 2.5e-4)),

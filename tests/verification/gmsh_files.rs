@@ -228,7 +228,7 @@ fn hertz_on_an_unstructured_mesh_of_triangles() {
         p0,
         1e-2,
     );
-    let profile = &solution.profiles["contact"];
+    let profile = &solution.node_profiles["contact"];
     let worst = (0..profile.x.len())
         .filter(|&i| profile.x[i] < 0.8 * half_width)
         .map(|i| {

@@ -39,7 +39,7 @@ fn a_sphere_has_hertzs_solution() {
     // p is compared for the load that there is: a³ goes with it
     let of_pressure = |solution: &Solution| {
         let a = (solution.summary.normal_force / load).cbrt();
-        let profile = &solution.profiles["top"];
+        let profile = &solution.node_profiles["top"];
         (0..profile.s.len())
             .filter(|&i| profile.x[i] <= 0.8)
             .map(|i| {

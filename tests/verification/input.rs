@@ -193,7 +193,7 @@ fn a_block_held_only_by_contact_is_in_equilibrium() {
         assert!((solution.summary.normal_force - 10.0).abs() < 1e-9);
         assert!(solution.summary.residuals.equilibrium < 1e-9);
         if friction == "null" {
-            let stress = &solution.profiles["bottom"].normal_stress;
+            let stress = &solution.node_profiles["bottom"].normal_stress;
             assert!(stress.iter().all(|s| (s + 5.0).abs() < 1e-9), "{stress:?}");
         }
     }
@@ -428,7 +428,7 @@ fn an_observer_gets_the_solution_so_far_after_every_step_but_the_last() {
         // only the end of the last step is assessed
         assert!(shorter.summary.accuracy.take().is_some());
         assert_eq!(so_far.summary, shorter.summary);
-        assert_eq!(so_far.profiles, shorter.profiles);
+        assert_eq!(so_far.node_profiles, shorter.node_profiles);
         assert_eq!(so_far.friction_profiles, shorter.friction_profiles);
     }
     assert!(!solution.fields.ux.is_empty());
@@ -471,8 +471,8 @@ fn friction_that_never_acts_changes_nothing() {
     let without = solve(&p);
     assert_eq!(with.fields, without.fields);
     assert_eq!(
-        with.profiles["taper"].tangential_displacement,
-        without.profiles["taper"].tangential_displacement
+        with.node_profiles["taper"].tangential_displacement,
+        without.node_profiles["taper"].tangential_displacement
     );
 }
 

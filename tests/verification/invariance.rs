@@ -207,7 +207,7 @@ fn a_mirrored_problem_has_the_mirrored_result() {
         -a.tangential_force,
         1e-9,
     );
-    let (p, q) = (&left.profiles["top"], &right.profiles["top"]);
+    let (p, q) = (&left.node_profiles["top"], &right.node_profiles["top"]);
     let largest = p.normal_stress.iter().fold(0.0f64, |m, s| m.max(s.abs()));
     for (i, stress) in p.tangential_stress.iter().enumerate() {
         let other = q.s.len() - 1 - i;

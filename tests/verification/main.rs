@@ -16,7 +16,7 @@ mod cook;
 mod corner;
 mod cylinder;
 mod disc_pressure;
-mod error_estimate;
+mod element_errors;
 mod even_profiles;
 mod examples;
 mod flat_punch;

@@ -197,7 +197,7 @@ fn the_vertical_loads_agree_with_another_program_for_both_normals() {
             "μ = .3"
         };
         let solution = cylinder(normal, friction);
-        let profile = &solution.profiles["top"];
+        let profile = &solution.node_profiles["top"];
         // the vertical part of p m and σ_t t, by Simpson's rule
         let vertical = |i: usize| {
             let slope = match normal {
@@ -232,7 +232,7 @@ fn points_that_stick_to_a_sloping_face_move_with_it() {
     let friction =
         json!({"coefficient": 50, "nonlocal_radius": 0, "elastic_slip": 1e-6, "points": "nodal"});
     let solution = cylinder("obstacle", friction);
-    let (fields, profile) = (&solution.fields, &solution.profiles["top"]);
+    let (fields, profile) = (&solution.fields, &solution.node_profiles["top"]);
     let mut stuck = 0;
     for i in 0..profile.s.len() {
         if profile.state[i] != solver::solution::NodeState::Stick {

@@ -225,7 +225,7 @@ fn a_kink_is_seen_in_every_form_of_obstacle() {
 #[test]
 fn a_smoothed_profile_gives_the_pressure_of_the_one_without_noise() {
     let exact = cylinder(json!({"kind": "circle", "radius": 8}), 1);
-    let pressure = |solution: &Solution| solution.profiles["top"].normal_stress.clone();
+    let pressure = |solution: &Solution| solution.node_profiles["top"].normal_stress.clone();
     let off = |solution: &Solution| {
         let pairs = pressure(solution).into_iter().zip(pressure(&exact));
         pairs.fold(0.0f64, |off, (a, b)| off.max((a - b).abs())) / peak(&exact)
@@ -252,7 +252,7 @@ fn a_smoothed_profile_gives_the_pressure_of_the_one_without_noise() {
         assert_eq!(warning(&smooth, WarningCode::KinkInContact), None);
         assert_eq!(warning(&smooth, WarningCode::SmoothingFlattens), None);
         // the same bits again
-        assert_eq!(cylinder(obstacle, 1).profiles, smooth.profiles);
+        assert_eq!(cylinder(obstacle, 1).node_profiles, smooth.node_profiles);
     }
 }
 

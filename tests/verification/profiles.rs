@@ -36,8 +36,11 @@ fn integral(problem: &Problem, nodal: &ContactProfile, values: impl Fn(usize) ->
 
 /// The two profiles of a solution's only contact.
 fn profiles(solution: &Solution) -> (&ContactProfile, &ContactProfile) {
-    let name = solution.profiles.keys().next().unwrap();
-    (&solution.profiles[name], &solution.friction_profiles[name])
+    let name = solution.node_profiles.keys().next().unwrap();
+    (
+        &solution.node_profiles[name],
+        &solution.friction_profiles[name],
+    )
 }
 
 /// The columns at the friction points are what the summary adds up: to rounding, also where the
@@ -169,7 +172,7 @@ fn every_step_has_its_profile_at_the_friction_points() {
         .steps
         .iter()
         .map(|step| {
-            let force = integral(&problem, &step.profiles["top"], |g| {
+            let force = integral(&problem, &step.node_profiles["top"], |g| {
                 step.friction_profiles["top"].tangential_stress[g]
             });
             close(force, step.summary.tangential_force, 1e-12);
@@ -204,4 +207,53 @@ fn a_sampled_profile_is_the_continuous_one() {
     let ends = 0.5 * (stress[0] + stress[20_000]);
     let force = step * (stress.iter().sum::<f64>() - ends);
     close(force, solution.summary.tangential_force, 2e-3);
+}
+
+/// The largest stresses of the profile that a user gets are the peaks of the summary: a node or a friction point may
+/// exceed one by what the iteration leaves, 1e-9.
+#[test]
+fn the_profile_holds_the_peaks() {
+    let mut problems: Vec<Problem> = EXAMPLES.map(example).to_vec();
+    problems.extend((0..40).map(|number| crate::catalogue::case(number).problem));
+    let (mut peaks, mut beside_nodes) = (0, 0);
+    for problem in &problems {
+        let solution = solver::solve(problem, &mut quiet).unwrap();
+        for (name, all) in &solution.profiles {
+            let summary = &solution.summary.contacts[name];
+            let nodes = &solution.node_profiles[name];
+            assert!(all.s.is_sorted());
+            let rows: Vec<usize> = nodes
+                .s
+                .iter()
+                .map(|s| all.s.iter().position(|other| other == s).unwrap())
+                .collect();
+            for (node, row) in rows.into_iter().enumerate() {
+                assert_eq!(
+                    all.normal_displacement[row],
+                    nodes.normal_displacement[node]
+                );
+                assert_eq!(all.state[row], nodes.state[node]);
+            }
+            for (values, at_nodes, peak) in [
+                (
+                    &all.normal_stress,
+                    &nodes.normal_stress,
+                    summary.peak_normal_stress,
+                ),
+                (
+                    &all.tangential_stress,
+                    &nodes.tangential_stress,
+                    summary.peak_tangential_stress,
+                ),
+            ] {
+                let Some(peak) = peak else { continue };
+                let largest = |values: &[f64]| values.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+                assert!(values.contains(&peak.value));
+                close(largest(values), peak.value.abs(), 1e-9);
+                peaks += 1;
+                beside_nodes += usize::from(largest(at_nodes) < 0.999 * peak.value.abs());
+            }
+        }
+    }
+    assert!(peaks > 80 && beside_nodes > 20, "{beside_nodes} of {peaks}");
 }

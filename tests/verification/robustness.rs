@@ -217,7 +217,7 @@ fn a_node_that_misses_the_axis_by_rounding_is_on_it_however_small_the_contact() 
     for (a, b) in forces(&exact).into_iter().zip(forces(&rounded)) {
         assert!((a / b - 1.0).abs() < 1e-9, "{a}, {b}");
     }
-    let pressures = |s: &Solution| s.profiles["tip"].normal_stress.clone();
+    let pressures = |s: &Solution| s.node_profiles["tip"].normal_stress.clone();
     let (exact, rounded) = (pressures(&exact), pressures(&rounded));
     let most = exact.iter().fold(0.0f64, |most, p| most.max(-p));
     for (a, b) in exact.iter().zip(&rounded) {

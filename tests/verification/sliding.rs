@@ -105,7 +105,7 @@ fn a_sliding_punch_presses_harder_at_its_trailing_edge() {
     };
     let solution = dragged(&x, 200.0, 2e-3, 1.3, 0.3, contact(mu), Value::Null);
     let load = solution.summary.normal_force;
-    let profile = &solution.profiles["top"];
+    let profile = &solution.node_profiles["top"];
     let exact = |x: f64, g: f64| {
         let against = -x; // the obstacle moves along +x
         let root = std::f64::consts::PI * (1.0 - x * x).sqrt();
@@ -186,7 +186,7 @@ fn a_drag_and_its_reversal_follow_cattaneo_and_mindlin() {
         0.01,
     );
     // q/(μp₀) along the contact, the few parts of 1 % of shear that normal loading locks in taken off
-    let profile = |k: usize| &with_memory.steps[k].profiles["top"];
+    let profile = |k: usize| &with_memory.steps[k].node_profiles["top"];
     let half_width =
         f64::sqrt(4.0 * load * 8.0 * (1.0 - 0.49 * 0.49) / (std::f64::consts::PI * 1000.0));
     let peak = 2.0 * load / (std::f64::consts::PI * half_width);
@@ -260,7 +260,7 @@ fn a_thin_strip_creeps_and_slides_on_its_base() {
     let u0 = 0.9 * slip;
     let solution = solve(&problem(&strip(json!(u0)).to_string()));
     let k = f64::sqrt(mu * pressure / (1000.0 * thickness * slip));
-    let profile = &solution.profiles["bottom"];
+    let profile = &solution.node_profiles["bottom"];
     let worst = (0..profile.s.len())
         // t of a bottom edge runs along −x
         .map(|i| {

@@ -117,7 +117,7 @@ fn a_flat_punch_sticks_up_to_its_published_radius() {
 fn a_prescribed_bound_has_the_stick_zone_of_the_elliptic_integral() {
     let base = punch("plane_strain", 0.3, 4000.0, json!({}));
     let first = solved(&base);
-    let profile = &first.profiles["top"];
+    let profile = &first.node_profiles["top"];
     let count = profile.s.len();
     let pressure: Vec<f64> = profile.normal_stress.iter().map(|s| -s).collect();
     let mut forces = vec![[0.0; 2]; count];
@@ -286,7 +286,7 @@ fn the_averaged_pressure_of_a_punch_has_its_published_values() {
         2e-5,
         &contact,
     ));
-    let profile = &solution.profiles["top"];
+    let profile = &solution.node_profiles["top"];
     let load = 2.0 * solution.summary.normal_force;
     let average: Vec<f64> = profile
         .nonlocal_pressure

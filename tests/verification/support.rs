@@ -5,9 +5,9 @@ use std::ops::ControlFlow;
 use solver::problem::Problem;
 use solver::solution::Solution;
 
-/// One of `examples/*.json`.
+/// One of the five problems on meshes of the thesis's size.
 pub(crate) fn example(name: &str) -> Problem {
-    let path = format!("{}/../examples/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/data/thesis/{name}.json", env!("CARGO_MANIFEST_DIR"));
     problem(&std::fs::read_to_string(path).unwrap())
 }
 

@@ -63,7 +63,7 @@ fn without_the_sign_it_settles_in_full_slip_and_reports_false_convergence() {
                 .any(|w| w.code == WarningCode::FalseConvergence)
         );
         // friction pushes along the motion where it moves at all
-        let profile = &solution.profiles["top"];
+        let profile = &solution.node_profiles["top"];
         let along = (0..profile.s.len())
             .filter(|&i| profile.tangential_stress[i] * profile.tangential_displacement[i] > 0.0)
             .count();

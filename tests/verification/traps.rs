@@ -82,7 +82,7 @@ fn arc_length_counts_from_the_start_of_the_boundary() {
         }
         solve(&block(&x, obstacle, 0.02, friction.clone()))
     });
-    let profile = &whole.profiles["top"];
+    let profile = &whole.node_profiles["top"];
     assert!(
         profile
             .s
@@ -106,7 +106,7 @@ fn arc_length_counts_from_the_start_of_the_boundary() {
         );
         let (p, q) = (p.unwrap(), q.unwrap());
         assert!((p.s - q.s).abs() < 1e-9, "{p:?} {q:?}");
-        let profile = &part.profiles["top"];
+        let profile = &part.node_profiles["top"];
         assert!(
             profile
                 .s

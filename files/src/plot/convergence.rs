@@ -62,6 +62,7 @@ pub fn convergence_svg(
     figure(
         theme,
         problem.title.as_deref().unwrap_or("Convergence"),
+        None,
         &[
             panel(
                 "relative residual",

@@ -9,7 +9,7 @@ use super::page::{self, number, with_unit};
 use super::theme::{Theme, hex};
 use crate::stress::von_mises;
 use solver::problem::{Analysis, Problem};
-use solver::solution::{ContactProfile, Fields, NodeState};
+use solver::solution::{Accuracy, ContactProfile, Fields, NodeState};
 
 /// The largest displacement is drawn as this part of the body, or of the window at the contact.
 const VISIBLE: f64 = 0.1;
@@ -85,6 +85,7 @@ pub fn deformed_svg(
     problem: &Problem,
     profiles: &BTreeMap<String, ContactProfile>,
     fields: &Fields,
+    accuracy: Option<&Accuracy>,
     stress: Stress,
 ) -> Result<String, String> {
     let body = Body { fields };
@@ -130,7 +131,8 @@ pub fn deformed_svg(
     let names = body::coordinates(&problem.analysis).map(|name| with_unit(name, unit));
     let bar = with_unit(stress.name(&problem.analysis), page::stress(&problem.units));
     let title = problem.title.as_deref().unwrap_or("Deformed body");
-    page::page(theme, title, height + BAR, |area| {
+    let note = page::verdict(accuracy);
+    page::page(theme, title, note.as_deref(), height + BAR, |area| {
         for (k, (frame, (_, factor))) in frames.iter().zip(&views).enumerate() {
             let scale = match *factor {
                 1.0 => "displacements to scale".to_owned(),
@@ -325,6 +327,7 @@ mod tests {
                 &problem,
                 &solution.profiles,
                 &solution.fields,
+                None,
                 stress,
             )
             .unwrap()
@@ -354,6 +357,7 @@ mod tests {
             &problem,
             &solution.profiles,
             &solution.fields,
+            None,
             Stress::Xx,
         )
         .unwrap();
@@ -366,6 +370,7 @@ mod tests {
                 &problem,
                 &solution.profiles,
                 &empty,
+                None,
                 Stress::Xx
             )
             .is_err()
@@ -378,6 +383,7 @@ mod tests {
                 &problem,
                 &solution.profiles,
                 &short,
+                None,
                 Stress::Xx
             )
             .is_err()
@@ -413,6 +419,7 @@ mod tests {
             &problem,
             &BTreeMap::new(),
             &fields,
+            None,
             Stress::Xx,
         )
         .unwrap();

@@ -71,8 +71,14 @@ pub struct Panel {
     pub marks: Vec<(f64, String)>,
 }
 
-/// Panels below one another under a title. `Err`: the reason why the figure could not be drawn.
-pub fn figure(theme: Theme, title: &str, panels: &[Panel]) -> Result<String, String> {
+/// Panels below one another under a title, with a note under it if there is one. `Err`: the reason why the figure could
+/// not be drawn.
+pub fn figure(
+    theme: Theme,
+    title: &str,
+    note: Option<&str>,
+    panels: &[Panel],
+) -> Result<String, String> {
     if panels
         .iter()
         .all(|panel| panel.curves.iter().all(|c| c.points.is_empty()))
@@ -80,7 +86,7 @@ pub fn figure(theme: Theme, title: &str, panels: &[Panel]) -> Result<String, Str
         return Err("there is nothing to draw".to_owned());
     }
     let heights: Vec<i32> = panels.iter().map(|p| LEGEND * rows(p) + PANEL).collect();
-    page::page(theme, title, heights.iter().sum(), |area| {
+    page::page(theme, title, note, heights.iter().sum(), |area| {
         let mut rest = area.clone();
         for (panel, height) in panels.iter().zip(&heights) {
             let (place, below) = rest.split_vertically(px(*height));
@@ -394,9 +400,9 @@ mod tests {
             .curves
             .extend((0..6).map(|_| curve("a rather long label of a curve")));
         assert!(rows(&panel) > 1);
-        let svg = figure(Theme::Light, "Title", std::slice::from_ref(&panel)).unwrap();
+        let svg = figure(Theme::Light, "Title", None, std::slice::from_ref(&panel)).unwrap();
         assert!(svg.contains("Title"));
-        assert!(figure(Theme::Light, "", &[]).is_err());
+        assert!(figure(Theme::Light, "", None, &[]).is_err());
     }
 
     #[test]

@@ -133,7 +133,7 @@ pub fn mesh_svg(
     if !each {
         caption += "; too many to be drawn one by one";
     }
-    page::page(theme, title, height + legend, |area| {
+    page::page(theme, title, None, height + legend, |area| {
         body::axes(area, theme, frame, &caption, [&axes[0], &axes[1]])?;
         for (k, (label, (row, x))) in labels.iter().zip(&places).enumerate() {
             let middle = height + LEGEND * row + LEGEND / 2 - 4;

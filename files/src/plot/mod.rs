@@ -24,7 +24,7 @@ pub use theme::Theme;
 
 use solver::mesh::Mesh;
 use solver::problem::Problem;
-use solver::solution::{ContactProfile, Fields, Iteration};
+use solver::solution::{Accuracy, ContactProfile, Fields, Iteration};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// The figures of a problem and its solution.
@@ -56,7 +56,9 @@ impl Plot {
 pub struct Parts<'a> {
     /// For `convergence`.
     pub history: &'a [Iteration],
-    /// For `profile` and `deformed`.
+    /// For `profile` and `deformed`: the verdict is under their titles; absent of a result that is not the last.
+    pub accuracy: Option<&'a Accuracy>,
+    /// For `profile`, at all points, so that the peaks are seen; for `deformed`.
     pub profiles: &'a BTreeMap<String, ContactProfile>,
     /// For `deformed`; `mesh` draws the problem's own mesh without them.
     pub fields: &'a Fields,
@@ -92,8 +94,16 @@ pub fn draw(
     let Style { theme, stress } = style.into();
     match plot {
         Plot::Mesh => mesh_svg(theme, problem, parts.stored, parts.fields),
-        Plot::Deformed => deformed_svg(theme, problem, parts.profiles, parts.fields, stress),
-        Plot::Profile => profile_svg(theme, problem, parts.profiles),
+        Plot::Deformed => {
+            let Parts {
+                profiles,
+                fields,
+                accuracy,
+                ..
+            } = *parts;
+            deformed_svg(theme, problem, profiles, fields, accuracy, stress)
+        }
+        Plot::Profile => profile_svg(theme, problem, parts.profiles, parts.accuracy),
         Plot::Convergence => convergence_svg(theme, problem, parts.history),
     }
 }
@@ -134,6 +144,7 @@ mod tests {
         let solution = solution(&problem);
         let parts = Parts {
             history: &solution.history,
+            accuracy: solution.summary.accuracy.as_ref(),
             profiles: &solution.profiles,
             fields: &solution.fields,
             stored: None,

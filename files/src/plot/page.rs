@@ -7,11 +7,14 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::theme::Theme;
 use solver::error::shortened;
 use solver::problem::Units;
+use solver::solution::Accuracy;
 
 /// Width of every figure (pixels).
 pub(super) const WIDTH: i32 = 720;
 /// Height of the title (pixels).
 pub(super) const HEAD: i32 = 40;
+/// Height of a note under the title (pixels).
+const NOTE: i32 = 22;
 /// plotters draws in whole units: a tenth of a pixel keeps curves smooth.
 pub(super) const FINE: i32 = 10;
 const FONT: &str = "sans-serif";
@@ -28,15 +31,17 @@ pub(super) const fn px(pixels: i32) -> i32 {
     pixels * FINE
 }
 
-/// A page `height` pixels high below its title. `draw` gets the area below the title, and returns
-/// further SVG that is put on top, in the units of the drawing from the corner of the page.
+/// A page `height` pixels high below its title, and the note under it if there is one. `draw` gets the area below the title, and returns
+/// further SVG that is put on top, in the units of the drawing; its origin is the title's height above the area.
 pub(super) fn page(
     theme: Theme,
     title: &str,
+    note: Option<&str>,
     height: i32,
     draw: impl FnOnce(&Area<'_>) -> Fallible<String>,
 ) -> Result<String, String> {
-    let size = (WIDTH, HEAD + height);
+    let head = HEAD + note.map_or(0, |_| NOTE);
+    let size = (WIDTH, head + height);
     let mut svg = String::new();
     let drawn = || -> Fallible<String> {
         let fine = (px(size.0) as u32, px(size.1) as u32);
@@ -50,7 +55,15 @@ pub(super) fn page(
         let letters = (19 * 62 / title.chars().count().max(62)) as i32;
         let style = text(theme, letters).pos(at);
         root.draw(&Text::new(title, middle, style))?;
-        let (_, below) = root.split_vertically(px(HEAD));
+        if let Some(note) = note {
+            let under = (px(WIDTH / 2), px(HEAD + NOTE / 2 - 4));
+            root.draw(&Text::new(
+                note.to_owned(),
+                under,
+                text(theme, LETTERS).pos(at),
+            ))?;
+        }
+        let (_, below) = root.split_vertically(px(head));
         let over = draw(&below)?;
         root.present()?;
         Ok(over)
@@ -62,6 +75,11 @@ pub(super) fn page(
     let mut svg = svg.replacen(&fine, &size, 1);
     // names come from clients, and XML does not allow these characters
     svg.retain(|c| c == '\n' || !(c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}')));
+    // it knows of the title alone
+    let over = match note {
+        Some(_) => format!(r#"<g transform="translate(0 {})">{over}</g>"#, px(NOTE)),
+        None => over,
+    };
     match svg.rfind("</svg>") {
         Some(end) => Ok(format!("{}{over}{}", &svg[..end], &svg[end..])),
         None => Err("the drawing has no end".to_owned()),
@@ -91,6 +109,11 @@ pub(super) fn draw_text(
 /// How wide a text of that height is at most, without asking a font (pixels).
 pub(super) fn width(words: &str) -> i32 {
     8 * words.chars().count() as i32
+}
+
+/// The verdict on a result, for the note of a figure.
+pub(super) fn verdict(accuracy: Option<&Accuracy>) -> Option<String> {
+    accuracy.map(|accuracy| format!("accuracy: {}", accuracy.verdict.in_words()))
 }
 
 /// A quantity with its unit, where there is one.
@@ -180,7 +203,7 @@ mod tests {
     #[test]
     fn a_title_is_escaped_and_shortened() {
         let title = format!("<script>&\u{1}{}", "x".repeat(200));
-        let svg = page(Theme::Dark, &title, 50, |_| Ok("<g/>".to_owned())).unwrap();
+        let svg = page(Theme::Dark, &title, None, 50, |_| Ok("<g/>".to_owned())).unwrap();
         assert!(
             !svg.contains("<script>")
                 && !svg.contains('\u{1}')
@@ -188,5 +211,13 @@ mod tests {
         );
         assert!(svg.contains('…') && svg.trim_end().ends_with("<g/></svg>"));
         assert!(svg.starts_with(r#"<svg width="720" height="90" viewBox="0 0 7200 900""#));
+        let noted = page(Theme::Dark, &title, Some("accuracy: good"), 50, |_| {
+            Ok(String::new())
+        });
+        let noted = noted.unwrap();
+        assert!(
+            noted.starts_with(r#"<svg width="720" height="112""#)
+                && noted.contains("accuracy: good")
+        );
     }
 }

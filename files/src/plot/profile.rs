@@ -8,14 +8,15 @@ use super::page::{self, with_unit};
 use super::theme::Theme;
 use solver::error::shortened;
 use solver::problem::{Contact, Problem};
-use solver::solution::ContactProfile;
+use solver::solution::{Accuracy, ContactProfile};
 
 /// For each contact boundary: σ_n above, and where there is friction σ_t with its bound ±τ below, against arc
-/// length. Stresses are negative in compression. `Err`: the reason why a figure could not be drawn.
+/// length. Stresses are negative in compression. Under the title is the verdict on the accuracy, where there is one. `Err`: the reason why a figure could not be drawn.
 pub fn profile_svg(
     theme: Theme,
     problem: &Problem,
     profiles: &BTreeMap<String, ContactProfile>,
+    accuracy: Option<&Accuracy>,
 ) -> Result<String, String> {
     if profiles.is_empty() {
         return Err("there is no contact boundary to draw".to_owned());
@@ -25,7 +26,7 @@ pub fn profile_svg(
         .flat_map(|(name, profile)| panels(problem, name, profile))
         .collect();
     let title = problem.title.as_deref().unwrap_or("Contact stresses");
-    figure(theme, title, &panels)
+    figure(theme, title, page::verdict(accuracy).as_deref(), &panels)
 }
 
 fn panels(problem: &Problem, name: &str, profile: &ContactProfile) -> Vec<Panel> {
@@ -100,11 +101,11 @@ mod tests {
             ("top".to_owned(), profile),
         ]);
         let mut problem = problem();
-        let smooth = profile_svg(Theme::Light, &problem, &two).unwrap();
+        let smooth = profile_svg(Theme::Light, &problem, &two, None).unwrap();
         let mut left = problem.contacts[0].clone();
         left.boundary = "left".into();
         problem.contacts.push(left);
-        let svg = profile_svg(Theme::Light, &problem, &two).unwrap();
+        let svg = profile_svg(Theme::Light, &problem, &two, None).unwrap();
         assert_eq!(svg.matches("±τ").count(), 2);
         assert_eq!(smooth.matches("±τ").count(), 1, "no friction, no bound");
         assert!(svg.starts_with("<svg") && svg.contains("Punch") && svg.contains("`left` [mm]"));
@@ -118,8 +119,8 @@ mod tests {
             ..ContactProfile::default()
         };
         let flat = BTreeMap::from([("top".to_owned(), flat)]);
-        assert!(profile_svg(Theme::Dark, &problem, &flat).is_ok());
-        assert!(profile_svg(Theme::Light, &problem, &BTreeMap::new()).is_err());
+        assert!(profile_svg(Theme::Dark, &problem, &flat, None).is_ok());
+        assert!(profile_svg(Theme::Light, &problem, &BTreeMap::new(), None).is_err());
     }
 
     #[test]

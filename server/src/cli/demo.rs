@@ -18,7 +18,12 @@ use crate::{
     event::{Event, Payload},
     job::{Job, Status},
     pb::{self, job_service_client::JobServiceClient},
+    run::Summary,
 };
+
+/// The example whose stresses are printed, at so many places.
+const SHOWN: &str = "cylinder";
+const PLACES: usize = 21;
 
 pub(super) async fn run() -> anyhow::Result<Exit> {
     let folder = tempfile::tempdir()?;
@@ -62,7 +67,7 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
             submit_grpc(&mut grpc, name, text).await?,
         ));
     }
-    let mut first = None;
+    let mut shown = None;
     for (name, by_rest, by_grpc) in &jobs {
         rest.watch(by_rest, name)
             .await
@@ -83,34 +88,32 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
             "{name}: REST and gRPC differ: {} and {digest}",
             summary["digest"]
         );
+        let summary: Summary = serde_json::from_value(summary)?;
+        let solution = &summary.solution;
+        let verdict = solution
+            .accuracy
+            .as_ref()
+            .map_or("unknown", |a| a.verdict.in_words());
         output::print(&format!(
-            "  {name:<18} both    same bits: {digest:.23}…\n\n"
+            "  {name:<18} both    same bits: {digest:.23}…\n  {:<18} accuracy {verdict}\n  {:<18} normal force {:.4}, \
+             tangential force {:.4}\n\n",
+            "", "", solution.normal_force, solution.tangential_force
         ))?;
-        first.get_or_insert((by_rest.clone(), summary));
+        if *name == SHOWN {
+            shown = Some((by_rest.clone(), summary));
+        }
     }
 
-    let (name, _) = examples::ALL[0];
-    let (id, summary) = first.context("there are no examples")?;
-    for boundary in summary["contacts"]
-        .as_object()
-        .into_iter()
-        .flat_map(|contacts| contacts.keys())
-    {
-        let profile = rest
-            .get(&format!("/v1/jobs/{id}/profiles/{boundary}"))
-            .await?;
-        let profile: ContactProfile = serde_json::from_value(profile)?;
+    let (id, summary) = shown.with_context(|| format!("there is no example {SHOWN}"))?;
+    for (boundary, contact) in &summary.solution.contacts {
+        let path = format!("/v1/jobs/{id}/profiles/{boundary}?points={PLACES}");
+        let profile: ContactProfile = serde_json::from_value(rest.get(&path).await?)?;
         output::print(&format!(
-            "Stresses of {name} along {boundary:?}:\n\n{}\n",
-            report::profile(&profile)
+            "Stresses of {SHOWN} along {boundary:?}, at {PLACES} places:\n\n{}\n{}",
+            report::profile(&profile),
+            report::contact(boundary, contact)
         ))?;
     }
-    let force = |name: &str| summary[name].as_f64().unwrap_or(f64::NAN);
-    output::print(&format!(
-        "normal force {:.4}, tangential force {:.4}\n",
-        force("normal_force"),
-        force("tangential_force")
-    ))?;
     Ok(Exit::Ok)
 }
 

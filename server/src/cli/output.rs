@@ -132,6 +132,7 @@ impl Output {
                     .collect();
                 let parts = Parts {
                     history: &history,
+                    accuracy: document.summary.solution.accuracy.as_ref(),
                     profiles: &document.profiles,
                     fields: &document.fields,
                     stored: None,

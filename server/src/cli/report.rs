@@ -2,9 +2,7 @@
 
 use std::fmt::Write;
 
-use solver::solution::{
-    ContactProfile, ContactSummary, Iteration, NodeState, Outcome, Peak, Verdict,
-};
+use solver::solution::{ContactProfile, ContactSummary, Iteration, NodeState, Outcome, Peak};
 
 use crate::run::Document;
 
@@ -65,12 +63,7 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
         line("title", title.into());
     }
     if let Some(accuracy) = &s.accuracy {
-        let verdict = match accuracy.verdict {
-            Verdict::Good => "good: forces to 1 %, peaks and extents to 5 %, or better",
-            Verdict::Fair => "fair: forces to 5 %, peaks and extents to 20 %",
-            Verdict::Poor => "POOR: some numbers are not to be relied on",
-        };
-        line("accuracy", verdict.into());
+        line("accuracy", accuracy.verdict.in_words().into());
         for reason in accuracy.reasons.iter().take(MOST_REASONS) {
             line("", reason.clone());
         }
@@ -187,6 +180,15 @@ fn contact_lines(name: &str, contact: &ContactSummary, line: &mut impl FnMut(&st
     if let Some(value) = &contact.peak_tangential_stress {
         line("  peak σ_t", peak(value));
     }
+}
+
+/// The lines of one contact.
+pub(super) fn contact(name: &str, contact: &ContactSummary) -> String {
+    let mut text = String::new();
+    contact_lines(name, contact, &mut |name, value| {
+        let _ = writeln!(text, "{name:<20}{value}");
+    });
+    text
 }
 
 /// The stresses along a contact boundary as a table.

@@ -20,9 +20,12 @@ pub struct Document {
     pub summary: Summary,
     /// One row per iteration.
     pub history: Vec<TimedIteration>,
-    /// Columns along each contact boundary.
+    /// Columns along each contact boundary, at all points where the solution is known, peaks included.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// The same at the points where friction acts; served by itself, and no part of a written document.
+    /// The same at the nodes; served by itself, and no part of a written document.
+    #[serde(skip)]
+    pub node_profiles: BTreeMap<String, ContactProfile>,
+    /// The same at the points where friction acts; as `node_profiles`.
     #[serde(skip)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
     /// One entry per load step of the problem.
@@ -42,6 +45,9 @@ pub struct Step {
     pub history: Vec<TimedIteration>,
     /// Columns along each contact boundary.
     pub profiles: BTreeMap<String, ContactProfile>,
+    /// As of a whole document; no part of a written one here either.
+    #[serde(skip)]
+    pub node_profiles: BTreeMap<String, ContactProfile>,
     /// As of a whole document; no part of a written one here either.
     #[serde(skip)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
@@ -83,6 +89,7 @@ impl Document {
             summary,
             history,
             profiles,
+            node_profiles,
             friction_profiles,
             steps,
             fields,
@@ -100,6 +107,7 @@ impl Document {
             summary,
             history: times.of(history),
             profiles,
+            node_profiles,
             friction_profiles,
             steps: steps.into_iter().map(step).collect(),
             fields,
@@ -114,6 +122,7 @@ impl Step {
             summary,
             history,
             profiles,
+            node_profiles,
             friction_profiles,
         } = step;
         Step {
@@ -121,6 +130,7 @@ impl Step {
             summary,
             history: times.of(history),
             profiles,
+            node_profiles,
             friction_profiles,
         }
     }

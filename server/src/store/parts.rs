@@ -60,14 +60,16 @@ impl Parts {
             Ok::<_, serde_json::Error>(())
         };
         for (number, step) in document.steps.iter().enumerate() {
-            add(ProfilePoints::Nodes, Some(number), &step.profiles)?;
+            add(ProfilePoints::All, Some(number), &step.profiles)?;
+            add(ProfilePoints::Nodes, Some(number), &step.node_profiles)?;
             add(
                 ProfilePoints::Friction,
                 Some(number),
                 &step.friction_profiles,
             )?;
         }
-        add(ProfilePoints::Nodes, None, &document.profiles)?;
+        add(ProfilePoints::All, None, &document.profiles)?;
+        add(ProfilePoints::Nodes, None, &document.node_profiles)?;
         add(ProfilePoints::Friction, None, &document.friction_profiles)?;
         if !document.fields.x.is_empty() {
             parts.push(("fields".to_string(), serde_json::to_vec(&document.fields)?));
@@ -126,6 +128,8 @@ pub(super) struct Piece<'a> {
 /// The points at which a stored profile has its values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProfilePoints {
+    /// At nodes and friction points and the places of the peaks.
+    All,
     /// At the nodes of the boundary.
     Nodes,
     /// Where friction acts.
@@ -135,6 +139,7 @@ pub enum ProfilePoints {
 /// The part that holds the profile of a boundary, at the end or at the end of a load step.
 pub(super) fn profile_part(boundary: &str, points: ProfilePoints, step: Option<usize>) -> String {
     let kind = match points {
+        ProfilePoints::All => "all",
         ProfilePoints::Nodes => "profile",
         ProfilePoints::Friction => "friction",
     };

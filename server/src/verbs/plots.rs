@@ -3,20 +3,23 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use files::plot::{self, Parts, Plot, Stress, Style, Theme};
-use serde::de::DeserializeOwned;
 use solver::{
     mesh::Mesh,
     problem::Problem,
-    solution::{ContactProfile, Fields, Iteration},
+    solution::{ContactProfile, Fields, Iteration, Summary},
 };
 
-use super::{history::StoredHistory, jobs, results, service::Service};
+use super::{
+    history::StoredHistory,
+    jobs, profiles,
+    results::{self, read},
+    service::Service,
+};
 use crate::{
     caller::Caller,
     error::ApiError,
     job::{Job, JobId},
     parameters::{Parameter, Variable, Words},
-    store::ProfilePoints,
 };
 
 /// A figure in a path.
@@ -72,11 +75,13 @@ pub async fn plot(
             Plot::Profile | Plot::Deformed => results::with_result(service, caller, id).await?,
         };
         let mut columns: Vec<(String, Vec<u8>)> = vec![];
+        let mut summary = None;
         if matches!(plot, Plot::Profile | Plot::Deformed) {
             for boundary in found.profiled_boundaries().await? {
-                let bytes = found.profile(&boundary, ProfilePoints::Nodes, None).await?;
+                let bytes = profiles::at_all_points(&mut found, &boundary, None).await?;
                 columns.extend(bytes.map(|bytes| (boundary, bytes)));
             }
+            summary = found.part("summary").await?;
         }
         let history = match plot {
             Plot::Convergence => Some(StoredHistory::load(service, &mut found).await?),
@@ -110,9 +115,10 @@ pub async fn plot(
             }
             _ => None,
         };
-        Ok((job, problem, columns, history, fields, stored))
+        Ok((job, problem, columns, summary, history, fields, stored))
     };
-    let draw = move |(job, problem, columns, history, fields, stored): Loaded| {
+    let draw = move |(job, problem, columns, summary, history, fields, stored): Loaded| {
+        let summary: Option<Summary> = summary.map(|bytes| read(&bytes)).transpose()?;
         let mut profiles: BTreeMap<String, ContactProfile> = BTreeMap::new();
         for (boundary, bytes) in columns {
             profiles.insert(boundary, read(&bytes)?);
@@ -128,6 +134,7 @@ pub async fn plot(
             .transpose()?;
         let parts = Parts {
             history: &history,
+            accuracy: summary.as_ref().and_then(|s| s.accuracy.as_ref()),
             profiles: &profiles,
             fields: &fields,
             stored: stored.as_ref(),
@@ -139,17 +146,14 @@ pub async fn plot(
     service.work_on(load, draw).await?
 }
 
-/// Job, problem, profiles, history, fields and stored mesh, in their stored form; the parts that a figure does not
+/// Job, problem, profiles, summary, history, fields and stored mesh, in their stored form; the parts that a figure does not
 /// need are absent.
 type Loaded = (
     Job,
     Problem,
     Vec<(String, Vec<u8>)>,
+    Option<Vec<u8>>,
     Option<StoredHistory>,
     Option<Vec<u8>>,
     Option<Vec<u8>>,
 );
-
-fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
-    serde_json::from_slice(bytes).map_err(ApiError::internal)
-}

@@ -1,10 +1,10 @@
 //! Columns along a contact boundary.
 
 use serde_json::json;
-use solver::solution::ContactProfile;
+use solver::solution::{ContactProfile, sample};
 
 use super::{
-    results::{StepResult, with_result},
+    results::{StepResult, read, with_result},
     service::Service,
 };
 use crate::{
@@ -19,8 +19,10 @@ use crate::{
 /// The points at which a profile has its values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Points {
-    /// At the nodes of the boundary.
+    /// At nodes and friction points and the places of the peaks.
     #[default]
+    All,
+    /// At the nodes of the boundary.
     Nodes,
     /// At the points where friction acts, from which forces and peaks are computed.
     Friction,
@@ -46,7 +48,7 @@ pub const STEP: Parameter<Text> = Parameter {
 /// The points at which values are requested.
 pub const POINTS: Parameter<Places> = Parameter {
     name: "points",
-    meaning: "Points of the profile: the nodes, the points where friction acts, or a number of evenly spaced points; default nodes",
+    meaning: "Points of the profile: all at which the solution is known (the nodes, the points where friction acts, and the places of the peaks, with the values of the summary), the nodes, the points where friction acts, or a number of evenly spaced points; default all",
     values: Places {
         spaced: Integers(2..=100_000),
     },
@@ -63,16 +65,17 @@ impl Values for Places {
     type Value = Points;
 
     fn schema(&self) -> serde_json::Value {
-        let words = json!({ "type": "string", "enum": ["nodes", "friction"] });
+        let words = json!({ "type": "string", "enum": ["all", "nodes", "friction"] });
         json!({ "anyOf": [words, self.spaced.schema()] })
     }
 
     fn expected(&self) -> String {
-        format!("nodes, friction, or {}", self.spaced.expected())
+        format!("all, nodes, friction, or {}", self.spaced.expected())
     }
 
     fn read(&self, text: &str) -> Option<Points> {
         match text {
+            "all" => Some(Points::All),
             "nodes" => Some(Points::Nodes),
             "friction" => Some(Points::Friction),
             count => {
@@ -98,21 +101,24 @@ pub async fn profile(
         None => None,
         Some(wanted) => Some(step_number(&steps(&mut found).await?, wanted, id)?),
     };
-    let (here, friction) = match points {
-        Points::Nodes => (ProfilePoints::Nodes, false),
-        Points::Friction => (ProfilePoints::Friction, false),
-        Points::Spaced(_) => (ProfilePoints::Nodes, true),
+    let here = match points {
+        Points::All => ProfilePoints::All,
+        Points::Friction => ProfilePoints::Friction,
+        Points::Nodes | Points::Spaced(_) => ProfilePoints::Nodes,
     };
-    let nodes = found.profile(boundary, here, step).await?;
-    let friction = match friction {
-        true => {
+    let profile = match here {
+        ProfilePoints::All => at_all_points(&mut found, boundary, step).await?,
+        here => found.profile(boundary, here, step).await?,
+    };
+    let friction = match points {
+        Points::Spaced(_) => {
             found
                 .profile(boundary, ProfilePoints::Friction, step)
                 .await?
         }
-        false => None,
+        _ => None,
     };
-    let Some(bytes) = nodes else {
+    let Some(bytes) = profile else {
         let known = found.profiled_boundaries().await?;
         if known.iter().any(|name| name == boundary) {
             return Err(ApiError::NotFound(format!(
@@ -126,16 +132,28 @@ pub async fn profile(
         )));
     };
     drop(found);
-    let read = |bytes: &[u8]| serde_json::from_slice(bytes).map_err(ApiError::internal);
     let Points::Spaced(count) = points else {
         return read(&bytes);
     };
     let sampling = service.work(move || {
         let nodes = read(&bytes)?;
         let friction = friction.map_or(Ok(ContactProfile::default()), |bytes| read(&bytes))?;
-        Ok(solver::solution::sample(&nodes, &friction, count))
+        Ok(sample(&nodes, &friction, count))
     });
     sampling.await?
+}
+
+/// The stored profile at all points; in results of older versions, that at nodes.
+pub(super) async fn at_all_points(
+    found: &mut Snapshot,
+    boundary: &str,
+    step: Option<usize>,
+) -> Result<Option<Vec<u8>>, ApiError> {
+    let all = found.profile(boundary, ProfilePoints::All, step).await?;
+    match all {
+        None => Ok(found.profile(boundary, ProfilePoints::Nodes, step).await?),
+        all => Ok(all),
+    }
 }
 
 fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, ApiError> {
@@ -162,7 +180,5 @@ fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, A
 /// The load steps of a result.
 async fn steps(found: &mut Snapshot) -> Result<Vec<StepResult>, ApiError> {
     let bytes = found.part("steps").await?;
-    bytes.map_or(Ok(vec![]), |bytes| {
-        serde_json::from_slice(&bytes).map_err(ApiError::internal)
-    })
+    bytes.map_or(Ok(vec![]), |bytes| read(&bytes))
 }

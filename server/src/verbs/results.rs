@@ -1,7 +1,7 @@
 //! The summary of a result, and whether there is a result.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::{jobs, service::Service};
 use crate::{
@@ -44,11 +44,11 @@ pub async fn result(service: &Service, caller: &Caller, id: JobId) -> Result<Job
         Ok((found.job.result_available, summary, steps))
     };
     let read = |(result_available, summary, steps): (_, Vec<u8>, Option<Vec<u8>>)| {
-        let steps = steps.map_or(Ok(vec![]), |steps| serde_json::from_slice(&steps));
+        let steps = steps.map_or(Ok(vec![]), |steps| read(&steps));
         Ok(JobResult {
             result_available,
-            summary: serde_json::from_slice(&summary).map_err(ApiError::internal)?,
-            steps: steps.map_err(ApiError::internal)?,
+            summary: read(&summary)?,
+            steps: steps?,
         })
     };
     service.work_on(load, read).await?
@@ -65,6 +65,11 @@ pub(super) async fn with_result(
         ResultAvailable::Partial | ResultAvailable::Final => Ok(found),
         ResultAvailable::None => Err(no_result(&found.job)),
     }
+}
+
+/// A stored part.
+pub(super) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
+    serde_json::from_slice(bytes).map_err(ApiError::internal)
 }
 
 /// The error of a job without a result, or without a result yet. A job that was canceled or still runs has history

@@ -7,12 +7,12 @@ use crate::algorithm::profile::{Forces, Missed, PatchView, Quantity};
 use crate::algorithm::small_strain::warn_of_large_strain;
 use crate::algorithm::system::System;
 use crate::body::ElasticBody;
-use crate::elasticity::{Dof, Recovered, StressDifference, StressError, recover};
+use crate::elasticity::{Dof, Recovered, StressDifference, recover};
 use crate::error::SolveError;
 use crate::model::Model;
 use crate::solution::{
-    ContactProfile, ContactSummary, ErrorEstimate, Fields, GaussFields, NodeState, Outcome, Phase,
-    Residuals, Summary, Warning, WarningCode,
+    ContactProfile, ContactSummary, Fields, GaussFields, NodeState, Outcome, Phase, Residuals,
+    Summary, Warning, WarningCode, at_all_points,
 };
 
 /// Forces with a larger imbalance than this have lost half of their digits: the result is not reliable.
@@ -32,8 +32,10 @@ const SLOW_CONTRACTION: f64 = 0.9;
 pub struct Reported {
     /// Scalars, extents and warnings.
     pub summary: Summary,
-    /// Columns along each contact boundary, by its name.
+    /// Columns along each contact boundary, by its name, at all points.
     pub profiles: BTreeMap<String, ContactProfile>,
+    /// The same at the nodes.
+    pub node_profiles: BTreeMap<String, ContactProfile>,
     /// The same where friction acts.
     pub friction_profiles: BTreeMap<String, ContactProfile>,
     /// Displacements and stresses.
@@ -74,14 +76,14 @@ pub fn report(
     );
     let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
     let difference = StressDifference::new(mesh, order, &recovered);
-    let error = difference.norms(mesh, section, order);
+    let errors = difference.norms(mesh, section, order);
     let (mut quantities, mut missed) = (Vec::new(), Vec::new());
     let circumference = system.circumference;
 
     let mut contact_state = vec![-1; model.mesh.nodes.len()];
     let mut warnings = model.warnings.clone();
     let (mut contacts, mut profiles) = (BTreeMap::new(), BTreeMap::new());
-    let mut friction_profiles = BTreeMap::new();
+    let (mut node_profiles, mut friction_profiles) = (BTreeMap::new(), BTreeMap::new());
     for (p, patch) in system.patches.iter().enumerate() {
         let view = PatchView::new(system, p, finished, &forces);
         let summary = view.summary();
@@ -97,9 +99,11 @@ pub fn report(
                 NodeState::Slip => 2,
             });
         }
-        friction_profiles.insert(patch.contact.name.clone(), view.friction_profile(&profile));
-        profiles.insert(patch.contact.name.clone(), profile);
-        contacts.insert(patch.contact.name.clone(), summary);
+        let (name, friction) = (&patch.contact.name, view.friction_profile(&profile));
+        profiles.insert(name.clone(), at_all_points(&profile, &friction, &summary));
+        node_profiles.insert(name.clone(), profile);
+        friction_profiles.insert(name.clone(), friction);
+        contacts.insert(name.clone(), summary);
     }
     warn_of_iteration(finished, &mut warnings);
     warn_of_large_strain(
@@ -169,7 +173,7 @@ pub fn report(
             * (recovered.strain_energy - work_of_loads + friction_energy(system, finished)),
         friction_work: circumference * (work.total + work.incremental),
         accuracy: None,
-        error_estimate: error_estimate(circumference, &recovered, &error),
+        strain_energy: Some(circumference * recovered.strain_energy),
         increments: 1,
         cut_backs: 0,
         uniqueness: None,
@@ -179,7 +183,7 @@ pub fn report(
         dofs: body.map.unknowns as u64,
         contact_dofs: system.load.len() as u64,
     };
-    let fields = fields(model, &displacements, &recovered, error, contact_state);
+    let fields = fields(model, &displacements, &recovered, &errors, contact_state);
     let finite = [
         summary.normal_force,
         summary.tangential_force,
@@ -198,6 +202,7 @@ pub fn report(
     Ok(Reported {
         summary,
         profiles,
+        node_profiles,
         friction_profiles,
         fields,
         quantities,
@@ -321,24 +326,11 @@ fn equilibrium(
     }
 }
 
-fn error_estimate(circumference: f64, recovered: &Recovered, error: &StressError) -> ErrorEstimate {
-    let energy_norm = (2.0 * circumference * recovered.strain_energy)
-        .max(0.0)
-        .sqrt();
-    let error = circumference.sqrt() * error.total;
-    let whole = energy_norm.hypot(error);
-    ErrorEstimate {
-        error,
-        energy_norm,
-        relative: if whole > 0.0 { error / whole } else { 0.0 },
-    }
-}
-
 fn fields(
     model: &Model,
     displacements: &[[f64; 2]],
     recovered: &Recovered,
-    error: StressError,
+    errors: &[f64],
     contact_state: Vec<i8>,
 ) -> Fields {
     let mesh = &model.mesh;
@@ -347,7 +339,7 @@ fn fields(
         stress.map(|s| s[component]).collect()
     };
     let circumference = model.section.circumference().sqrt();
-    let per_element = error.elements.iter().map(|e| circumference * e).collect();
+    let element_error = errors.iter().map(|e| circumference * e).collect();
     let stress = |component: usize| recovered.stress.iter().map(|s| s[component]).collect();
     Fields {
         x: mesh.nodes.iter().map(|x| x[0]).collect(),
@@ -360,7 +352,7 @@ fn fields(
         stress_zz: stress(3),
         contact_state,
         elements: mesh.elements.clone(),
-        element_error: per_element,
+        element_error,
         gauss: GaussFields {
             order: model.quadrature,
             x: recovered.points.iter().map(|x| x[0]).collect(),

@@ -152,8 +152,8 @@ impl Size {
         let of_nodes = 1500.0 * margin * self.nodes;
         // profiles and rows are held as numbers and as text; a step is also part of what is stored on the way
         let history = 1.2e4 * self.increments
-            + self.steps * (6e3 + 400.0 * self.profile)
-            + 200.0 * self.profile;
+            + self.steps * (6e3 + 600.0 * self.profile)
+            + 300.0 * self.profile;
         let memory = 8.0 * (factor + dense + self.weights) + of_nodes + history + FLOOR;
         let sweeps = contact.powi(3) * (1.0 + 2.0 * self.increments * self.repeats);
         let time = 6e-6 * dofs + 4e-9 * dofs.powf(1.5) + 1e-9 * sweeps + 2.5e-6 * self.weights;

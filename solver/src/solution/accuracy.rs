@@ -40,6 +40,17 @@ pub enum Verdict {
     Poor,
 }
 
+impl Verdict {
+    /// What it says, for people.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Verdict::Good => "good: forces to 1 %, peaks and extents to 5 %, or better",
+            Verdict::Fair => "fair: forces to 5 %, peaks and extents to 20 %",
+            Verdict::Poor => "POOR: some numbers are not to be relied on",
+        }
+    }
+}
+
 /// A number of the solution with its error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EstimatedQuantity {
@@ -49,7 +60,7 @@ pub struct EstimatedQuantity {
     pub contact: String,
     /// Its value, as in the summary.
     pub value: f64,
-    /// EstimatedQuantity error that the mesh causes, in the unit of the value; absent where the quantity has no limit, or
+    /// Error that the mesh causes, in the unit of the value; absent where the quantity has no limit, or
     /// nothing is known.
     pub error: Option<f64>,
     /// The error as a part: of the value; of the friction force for a tangential one; of the length of the contact for

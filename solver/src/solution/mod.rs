@@ -9,7 +9,7 @@ mod sample;
 
 pub use crate::phase::Phase;
 pub use accuracy::{Accuracy, ErrorMethod, EstimatedQuantity, QuantityName, Verdict};
-pub use sample::sample;
+pub use sample::{at_all_points, sample};
 
 use std::collections::BTreeMap;
 
@@ -28,10 +28,13 @@ pub struct Solution {
     pub summary: Summary,
     /// One row per iteration.
     pub history: Vec<Iteration>,
-    /// Columns along each contact boundary, by its name.
+    /// Columns along each contact boundary, by its name, at all points where the solution is known: the nodes, the points
+    /// where friction acts, and the places of the peaks, with the values of the summary.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// The same columns at the points where friction acts, see [`ContactProfile`]. Not part of
-    /// the document and its digest: it is stored and served separately.
+    /// The same columns at the nodes. Not part of the document and its digest: they are stored and served separately.
+    #[serde(default, skip_serializing)]
+    pub node_profiles: BTreeMap<String, ContactProfile>,
+    /// The same columns at the points where friction acts, see [`ContactProfile`]; not part of the document either.
     #[serde(default, skip_serializing)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
     /// One entry per load step of the problem; summary, profiles and fields are those of the last.
@@ -44,8 +47,11 @@ impl Solution {
     /// Whether every number is finite, also those that are not part of the document.
     pub fn is_finite(&self) -> bool {
         is_finite(self)
-            && is_finite(&self.friction_profiles)
-            && self.steps.iter().all(|s| is_finite(&s.friction_profiles))
+            && is_finite(&[&self.node_profiles, &self.friction_profiles])
+            && self
+                .steps
+                .iter()
+                .all(|s| is_finite(&[&s.node_profiles, &s.friction_profiles]))
     }
 }
 
@@ -60,6 +66,9 @@ pub struct StepSolution {
     pub history: Vec<Iteration>,
     /// Columns along each contact boundary, by its name.
     pub profiles: BTreeMap<String, ContactProfile>,
+    /// As in a whole solution; not part of the document either.
+    #[serde(default, skip_serializing)]
+    pub node_profiles: BTreeMap<String, ContactProfile>,
     /// As in a whole solution; not part of the document either.
     #[serde(default, skip_serializing)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
@@ -118,8 +127,9 @@ pub struct Summary {
     /// Work done against friction (force × length): ∫τ φ |u_t − d| in the total law; in the
     /// incremental law ∫τ φ Δ(u_t − d), summed over the increments so far.
     pub friction_work: f64,
-    /// Estimate of the discretisation error of the whole body in one norm. It bounds no quantity: see `accuracy`.
-    pub error_estimate: ErrorEstimate,
+    /// Energy of the strains, ½ ∫ σ : ε (force × length); absent in results of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strain_energy: Option<f64>,
     /// Increments over all steps so far.
     pub increments: u32,
     /// Increments that did not converge and were halved.
@@ -136,18 +146,6 @@ pub struct Summary {
     pub dofs: u64,
     /// Unknowns on the contact boundaries.
     pub contact_dofs: u64,
-}
-
-/// Error estimate of Zienkiewicz and Zhu: stresses recovered at nodes against those of the elements,
-/// in the energy norm (∫ σ : C⁻¹ σ)^½.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct ErrorEstimate {
-    /// EstimatedQuantity norm of the error ((force × length)^½).
-    pub error: f64,
-    /// Norm of the solution, √(2 · strain energy).
-    pub energy_norm: f64,
-    /// error / √(energy_norm² + error²); 0 for a body without stress.
-    pub relative: f64,
 }
 
 /// A second solution of the same problem beside the first.
@@ -496,6 +494,14 @@ impl ContactProfile {
         }
         self.state.push(other.state[row]);
     }
+
+    /// Inserts the first row of another profile.
+    fn insert_row(&mut self, row: usize, other: &ContactProfile) {
+        for (to, from) in self.columns_mut().into_iter().zip(other.columns()) {
+            to.insert(row, from[0]);
+        }
+        self.state.insert(row, other.state[0]);
+    }
 }
 
 /// State of a contact node, or of a point between two.
@@ -542,7 +548,9 @@ pub struct Fields {
     pub contact_state: Vec<i8>,
     /// Eight or six node numbers per element: corners counter-clockwise, then midsides.
     pub elements: Vec<Element>,
-    /// EstimatedQuantity error of each element (see [`ErrorEstimate`]).
+    /// Where the mesh is coarse for the stresses: of each element the norm (∫ (σ* − σ) : C⁻¹ (σ* − σ))^½ of its stresses
+    /// σ against the recovered ones σ* ((force × length)^½). It compares elements with each other and bounds nothing: how
+    /// far the results can be trusted is `accuracy` in the summary.
     pub element_error: Vec<f64>,
     /// Stresses at the integration points of every element, not averaged.
     pub gauss: GaussFields,

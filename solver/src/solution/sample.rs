@@ -1,6 +1,6 @@
 //! A stored profile at any number of points, without solving again.
 
-use super::{ContactProfile, NodeState};
+use super::{ContactProfile, ContactSummary};
 use crate::element::edge3;
 
 /// A place counts as a node within this part of the whole length: the rounding of `s`.
@@ -26,80 +26,77 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// At a node all columns are those of the node.
 pub fn sample(profile: &ContactProfile, friction: &ContactProfile, count: usize) -> ContactProfile {
     let mut sampled = ContactProfile::default();
-    // Γ_C is a chain of edges: start, midside, end, and the end is the next one's start
-    let edges = profile.s.len().saturating_sub(1) / 2;
+    let edges = edges(profile);
     if edges == 0 {
         return sampled;
     }
     let known = Known::new(profile, friction);
     let (first, last) = (profile.s[0], profile.s[2 * edges]);
-    let (mut edge, mut interval) = (0, 0);
     for k in 0..count {
         let s = match k {
             0 => first,
             _ if k == count - 1 => last,
             _ => first + (last - first) * (k as f64 / (count - 1) as f64),
         };
-        while edge + 1 < edges && profile.s[2 * edge + 2] < s {
-            edge += 1;
-        }
-        while interval + 2 < known.s.len() && known.s[interval + 1] < s {
-            interval += 1;
-        }
-        let nodes = [2 * edge, 2 * edge + 2, 2 * edge + 1];
-        let same = |i: &usize| (profile.s[*i] - s).abs() <= ROUNDING * (last - first);
-        if let Some(node) = nodes.into_iter().find(same) {
-            sampled.push_row(profile, node);
-            continue;
-        }
-        let h = edge3::shape(edge3::invert(&nodes.map(|i| profile.s[i]), s));
-        // + 0.0 turns −0 into 0
-        let along = |column: &[f64]| edge3::interpolate(&h, &nodes.map(|i| column[i])) + 0.0;
-        let between = |column: &[f64]| curve(&known.s, column, interval, s) + 0.0;
-        sampled.s.push(s);
-        for (to, from) in [
-            (&mut sampled.x, &profile.x),
-            (&mut sampled.y, &profile.y),
-            (&mut sampled.gap, &profile.gap),
-            (
-                &mut sampled.normal_displacement,
-                &profile.normal_displacement,
-            ),
-            (
-                &mut sampled.tangential_displacement,
-                &profile.tangential_displacement,
-            ),
-            (&mut sampled.normal_stress, &profile.normal_stress),
-        ] {
-            to.push(along(from));
-        }
-        let values = &known.values;
-        sampled
-            .tangential_stress
-            .push(between(&values.tangential_stress));
-        sampled
-            .nonlocal_pressure
-            .push(between(&values.nonlocal_pressure));
-        let bound = between(&values.friction_bound);
-        sampled.friction_bound.push(bound.max(0.0));
-        let ratio = between(&values.friction_ratio);
-        sampled.friction_ratio.push(ratio.clamp(0.0, 1.0));
-        sampled.state.push(known.nearest(interval, s));
+        sampled.push_row(&known.at(s), 0);
     }
     sampled
 }
 
+/// The columns of a profile at all points where the solution is known: the nodes, the points where friction acts, and
+/// the places of the two peaks, which have the values of the summary. So the largest stresses of these columns are
+/// the peaks.
+///
+/// `profile` and `friction` as for [`sample`], by which the other columns are found at the peaks; `summary`: that of the
+/// same contact in the same step.
+pub fn at_all_points(
+    profile: &ContactProfile,
+    friction: &ContactProfile,
+    summary: &ContactSummary,
+) -> ContactProfile {
+    let edges = edges(profile);
+    if edges == 0 {
+        return profile.clone();
+    }
+    let known = Known::new(profile, friction);
+    let close = ROUNDING * (profile.s[2 * edges] - profile.s[0]);
+    let mut all = known.values.clone();
+    // where a row is, or is inserted
+    let row_at = |all: &mut ContactProfile, s: f64| {
+        let row = all.s.partition_point(|other| *other < s - close);
+        if all.s.get(row).is_none_or(|other| *other > s + close) {
+            all.insert_row(row, &known.at(s));
+        }
+        row
+    };
+    if let Some(peak) = summary.peak_normal_stress {
+        let row = row_at(&mut all, peak.s);
+        all.normal_stress[row] = peak.value;
+    }
+    if let Some(peak) = summary.peak_tangential_stress {
+        let row = row_at(&mut all, peak.s);
+        all.tangential_stress[row] = peak.value;
+        all.friction_bound[row] = all.friction_bound[row].max(peak.value.abs());
+    }
+    all
+}
+
+/// Γ_C is a chain of edges: start, midside, end, and the end is the next one's start.
+fn edges(profile: &ContactProfile) -> usize {
+    profile.s.len().saturating_sub(1) / 2
+}
+
 /// Nodes and friction points, in order of arc length.
-struct Known {
-    s: Vec<f64>,
+struct Known<'a> {
+    nodes: &'a ContactProfile,
     values: ContactProfile,
 }
 
-impl Known {
-    fn new(profile: &ContactProfile, friction: &ContactProfile) -> Self {
+impl<'a> Known<'a> {
+    fn new(nodes: &'a ContactProfile, friction: &ContactProfile) -> Self {
         let mut values = ContactProfile::default();
         let mut next = 0;
-        for (node, s) in profile.s.iter().enumerate() {
+        for (node, s) in nodes.s.iter().enumerate() {
             while next < friction.s.len() && friction.s[next] <= *s {
                 // the middle Gauss point of an edge is its midside: the node's values count
                 if friction.s[next] < *s {
@@ -107,17 +104,48 @@ impl Known {
                 }
                 next += 1;
             }
-            values.push_row(profile, node);
+            values.push_row(nodes, node);
         }
-        Known {
-            s: values.s.clone(),
-            values,
-        }
+        Known { nodes, values }
     }
 
-    fn nearest(&self, interval: usize, s: f64) -> NodeState {
-        let later = self.s[interval + 1] - s < s - self.s[interval];
-        self.values.state[interval + usize::from(later)]
+    /// All columns at one place.
+    fn at(&self, s: f64) -> ContactProfile {
+        let (nodes, values) = (self.nodes, &self.values);
+        let edges = edges(nodes);
+        // the first edge that does not end before s
+        let before = nodes.s.partition_point(|other| *other < s);
+        let edge = (before.saturating_sub(1) / 2).min(edges - 1);
+        let corners = [2 * edge, 2 * edge + 2, 2 * edge + 1];
+        let mut row = ContactProfile::default();
+        let length = nodes.s[2 * edges] - nodes.s[0];
+        let same = |i: &usize| (nodes.s[*i] - s).abs() <= ROUNDING * length;
+        if let Some(node) = corners.into_iter().find(same) {
+            row.push_row(nodes, node);
+            return row;
+        }
+        let interval = values.s.partition_point(|other| *other < s).max(1) - 1;
+        let interval = interval.min(values.s.len() - 2);
+        let h = edge3::shape(edge3::invert(&corners.map(|i| nodes.s[i]), s));
+        // + 0.0 turns −0 into 0
+        let along = |column: &[f64]| edge3::interpolate(&h, &corners.map(|i| column[i])) + 0.0;
+        let between = |column: &[f64]| curve(&values.s, column, interval, s) + 0.0;
+        let later = values.s[interval + 1] - s < s - values.s[interval];
+        let nearest = interval + usize::from(later);
+        ContactProfile {
+            s: vec![s],
+            x: vec![along(&nodes.x)],
+            y: vec![along(&nodes.y)],
+            gap: vec![along(&nodes.gap)],
+            normal_displacement: vec![along(&nodes.normal_displacement)],
+            tangential_displacement: vec![along(&nodes.tangential_displacement)],
+            normal_stress: vec![along(&nodes.normal_stress)],
+            tangential_stress: vec![between(&values.tangential_stress)],
+            nonlocal_pressure: vec![between(&values.nonlocal_pressure)],
+            friction_bound: vec![between(&values.friction_bound).max(0.0)],
+            friction_ratio: vec![between(&values.friction_ratio).clamp(0.0, 1.0)],
+            state: vec![values.state[nearest]],
+        }
     }
 }
 
@@ -145,6 +173,7 @@ fn curve(s: &[f64], v: &[f64], j: usize, at: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::element::gauss::GAUSS_3;
+    use crate::solution::NodeState;
 
     /// Columns that are quadratics of s, on edges that end at `corners`.
     fn profiles(corners: &[f64]) -> (ContactProfile, ContactProfile) {

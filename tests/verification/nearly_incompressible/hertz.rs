@@ -72,7 +72,7 @@ impl AgainstHertz {
             (end - half_width).abs() <= h,
             "ν = {ratio}: {end} for {half_width}"
         );
-        let profile = &solution.profiles["top"];
+        let profile = &solution.node_profiles["top"];
         let inside = (0..profile.s.len()).filter(|&i| profile.x[i] <= 0.9 * half_width);
         let off: Vec<f64> = inside
             .map(|i| {

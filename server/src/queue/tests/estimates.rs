@@ -13,21 +13,24 @@ fn problems() -> Vec<(String, Value)> {
     for (name, text) in [
         (
             "annular punch",
-            include_str!("../../../../examples/annular_punch.json"),
+            include_str!("../../../../tests/data/thesis/annular_punch.json"),
         ),
         (
             "cylinder",
-            include_str!("../../../../examples/cylinder.json"),
+            include_str!("../../../../tests/data/thesis/cylinder.json"),
         ),
         (
             "cylinder on end",
-            include_str!("../../../../examples/cylinder_on_end.json"),
+            include_str!("../../../../tests/data/thesis/cylinder_on_end.json"),
         ),
         (
             "rectangular punch",
-            include_str!("../../../../examples/rectangular_punch.json"),
+            include_str!("../../../../tests/data/thesis/rectangular_punch.json"),
         ),
-        ("sheet", include_str!("../../../../examples/sheet.json")),
+        (
+            "sheet",
+            include_str!("../../../../tests/data/thesis/sheet.json"),
+        ),
     ] {
         let example: Value = serde_json::from_str(text).unwrap();
         for refine in [0, 1, 2, 3] {

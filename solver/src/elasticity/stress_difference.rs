@@ -1,5 +1,5 @@
-//! The error estimate of Zienkiewicz and Zhu: stresses recovered at nodes are better than those of
-//! the elements; their difference, in the energy norm, estimates the error.
+//! Stresses recovered at nodes are better than those of the elements: their difference stands for the error (Zienkiewicz
+//! and Zhu), in the energy norm of every element, and weighted by the differences of other fields.
 //!
 //!   ‖e‖² = ∫ (σ* − σ) : C⁻¹ (σ* − σ),   σ* = Σ h_i σ_i with the recovered nodal stresses σ_i
 
@@ -9,14 +9,6 @@ use crate::elasticity::recovery::{ELEMENTS_PER_QUESTION, recover_nodal_stresses}
 use crate::elasticity::{Recovered, Section, recover};
 use crate::element::Element;
 use crate::mesh::Mesh;
-
-/// The estimate, without 2π.
-pub struct StressError {
-    /// Norm of the error of every element ((force × length)^½).
-    pub elements: Vec<f64>,
-    /// Norm of the error of the whole.
-    pub total: f64,
-}
 
 /// σ* − σ at the integration points.
 pub struct StressDifference {
@@ -206,14 +198,11 @@ impl StressDifference {
         Some(products)
     }
 
-    /// The norm of the difference, of every element and of the whole: the estimate.
-    pub fn norms(&self, mesh: &Mesh, section: &Section, quadrature: u32) -> StressError {
+    /// The norm of the difference in every element ((force × length)^½, without 2π).
+    pub fn norms(&self, mesh: &Mesh, section: &Section, quadrature: u32) -> Vec<f64> {
         let squares = self.stress_products(mesh, section, quadrature, self);
-        let squares: Vec<f64> = squares.into_iter().map(|square| square.max(0.0)).collect();
-        StressError {
-            total: squares.iter().sum::<f64>().sqrt(),
-            elements: squares.iter().map(|square| square.sqrt()).collect(),
-        }
+        let norm = |square: f64| square.max(0.0).sqrt();
+        squares.into_iter().map(norm).collect()
     }
 }
 
