@@ -70,13 +70,13 @@ fn factors(name: QuantityName) -> [f64; 8] {
     use QuantityName::*;
     #[rustfmt::skip] // a table
     let factors = match name {
-        NormalForce              => [2.0, 1.0, 0.0, 1.0, 0.0,  0.0,  0.0,  1e-4],
-        TangentialForce          => [3.0, 0.3, 0.0, 0.0, 0.75, 0.0,  0.33, 1e-4],
-        FrictionForce            => [1.6, 1.5, 0.0, 0.0, 0.5,  0.33, 1.0,  1e-4],
-        PeakNormalStress         => [0.0, 1.1, 4.2, 0.0, 0.0,  0.0,  0.0,  1e-4],
-        PeakTangentialStress     => [0.0, 2.5, 1.0, 0.0, 0.0,  0.2,  0.0,  1e-4],
-        ContactStart | ContactEnd => [0.0, 0.0, 0.0, 0.0, 0.0, 0.75, 0.0,  0.0],
-        StickEnd                 => [0.0, 1.0, 0.0, 0.0, 0.0,  0.54, 0.0,  0.0],
+        NormalForce              => [1.3,  1.6,  0.0,  0.9,  0.0,  0.0,   0.0,   1e-4],
+        TangentialForce          => [2.6,  0.65, 0.35, 0.0,  0.35, 0.55,  0.12,  1e-4],
+        FrictionForce            => [0.5,  1.7,  0.0,  0.3,  0.5,  0.68,  0.11,  1e-4],
+        PeakNormalStress         => [0.0,  0.13, 1.4,  0.1,  0.0,  0.58,  0.068, 1e-4],
+        PeakTangentialStress     => [2.05, 1.15, 2.2,  0.0,  0.0,  0.185, 0.01,  1e-4],
+        ContactStart | ContactEnd => [0.0, 0.0,  0.0,  0.0,  0.0,  0.75,  0.0,   0.0],
+        StickEnd                 => [0.0,  1.6,  0.0,  2.1,  0.0,  0.36,  0.0,   0.0],
     };
     factors
 }

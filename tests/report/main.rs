@@ -6,6 +6,7 @@
 //! writes elsewhere than into docs. Fails when a row of docs/verification.md has no line.
 #![allow(clippy::unwrap_used, clippy::panic)] // a tool of ours: it stops where it stands
 
+mod accuracy;
 mod examples;
 mod studies;
 mod table;
@@ -32,6 +33,7 @@ fn main() {
     text += &table::nearly_incompressible(&records);
     text += &table::robustness(&records);
     text += &table::dragged_sheet(&records);
+    text += &accuracy::section(&records);
     text += &table::adaptive(&records);
     text += &examples::section(&figures);
     text += &studies::section();

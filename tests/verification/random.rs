@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use serde_json::json;
 use solver::solution::{Outcome, WarningCode};
 
 use crate::catalogue;
+use crate::record::keep_table;
 use crate::support::{numbers, quiet};
 
 /// Problems that are solved; `SIGNORINI_RANDOM` asks for others: `from..to`.
@@ -45,6 +47,10 @@ fn random_problems_converge() {
     for (end, lines) in &ends {
         println!("{end}: {}\n  {}", lines.len(), lines.join("\n  "));
     }
+    let lines = |end: &str| ends.get(end).cloned().unwrap_or_default();
+    let table = json!({"problems": total, "warnings": warned,
+        "refused": lines("refused"), "not_converged": lines("not converged")});
+    keep_table("random", &table);
     let missed: usize = ends.values().map(Vec::len).sum();
     assert!(200 * missed <= total, "{missed} of {total}");
 }

@@ -43,6 +43,7 @@ const SHAPING: f64 = 0.01;
 
 /// A kink of the obstacle in contact.
 pub(super) struct Kink {
+    pub(super) edge: usize,
     s: f64,
     /// Change of slope, > 0; infinite at an edge.
     change: f64,
@@ -135,6 +136,7 @@ impl PatchView<'_> {
             growth,
             spacing,
             mirrored,
+            edge: _,
         } = sharpest;
         let (peak, _, _) = self.highest_pressure().unwrap_or((0.0, 0, 0.0));
         let count = match kinks.len() {
@@ -221,6 +223,7 @@ impl PatchView<'_> {
             let on_axis = place.xi.abs() == 1.0 && self.system.nodes[node].on_axis;
             let part = if on_axis { 0.25 } else { 0.5 / PI };
             Kink {
+                edge: place.edge,
                 s: self.arc(&place),
                 change,
                 growth: part * LN_2 * moduli[place.edge] * change,

@@ -4,6 +4,7 @@
 mod between;
 mod extents;
 mod quantities;
+mod resolution;
 mod warnings;
 
 pub use between::Missed;

@@ -5,7 +5,6 @@ use crate::algorithm::adjoint::Gradient;
 use crate::algorithm::system::Point;
 use crate::contact::edge_nodes;
 use crate::element::edge3;
-use crate::element::gauss::GAUSS_3;
 use crate::solution::{Outcome, QuantityName};
 
 /// A quantity of a contact.
@@ -20,9 +19,11 @@ pub struct Quantity {
     pub gradient: Option<Gradient>,
     /// Its error per change of what `gradient` is of; 1 but for the end of stick, which moves with the slip there.
     pub factor: f64,
-    /// What the place of nodes and points alone leaves open, in the unit of the value.
+    /// What the place of nodes alone leaves open, in the unit of the value: the distance to the next node at an end of
+    /// contact, the drop beside a peak, in friction forces what cancels within edges and what is beside singularities.
     pub spacing: f64,
-    /// What the law has between the points where friction acts, likewise.
+    /// What the law has between the points where friction acts, likewise: in friction forces; beside a peak of the pressure
+    /// a jump of σ_t; at a peak of σ_t the change of its bound.
     pub between: f64,
     /// The edges of the contact that `spacing` comes from, with their parts in any unit.
     pub spacing_at: Vec<(usize, f64)>,
@@ -32,6 +33,17 @@ pub struct Quantity {
     pub unlimited: bool,
     /// The obstacle reaches into the body between the nodes: what that changes is not known.
     pub unseen: bool,
+}
+
+/// An end of an interval of contact.
+pub(super) struct EndOfContact {
+    name: QuantityName,
+    /// Of the outermost node in contact.
+    s: f64,
+    /// From there to the next node (length).
+    pub(super) spacing: f64,
+    /// The edge that this lies on.
+    pub(super) edge: usize,
 }
 
 /// Ends of stick with an error: each costs as much as another recovery of the stresses, and a rough obstacle has
@@ -111,6 +123,10 @@ impl PatchView<'_> {
         ];
         let (canceling, _) = self.oscillation();
         let by_edge = self.between_points();
+        let singular = self.beside_singularities();
+        let open: f64 = singular.iter().map(|(_, force)| force).sum();
+        let canceling_at = self.canceling().into_iter().map(f64::abs).enumerate();
+        let open_at: Vec<(usize, f64)> = canceling_at.chain(singular).collect();
         let between = [
             by_edge.iter().sum::<f64>(),
             by_edge.iter().map(|part| part.abs()).sum(),
@@ -119,45 +135,20 @@ impl PatchView<'_> {
         let quantity = |(name, value, gradient)| Quantity {
             factor: circumference,
             spacing: match name {
-                QuantityName::FrictionForce => circumference * canceling,
-                _ => 0.0,
+                QuantityName::NormalForce => 0.0,
+                QuantityName::TangentialForce => circumference * open,
+                _ => circumference * (canceling + open),
             },
             between: match name {
                 QuantityName::NormalForce => 0.0,
                 QuantityName::TangentialForce => circumference * between[0].abs(),
                 _ => circumference * between[1],
             },
-            spacing_at: at(&self.canceling()),
+            spacing_at: open_at.clone(),
             between_at: at(&by_edge),
             ..self.quantity(name, value, Some(gradient))
         };
         forces.into_iter().map(quantity).collect()
-    }
-
-    /// What the points where friction acts leave out: the differences of ∫σ_t over each edge, by the points and by many
-    /// more (force, without 2π).
-    fn between_points(&self) -> Vec<f64> {
-        const SAMPLES: usize = 16;
-        let boundary = &self.patch.contact.boundary;
-        if self.patch.law.is_none() {
-            return Vec::new();
-        }
-        let mut differences = Vec::with_capacity(boundary.edge_count());
-        for (edge, places) in boundary.friction_points.chunks(3).enumerate() {
-            let weight: f64 = places.iter().map(|place| place.weight).sum();
-            let stress = |xi: f64| self.tangential_stress_at(edge, xi);
-            let sample = |k: usize| stress(-1.0 + (2 * k + 1) as f64 / SAMPLES as f64);
-            let many = (0..SAMPLES).map(sample).sum::<f64>() / SAMPLES as f64;
-            let few = match self.at_gauss_points() {
-                true => GAUSS_3
-                    .iter()
-                    .map(|(xi, w)| 0.5 * w * stress(*xi))
-                    .sum::<f64>(),
-                false => (stress(-1.0) + 4.0 * stress(0.0) + stress(1.0)) / 6.0,
-            };
-            differences.push(weight * (many - few));
-        }
-        differences
     }
 
     fn peaks(&self) -> Vec<Quantity> {
@@ -169,7 +160,16 @@ impl PatchView<'_> {
                 gradient.add_pressure(system, self.patch.first + i, -shape);
             }
             let unlimited = self.pressure_without_limit();
+            let beside = [xi - NEAR, xi + NEAR].map(|xi| self.along(edge, xi, Self::pressure_at));
+            let jumps: Vec<(usize, f64)> = self
+                .neighbours(edge)
+                .map(|edge| (edge, self.jump_within(edge)))
+                .collect();
             found.push(Quantity {
+                spacing: pressure - beside[0].min(beside[1]),
+                spacing_at: vec![(edge, 1.0)],
+                between: jumps.iter().fold(0.0, |most, (_, jump)| most.max(*jump)),
+                between_at: jumps,
                 unlimited,
                 ..self.quantity(QuantityName::PeakNormalStress, -pressure, Some(gradient))
             });
@@ -182,11 +182,13 @@ impl PatchView<'_> {
                 let pressures = &self.forces.pressures;
                 gradient.add_traction(system, state, pressures, bound, &point, 1.0);
             }
-            let beside =
-                [xi - NEAR, xi + NEAR].map(|xi| self.tangential_stress_near(edge, xi).abs());
+            let size = |xi: f64| self.along(edge, xi, Self::tangential_stress_at).abs();
+            let beside = [xi - NEAR, xi + NEAR].map(size);
             found.push(Quantity {
                 spacing: stress.abs() - beside[0].min(beside[1]),
                 spacing_at: vec![(edge, 1.0)],
+                between: self.change_of_bound(edge, xi),
+                between_at: vec![(edge, 1.0)],
                 unlimited: self.averages_nothing() && self.pressure_without_limit(),
                 ..self.quantity(QuantityName::PeakTangentialStress, stress, Some(gradient))
             });
@@ -206,41 +208,15 @@ impl PatchView<'_> {
         friction.is_some_and(|law| law.bound.radius() == Some(0.0))
     }
 
-    /// σ_t at a place that may lie on the next edge.
-    fn tangential_stress_near(&self, edge: usize, xi: f64) -> f64 {
-        let last = self.patch.contact.boundary.edge_count() - 1;
-        match xi {
-            _ if xi < -1.0 && edge > 0 => self.tangential_stress_at(edge - 1, xi + 2.0),
-            _ if xi > 1.0 && edge < last => self.tangential_stress_at(edge + 1, xi - 2.0),
-            _ => self.tangential_stress_at(edge, xi.clamp(-1.0, 1.0)),
-        }
-    }
-
     /// The ends of contact lie between two nodes; those of stick move with the slip.
     fn ends(&self) -> Vec<Quantity> {
-        let s = &self.patch.contact.boundary.s;
-        let last = self.count() - 1;
-        let mut found = Vec::new();
-        for i in 0..=last {
-            if !self.active(i) {
-                continue;
-            }
-            let end = |name, spacing, edge| Quantity {
-                spacing,
-                spacing_at: vec![(edge, 1.0)],
-                ..self.quantity(name, s[i], None)
-            };
-            if i == 0 || !self.active(i - 1) {
-                let spacing = if i == 0 { 0.0 } else { s[i] - s[i - 1] };
-                let edge = i.saturating_sub(1) / 2;
-                found.push(end(QuantityName::ContactStart, spacing, edge));
-            }
-            if i == last || !self.active(i + 1) {
-                let spacing = if i == last { 0.0 } else { s[i + 1] - s[i] };
-                let edge = i.min(last - 1) / 2;
-                found.push(end(QuantityName::ContactEnd, spacing, edge));
-            }
-        }
+        let ends = self.ends_of_contact().into_iter();
+        let quantity = |end: EndOfContact| Quantity {
+            spacing: end.spacing,
+            spacing_at: vec![(end.edge, 1.0)],
+            ..self.quantity(end.name, end.s, None)
+        };
+        let mut found: Vec<Quantity> = ends.map(quantity).collect();
         let mut turns = self.turns();
         turns.truncate(MOST_STICK_ENDS);
         for (edge, xi) in turns {
@@ -263,6 +239,32 @@ impl PatchView<'_> {
                 spacing_at: vec![(edge, 1.0)],
                 ..self.quantity(QuantityName::StickEnd, point.s, Some(gradient))
             });
+        }
+        found
+    }
+
+    /// Where intervals of contact begin and end.
+    pub(super) fn ends_of_contact(&self) -> Vec<EndOfContact> {
+        let s = &self.patch.contact.boundary.s;
+        let last = self.count() - 1;
+        let mut found = Vec::new();
+        for i in (0..=last).filter(|i| self.active(*i)) {
+            if i == 0 || !self.active(i - 1) {
+                found.push(EndOfContact {
+                    name: QuantityName::ContactStart,
+                    s: s[i],
+                    spacing: if i == 0 { 0.0 } else { s[i] - s[i - 1] },
+                    edge: i.saturating_sub(1) / 2,
+                });
+            }
+            if i == last || !self.active(i + 1) {
+                found.push(EndOfContact {
+                    name: QuantityName::ContactEnd,
+                    s: s[i],
+                    spacing: if i == last { 0.0 } else { s[i + 1] - s[i] },
+                    edge: i.min(last - 1) / 2,
+                });
+            }
         }
         found
     }
