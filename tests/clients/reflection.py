@@ -47,7 +47,7 @@ def submit_and_read(client):
 
     summary = as_json(client.GetResult(id=job.id).summary)
     equal((summary["outcome"], round(summary["tangential_force"], 2)), ("OUTCOME_CONVERGED", 14.17), "the result")
-    profile = client.GetProfile(id=job.id, boundary="top")
+    profile = client.GetProfile(id=job.id, boundary="top", points="nodes")
     equal((len(profile.s), list(profile.s)), (11, sorted(profile.s)), "the profile")
     rows = client.ListIterations(id=job.id).iterations
     equal([row.k for row in rows], list(range(1, summary["iterations"] + 1)), "the history")
