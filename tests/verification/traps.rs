@@ -118,3 +118,47 @@ fn arc_length_counts_from_the_start_of_the_boundary() {
         assert!(close, "{} {}", a.normal_force, b.normal_force);
     }
 }
+
+/// The work of friction was below zero in monotone pressing, −0.1 ε ∫|σ_t|: ∫ τ φ Δu counted what the pressure made of an
+/// elastic slip without a work, and took it off when the slip receded. It is what sliding dissipates, and the elastic slip
+/// with its stress: never negative, never less after more sliding, and in one increment that of the total law.
+#[test]
+fn the_work_of_friction_is_never_negative() {
+    let pressed = |history: &str, elastic_slip: f64, steps: Value| {
+        let mut problem = example("cylinder");
+        problem.mesh.refine = Refine::Times(1);
+        problem.steps = serde_json::from_value(steps).unwrap();
+        let friction = problem.contacts[0].friction.as_mut().unwrap();
+        friction.history = serde_json::from_value(json!(history)).unwrap();
+        friction.elastic_slip = elastic_slip;
+        solve(&problem)
+    };
+    for elastic_slip in [1e-2, 1e-3, 1e-4] {
+        for increments in [1, 4, 16] {
+            let pressed = pressed(
+                "incremental",
+                elastic_slip,
+                json!([{"increments": increments}]),
+            );
+            let work = pressed.summary.friction_work;
+            assert!(
+                work > 0.0,
+                "{work} at ε = {elastic_slip}, {increments} increments"
+            );
+        }
+        let [once, total] =
+            ["incremental", "total"].map(|history| pressed(history, elastic_slip, json!([{}])));
+        let [once, total] = [once, total].map(|solution| solution.summary.friction_work);
+        assert!((once / total - 1.0).abs() < 1e-12, "{once} {total}");
+    }
+    // in and out again, twice: dissipation only grows, and what the elastic slip adds is below ε ∫τ
+    let steps = json!([{"increments": 4}, {"indentation": 0.5, "increments": 4}, {"increments": 4}, {"indentation": 0.2, "increments": 4}]);
+    let cycled = pressed("incremental", 1e-3, steps);
+    let ends = cycled.steps.windows(2);
+    for (before, after) in ends.map(|pair| (&pair[0].summary, &pair[1].summary)) {
+        let elastic = 1e-3 * before.friction_force;
+        assert!(after.friction_work > before.friction_work - elastic);
+    }
+    let [first, last] = [0, 3].map(|k| cycled.steps[k].summary.friction_work);
+    assert!(last > 1.05 * first, "{first} {last}");
+}

@@ -21,7 +21,7 @@ pub use convex::{Minimum, minimise};
 pub use finished::Finished;
 pub use profile::{Missed, Quantity};
 pub use report::{Reported, report};
-pub use system::{ContactNode, Patch, Point, State, System, Work};
+pub use system::{ContactNode, Patch, Point, State, System};
 pub use track::{Cycle, Place};
 pub use uniqueness::{compared, note_doubled_increments, note_uniqueness, other_solution};
 

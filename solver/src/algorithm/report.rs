@@ -167,7 +167,7 @@ pub fn report(
         },
         energy: circumference
             * (recovered.strain_energy - work_of_loads + friction_energy(system, finished)),
-        friction_work: circumference * (work.total + work.incremental),
+        friction_work: circumference * work,
         accuracy: None,
         error_estimate: error_estimate(circumference, &recovered, &error),
         increments: 1,

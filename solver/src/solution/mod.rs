@@ -115,8 +115,10 @@ pub struct Summary {
     pub residuals: Residuals,
     /// Potential energy (1.21) of the final state with its own friction bound (force × length).
     pub energy: f64,
-    /// Work done against friction (force × length): ∫τ φ |u_t − d| in the total law; in the
-    /// incremental law ∫τ φ Δ(u_t − d), summed over the increments so far.
+    /// Work done against friction (force × length), never negative: ∫τ φ |e| with the slip e of this state, u_t − d in the
+    /// total law and u_t − d − g in the incremental one; there what sliding has dissipated in the increments before is
+    /// added, ∫τ |Δg|. The elastic slip counts with the stress that it ends with, although at most half of that was spent
+    /// on it: the work is too large by up to ε ∫τ.
     pub friction_work: f64,
     /// Estimate of the discretisation error of the whole body in one norm. It bounds no quantity: see `accuracy`.
     pub error_estimate: ErrorEstimate,
