@@ -277,7 +277,10 @@ impl Checks {
                 Reason::NotAChain,
                 format!("{} pieces", runs.len()),
                 "one chain of edges",
-                "Name each piece under /mesh/boundaries and give it a contact of its own.",
+                format!(
+                    "Name each piece under /mesh/boundaries and give it a contact of its own.{}",
+                    self.hint_to_merge(mesh)
+                ),
             ));
         };
         if run[0][0] == run[run.len() - 1][1] {

@@ -124,6 +124,7 @@ impl Checks {
                 " Parts hold each other along a side that they share, all three nodes of it; at a single node they are hinged, and without common nodes apart.",
             );
         }
+        hint.push_str(&self.hint_to_merge(mesh));
         if !without_contacts {
             hint.push_str(" A contact holds along its normal, and along its tangent if it has friction or is bonded.");
         }

@@ -16,6 +16,7 @@ mod loads;
 mod materials;
 mod numbers;
 mod supports;
+mod unmerged;
 
 pub use axis::Axis;
 pub use contact_model::ContactModel;
@@ -144,6 +145,7 @@ impl Checks {
         let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);
         all.finish(())?;
         self.warn_about_contacts(&contacts);
+        self.warn_of_unmerged(&mesh, &contacts);
         Ok(Model {
             mesh,
             section,

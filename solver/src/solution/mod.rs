@@ -279,6 +279,8 @@ pub enum WarningCode {
     ElementsReversed,
     /// Elements without midside nodes, which were given some.
     RaisedToSecondOrder,
+    /// Nodes at the same place that are not connected: a crack.
+    CoincidentNodes,
     /// A strip that leaves its polyline between two grid lines.
     StripCutsPolyline,
     /// An obstacle that ends inside an edge.
