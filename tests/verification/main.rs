@@ -30,6 +30,7 @@ mod invariance;
 mod lift_off;
 mod loads;
 mod manufactured;
+mod misuse;
 mod nearly_incompressible;
 mod oblique;
 mod obstacle_normals;

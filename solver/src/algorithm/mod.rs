@@ -7,6 +7,7 @@ mod adjoint;
 mod convex;
 mod finished;
 mod fixed_point;
+mod large_slip;
 mod newton;
 mod profile;
 mod report;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::algorithm::finished::Finished;
+use crate::algorithm::large_slip::warn_of_large_slip;
 use crate::algorithm::profile::{Forces, Missed, PatchView, Quantity};
 use crate::algorithm::small_strain::warn_of_large_strain;
 use crate::algorithm::system::System;
@@ -102,12 +103,13 @@ pub fn report(
         contacts.insert(patch.contact.name.clone(), summary);
     }
     warn_of_iteration(finished, &mut warnings);
+    let slides = warn_of_large_slip(system, v, &forces.reactions, &mut warnings);
     warn_of_large_strain(
         model,
         system,
         &finished.state.active,
         &recovered,
-        &displacements,
+        (&displacements, slides),
         &mut warnings,
     );
 

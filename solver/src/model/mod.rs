@@ -15,6 +15,7 @@ mod level;
 mod loads;
 mod materials;
 mod numbers;
+mod sliding;
 mod supports;
 mod unmerged;
 
@@ -145,6 +146,7 @@ impl Checks {
         let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);
         all.finish(())?;
         self.warn_about_contacts(&contacts);
+        self.warn_of_dragged_symmetry(&contacts, &fixed, &axis, &problem.steps);
         self.warn_of_unmerged(&mesh, &contacts);
         Ok(Model {
             mesh,

@@ -289,6 +289,8 @@ pub enum WarningCode {
     SmoothingFlattens,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
+    /// An obstacle that is dragged along a contact with a line of symmetry at its end.
+    SymmetricDrag,
     /// Edges longer than the nonlocal radius.
     MeshTooCoarseForRadius,
     /// Few elements in the contact.
@@ -321,6 +323,8 @@ pub enum WarningCode {
     ContactCycling,
     /// Forces on the body that do not balance.
     OutOfBalance,
+    /// A body that slides farther than its contact is long.
+    LargeSlip,
     /// Strains in a contact beyond what linear elasticity describes.
     LargeStrain,
     /// Displacements that are not small beside the body.
