@@ -3,15 +3,21 @@
 
 use serde_json::{Value, json};
 use solver::model::Model;
-use solver::problem::Refine;
-use solver::solution::{Summary, Warning, WarningCode};
+use solver::problem::{Problem, Refine};
+use solver::solution::{Outcome, Solution, Summary, Warning, WarningCode};
 
-use crate::support::{example, problem, solve};
+use crate::support::{Lattice, example, problem, quiet, solve};
 
 /// The warning of a kind.
 fn told(warnings: &[Warning], code: WarningCode) -> Option<&str> {
     let mut found = warnings.iter().filter(|w| w.code == code);
     found.next().map(|w| &w.message[..])
+}
+
+/// Solves a problem that may end in any way.
+fn ended(problem: &Problem) -> Solution {
+    let external = files::external_mesh(problem, None);
+    solver::solve_on(problem, external, &mut quiet).unwrap()
 }
 
 #[track_caller]
@@ -175,4 +181,182 @@ fn a_drag_of_half_a_body_is_told() {
     ] {
         assert_eq!(told(&sound, WarningCode::SymmetricDrag), None);
     }
+}
+
+/// A block 2 × 1 of squares, pressed on a plane by a pressure and pushed by a traction on its side.
+fn pushed(push: f64, friction: Value, supports: Value) -> Solution {
+    let lines: Vec<f64> = (0..=8).map(|k| 0.25 * f64::from(k)).collect();
+    let text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": lines, "y": [0, 0.5, 1]}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": supports,
+        "loads": [{"boundary": "top", "pressure": 5}, {"boundary": "left", "traction": [push, 0]}],
+        "contacts": [{"boundary": "bottom", "obstacle": {"kind": "flat"}, "friction": friction}],
+    });
+    ended(&problem(&text.to_string()))
+}
+
+/// Pushed by more than μN = 3 (cohesion or a prescribed bound: what they add), a body without support has no equilibrium.
+/// The outcome says so at once, with both forces; just above the limit after the iterations; below it the body rests. (3 %:
+/// on edges longer than the radius the average of a single node is not exact; 5 %: where a corner lifts nothing rubs.)
+#[test]
+fn a_body_pushed_beyond_its_friction_is_said_to_slide_away() {
+    let coulomb =
+        json!({"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-4, "points": "nodal"});
+    let gauss = json!({"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-4});
+    let averaged = json!({"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4, "normalization": "conserving"});
+    let tanh = json!({"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-4, "points": "nodal", "transition": "tanh"});
+    let cohesive = json!({"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4, "cohesion": 0.5, "normalization": "conserving"});
+    let capped =
+        json!({"coefficient": 9, "nonlocal_radius": 0.2, "elastic_slip": 1e-4, "shear_cap": 1.5});
+    let given = json!({"bound": 1.5, "elastic_slip": 1e-4});
+    for (friction, limit) in [
+        (coulomb, 3.0),
+        (gauss, 3.0),
+        (averaged, 3.0),
+        (tanh, 3.0),
+        (cohesive, 4.0),
+        (capped, 3.0),
+        (given, 3.0),
+    ] {
+        let rests = pushed(0.9 * limit, friction.clone(), json!([])).summary;
+        assert_eq!(rests.outcome, Outcome::Converged, "{friction}");
+        for part in [1.002, 1.5] {
+            let slides = pushed(part * limit, friction.clone(), json!([])).summary;
+            assert_eq!(slides.outcome, Outcome::NotConverged, "{friction}, {part}");
+            let message = told(&slides.warnings, WarningCode::SlidesAway);
+            let push: f64 = format!("{:.5e}", part * limit).parse().unwrap();
+            let push = format!("with {push:?} along x");
+            says(
+                message,
+                &[
+                    &push,
+                    "only friction holds",
+                    "there is no equilibrium",
+                    "Support the body",
+                ],
+            );
+            let hold = message
+                .unwrap()
+                .split(['d', ' ', ':'])
+                .filter_map(|word| word.parse::<f64>().ok())
+                .next_back();
+            assert!(
+                (hold.unwrap() / limit - 1.0).abs() < 0.03,
+                "{friction}: {message:?}"
+            );
+            for code in [
+                WarningCode::NotConverged,
+                WarningCode::LargeDisplacement,
+                WarningCode::OutOfBalance,
+            ] {
+                assert_eq!(told(&slides.warnings, code), None, "{friction}, {part}");
+            }
+            // known from equilibrium: no iteration is made
+            if part > 1.2 {
+                says(message, &["can hold at most"]);
+                assert_eq!(slides.iterations, 1, "{friction}");
+                assert!(
+                    (slides.friction_force / limit - 1.0).abs() < 0.05,
+                    "{friction}: {}",
+                    slides.friction_force
+                );
+            }
+        }
+        // any support holds it
+        let held = json!([{"boundary": "right", "ux": 0}]);
+        assert_eq!(
+            pushed(1.5 * limit, friction, held).summary.outcome,
+            Outcome::Converged
+        );
+    }
+}
+
+/// Where the pressure does not follow from equilibrium, the state that the iterations leave tells: pressed by a support, or
+/// a shaft in a hub. A wall ahead ends the motion: nothing is claimed then, and the body rests there.
+#[test]
+fn what_holds_is_looked_at_where_equilibrium_does_not_tell() {
+    let coulomb = json!({"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4});
+    let pressed = json!([{"boundary": "top", "uy": -0.01}]);
+    let slides = pushed(100.0, coulomb.clone(), pressed.clone()).summary;
+    let message = told(&slides.warnings, WarningCode::SlidesAway);
+    says(message, &["with 100.0 along x", "with the pressure found"]);
+    assert_eq!(
+        pushed(2.0, coulomb.clone(), pressed).summary.outcome,
+        Outcome::Converged
+    );
+
+    let shaft = |push: f64| {
+        let text = json!({
+            "analysis": {"kind": "axisymmetric"},
+            "mesh": {"grid": {"x": [0, 0.25, 0.5, 0.75, 1], "y": [0, 0.5, 1, 1.5, 2]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "loads": [{"boundary": "top", "traction": [0, -push]}],
+            "contacts": [{"boundary": "right", "obstacle": {"kind": "flat"}, "indentation": 0.01, "friction": coulomb}],
+        });
+        ended(&problem(&text.to_string())).summary
+    };
+    assert_eq!(shaft(1.0).outcome, Outcome::Converged);
+    let slides = shaft(50.0);
+    assert_ne!(slides.outcome, Outcome::Converged);
+    // π r² times the traction
+    let message = told(&slides.warnings, WarningCode::SlidesAway);
+    says(message, &["with 157.08 along the axis"]);
+
+    let walled = |gap: f64| {
+        let lines: Vec<f64> = (0..=8).map(|k| 0.25 * f64::from(k)).collect();
+        let text = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": lines, "y": [0, 0.5, 1]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "loads": [{"boundary": "top", "pressure": 5}, {"boundary": "left", "traction": [4, 0]}],
+            "contacts": [
+                {"boundary": "bottom", "obstacle": {"kind": "flat"}, "friction": {"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4}},
+                {"boundary": "right", "obstacle": {"kind": "flat"}, "indentation": -gap},
+            ],
+        });
+        ended(&problem(&text.to_string())).summary
+    };
+    let rests = walled(0.05);
+    assert_eq!(told(&rests.warnings, WarningCode::SlidesAway), None);
+    assert_eq!(rests.outcome, Outcome::Converged);
+    assert!(rests.contacts["right"].normal_force > 0.9);
+}
+
+/// A plate on a pin at its corner, which friction with a prescribed bound at its top holds against turning:
+/// a moment beyond it is told, and one below it is held.
+#[test]
+fn a_plate_that_is_turned_beyond_its_friction_is_said_to_turn() {
+    let lattice = Lattice::new(8, 4, |i, j| [0.125 * i as f64, 0.125 * j as f64]);
+    let sides =
+        json!({"top": lattice.edges(8, |k| (k, 8)), "right": lattice.edges(4, |k| (16, k))});
+    let pin = lattice.nodes.iter().position(|x| *x == [0.0, 0.0]).unwrap();
+    let turned = |shear: f64| {
+        let text = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"inline": {"nodes": lattice.nodes, "elements": lattice.elements, "boundaries": sides, "node_sets": {"pin": [pin]}}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"nodes": "pin", "ux": 0, "uy": 0}],
+            "loads": [{"boundary": "right", "traction": [0, shear]}],
+            "contacts": [{"boundary": "top", "obstacle": {"kind": "flat"}, "condition": "none",
+                "friction": {"bound": 3, "elastic_slip": 1e-4}}],
+        });
+        ended(&problem(&text.to_string())).summary
+    };
+    // the top, 2 long and 1 above the pin, holds 3 · 2 · 1; the right side, 1 long and 2 away, turns with 2 per unit
+    assert_eq!(turned(2.9).outcome, Outcome::Converged);
+    let slides = turned(3.1);
+    assert_eq!(
+        (slides.outcome, slides.iterations),
+        (Outcome::NotConverged, 1)
+    );
+    let message = told(&slides.warnings, WarningCode::SlidesAway);
+    says(
+        message,
+        &[
+            "turn the body with a moment of 6.2 in rotation about (0, 0)",
+            "can hold at most 6.0:",
+        ],
+    );
 }

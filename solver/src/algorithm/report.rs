@@ -103,15 +103,18 @@ pub fn report(
         contacts.insert(patch.contact.name.clone(), summary);
     }
     warn_of_iteration(finished, &mut warnings);
-    let slides = warn_of_large_slip(system, v, &forces.reactions, &mut warnings);
-    warn_of_large_strain(
-        model,
-        system,
-        &finished.state.active,
-        &recovered,
-        (&displacements, slides),
-        &mut warnings,
-    );
+    // how far a body that slides away has come means nothing
+    if finished.slide.is_none() {
+        let slides = warn_of_large_slip(system, v, &forces.reactions, &mut warnings);
+        warn_of_large_strain(
+            model,
+            system,
+            &finished.state.active,
+            &recovered,
+            (&displacements, slides),
+            &mut warnings,
+        );
+    }
 
     let total =
         |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
@@ -140,7 +143,7 @@ pub fn report(
         Outcome::Converged if equilibrium > out_of_balance => Outcome::FalseConvergence,
         outcome => outcome,
     };
-    if equilibrium > out_of_balance {
+    if equilibrium > out_of_balance && finished.slide.is_none() {
         warnings.push(Warning {
             code: WarningCode::OutOfBalance,
             pointer: String::new(),
@@ -383,6 +386,10 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
             message,
         });
     };
+    if let Some(slide) = &finished.slide {
+        warn(WarningCode::SlidesAway, slide.message());
+        return;
+    }
     if let Some(q) = finished.contraction.filter(|q| *q > SLOW_CONTRACTION) {
         warn(
             WarningCode::SlowContraction,

@@ -21,6 +21,7 @@ mod unmerged;
 
 pub use axis::Axis;
 pub use contact_model::ContactModel;
+pub use freedom::RigidMotion;
 pub use level::Level;
 pub use supports::Held;
 
@@ -92,6 +93,11 @@ impl Model {
     /// that moves.
     pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(String, u32)> {
         freedom::motion_left(&self.mesh, &self.section, &self.fixed, hindered)
+    }
+
+    /// All rigid motions that neither the supports nor the given nodes and directions prevent, but those that bend hinges.
+    pub fn free_motions(&self, hindered: &[(u32, [f64; 2])]) -> Vec<RigidMotion> {
+        freedom::free_motions(&self.mesh, &self.section, &self.fixed, hindered)
     }
 }
 

@@ -323,6 +323,8 @@ pub enum WarningCode {
     ContactCycling,
     /// Forces on the body that do not balance.
     OutOfBalance,
+    /// A body that slides away: loads along its contacts beyond what their friction can hold, and nothing else to hold it.
+    SlidesAway,
     /// A body that slides farther than its contact is long.
     LargeSlip,
     /// Strains in a contact beyond what linear elasticity describes.
