@@ -117,6 +117,61 @@ fn a_missing_file_exits_with_1_in_one_line() {
     assert_eq!(String::from_utf8(output.stderr).unwrap().lines().count(), 1);
 }
 
+/// Pulled off its obstacle, a body flies away: no solution, and no fault of the input that can be seen before.
+#[test]
+fn a_body_that_its_contacts_do_not_hold_exits_with_1() {
+    let problem = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [0, 1, 2], "y": [0, 1]}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "left", "ux": 0}],
+        "loads": [{"boundary": "top", "pressure": -5}],
+        "contacts": [{"boundary": "bottom", "obstacle": {"kind": "flat"}}],
+    });
+    let output = solve(&problem.to_string(), &[]);
+    assert_eq!(output.status.code(), Some(1));
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(errors.contains("nothing holds the body"), "{errors}");
+}
+
+/// Every code that a command ends with is in the help, 1 among them.
+#[test]
+fn the_help_lists_every_exit_code() {
+    let help = |arguments: &[&str]| {
+        let output = Command::new(SIGNORINI).args(arguments).output().unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let all = help(&["--help"]);
+    let listed: Vec<&str> = all
+        .lines()
+        .skip_while(|line| *line != "Exit codes:")
+        .skip(1)
+        .collect();
+    let codes: Vec<&str> = listed
+        .iter()
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert_eq!(
+        codes,
+        ["0", "1", "2", "3", "4", "5", "6", "7", "9"],
+        "{all}"
+    );
+    for command in ["solve", "serve", "doctor"] {
+        let own = help(&["help", command]);
+        let codes = own.lines().find(|line| line.contains("Exit code")).unwrap();
+        assert!(
+            codes.contains("2 ") && codes.contains("1 anything else"),
+            "{own}"
+        );
+    }
+    let unknown = Command::new(SIGNORINI)
+        .args(["explain", "nonsense"])
+        .output()
+        .unwrap();
+    assert_eq!(unknown.status.code(), Some(2));
+}
+
 #[test]
 fn every_format_is_written_and_no_other_file_is_left() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,9 +1,12 @@
 //! The exit codes of the process.
 
+use strum::VariantArray;
+
 use crate::{app::CannotListen, store::StoreError};
 
-/// How a command ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How a command ends. A signal ends it as the system does, for a shell 128 and its number: Ctrl-C during `solve` 130;
+/// a panic with 101.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, VariantArray)]
 pub(super) enum Exit {
     /// Success.
     Ok = 0,
@@ -26,6 +29,32 @@ pub(super) enum Exit {
 }
 
 impl Exit {
+    /// What it means, for `--help` and the README.
+    fn meaning(self) -> &'static str {
+        match self {
+            Exit::Ok => "success; of solve: converged; of serve: stopped by SIGTERM or SIGINT",
+            Exit::Failed => {
+                "anything else: a file that cannot be read or written, a body that its contacts do not hold in the end, no memory"
+            }
+            Exit::Invalid => {
+                "invalid or too large: the problem, an option, or the code to be explained"
+            }
+            Exit::Listen => "serve: cannot listen at the address",
+            Exit::Folder => "serve, doctor: the folder cannot be used",
+            Exit::Locked => "serve, doctor: another server uses the folder",
+            Exit::Schema => "serve, doctor: the tables are of another program or version",
+            Exit::Damaged => "serve, doctor: stored data is missing or damaged",
+            Exit::NotConverged => "solve: not converged; the result is written all the same",
+        }
+    }
+
+    /// All exit codes, a line each.
+    pub(super) fn list() -> String {
+        let line = |exit: &Exit| format!("\n  {}  {}", *exit as u8, exit.meaning());
+        let lines: String = Exit::VARIANTS.iter().map(line).collect();
+        format!("Exit codes:{lines}")
+    }
+
     /// Of a command that ended with this error.
     pub(super) fn of(error: &anyhow::Error) -> Exit {
         match error.downcast_ref() {
@@ -37,6 +66,22 @@ impl Exit {
             }
             _ if error.is::<CannotListen>() => Exit::Listen,
             _ => Exit::Failed,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn the_readme_has_every_exit_code_with_its_meaning() {
+        let readme = concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md");
+        let readme = std::fs::read_to_string(readme).unwrap();
+        for exit in Exit::VARIANTS {
+            let line = format!("| {} | {} |", *exit as u8, exit.meaning());
+            assert!(readme.contains(&line), "README.md lacks the line\n{line}");
         }
     }
 }

@@ -21,7 +21,7 @@ use crate::{app::WORKER, config::Config, rest};
 
 /// Solves frictional contact problems, one at a time or as jobs of a service
 #[derive(Debug, Parser)]
-#[command(name = "signorini", version, arg_required_else_help = true)]
+#[command(name = "signorini", version, arg_required_else_help = true, after_help = Exit::list())]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -30,12 +30,15 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Start the service: REST and gRPC on one port. Exit code: 0 stopped, 3 cannot listen, 4 the folder cannot be used,
-    /// 5 another server uses it, 6 its tables are of another program or version, 7 stored data is missing or damaged
+    /// 5 another server uses it, 6 its tables are of another program or version, 7 stored data is missing or damaged, 2 an
+    /// invalid option, 1 anything else
     Serve(Config),
     /// Check a store that no server is using, and save what is intact. Exit code: 0 all is intact, 4 the folder cannot be
-    /// used, 5 a server uses it, 6 its tables are of another program or version, 7 something is missing or damaged
+    /// used, 5 a server uses it, 6 its tables are of another program or version, 7 something is missing or damaged, 2 an
+    /// invalid option, 1 anything else
     Doctor(doctor::Arguments),
-    /// Solve one problem without a service. Exit code: 0 converged, 9 not converged, 2 invalid input
+    /// Solve one problem without a service. Exit code: 0 converged, 9 not converged (the result is written), 2 invalid or
+    /// too large, 1 anything else, such as a file that cannot be read, or a body that its contacts do not hold
     Solve(solve::Arguments),
     /// Print the JSON Schema of a problem: every field with its meaning and default
     Schema,

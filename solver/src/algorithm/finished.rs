@@ -1,5 +1,6 @@
 //! The end of an iteration: what every method returns, and what is kept of it.
 
+use crate::algorithm::slides::Slide;
 use crate::algorithm::system::State;
 use crate::algorithm::track::{Cycle, Measured, Track};
 use crate::solution::{Iteration, Outcome, Residuals, Stage};
@@ -27,6 +28,8 @@ pub struct Finished {
     pub history: Vec<Iteration>,
     /// Period and nodes of a cycle.
     pub cycle: Option<Cycle>,
+    /// Why there is no equilibrium, where the body slides away.
+    pub slide: Option<Slide>,
 }
 
 /// Where a method ended.
@@ -80,6 +83,7 @@ pub(super) fn finish(track: Track<'_, '_>, end: End) -> Finished {
         contraction: end.contraction,
         history: track.history,
         cycle: end.cycle,
+        slide: None,
         state: measured.state,
         bound: measured.bound,
     }

@@ -7,9 +7,11 @@ mod adjoint;
 mod convex;
 mod finished;
 mod fixed_point;
+mod large_slip;
 mod newton;
 mod profile;
 mod report;
+mod slides;
 mod small_strain;
 mod system;
 mod thesis;
@@ -21,7 +23,8 @@ pub use convex::{Minimum, minimise};
 pub use finished::Finished;
 pub use profile::{Missed, Quantity};
 pub use report::{Reported, report};
-pub use system::{ContactNode, Patch, Point, State, System, Work};
+pub use slides::Slide;
+pub use system::{ContactNode, Patch, Point, State, System};
 pub use track::{Cycle, Place};
 pub use uniqueness::{compared, note_doubled_increments, note_uniqueness, other_solution};
 
@@ -31,14 +34,58 @@ use crate::problem::{Algorithm, SolverControls};
 use crate::solution::{Observer, Outcome, Progress, Stage};
 use finished::{End, finish};
 use fixed_point::{stuck, sweep};
-use track::{Measured, Track};
+use track::{Measured, Row, Track};
 
 /// Newton steps before giving up.
 const NEWTON_STEPS: u32 = 60;
 
 /// Solves a system at its load level with the chosen algorithm, from the end of the previous increment
-/// if there is one.
+/// if there is one. Says so where the loads push the body away.
 pub fn run(
+    system: &System<'_>,
+    controls: &SolverControls,
+    place: Place,
+    before: Option<&Finished>,
+    observe: &mut Observer<'_>,
+) -> Finished {
+    if system.semidefinite
+        && let Some(slide) = slides::certain(system)
+    {
+        return away(Track::new(system, controls, place), slide, observe);
+    }
+    let finished = iterate(system, controls, place, before, observe);
+    let slide = match finished.outcome {
+        Outcome::Converged | Outcome::Canceled => None,
+        _ if system.semidefinite => slides::found(system, &finished.state),
+        _ => None,
+    };
+    Finished { slide, ..finished }
+}
+
+/// The end of a body that slides away: the bonded state with all the friction that its pressure allows.
+fn away(mut track: Track<'_, '_>, slide: Slide, observe: &mut Observer<'_>) -> Finished {
+    let (bonded, answer) = bonded_state(track.system, track.controls, observe);
+    let measured = slides::slid(track.system, bonded, &slide);
+    let row = Row {
+        stage: Stage::Bonded,
+        residual: measured.residuals.kkt,
+        contraction: None,
+        inner: 0,
+        tractions: track.system.tractions(&measured.state.v, &measured.bound),
+        own_r_f: None,
+    };
+    let answers = [answer, track.record(&measured, row, observe)];
+    let outcome = match answers.iter().any(ControlFlow::is_break) {
+        true => Outcome::Canceled,
+        false => Outcome::NotConverged,
+    };
+    Finished {
+        slide: Some(slide),
+        ..finish(track, End::new(measured, Stage::Bonded, outcome))
+    }
+}
+
+fn iterate(
     system: &System<'_>,
     controls: &SolverControls,
     place: Place,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::algorithm::finished::Finished;
+use crate::algorithm::large_slip::warn_of_large_slip;
 use crate::algorithm::profile::{Forces, Missed, PatchView, Quantity};
 use crate::algorithm::small_strain::warn_of_large_strain;
 use crate::algorithm::system::System;
@@ -106,14 +107,18 @@ pub fn report(
         contacts.insert(name.clone(), summary);
     }
     warn_of_iteration(finished, &mut warnings);
-    warn_of_large_strain(
-        model,
-        system,
-        &finished.state.active,
-        &recovered,
-        &displacements,
-        &mut warnings,
-    );
+    // how far a body that slides away has come means nothing
+    if finished.slide.is_none() {
+        let slides = warn_of_large_slip(system, v, &forces.reactions, &mut warnings);
+        warn_of_large_strain(
+            model,
+            system,
+            &finished.state.active,
+            &recovered,
+            (&displacements, slides),
+            &mut warnings,
+        );
+    }
 
     let total =
         |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
@@ -142,7 +147,7 @@ pub fn report(
         Outcome::Converged if equilibrium > out_of_balance => Outcome::FalseConvergence,
         outcome => outcome,
     };
-    if equilibrium > out_of_balance {
+    if equilibrium > out_of_balance && finished.slide.is_none() {
         warnings.push(Warning {
             code: WarningCode::OutOfBalance,
             pointer: String::new(),
@@ -171,7 +176,7 @@ pub fn report(
         },
         energy: circumference
             * (recovered.strain_energy - work_of_loads + friction_energy(system, finished)),
-        friction_work: circumference * (work.total + work.incremental),
+        friction_work: circumference * work,
         accuracy: None,
         strain_energy: Some(circumference * recovered.strain_energy),
         increments: 1,
@@ -373,6 +378,10 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
             message,
         });
     };
+    if let Some(slide) = &finished.slide {
+        warn(WarningCode::SlidesAway, slide.message());
+        return;
+    }
     if let Some(q) = finished.contraction.filter(|q| *q > SLOW_CONTRACTION) {
         warn(
             WarningCode::SlowContraction,

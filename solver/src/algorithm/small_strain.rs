@@ -14,13 +14,14 @@ const LARGE_STRAIN: f64 = 0.25;
 /// Displacements above this part of the body's size are not small.
 const LARGE_DISPLACEMENT: f64 = 0.1;
 
-/// Warns once: of the contact with the largest strain, or else of displacements beside the size of the body.
+/// Warns once: of the contact with the largest strain, or else of displacements beside the size of the body. Displacements
+/// of a body that `slides` too far are that: it is told already.
 pub(super) fn warn_of_large_strain(
     model: &Model,
     system: &System<'_>,
     active: &[bool],
     recovered: &Recovered,
-    displacements: &[[f64; 2]],
+    (displacements, slides): (&[[f64; 2]], bool),
     warnings: &mut Vec<Warning>,
 ) {
     let strains = system
@@ -42,7 +43,7 @@ pub(super) fn warn_of_large_strain(
     let size = model.mesh.extent(0).hypot(model.mesh.extent(1));
     let lengths = displacements.iter().map(|[x, y]| x.hypot(*y));
     let largest = lengths.fold(0.0, f64::max);
-    if largest > LARGE_DISPLACEMENT * size {
+    if largest > LARGE_DISPLACEMENT * size && !slides {
         warnings.push(Warning {
             code: WarningCode::LargeDisplacement,
             pointer: String::new(),

@@ -7,7 +7,7 @@ use crate::error::SolveError;
 use crate::friction::{Average, BoundLaw, Chain, FrictionLaw, Source, largest_pressure};
 use crate::linear::Dense;
 use crate::model::{ContactModel, Level, Model};
-use crate::problem::{Condition, FrictionPoints, History, Measure};
+use crate::problem::{Condition, FrictionPoints, Measure};
 use crate::solution::{Observer, Progress};
 
 /// A friction point whose bound is below this part of the largest is open: its anchor follows it.
@@ -31,8 +31,8 @@ pub struct System<'a> {
     pub level: Level,
     /// Ŝ has rigid motions that only contact can prevent.
     pub semidefinite: bool,
-    /// Work done against friction under the incremental law in the increments so far (without 2π).
-    pub past_work: f64,
+    /// What sliding has dissipated in the increments so far, under the incremental law (force × length, without 2π).
+    pub dissipated: f64,
     /// A typical nodal force of this problem, for levels where nothing acts: that of the full loads, or of a
     /// contact node pushed by the indentation or the drag.
     pub reference_force: f64,
@@ -119,8 +119,6 @@ pub struct Point {
     pub source: Source,
     /// g, the anchor: slip is measured from here; 0 in the total law.
     pub anchor: f64,
-    /// u_t − d at the end of the previous increment, for the work done.
-    past_displacement: f64,
 }
 
 /// One contact of the model in the system.
@@ -143,15 +141,6 @@ pub struct State {
     pub active: Vec<bool>,
 }
 
-/// Work done against friction (force × length, without 2π).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Work {
-    /// In contacts with the total law.
-    pub total: f64,
-    /// In contacts with the incremental law, all increments together.
-    pub incremental: f64,
-}
-
 impl<'a> System<'a> {
     /// Collects the contacts of a model on its condensed body, at full load. The observer is asked at every friction
     /// point: a wide average along a long contact takes minutes.
@@ -169,7 +158,7 @@ impl<'a> System<'a> {
             circumference: model.section.circumference(),
             level: Level::FULL,
             semidefinite: model.held_by_contact,
-            past_work: 0.0,
+            dissipated: 0.0,
             reference_force: 0.0,
             body,
             model,
@@ -269,7 +258,6 @@ impl<'a> System<'a> {
                 weight,
                 source: law.bound.source(s).shifted(first),
                 anchor: 0.0,
-                past_displacement: 0.0,
             };
             let mut add = |point: Point| {
                 self.points.push(point);
@@ -333,15 +321,14 @@ impl<'a> System<'a> {
                 None => Source::Given(0.0),
             },
             anchor,
-            past_displacement: 0.0,
         }
     }
 
     /// Forgets the increments so far: anchors and work.
     pub fn restart(&mut self) {
-        self.past_work = 0.0;
+        self.dissipated = 0.0;
         for point in &mut self.points {
-            (point.anchor, point.past_displacement) = (0.0, 0.0);
+            point.anchor = 0.0;
         }
     }
 
@@ -401,40 +388,27 @@ impl<'a> System<'a> {
         bonded
     }
 
-    /// The end of an increment: the anchors of sliding and of open points move with the slip.
+    /// The end of an increment: the anchors of sliding and of open points move with the slip, which dissipates τ|Δg|.
     pub fn move_anchors(&mut self, v: &[f64], bound: &[f64]) {
-        self.past_work = self.work(v, bound).incremental;
         let largest = bound.iter().fold(0.0f64, |a, b| a.max(*b));
         for (g, tau) in bound.iter().enumerate() {
             let point = &self.points[g];
-            let (slip, relative) = (self.slip(v, point), self.relative_displacement(v, point));
+            let slip = self.slip(v, point);
             let open = *tau <= OPEN * largest;
             let moved = self.law(point).anchor_move(slip, open);
+            self.dissipated += point.weight * tau * moved.abs();
             self.points[g].anchor += moved;
-            self.points[g].past_displacement = relative;
         }
     }
 
-    /// Work done against friction (without 2π): ∫τ φ (u_t − d) in the total law, ∫τ φ Δ(u_t − d)
-    /// summed over the increments in the incremental law, this state included.
-    pub fn work(&self, v: &[f64], bound: &[f64]) -> Work {
-        let (mut total, mut increment) = (0.0, 0.0);
-        for (point, tau) in self.points.iter().zip(bound) {
-            let law = self.law(point);
+    /// Work done against friction (without 2π): ∫τ φ |e| in this state, and what sliding has dissipated before.
+    pub fn work(&self, v: &[f64], bound: &[f64]) -> f64 {
+        let points = self.points.iter().zip(bound);
+        let work = points.map(|(point, tau)| {
             let slip = self.slip(v, point);
-            let force = point.weight * tau * law.phi(slip);
-            match law.history {
-                History::Total => total += force * slip,
-                History::Incremental => {
-                    let relative = self.relative_displacement(v, point);
-                    increment += force * (relative - point.past_displacement);
-                }
-            }
-        }
-        Work {
-            total,
-            incremental: self.past_work + increment,
-        }
+            point.weight * tau * self.law(point).phi(slip) * slip
+        });
+        self.dissipated + work.sum::<f64>()
     }
 
     /// The initial state: no displacement, and only bonded nodes in contact.

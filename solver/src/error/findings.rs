@@ -199,6 +199,11 @@ pub fn shortened(text: &str, most: usize) -> String {
     }
 }
 
+/// A number to six digits, for messages: in any units, with `{:?}`.
+pub fn rounded(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,7 +5,7 @@
 mod findings;
 mod reason;
 
-pub use findings::{AllChecks, Checked, Findings, MOST_LISTED, Refused, shortened};
+pub use findings::{AllChecks, Checked, Findings, MOST_LISTED, Refused, rounded, shortened};
 pub use reason::Reason;
 
 use std::fmt;

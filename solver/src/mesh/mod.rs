@@ -1,6 +1,7 @@
 //! The body as nodes, elements and named boundaries.
 
 mod build;
+mod coincident;
 mod graded;
 mod grid;
 mod inline;
@@ -8,6 +9,7 @@ mod inverted;
 mod refine;
 
 pub use build::{NO_NODE, RawMesh, build};
+pub use coincident::coincident_nodes;
 pub use graded::GradedMesh;
 pub use grid::{check_grid, grid_mesh, largest_cut};
 pub use inline::inline_mesh;

@@ -55,6 +55,9 @@ impl Checks {
                 format!("The strip leaves its polyline by {distance:.3e} at x = {x}, between two grid lines. Put a grid line there."),
             );
         }
+        if input.grid().is_none() {
+            self.unmerged = mesh::coincident_nodes(&mesh);
+        }
         for _ in 0..refine {
             mesh = mesh::refine(&mesh);
         }

@@ -11,6 +11,8 @@ pub(super) const ALIGNED: f64 = 1e-9;
 pub(super) struct Checks {
     pub(super) found: Findings,
     pub(super) warnings: Vec<Warning>,
+    /// Nodes of the given mesh that lie at the place of another node without being connected to it.
+    pub(super) unmerged: Vec<[u32; 2]>,
 }
 
 impl Checks {

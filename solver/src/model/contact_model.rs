@@ -32,6 +32,8 @@ pub struct ContactModel {
     pub push: Vec<[f64; 2]>,
     /// The obstacle's own displacement along the contact's t (length).
     pub tangential_displacement: f64,
+    /// Sliding changes neither gap nor place: a straight obstacle without ends along a whole straight side of the body.
+    pub endless: bool,
     /// Whose normal it is.
     pub normal: NormalOf,
     /// The contact condition.

@@ -6,6 +6,7 @@ use super::axis::Axis;
 use super::checks::{ALIGNED, Checks};
 use super::contact_model::ContactModel;
 use super::level::Level;
+use super::sliding;
 use super::supports::Held;
 use crate::contact::obstacle::{self, FacingRun};
 use crate::contact::{ContactBoundary, Profile};
@@ -87,12 +88,14 @@ impl Checks {
         let push = turn_normals(&mut boundary, &run, contact.normal);
         let end_slopes = [0, run.profile.len() - 1].map(|i| run.profile[i].slope);
         let along = |(profile, push): (&Profile, &[f64; 2])| profile.distance * push[0];
+        let profile: Vec<f64> = run.profile.iter().zip(&push).map(along).collect();
         Ok(ContactModel {
             name: contact.boundary.clone(),
             pointer,
+            endless: sliding::endless(mesh, &boundary, &contact.obstacle, &profile),
             boundary,
             cut,
-            profile: run.profile.iter().zip(&push).map(along).collect(),
+            profile,
             places: run.places,
             end_slopes,
             indentation: contact.indentation,
@@ -277,7 +280,10 @@ impl Checks {
                 Reason::NotAChain,
                 format!("{} pieces", runs.len()),
                 "one chain of edges",
-                "Name each piece under /mesh/boundaries and give it a contact of its own.",
+                format!(
+                    "Name each piece under /mesh/boundaries and give it a contact of its own.{}",
+                    self.hint_to_merge(mesh)
+                ),
             ));
         };
         if run[0][0] == run[run.len() - 1][1] {

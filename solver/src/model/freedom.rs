@@ -124,6 +124,7 @@ impl Checks {
                 " Parts hold each other along a side that they share, all three nodes of it; at a single node they are hinged, and without common nodes apart.",
             );
         }
+        hint.push_str(&self.hint_to_merge(mesh));
         if !without_contacts {
             hint.push_str(" A contact holds along its normal, and along its tangent if it has friction or is bonded.");
         }
@@ -161,6 +162,59 @@ pub(super) fn motion_left(
         // only with contacts that do not touch: the model was examined with all of them
         Unheld::TooMany(_, node) => Some(("at single nodes that join its parts".to_owned(), node)),
     }
+}
+
+/// A rigid motion of a part of the body, or of several hinged parts as one.
+#[derive(Clone, Debug)]
+pub struct RigidMotion {
+    /// In words, after "free to move".
+    pub words: String,
+    /// The nodes that move, and how: by 1 in a translation; in a rotation the farthest from the centre of the part by 1.
+    pub moves: Vec<(u32, [f64; 2])>,
+    /// In a rotation, the distance of that node (length): times the power of a force it is the moment.
+    pub arm: Option<f64>,
+}
+
+/// All rigid motions that neither the supports nor the given nodes and directions prevent, but those that bend hinges.
+pub(super) fn free_motions(
+    mesh: &Mesh,
+    section: &Section,
+    fixed: &BTreeMap<u32, Held>,
+    hindered: &[Hold],
+) -> Vec<RigidMotion> {
+    let mut held = directions(fixed);
+    held.extend(hindered);
+    let parts = Parts::new(mesh, section.axisymmetric());
+    let rows = parts.rows(&held);
+    let mut found = Vec::new();
+    for together in parts.mechanisms(&rows) {
+        let nodes = together
+            .iter()
+            .flat_map(|p| &parts.parts[*p as usize].nodes);
+        let nodes: BTreeSet<u32> = nodes.copied().collect();
+        let whole = Part::new(mesh, nodes.into_iter().collect());
+        for motion in parts.as_one(&whole, &together, &rows, whole.tolerance) {
+            let motion: Motion = [motion[0], motion[1], motion[2]];
+            let (words, ..) = parts.words(&whole, &[motion]);
+            let turn = motion[2].abs();
+            let length = if turn > 1e-6 {
+                turn
+            } else {
+                motion[0].hypot(motion[1])
+            };
+            let motion = motion.map(|m| m / length);
+            let moved = |node: &u32| {
+                let place = mesh.nodes[*node as usize];
+                (*node, whole.displacement(place, &motion))
+            };
+            found.push(RigidMotion {
+                words,
+                moves: whole.nodes.iter().map(moved).collect(),
+                arm: (turn > 1e-6).then_some(whole.size),
+            });
+        }
+    }
+    found
 }
 
 /// Nodes and the directions they are held along.

@@ -15,10 +15,13 @@ mod level;
 mod loads;
 mod materials;
 mod numbers;
+mod sliding;
 mod supports;
+mod unmerged;
 
 pub use axis::Axis;
 pub use contact_model::ContactModel;
+pub use freedom::RigidMotion;
 pub use level::Level;
 pub use supports::Held;
 
@@ -91,6 +94,11 @@ impl Model {
     pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(String, u32)> {
         freedom::motion_left(&self.mesh, &self.section, &self.fixed, hindered)
     }
+
+    /// All rigid motions that neither the supports nor the given nodes and directions prevent, but those that bend hinges.
+    pub fn free_motions(&self, hindered: &[(u32, [f64; 2])]) -> Vec<RigidMotion> {
+        freedom::free_motions(&self.mesh, &self.section, &self.fixed, hindered)
+    }
 }
 
 /// Where the mesh of a model comes from.
@@ -144,6 +152,8 @@ impl Checks {
         let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);
         all.finish(())?;
         self.warn_about_contacts(&contacts);
+        self.warn_of_dragged_symmetry(&contacts, &fixed, &axis, &problem.steps);
+        self.warn_of_unmerged(&mesh, &contacts);
         Ok(Model {
             mesh,
             section,

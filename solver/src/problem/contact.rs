@@ -16,7 +16,8 @@ pub struct Contact {
     /// gap = profile − indentation.
     #[serde(default)]
     pub indentation: f64,
-    /// Displacement of the obstacle along t, the outward normal turned clockwise (length).
+    /// Displacement of the obstacle along t, the outward normal turned clockwise (length). The contact stays on the
+    /// material that faced the obstacle before: keep the slip below the contact's length.
     #[serde(default)]
     pub tangential_displacement: f64,
     /// The direction that gap and normal displacement are measured along.

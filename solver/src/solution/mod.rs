@@ -124,8 +124,10 @@ pub struct Summary {
     pub residuals: Residuals,
     /// Potential energy (1.21) of the final state with its own friction bound (force × length).
     pub energy: f64,
-    /// Work done against friction (force × length): ∫τ φ |u_t − d| in the total law; in the
-    /// incremental law ∫τ φ Δ(u_t − d), summed over the increments so far.
+    /// Work done against friction (force × length), never negative: ∫τ φ |e| with the slip e of this state, u_t − d in the
+    /// total law and u_t − d − g in the incremental one; there what sliding has dissipated in the increments before is
+    /// added, ∫τ |Δg|. The elastic slip counts with the stress that it ends with, although at most half of that was spent
+    /// on it: the work is too large by up to ε ∫τ.
     pub friction_work: f64,
     /// Energy of the strains, ½ ∫ σ : ε (force × length); absent in results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -275,6 +277,8 @@ pub enum WarningCode {
     ElementsReversed,
     /// Elements without midside nodes, which were given some.
     RaisedToSecondOrder,
+    /// Nodes at the same place that are not connected: a crack.
+    CoincidentNodes,
     /// A strip that leaves its polyline between two grid lines.
     StripCutsPolyline,
     /// An obstacle that ends inside an edge.
@@ -283,6 +287,8 @@ pub enum WarningCode {
     SmoothingFlattens,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
+    /// An obstacle that is dragged along a contact with a line of symmetry at its end.
+    SymmetricDrag,
     /// Edges longer than the nonlocal radius.
     MeshTooCoarseForRadius,
     /// Few elements in the contact.
@@ -315,6 +321,10 @@ pub enum WarningCode {
     ContactCycling,
     /// Forces on the body that do not balance.
     OutOfBalance,
+    /// A body that slides away: loads along its contacts beyond what their friction can hold, and nothing else to hold it.
+    SlidesAway,
+    /// A body that slides farther than its contact is long.
+    LargeSlip,
     /// Strains in a contact beyond what linear elasticity describes.
     LargeStrain,
     /// Displacements that are not small beside the body.

@@ -12,6 +12,13 @@ const SMOOTH_PEAK: f64 = 0.28;
 /// Stick tractions oscillate if more than this part of the friction force cancels inside edges.
 const OSCILLATING: f64 = 3e-3;
 
+/// Friction below this part of the normal force, or below ten tolerances of it, is not known: rounding and the iterations
+/// leave as much of none. (The residuals are relative to the largest reaction.)
+const UNKNOWN: f64 = 1e-9;
+
+/// Unless it is more than this part of what the bound allows: then the bound determines it, however small.
+const SLIGHT: f64 = 1e-3;
+
 /// One edge may contribute this part, because the motion may turn there.
 const TURN: f64 = 0.02;
 
@@ -206,7 +213,7 @@ impl PatchView<'_> {
     /// about that part.
     fn warn_of_oscillation(&self, warnings: &mut Vec<Warning>) {
         let (canceling, total) = self.oscillation();
-        if canceling > OSCILLATING * total {
+        if canceling > OSCILLATING * total && !self.is_noise(total) {
             warnings.push(Warning {
                 code: WarningCode::OscillatingStick,
                 pointer: self.patch.contact.pointer.clone(),
@@ -216,6 +223,22 @@ impl PatchView<'_> {
                 ),
             });
         }
+    }
+
+    /// Whether a friction force (without 2π) is what rounding leaves of none: where nothing slides, as under a uniform
+    /// pressure with ν = 0, it has any sign.
+    fn is_noise(&self, friction: f64) -> bool {
+        let (system, p) = (self.system, self.p);
+        let pressed = system.normal_force(system.range(self.patch), &self.forces.reactions);
+        let scale = match pressed > 0.0 {
+            true => pressed,
+            false => system.reference_force,
+        };
+        let points = system.points.iter().zip(&self.finished.bound);
+        let own = points.filter(|(point, _)| point.patch == p);
+        let most: f64 = own.map(|(point, tau)| point.weight * tau).sum();
+        let known = f64::max(UNKNOWN, 10.0 * system.model.controls.tolerance);
+        friction <= known * scale && friction <= SLIGHT * most
     }
 
     /// The part of the friction force that cancels inside edges though the motion does not turn there, and the whole

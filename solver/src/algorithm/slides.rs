@@ -1,0 +1,288 @@
+//! Bodies that only friction holds along some motion, and that are pushed along it by more than friction can hold. They
+//! have no equilibrium: iterations would run away with them.
+
+use crate::algorithm::system::{Patch, Point, State, System};
+use crate::algorithm::track::Measured;
+use crate::elasticity::Dof;
+use crate::error::rounded;
+use crate::friction::{BoundLaw, Source};
+use crate::model::RigidMotion;
+use crate::problem::Condition;
+
+/// Push and friction that differ by less are equal: by rounding, and by what iterations leave.
+const EQUAL: [f64; 2] = [1e-9, 1e-6];
+
+/// Two directions are the same, or perpendicular, to this part.
+const ALIGNED: f64 = 1e-9;
+
+/// Elastic slips by which a body that slides away is moved: all of its friction then acts, also with `tanh`.
+const MOVED: f64 = 20.0;
+
+/// A body that slides away.
+#[derive(Clone, Debug)]
+pub struct Slide {
+    motion: RigidMotion,
+    /// Along the motion, with its sign: the power of the loads, and of the largest friction (with 2π).
+    push: f64,
+    hold: f64,
+    /// The friction is the largest that equilibrium allows, and not only that of the pressure found.
+    certain: bool,
+}
+
+impl Slide {
+    /// The cause, with both forces or moments, and what to do.
+    pub(super) fn message(&self) -> String {
+        let (kind, arm) = match self.motion.arm {
+            None => ("", 1.0),
+            Some(arm) => ("a moment of ", arm),
+        };
+        let [push, hold] = [self.push.abs(), self.hold].map(|f| rounded(arm * f));
+        let verb = match self.motion.arm {
+            None => "push",
+            Some(_) => "turn",
+        };
+        let words = &self.motion.words;
+        let most = match self.certain {
+            true => format!("at most {hold:?}: there is no equilibrium"),
+            false => format!(
+                "{hold:?} with the pressure found: there is no equilibrium unless that grows"
+            ),
+        };
+        format!(
+            "The loads {verb} the body with {kind}{push:?} {words}, where only friction holds it, and friction can hold {most}. Support the body against this motion, or {verb} it by less."
+        )
+    }
+}
+
+/// A slide that follows from equilibrium alone, whatever the pressure.
+pub(super) fn certain(system: &System<'_>) -> Option<Slide> {
+    let motions = motions(system, |_| true).into_iter();
+    let slide = |motion: RigidMotion| {
+        let moved = Moved::new(system, &motion);
+        let push = moved.push(system);
+        let [hold, most] = moved.most(system)?.map(|f| system.circumference * f);
+        let slides = push.abs() > most * (1.0 + EQUAL[0]);
+        slides.then_some(Slide {
+            motion,
+            push,
+            hold,
+            certain: true,
+        })
+    };
+    motions.filter_map(slide).next()
+}
+
+/// A slide in a state that iterations have left: with its contacts and its pressure.
+pub(super) fn found(system: &System<'_>, state: &State) -> Option<Slide> {
+    let active = &state.active;
+    let reactions = system.reactions(state);
+    let bound = system.friction_bound(&system.pressures(&reactions));
+    let motions = motions(system, |node| active[node]).into_iter();
+    let slide = |motion: RigidMotion| {
+        let moved = Moved::new(system, &motion);
+        let (push, hold) = (moved.push(system), moved.hold(system, &bound));
+        let slides = push.abs() > hold * (1.0 + EQUAL[1]) && !moved.stopped(system, active, push);
+        slides.then_some(Slide {
+            motion,
+            push,
+            hold,
+            certain: false,
+        })
+    };
+    motions.filter_map(slide).next()
+}
+
+/// The bonded state moved along a slide, so that all friction acts against it.
+pub(super) fn slid(system: &System<'_>, bonded: Measured, slide: &Slide) -> Measured {
+    let moved = Moved::new(system, &slide.motion);
+    let laws = system.patches.iter().filter_map(|patch| patch.law.as_ref());
+    let slip = laws.map(|law| law.elastic_slip).fold(0.0, f64::max);
+    let anchors = system.points.iter().map(|point| point.anchor.abs());
+    let far = (MOVED * slip + anchors.fold(0.0, f64::max)) * slide.push.signum();
+    let mut state = bonded.state;
+    for patch in &system.patches {
+        for (i, node) in system.range(patch).enumerate() {
+            if let Dof::Free(dof) = system.nodes[node].tangent {
+                state.v[dof] += far * moved.along_tangent(patch, i);
+            }
+        }
+    }
+    Measured::new(system, state, bonded.implied_bound)
+}
+
+/// Motions that nothing but friction prevents, if these nodes touch.
+fn motions(system: &System<'_>, touches: impl Fn(usize) -> bool) -> Vec<RigidMotion> {
+    let mut hindered = Vec::new();
+    for patch in &system.patches {
+        let boundary = &patch.contact.boundary;
+        for (i, node) in system.range(patch).enumerate() {
+            if patch.contact.condition != Condition::None && touches(node) {
+                hindered.push((boundary.nodes[i], boundary.normals[i]));
+            }
+            if system.nodes[node].held_tangent.is_some() {
+                hindered.push((boundary.nodes[i], boundary.tangent(i)));
+            }
+        }
+    }
+    system.model.free_motions(&hindered)
+}
+
+/// The displacement of every node by a motion; none of those that do not take part.
+struct Moved(Vec<Option<[f64; 2]>>);
+
+impl Moved {
+    fn new(system: &System<'_>, motion: &RigidMotion) -> Self {
+        let mut moved = vec![None; system.model.mesh.nodes.len()];
+        for (node, by) in &motion.moves {
+            moved[*node as usize] = Some(*by);
+        }
+        Moved(moved)
+    }
+
+    fn of(&self, node: u32) -> [f64; 2] {
+        self.0[node as usize].unwrap_or_default()
+    }
+
+    /// The power of the loads, with 2π.
+    fn push(&self, system: &System<'_>) -> f64 {
+        system.circumference * self.load(system, |moved| moved)
+    }
+
+    /// Σ of the loads times a direction at each node.
+    fn load(&self, system: &System<'_>, along: impl Fn([f64; 2]) -> [f64; 2]) -> f64 {
+        let loads = system.body.nodal_loads.iter().zip(&self.0);
+        let power = loads.filter_map(|(f, moved)| Some(dot(*f, along((*moved)?))));
+        system.level.loads * power.sum::<f64>()
+    }
+
+    fn along_tangent(&self, patch: &Patch<'_>, i: usize) -> f64 {
+        let boundary = &patch.contact.boundary;
+        dot(boundary.tangent(i), self.of(boundary.nodes[i]))
+    }
+
+    /// How far a friction point moves along its tangent.
+    fn at(&self, system: &System<'_>, point: &Point) -> f64 {
+        let patch = &system.patches[point.patch];
+        let along = |k: usize| self.along_tangent(patch, point.nodes[k] - patch.first);
+        (0..3).map(|k| point.shape[k] * along(k)).sum()
+    }
+
+    /// The largest power of friction with these bounds, with 2π.
+    fn hold(&self, system: &System<'_>, bound: &[f64]) -> f64 {
+        let points = system.points.iter().zip(bound);
+        let power = points.map(|(point, tau)| point.weight * tau * self.at(system, point).abs());
+        system.circumference * power.sum::<f64>()
+    }
+
+    /// Whether an obstacle that does not touch yet is in the way.
+    fn stopped(&self, system: &System<'_>, active: &[bool], push: f64) -> bool {
+        system.patches.iter().any(|patch| {
+            let boundary = &patch.contact.boundary;
+            let in_the_way = |i: usize| {
+                let moved = self.of(boundary.nodes[i]);
+                !active[patch.first + i]
+                    && push.signum() * dot(boundary.normals[i], moved) > ALIGNED
+            };
+            patch.contact.condition != Condition::None && (0..boundary.nodes.len()).any(in_the_way)
+        })
+    }
+
+    /// The largest power of friction (without 2π), if that is known before solving: with prescribed bounds or caps, or if
+    /// the sum of all pressures follows from equilibrium. First for averaged pressures that are nowhere negative, then for
+    /// any: parabolas between the nodes may be, where contact ends.
+    fn most(&self, system: &System<'_>) -> Option<[f64; 2]> {
+        let (mut given, mut capped, mut cohesive) = (0.0, 0.0, 0.0);
+        let mut coefficients = [0.0f64; 2];
+        for (p, patch) in system.patches.iter().enumerate() {
+            let Some(law) = &patch.law else { continue };
+            let own = || system.points.iter().filter(|point| point.patch == p);
+            let length: f64 = own().map(|g| g.weight * self.at(system, g).abs()).sum();
+            match &law.bound {
+                _ if length == 0.0 => {}
+                BoundLaw::Prescribed(_) => {
+                    given += own().map(|g| self.prescribed(system, g)).sum::<f64>();
+                }
+                BoundLaw::Pressure {
+                    coefficient,
+                    cohesion,
+                    shear_cap,
+                    ..
+                } => {
+                    capped += shear_cap * length;
+                    cohesive += cohesion * length;
+                    for (most, gain) in coefficients.iter_mut().zip(self.gain(system, p)) {
+                        *most = most.max(coefficient * gain);
+                    }
+                }
+            }
+        }
+        let pressed = match coefficients[1] > 0.0 {
+            true => self.pressed(system).unwrap_or(f64::INFINITY),
+            false => 0.0,
+        };
+        let most = coefficients.map(|mu| given + capped.min(cohesive + mu * pressed));
+        most[1].is_finite().then_some(most)
+    }
+
+    fn prescribed(&self, system: &System<'_>, point: &Point) -> f64 {
+        match point.source {
+            Source::Given(tau) => point.weight * tau * self.at(system, point).abs(),
+            Source::Average(_) => 0.0,
+        }
+    }
+
+    /// The most that averaging can make of a reaction: 1 inside a contact; and the same without what is negative, somewhat
+    /// more.
+    fn gain(&self, system: &System<'_>, p: usize) -> [f64; 2] {
+        let mut sums = vec![[0.0; 2]; system.nodes.len()];
+        for point in system.points.iter().filter(|point| point.patch == p) {
+            if let Source::Average(row) = &point.source {
+                let moved = point.weight * self.at(system, point).abs();
+                for (i, weight) in row.weights.iter().enumerate() {
+                    let [all, positive] = &mut sums[row.first + i];
+                    *all += moved * weight;
+                    *positive += moved * weight.max(0.0);
+                }
+            }
+        }
+        let nodes = system.range(&system.patches[p]);
+        let gains = nodes.map(|i| sums[i].map(|sum| sum / system.nodes[i].weight));
+        gains.fold([0.0; 2], |[a, b], [c, d]| [a.max(c), b.max(d)])
+    }
+
+    /// The sum of all reactions on the body that moves, where it follows from equilibrium: all contacts have the same
+    /// normal, and nothing else holds the body.
+    fn pressed(&self, system: &System<'_>) -> Option<f64> {
+        let mut bonded = Vec::new();
+        let mut normal: Option<[f64; 2]> = None;
+        let mut inside = None;
+        for patch in &system.patches {
+            let boundary = &patch.contact.boundary;
+            for (i, &node) in boundary.nodes.iter().enumerate() {
+                if system.nodes[patch.first + i].bonded {
+                    bonded.extend([(node, boundary.normals[i]), (node, boundary.tangent(i))]);
+                }
+                if self.0[node as usize].is_none() || patch.contact.condition == Condition::None {
+                    continue;
+                }
+                inside = Some(node);
+                let n = boundary.normals[i];
+                let first = *normal.get_or_insert(n);
+                if (first[0] - n[0]).hypot(first[1] - n[1]) > ALIGNED {
+                    return None;
+                }
+            }
+        }
+        let (normal, inside) = (normal?, inside?);
+        let free = system.model.free_motions(&bonded);
+        let own = |motion: &&RigidMotion| motion.moves.iter().any(|(node, _)| *node == inside);
+        if free.iter().filter(own).count() < 3 {
+            return None;
+        }
+        Some(self.load(system, |_| normal)).filter(|pressed| *pressed > 0.0)
+    }
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}

@@ -1,0 +1,110 @@
+//! Obstacles that slide along the body: what linear kinematics and lines of symmetry leave of that.
+
+use std::collections::BTreeMap;
+
+use super::axis::Axis;
+use super::checks::{ALIGNED, Checks};
+use super::contact_model::ContactModel;
+use super::supports::Held;
+use crate::contact::ContactBoundary;
+use crate::mesh::Mesh;
+use crate::problem::{Obstacle, Step};
+use crate::solution::WarningCode;
+
+/// Cosine of the angle between two sides up to which the surface goes on straight: 20°.
+const STRAIGHT_ON: f64 = 0.94;
+
+impl Checks {
+    /// Warns of an obstacle that is dragged along a contact with a line of symmetry at its end: the other half, which is
+    /// not modelled, would be dragged the opposite way.
+    pub(super) fn warn_of_dragged_symmetry(
+        &mut self,
+        contacts: &[ContactModel],
+        fixed: &BTreeMap<u32, Held>,
+        axis: &Axis,
+        steps: &[Step],
+    ) {
+        let drags = |step: &Step| step.tangential_displacement != 0.0;
+        if !steps.is_empty() && !steps.iter().any(drags) {
+            return;
+        }
+        for contact in contacts.iter().filter(|c| c.tangential_displacement != 0.0) {
+            let boundary = &contact.boundary;
+            let on_axis = |i: usize| axis.holds(boundary.positions[i]);
+            let held = |i: usize| match fixed.get(&boundary.nodes[i]) {
+                Some(held @ Held::Along { .. }) => held.along(boundary.tangent(i)) == Some(0.0),
+                _ => false,
+            };
+            let mut ends = [0, boundary.nodes.len() - 1].into_iter();
+            let Some(end) = ends.find(|&i| on_axis(i) || held(i)) else {
+                continue;
+            };
+            let ([x, y], d) = (boundary.positions[end], contact.tangential_displacement);
+            let (what, instead) = match on_axis(end) {
+                true => (
+                    "the axis",
+                    "Leave it out: a body of revolution cannot be dragged across its axis.",
+                ),
+                false => (
+                    "a line of symmetry",
+                    "Model the whole body, or leave it out. If the support is a wall and no symmetry, end the contact an edge before it.",
+                ),
+            };
+            self.warn(
+                WarningCode::SymmetricDrag,
+                &format!("{}/tangential_displacement", contact.pointer),
+                format!("The contact ends on {what}, at ({x}, {y}), and its obstacle is displaced along it by {d}: beyond that end it would be dragged the opposite way. {instead}"),
+            );
+        }
+    }
+}
+
+/// Whether sliding changes neither gap nor place of a contact: a straight obstacle without ends along a straight side of
+/// the body, which ends in corners.
+pub(super) fn endless(
+    mesh: &Mesh,
+    boundary: &ContactBoundary,
+    obstacle: &Obstacle,
+    profile: &[f64],
+) -> bool {
+    let unbounded = matches!(obstacle.span(), (None, None, _));
+    let straight = matches!(obstacle, Obstacle::Flat { .. } | Obstacle::Line { .. });
+    let [a, b] = boundary.normals[0];
+    let even = boundary
+        .normals
+        .iter()
+        .all(|[c, d]| (a * d - b * c).abs() <= ALIGNED);
+    let parallel = profile
+        .iter()
+        .all(|p| (p - profile[0]).abs() <= ALIGNED * boundary.length());
+    unbounded && straight && even && parallel && !goes_on(mesh, boundary)
+}
+
+/// Whether the surface of the body goes on straight beyond an end of a boundary.
+fn goes_on(mesh: &Mesh, boundary: &ContactBoundary) -> bool {
+    let nodes = &boundary.nodes;
+    let ends = [
+        [nodes[0], nodes[1]],
+        [nodes[nodes.len() - 1], nodes[nodes.len() - 2]],
+    ];
+    // sides at the ends by their midsides, and how many elements have each
+    let mut sides: BTreeMap<(usize, u32), u32> = BTreeMap::new();
+    for [p, q, mid] in mesh.elements.iter().flat_map(|element| element.sides()) {
+        for (e, [end, own]) in ends.into_iter().enumerate() {
+            if (p == end || q == end) && mid != own {
+                *sides.entry((e, mid)).or_default() += 1;
+            }
+        }
+    }
+    let direction = |from: u32, to: u32| {
+        let [[x0, y0], [x1, y1]] = [from, to].map(|n| mesh.nodes[n as usize]);
+        let length = (x1 - x0).hypot(y1 - y0);
+        [(x1 - x0) / length, (y1 - y0) / length]
+    };
+    let surface = sides.into_iter().filter(|(_, count)| *count == 1);
+    surface.into_iter().any(|((e, mid), _)| {
+        let [end, own] = ends[e];
+        let ([a, b], [c, d]) = (direction(own, end), direction(end, mid));
+        a * c + b * d > STRAIGHT_ON
+    })
+}

@@ -1,0 +1,48 @@
+//! Cracks that nobody asked for: nodes at the same place that a mesh generator did not merge.
+
+use std::collections::BTreeSet;
+
+use super::checks::Checks;
+use super::contact_model::ContactModel;
+use crate::mesh::Mesh;
+use crate::solution::WarningCode;
+
+impl Checks {
+    /// Warns of nodes at the same place that are not connected. It is no fault, since a crack may be meant: where both of
+    /// its sides are contacts it is taken to be. (Parts that are free to move without each other are refused.)
+    pub(super) fn warn_of_unmerged(&mut self, mesh: &Mesh, contacts: &[ContactModel]) {
+        let meant: BTreeSet<u32> = contacts
+            .iter()
+            .flat_map(|contact| contact.boundary.nodes.iter().copied())
+            .collect();
+        self.unmerged
+            .retain(|pair| !pair.iter().all(|node| meant.contains(node)));
+        let Some(&[first, second]) = self.unmerged.first() else {
+            return;
+        };
+        let [x, y] = mesh.nodes[first as usize];
+        let others = match self.unmerged.len() {
+            1 => String::new(),
+            count => format!(" ({count} such pairs)"),
+        };
+        self.warn(
+            WarningCode::CoincidentNodes,
+            "/mesh",
+            format!(
+                "Nodes {first} and {second} are both at ({x}, {y}) and belong to different elements{others}: the body has a crack there, along which its parts do not hold each other. Merge them, in Gmsh with `Coherence Mesh;` or `removeDuplicateNodes`, unless the crack is meant."
+            ),
+        );
+    }
+
+    /// What may be the cause where a body falls into parts, or a boundary into pieces; empty where all nodes are merged.
+    pub(super) fn hint_to_merge(&self, mesh: &Mesh) -> String {
+        let Some(&[first, second]) = self.unmerged.first() else {
+            return String::new();
+        };
+        let [x, y] = mesh.nodes[first as usize];
+        format!(
+            " Nodes {first} and {second} are both at ({x}, {y}) and not connected, {} such pairs in all: merge them, in Gmsh with `Coherence Mesh;`.",
+            self.unmerged.len()
+        )
+    }
+}

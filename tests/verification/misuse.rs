@@ -1,0 +1,362 @@
+//! Problems that ask for what the model does not have, or that have no solution: each is told in words, and what is near
+//! to it and sound is not.
+
+use serde_json::{Value, json};
+use solver::model::Model;
+use solver::problem::{Problem, Refine};
+use solver::solution::{Outcome, Solution, Summary, Warning, WarningCode};
+
+use crate::support::{Lattice, example, problem, quiet, solve};
+
+/// The warning of a kind.
+fn told(warnings: &[Warning], code: WarningCode) -> Option<&str> {
+    let mut found = warnings.iter().filter(|w| w.code == code);
+    found.next().map(|w| &w.message[..])
+}
+
+/// Solves a problem that may end in any way.
+fn ended(problem: &Problem) -> Solution {
+    let external = files::external_mesh(problem, None);
+    solver::solve_on(problem, external, &mut quiet).unwrap()
+}
+
+#[track_caller]
+fn says(text: Option<&str>, parts: &[&str]) {
+    let text = text.unwrap_or("no warning");
+    for part in parts {
+        assert!(text.contains(part), "{part:?} in {text:?}");
+    }
+}
+
+/// A block of half-width 2 on its base, all lengths times `scale`.
+fn block(contact: &Value, scale: f64) -> Value {
+    let x: Vec<f64> = (-20..=20).map(|k| 0.1 * scale * f64::from(k)).collect();
+    let y = [-2.0, -1.0, -0.5, -0.2, 0.0].map(|y| scale * y);
+    json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": x, "y": y}, "boundaries": {"middle": {"side": "top", "x": [-0.5 * scale, 0.5 * scale]}}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [contact],
+    })
+}
+
+/// A parabola pressed in so that it touches about 0.8 of the top, and dragged.
+fn dragged(obstacle: &Value, drag: f64, scale: f64) -> Summary {
+    let contact = json!({"boundary": "top", "obstacle": obstacle, "indentation": 0.02 * scale,
+        "tangential_displacement": drag * scale,
+        "friction": {"coefficient": 0.3, "nonlocal_radius": 0.2 * scale, "elastic_slip": 1e-4 * scale}});
+    solve(&problem(&block(&contact, scale).to_string())).summary
+}
+
+/// Gaps are those of the places before deformation. Dragged by three lengths of the contact, the obstacle would press on
+/// other material: it is told, with slip and length, once, in any unit of length; a drag of a third of it is not.
+#[test]
+fn a_drag_beyond_the_contact_is_told() {
+    for scale in [1.0, 1e-6, 1e6] {
+        let obstacle = json!({"kind": "parabola", "radius": 8.0 * scale});
+        let still = dragged(&obstacle, 0.0, scale);
+        let [from, to] = still.contacts["top"].contact[0];
+        let width = (to - from) / scale;
+        assert!(width > 0.5 && width < 1.5, "{width}");
+        let far = dragged(&obstacle, 3.0 * width, scale);
+        let message = told(&far.warnings, WarningCode::LargeSlip);
+        says(
+            message,
+            &[
+                "slides along the obstacle by",
+                "the contact is",
+                "linear kinematics",
+            ],
+        );
+        let numbers: Vec<f64> = message
+            .unwrap()
+            .split([' ', ',', ':'])
+            .filter_map(|word| word.parse().ok())
+            .collect();
+        let [slip, length] = numbers[..] else {
+            panic!("{numbers:?}")
+        };
+        // the body follows by a few per cent of the contact; its contact may reach a node farther on each side
+        assert!(
+            slip > 2.8 * width * scale && slip < 3.0 * width * scale,
+            "{slip}"
+        );
+        assert!(
+            length >= width * scale && length < (width + 0.21) * scale,
+            "{length}"
+        );
+        for code in [WarningCode::LargeDisplacement, WarningCode::LargeStrain] {
+            assert_eq!(told(&far.warnings, code), None);
+        }
+        let near = dragged(&obstacle, 0.3 * width, scale);
+        assert_eq!(told(&near.warnings, WarningCode::LargeSlip), None);
+    }
+}
+
+/// A punch, and a straight obstacle on a part of a straight side, have a place from which the body slides away; a plane
+/// under a whole side has none. Nor do the examples, and their refined twins, slide too far (the sheet by .18, along a
+/// contact that is .29 long at least).
+#[test]
+fn sliding_along_a_plane_and_in_the_examples_is_sound() {
+    let large = |boundary: &str, obstacle: Value, drag: f64| {
+        let contact = json!({"boundary": boundary, "obstacle": obstacle, "indentation": 0.02, "tangential_displacement": drag,
+            "friction": {"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4}});
+        let summary = solve(&problem(&block(&contact, 1.0).to_string())).summary;
+        told(&summary.warnings, WarningCode::LargeSlip).is_some()
+    };
+    let punch = json!({"kind": "flat", "from": -0.5, "to": 0.5});
+    let plane = json!({"kind": "flat"});
+    assert!(large("top", punch.clone(), 1.5) && !large("top", punch, 0.5));
+    assert!(large("middle", plane.clone(), 1.5) && !large("middle", plane.clone(), 0.5));
+    assert!(!large("top", plane, 10.0));
+    assert!(!large(
+        "top",
+        json!({"kind": "line", "point": [0, 0], "angle": 0}),
+        10.0
+    ));
+    for name in [
+        "rectangular_punch",
+        "cylinder",
+        "annular_punch",
+        "cylinder_on_end",
+        "sheet",
+    ] {
+        for refine in 0..=2 {
+            let mut problem = example(name);
+            problem.mesh.refine = Refine::Times(refine);
+            let warnings = solve(&problem).summary.warnings;
+            assert_eq!(
+                told(&warnings, WarningCode::LargeSlip),
+                None,
+                "{name}, {refine}"
+            );
+        }
+    }
+}
+
+/// Half a body under a drag has another half that would be dragged the opposite way; so has one that turns about an axis.
+#[test]
+fn a_drag_of_half_a_body_is_told() {
+    let warnings = |analysis: &str, left: Value, from: f64, drag: f64, steps: Value| {
+        let mut p = json!({
+            "analysis": {"kind": analysis},
+            "mesh": {"grid": {"x": [0, 0.2, 0.4, 0.6, 1, 2], "y": [-2, -1, -0.5, -0.2, 0]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [left, {"boundary": "bottom", "ux": 0, "uy": 0}],
+            "contacts": [{"boundary": "top", "obstacle": {"kind": "flat", "from": from, "to": 0.6},
+                "indentation": 0.01, "tangential_displacement": drag,
+                "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}}],
+        });
+        if !steps.is_null() {
+            p["steps"] = steps;
+        }
+        Model::new(&problem(&p.to_string()), None).unwrap().warnings
+    };
+    let symmetric = || json!({"boundary": "left", "ux": 0});
+    let half = warnings("plane_strain", symmetric(), 0.0, 0.01, Value::Null);
+    let message = told(&half, WarningCode::SymmetricDrag);
+    says(
+        message,
+        &[
+            "at (0, 0)",
+            "0.01",
+            "the opposite way",
+            "Model the whole body",
+        ],
+    );
+    let round = warnings("axisymmetric", symmetric(), 0.0, 0.01, Value::Null);
+    says(
+        told(&round, WarningCode::SymmetricDrag),
+        &["the axis", "cannot be dragged"],
+    );
+    let clamped = json!({"boundary": "left", "ux": 0, "uy": 0});
+    let never = json!([{"tangential_displacement": 0}]);
+    for sound in [
+        warnings("plane_strain", symmetric(), 0.0, 0.0, Value::Null),
+        warnings("plane_strain", symmetric(), 0.2, 0.01, Value::Null),
+        warnings("plane_strain", clamped, 0.2, 0.01, Value::Null),
+        warnings("plane_strain", symmetric(), 0.0, 0.01, never),
+        warnings("axisymmetric", symmetric(), 0.2, 0.01, Value::Null),
+    ] {
+        assert_eq!(told(&sound, WarningCode::SymmetricDrag), None);
+    }
+}
+
+/// A block 2 × 1 of squares, pressed on a plane by a pressure and pushed by a traction on its side.
+fn pushed(push: f64, friction: Value, supports: Value) -> Solution {
+    let lines: Vec<f64> = (0..=8).map(|k| 0.25 * f64::from(k)).collect();
+    let text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": lines, "y": [0, 0.5, 1]}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": supports,
+        "loads": [{"boundary": "top", "pressure": 5}, {"boundary": "left", "traction": [push, 0]}],
+        "contacts": [{"boundary": "bottom", "obstacle": {"kind": "flat"}, "friction": friction}],
+    });
+    ended(&problem(&text.to_string()))
+}
+
+/// Pushed by more than μN = 3 (cohesion or a prescribed bound: what they add), a body without support has no equilibrium.
+/// The outcome says so at once, with both forces; just above the limit after the iterations; below it the body rests. (3 %:
+/// on edges longer than the radius the average of a single node is not exact; 5 %: where a corner lifts nothing rubs.)
+#[test]
+fn a_body_pushed_beyond_its_friction_is_said_to_slide_away() {
+    let coulomb =
+        json!({"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-4, "points": "nodal"});
+    let gauss = json!({"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-4});
+    let averaged = json!({"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4, "normalization": "conserving"});
+    let tanh = json!({"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-4, "points": "nodal", "transition": "tanh"});
+    let cohesive = json!({"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4, "cohesion": 0.5, "normalization": "conserving"});
+    let capped =
+        json!({"coefficient": 9, "nonlocal_radius": 0.2, "elastic_slip": 1e-4, "shear_cap": 1.5});
+    let given = json!({"bound": 1.5, "elastic_slip": 1e-4});
+    for (friction, limit) in [
+        (coulomb, 3.0),
+        (gauss, 3.0),
+        (averaged, 3.0),
+        (tanh, 3.0),
+        (cohesive, 4.0),
+        (capped, 3.0),
+        (given, 3.0),
+    ] {
+        let rests = pushed(0.9 * limit, friction.clone(), json!([])).summary;
+        assert_eq!(rests.outcome, Outcome::Converged, "{friction}");
+        for part in [1.002, 1.5] {
+            let slides = pushed(part * limit, friction.clone(), json!([])).summary;
+            assert_eq!(slides.outcome, Outcome::NotConverged, "{friction}, {part}");
+            let message = told(&slides.warnings, WarningCode::SlidesAway);
+            let push: f64 = format!("{:.5e}", part * limit).parse().unwrap();
+            let push = format!("with {push:?} along x");
+            says(
+                message,
+                &[
+                    &push,
+                    "only friction holds",
+                    "there is no equilibrium",
+                    "Support the body",
+                ],
+            );
+            let hold = message
+                .unwrap()
+                .split(['d', ' ', ':'])
+                .filter_map(|word| word.parse::<f64>().ok())
+                .next_back();
+            assert!(
+                (hold.unwrap() / limit - 1.0).abs() < 0.03,
+                "{friction}: {message:?}"
+            );
+            for code in [
+                WarningCode::NotConverged,
+                WarningCode::LargeDisplacement,
+                WarningCode::OutOfBalance,
+            ] {
+                assert_eq!(told(&slides.warnings, code), None, "{friction}, {part}");
+            }
+            // known from equilibrium: no iteration is made
+            if part > 1.2 {
+                says(message, &["can hold at most"]);
+                assert_eq!(slides.iterations, 1, "{friction}");
+                assert!(
+                    (slides.friction_force / limit - 1.0).abs() < 0.05,
+                    "{friction}: {}",
+                    slides.friction_force
+                );
+            }
+        }
+        // any support holds it
+        let held = json!([{"boundary": "right", "ux": 0}]);
+        assert_eq!(
+            pushed(1.5 * limit, friction, held).summary.outcome,
+            Outcome::Converged
+        );
+    }
+}
+
+/// Where the pressure does not follow from equilibrium, the state that the iterations leave tells: pressed by a support, or
+/// a shaft in a hub. A wall ahead ends the motion: nothing is claimed then, and the body rests there.
+#[test]
+fn what_holds_is_looked_at_where_equilibrium_does_not_tell() {
+    let coulomb = json!({"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4});
+    let pressed = json!([{"boundary": "top", "uy": -0.01}]);
+    let slides = pushed(100.0, coulomb.clone(), pressed.clone()).summary;
+    let message = told(&slides.warnings, WarningCode::SlidesAway);
+    says(message, &["with 100.0 along x", "with the pressure found"]);
+    assert_eq!(
+        pushed(2.0, coulomb.clone(), pressed).summary.outcome,
+        Outcome::Converged
+    );
+
+    let shaft = |push: f64| {
+        let text = json!({
+            "analysis": {"kind": "axisymmetric"},
+            "mesh": {"grid": {"x": [0, 0.25, 0.5, 0.75, 1], "y": [0, 0.5, 1, 1.5, 2]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "loads": [{"boundary": "top", "traction": [0, -push]}],
+            "contacts": [{"boundary": "right", "obstacle": {"kind": "flat"}, "indentation": 0.01, "friction": coulomb}],
+        });
+        ended(&problem(&text.to_string())).summary
+    };
+    assert_eq!(shaft(1.0).outcome, Outcome::Converged);
+    let slides = shaft(50.0);
+    assert_ne!(slides.outcome, Outcome::Converged);
+    // π r² times the traction
+    let message = told(&slides.warnings, WarningCode::SlidesAway);
+    says(message, &["with 157.08 along the axis"]);
+
+    let walled = |gap: f64| {
+        let lines: Vec<f64> = (0..=8).map(|k| 0.25 * f64::from(k)).collect();
+        let text = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": lines, "y": [0, 0.5, 1]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "loads": [{"boundary": "top", "pressure": 5}, {"boundary": "left", "traction": [4, 0]}],
+            "contacts": [
+                {"boundary": "bottom", "obstacle": {"kind": "flat"}, "friction": {"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4}},
+                {"boundary": "right", "obstacle": {"kind": "flat"}, "indentation": -gap},
+            ],
+        });
+        ended(&problem(&text.to_string())).summary
+    };
+    let rests = walled(0.05);
+    assert_eq!(told(&rests.warnings, WarningCode::SlidesAway), None);
+    assert_eq!(rests.outcome, Outcome::Converged);
+    assert!(rests.contacts["right"].normal_force > 0.9);
+}
+
+/// A plate on a pin at its corner, which friction with a prescribed bound at its top holds against turning:
+/// a moment beyond it is told, and one below it is held.
+#[test]
+fn a_plate_that_is_turned_beyond_its_friction_is_said_to_turn() {
+    let lattice = Lattice::new(8, 4, |i, j| [0.125 * i as f64, 0.125 * j as f64]);
+    let sides =
+        json!({"top": lattice.edges(8, |k| (k, 8)), "right": lattice.edges(4, |k| (16, k))});
+    let pin = lattice.nodes.iter().position(|x| *x == [0.0, 0.0]).unwrap();
+    let turned = |shear: f64| {
+        let text = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"inline": {"nodes": lattice.nodes, "elements": lattice.elements, "boundaries": sides, "node_sets": {"pin": [pin]}}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"nodes": "pin", "ux": 0, "uy": 0}],
+            "loads": [{"boundary": "right", "traction": [0, shear]}],
+            "contacts": [{"boundary": "top", "obstacle": {"kind": "flat"}, "condition": "none",
+                "friction": {"bound": 3, "elastic_slip": 1e-4}}],
+        });
+        ended(&problem(&text.to_string())).summary
+    };
+    // the top, 2 long and 1 above the pin, holds 3 · 2 · 1; the right side, 1 long and 2 away, turns with 2 per unit
+    assert_eq!(turned(2.9).outcome, Outcome::Converged);
+    let slides = turned(3.1);
+    assert_eq!(
+        (slides.outcome, slides.iterations),
+        (Outcome::NotConverged, 1)
+    );
+    let message = told(&slides.warnings, WarningCode::SlidesAway);
+    says(
+        message,
+        &[
+            "turn the body with a moment of 6.2 in rotation about (0, 0)",
+            "can hold at most 6.0:",
+        ],
+    );
+}
