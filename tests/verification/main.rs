@@ -40,6 +40,7 @@ mod random;
 mod record;
 mod refusals;
 mod robustness;
+mod rounding;
 mod sliding;
 mod small_strain;
 mod stick;

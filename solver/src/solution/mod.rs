@@ -69,7 +69,8 @@ pub struct StepSolution {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Contact set unchanged, every residual below the tolerance.
+    /// Contact set unchanged, every residual below the tolerance, or (warning `rounding_limits_residual`) no larger than
+    /// what rounding leaves of it.
     Converged,
     /// `max_iterations` reached.
     NotConverged,
@@ -154,7 +155,7 @@ pub struct ErrorEstimate {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Comparison {
     /// True where the two agree: forces and friction bounds to 1e-6 (uniqueness only; for doubled
-    /// increments to `tolerance`).
+    /// increments to `tolerance`), or to what rounding leaves of them.
     pub agrees: bool,
     /// Whether the second one converged; if not, `agrees` has no meaning.
     pub converged: bool,
@@ -311,6 +312,8 @@ pub enum WarningCode {
     SlowContraction,
     /// Residuals above the tolerance after all iterations.
     NotConverged,
+    /// Residuals that rounding keeps above the tolerance.
+    RoundingLimitsResidual,
     /// An iteration of the thesis that settles in a state that is not a solution.
     FalseConvergence,
     /// Contact and slip that repeat themselves.
