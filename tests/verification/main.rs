@@ -5,6 +5,7 @@
 
 mod abaqus_files;
 mod adaptive;
+mod adaptive_ends;
 mod annular_punch;
 mod axis;
 mod balance;

@@ -49,6 +49,11 @@ pub enum Update<'a> {
         /// Bytes.
         bytes: u64,
     },
+    /// The solver could go on with more memory, and asks whether there is room; if not it ends with what it has.
+    Room {
+        /// Bytes.
+        bytes: u64,
+    },
     /// There was not so much memory.
     OutOfMemory {
         /// Bytes that the solver needed.
@@ -121,6 +126,7 @@ pub fn run(
             }),
             Progress::Pulse => Update::Pulse,
             Progress::Needs { bytes } => Update::Needs { bytes },
+            Progress::Room { bytes } => Update::Room { bytes },
             Progress::OutOfMemory { bytes } => Update::OutOfMemory { bytes },
         };
         match non_finite {

@@ -32,6 +32,10 @@ pub(super) enum Unmet {
     Stalled,
     /// The linearised problem has no unique solution, or the obstacle reaches between the nodes.
     Unknown,
+    /// The finer mesh, of so many unknowns, would need so much memory (bytes).
+    Memory { unknowns: u64, bytes: u64 },
+    /// The finer mesh, of so many unknowns, has no solution: why.
+    Failed(u64, String),
     /// An element of the first mesh is so curved or crooked that its parts would be folded.
     Folded,
 }
@@ -107,6 +111,13 @@ pub(super) fn unfinished(
             Unmet::ContactElements(count, most) => format!(
                 "the next mesh would have {count} elements at one contact, more than {most}"
             ),
+            Unmet::Memory { unknowns, bytes } => format!(
+                "the next mesh, of {unknowns} unknowns, would need {} MiB, more than this job has left",
+                bytes.div_ceil(1 << 20)
+            ),
+            Unmet::Failed(unknowns, why) => {
+                format!("the next mesh, of {unknowns} unknowns, has no solution ({why})")
+            }
             Unmet::Meshes => "there are no more meshes than that".to_owned(),
             Unmet::Stalled => {
                 format!("the last {PATIENCE} have made it so little smaller that no more are tried")

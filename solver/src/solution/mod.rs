@@ -603,6 +603,12 @@ pub enum Progress<'a> {
         /// Bytes.
         bytes: u64,
     },
+    /// The solver could go on with this much more memory, and asks whether there is room for it. If not it ends with what
+    /// it has: the answer does not stop it.
+    Room {
+        /// Bytes.
+        bytes: u64,
+    },
     /// There was not so much memory: the solver goes on without, and cannot get far.
     OutOfMemory {
         /// Bytes that it needed.

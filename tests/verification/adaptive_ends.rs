@@ -1,0 +1,161 @@
+//! Adaptive refinement that cannot go on, for memory or because a later mesh has no solution: the mesh before is the
+//! result, with its errors and the reason.
+
+use std::ops::ControlFlow::{self, Break, Continue};
+
+use solver::mesh::Mesh;
+use solver::problem::{AdaptiveRefine, Problem, Refine};
+use solver::solution::{Outcome, Progress, Solution, WarningCode};
+
+use crate::support::example;
+
+fn cylinder() -> Problem {
+    let mut problem = example("cylinder");
+    problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.01 });
+    problem
+}
+
+/// What was seen of a solution, and the bytes of every question for room.
+struct Seen {
+    solution: Solution,
+    mesh: Mesh,
+    asked: Vec<u64>,
+    meshes: u32,
+    rows: usize,
+}
+
+/// Solves with an observer that grants room by the number of the question and its bytes.
+fn solve(problem: &Problem, room: impl Fn(usize, u64) -> bool) -> Seen {
+    let (mut asked, mut meshes, mut rows) = (Vec::new(), 0, 0);
+    let (solution, mesh) = solver::solve_with_mesh(problem, None, &mut |progress| {
+        match progress {
+            Progress::Room { bytes } => {
+                asked.push(bytes);
+                return match room(asked.len() - 1, bytes) {
+                    true => Continue(()),
+                    false => Break(()),
+                };
+            }
+            Progress::Refinement { number, .. } => meshes = number,
+            Progress::Iteration(_) => rows += 1,
+            _ => {}
+        }
+        Continue(())
+    })
+    .unwrap();
+    Seen {
+        solution,
+        mesh,
+        asked,
+        meshes,
+        rows,
+    }
+}
+
+fn reason(solution: &Solution) -> &str {
+    let mut warnings = solution.summary.warnings.iter();
+    let unfinished = warnings.find(|w| w.code == WarningCode::RefinementUnfinished);
+    &unfinished.unwrap().message
+}
+
+/// `seen` ended at the mesh `count` of `whole`, and is all that it was there.
+fn assert_is_the_mesh(count: usize, seen: &Seen, whole: &Seen) {
+    let (summary, all) = (&seen.solution.summary, &whole.solution.summary.refinements);
+    assert_eq!(summary.outcome, Outcome::Converged);
+    assert_eq!(summary.refinements, all[..count]);
+    let last = &all[count - 1];
+    assert_eq!(summary.normal_force, last.normal_force);
+    assert_eq!(seen.mesh.elements.len() as u64, last.elements);
+    assert_eq!(seen.solution.fields.elements.len() as u64, last.elements);
+    // its own errors, and its own rows
+    let accuracy = summary.accuracy.as_ref().unwrap();
+    let relative = accuracy.quantities.iter().filter_map(|q| q.relative);
+    assert_eq!(relative.fold(0.0, f64::max), last.error.unwrap());
+    assert_eq!(seen.rows, seen.solution.history.len());
+}
+
+#[test]
+fn a_mesh_for_which_there_is_no_room_leaves_the_one_before() {
+    let whole = solve(&cylinder(), |_, _| true);
+    let count = whole.solution.summary.refinements.len();
+    assert!(count >= 4 && whole.asked.len() > 3 * count, "{count}");
+    // the estimates of whole meshes grow, and nothing that one asks for while it is solved is above its own
+    let estimates: Vec<u64> = whole.asked.iter().fold(Vec::new(), |mut list, bytes| {
+        if list.last().is_none_or(|last| bytes > last) {
+            list.push(*bytes);
+        }
+        list
+    });
+    assert_eq!(estimates.len(), count - 1);
+    for (before, estimate) in estimates.iter().enumerate() {
+        let seen = solve(&cylinder(), |_, bytes| bytes < *estimate);
+        assert_is_the_mesh(before + 1, &seen, &whole);
+        assert_eq!(seen.meshes as usize, before + 1, "it is not begun");
+        let needed = format!(
+            " unknowns, would need {} MiB, more than this job has left",
+            estimate.div_ceil(1 << 20)
+        );
+        assert!(
+            reason(&seen.solution).contains(&needed),
+            "{needed}: {}",
+            reason(&seen.solution)
+        );
+    }
+}
+
+/// Refused while a mesh is solved: what is there is thrown away.
+#[test]
+fn room_that_is_refused_on_the_way_leaves_the_mesh_before_too() {
+    let whole = solve(&cylinder(), |_, _| true);
+    for refused in (0..whole.asked.len()).step_by(3) {
+        let seen = solve(&cylinder(), |question, _| question != refused);
+        let count = seen.solution.summary.refinements.len();
+        assert!(count < whole.solution.summary.refinements.len());
+        assert_is_the_mesh(count, &seen, &whole);
+        assert!(reason(&seen.solution).contains("more than this job has left"));
+    }
+}
+
+/// A stop is no lack of room.
+#[test]
+fn an_observer_that_stops_is_obeyed_at_a_question_for_room() {
+    let mut stopped = false;
+    let ended = solver::solve(&cylinder(), &mut |progress| -> ControlFlow<()> {
+        stopped |= matches!(progress, Progress::Room { .. });
+        match stopped {
+            true => Break(()),
+            false => Continue(()),
+        }
+    });
+    assert_eq!(ended.err(), Some(solver::error::SolveError::Stopped));
+}
+
+#[test]
+fn a_later_mesh_that_does_not_converge_leaves_the_one_before() {
+    let whole = solve(&cylinder(), |_, _| true);
+    let mut few = cylinder();
+    // enough for the first mesh, whose iterations are all sweeps but the first
+    let sweeps = |count: usize| {
+        let mut once = few.clone();
+        once.mesh.refine = Refine::Times(0);
+        once.solver.max_iterations = count as u32;
+        solve(&once, |_, _| true).solution.summary.converged
+    };
+    let enough = (1..100).find(|count| sweeps(*count)).unwrap();
+    few.solver.max_iterations = enough as u32;
+    let seen = solve(&few, |_, _| true);
+    let count = seen.solution.summary.refinements.len();
+    println!(
+        "{enough} sweeps: {count} meshes: {}",
+        reason(&seen.solution)
+    );
+    assert_is_the_mesh(count, &seen, &whole);
+    assert!(count < whole.solution.summary.refinements.len());
+    assert!(seen.meshes as usize == count + 1);
+    let why = "has no solution (its iteration does not converge)";
+    assert!(
+        reason(&seen.solution).contains(why),
+        "{}",
+        reason(&seen.solution)
+    );
+}
