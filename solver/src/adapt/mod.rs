@@ -276,9 +276,7 @@ fn finer(
         for (part, _) in parts.iter().zip(marked).filter(|(_, marked)| **marked) {
             divided[*part as usize] = true;
         }
-        if !graded.refine(&divided) {
-            return Err(Unmet::Folded);
-        }
+        graded.refine(&divided);
         let (finer, of) = graded.closed();
         *parts = of;
         finer

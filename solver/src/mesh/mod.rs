@@ -3,6 +3,7 @@
 mod build;
 mod graded;
 mod grid;
+mod halving;
 mod inline;
 mod inverted;
 mod refine;
