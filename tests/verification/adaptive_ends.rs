@@ -3,8 +3,9 @@
 
 use std::ops::ControlFlow::{self, Break, Continue};
 
+use serde_json::json;
 use solver::mesh::Mesh;
-use solver::problem::{AdaptiveRefine, Problem, Refine};
+use solver::problem::{AdaptiveRefine, Algorithm, History, Problem, Refine, ThesisOptions};
 use solver::solution::{Outcome, Progress, Solution, WarningCode};
 
 use crate::support::example;
@@ -157,5 +158,85 @@ fn a_later_mesh_that_does_not_converge_leaves_the_one_before() {
         reason(&seen.solution).contains(why),
         "{}",
         reason(&seen.solution)
+    );
+}
+
+/// The first mesh is the result where it has no solution, and no error of it is known.
+#[test]
+fn a_first_mesh_without_a_solution_is_named() {
+    for (signed, why) in [
+        (false, "its state is not a solution"),
+        (true, "its contact and slip repeat themselves"),
+    ] {
+        let mut thesis = cylinder();
+        thesis.solver.algorithm = Algorithm::Thesis;
+        thesis.solver.thesis = Some(ThesisOptions {
+            signed,
+            ..ThesisOptions::default()
+        });
+        let seen = solve(&thesis, |_, _| true);
+        let summary = &seen.solution.summary;
+        assert!(!summary.converged && seen.meshes == 1 && seen.asked.is_empty());
+        assert_eq!(summary.refinements.len(), 1);
+        assert_eq!(summary.refinements[0].error, None);
+        assert!(
+            reason(&seen.solution).contains(why),
+            "{}",
+            reason(&seen.solution)
+        );
+    }
+}
+
+/// The thesis's own iteration knows no triangles: where it converges, its meshes are refined uniformly.
+#[test]
+fn the_thesis_is_refined_uniformly() {
+    let mut thesis = example("rectangular_punch");
+    thesis.contacts[0].friction = None;
+    thesis.solver.algorithm = Algorithm::Thesis;
+    thesis.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.01 });
+    let summary = solve(&thesis, |_, _| true).solution.summary;
+    let elements: Vec<u64> = summary.refinements.iter().map(|row| row.elements).collect();
+    assert!(summary.converged && elements.len() > 1, "{elements:?}");
+    let four = elements.windows(2).all(|pair| pair[1] == 4 * pair[0]);
+    assert!(four && elements[0] == 56, "{elements:?}");
+    assert!(summary.refinements.last().unwrap().error.unwrap() <= 0.01);
+}
+
+/// Load steps are solved on each mesh; all of their results are those of the last. Errors are those of the last step: where
+/// nothing touches any more then, it is said that the others are not refined for.
+#[test]
+fn load_steps_are_those_of_the_last_mesh() {
+    let steps = |last: serde_json::Value| {
+        let mut problem = cylinder();
+        let friction = problem.contacts[0].friction.as_mut().unwrap();
+        friction.history = History::Incremental;
+        problem.steps =
+            serde_json::from_value(json!([{"indentation": 0.5, "increments": 2}, last])).unwrap();
+        solve(&problem, |_, _| true)
+    };
+    let pressed = steps(json!({"indentation": 1}));
+    let summary = &pressed.solution.summary;
+    assert!(summary.refinements.len() > 2 && summary.converged);
+    assert!(summary.refinements.last().unwrap().error.unwrap() <= 0.01);
+    let nodes = pressed.solution.profiles["top"].s.len();
+    assert_eq!(pressed.solution.steps.len(), 2);
+    for step in &pressed.solution.steps {
+        assert!(step.summary.converged && step.summary.refinements.is_empty());
+        assert_eq!(step.profiles["top"].s.len(), nodes);
+    }
+    assert_eq!(pressed.rows, pressed.solution.history.len());
+    assert!(
+        !summary
+            .warnings
+            .iter()
+            .any(|w| w.code == WarningCode::RefinementUnfinished)
+    );
+
+    let lifted = steps(json!({"indentation": 0}));
+    assert_eq!(lifted.solution.summary.refinements.len(), 1);
+    let message = reason(&lifted.solution);
+    assert!(
+        message.starts_with("At the end of the last load step nothing touches"),
+        "{message}"
     );
 }

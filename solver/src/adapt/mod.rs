@@ -75,12 +75,18 @@ pub fn run(
         let cut = cut_edges(&contacts, &solution, &mesh, goal.tolerance);
         let results = WatchedResults::new(&solution);
         let change = sequence.last().map(|before| results.change(before));
-        let error = largest_error(&solution).max(cut.error);
+        let unsolved = unsolved(solution.summary.outcome);
+        let error = match unsolved {
+            None => largest_error(&solution).max(cut.error),
+            Some(_) => f64::INFINITY,
+        };
         sequence.push(results.row(change, error));
 
         let mut next = None;
-        let unmet = if on_mesh.stopped || !solution.summary.converged {
+        let unmet = if on_mesh.stopped || solution.summary.outcome == Outcome::Canceled {
             None
+        } else if let Some(why) = unsolved {
+            Some(Unmet::First(why))
         } else if error <= goal.tolerance {
             Some(Unmet::Nothing)
         } else if let Some(unmet) = given_up(&sequence, goal.tolerance) {
@@ -169,15 +175,20 @@ impl OnMesh {
             (_, Err(SolveError::Stopped | SolveError::Invalid(_))) => None,
             (_, Err(error)) => Some(Unmet::Failed(unknowns, error.to_string())),
             (_, Ok(solution)) => {
-                let why = match solution.summary.outcome {
-                    Outcome::Converged | Outcome::Canceled => return None,
-                    Outcome::NotConverged => "its iteration does not converge",
-                    Outcome::ContactCycling => "its contact and slip repeat themselves",
-                    Outcome::FalseConvergence => "forces do not balance there",
-                };
+                let why = unsolved(solution.summary.outcome)?;
                 Some(Unmet::Failed(unknowns, why.to_owned()))
             }
         }
+    }
+}
+
+/// Why an outcome is no solution, unless it is one or was stopped.
+fn unsolved(outcome: Outcome) -> Option<&'static str> {
+    match outcome {
+        Outcome::Converged | Outcome::Canceled => None,
+        Outcome::NotConverged => Some("its iteration does not converge"),
+        Outcome::ContactCycling => Some("its contact and slip repeat themselves"),
+        Outcome::FalseConvergence => Some("its state is not a solution"),
     }
 }
 
