@@ -69,6 +69,12 @@ pub fn run(
         let unknowns = model.estimate_of_mesh().dofs;
         let (solved, mut on_mesh) = solve_on(model, &mut origins, solve, before.is_some(), observe);
         if let (Some(unmet), Some(before)) = (on_mesh.failed(&solved, unknowns), before.take()) {
+            let of_before = sequence.iter().rev().nth(1);
+            let _ = observe(Progress::Refinement {
+                number: sequence.len() as u32,
+                elements: before.mesh.elements.len() as u64,
+                error: of_before.and_then(|row| row.error),
+            });
             return Ok(before.ended(problem, goal, sequence, Some(unmet), observe));
         }
         let solution = solved?;

@@ -578,9 +578,9 @@ pub enum Progress<'a> {
     Phase(Phase),
     /// An iteration is done.
     Iteration(&'a Iteration),
-    /// Adaptive refinement begins to solve on a mesh.
+    /// Adaptive refinement begins to solve on a mesh, or returns to the one before, whose results are final.
     Refinement {
-        /// Number of the mesh, from 1.
+        /// Number of the mesh, from 1; that of the one before if it returns to it.
         number: u32,
         /// Its elements.
         elements: u64,
