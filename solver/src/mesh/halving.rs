@@ -76,6 +76,7 @@ pub(super) fn halvings(mesh: &Mesh) -> Vec<Halving> {
     let most = halvings.iter().map(|halving| halving.times).max();
     let most = 1 + most.unwrap_or(0);
     let mut levels = vec![0u32; halvings.len()];
+    let mut limits = vec![most; halvings.len()];
     let mut again: Vec<usize> = (0..levels.len()).collect();
     while let Some(e) = again.pop() {
         let sides = neighbours[e].iter().enumerate();
@@ -87,10 +88,12 @@ pub(super) fn halvings(mesh: &Mesh) -> Vec<Halving> {
         if !must_divide(mesh.elements[e].family().corners(), split) {
             continue;
         }
-        // what rises so high goes round in a circle, and some element of it is halved
-        match levels[e] > most && halvings[e].times > 0 {
-            true => halvings[e].times -= 1,
-            false => levels[e] += 1,
+        levels[e] += 1;
+        // what rises so high goes round in a circle, and some element of it is halved; with one halving less it may rise as
+        // far again until it settles
+        if levels[e] > limits[e] && halvings[e].times > 0 {
+            halvings[e].times -= 1;
+            limits[e] += most;
         }
         again.push(e);
         again.extend(neighbours[e].iter().flatten().map(|(f, _)| *f));
