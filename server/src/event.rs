@@ -42,7 +42,7 @@ pub enum Payload {
         /// The phase.
         stage: Phase,
     },
-    /// Adaptive refinement began to solve on a mesh. Its iterations are reported once it is known to be the last.
+    /// Adaptive refinement began to solve on a mesh, or returned to the one before. Its iterations are reported once it is known to be the last.
     Mesh {
         /// Number of the mesh, from 1.
         number: u32,

@@ -2,7 +2,7 @@
 //! history for both laws.
 
 use crate::accuracy;
-use crate::algorithm::{self, Finished, Place, System, report};
+use crate::algorithm::{self, Finished, Place, Rounding, System, report};
 use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::model::{Level, Model};
@@ -98,7 +98,7 @@ pub fn run(
     };
     if model.controls.check_increments && solution.summary.converged {
         let summary = &mut solution.summary;
-        let second = doubled(model, load_history.system, steps, summary, observe);
+        let second = doubled(model, load_history, steps, summary, observe);
         algorithm::note_doubled_increments(summary, second);
     }
     if model.steps.is_empty() {
@@ -111,12 +111,13 @@ pub fn run(
 /// The forces after twice the increments, without reporting to the observer.
 fn doubled(
     model: &Model,
-    mut system: System<'_>,
+    first: LoadHistory<'_>,
     steps: &[Step],
     solution: &Summary,
     observe: &mut Observer<'_>,
 ) -> Comparison {
     let quiet: &mut Observer<'_> = &mut algorithm::quiet(observe);
+    let (mut system, rounding) = (first.system, first.rounding);
     system.restart();
     let mut load_history = LoadHistory::new(model, system);
     let mut last = None;
@@ -128,7 +129,8 @@ fn doubled(
             break;
         }
     }
-    let tolerance = model.controls.tolerance;
+    let rounding = algorithm::rounding_of_forces([rounding, load_history.rounding]);
+    let tolerance = model.controls.tolerance.max(rounding);
     algorithm::compared(&load_history.system, solution, last.as_ref(), tolerance)
 }
 
@@ -152,6 +154,8 @@ struct LoadHistory<'a> {
     row_count: u32,
     increments: u32,
     cut_backs: u32,
+    /// Of the increment so far that rounding leaves the largest residual of.
+    rounding: Option<Rounding>,
 }
 
 impl<'a> LoadHistory<'a> {
@@ -166,6 +170,7 @@ impl<'a> LoadHistory<'a> {
             row_count: 0,
             increments: 0,
             cut_backs: 0,
+            rounding: None,
         }
     }
 
@@ -192,6 +197,10 @@ impl<'a> LoadHistory<'a> {
             let place = (number, &mut increment);
             let finished = self.advance(&path, place, from, to, 0, observe);
             if !can_continue(finished.outcome) || k == count {
+                let finished = Finished {
+                    rounding: self.rounding,
+                    ..finished
+                };
                 return (finished, std::mem::take(&mut self.rows));
             }
         }
@@ -211,6 +220,8 @@ impl<'a> LoadHistory<'a> {
         let finished = self.increment(path, (step, *increment), to, observe);
         let hopeful = !self.model.steps.is_empty()
             && self.model.controls.algorithm != Algorithm::Thesis
+            // in half an increment displacements are as large
+            && finished.rounding.is_none()
             && halvings < MOST_HALVINGS;
         match finished.outcome {
             Outcome::NotConverged | Outcome::ContactCycling if hopeful => {
@@ -253,6 +264,10 @@ impl<'a> LoadHistory<'a> {
         let finished = algorithm::run(&self.system, controls, place, self.last.as_ref(), observe);
         self.row_count += finished.history.len() as u32;
         self.rows.extend(finished.history.iter().cloned());
+        let residual = |rounding: &Option<Rounding>| rounding.map_or(0.0, |r| r.residual);
+        if residual(&finished.rounding) > residual(&self.rounding) {
+            self.rounding = finished.rounding;
+        }
         if can_continue(finished.outcome) {
             self.increments += 1;
             self.level = level;

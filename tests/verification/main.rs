@@ -5,6 +5,7 @@
 
 mod abaqus_files;
 mod adaptive;
+mod adaptive_ends;
 mod annular_punch;
 mod axis;
 mod balance;
@@ -41,6 +42,7 @@ mod random;
 mod record;
 mod refusals;
 mod robustness;
+mod rounding;
 mod sliding;
 mod small_strain;
 mod stick;

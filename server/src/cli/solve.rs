@@ -104,8 +104,11 @@ pub(super) fn run(
                 eprintln!("warning: {}: {}", warning.pointer, warning.message)
             }
             // Ctrl-C ends the process
-            Update::Step(_) | Update::Pulse | Update::Needs { .. } | Update::OutOfMemory { .. } => {
-            }
+            Update::Step(_)
+            | Update::Pulse
+            | Update::Needs { .. }
+            | Update::Room { .. }
+            | Update::OutOfMemory { .. } => {}
         }
         ControlFlow::Continue(())
     });

@@ -61,7 +61,7 @@ pub(super) fn solve_and_report(
     let solve =
         |observe: &mut Observer<'_>| solve(&problem, files::external_mesh(&problem, mesh), observe);
     let document = run::run(&problem, parse_s, solve, &mut |update| {
-        let mut needed = 0;
+        let (mut needed, mut room) = (0, 0);
         // what is reported belongs to the recorder then, whose thread frees it
         let told = meter.hand_over(|| {
             let report = match update {
@@ -83,6 +83,10 @@ pub(super) fn solve_and_report(
                     needed = bytes;
                     None
                 }
+                Update::Room { bytes } => {
+                    room = bytes;
+                    None
+                }
                 Update::OutOfMemory { bytes } => {
                     // the machine has less than the share: more than it is needed, whatever is used
                     needed = bytes.max(share);
@@ -97,7 +101,9 @@ pub(super) fn solve_and_report(
         tell(match meter.check(needed) {
             ControlFlow::Break(outgrown) => Told::OutOfMemory(outgrown),
             ControlFlow::Continue(()) => Told::Nothing,
-        })
+        })?;
+        // no room is an answer, and no reason to stop
+        meter.check(room).map_break(|_| ())
     })?;
     let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite {
         phase: solver::solution::Phase::Recover,

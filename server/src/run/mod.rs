@@ -27,7 +27,7 @@ pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Sol
 pub enum Update<'a> {
     /// A phase begins.
     Phase(Phase),
-    /// Adaptive refinement begins to solve on a mesh.
+    /// Adaptive refinement begins to solve on a mesh, or returns to the one before.
     Mesh {
         /// Number of the mesh, from 1.
         number: u32,
@@ -46,6 +46,11 @@ pub enum Update<'a> {
     Pulse,
     /// The solver is about to take more memory, and asks whether it may.
     Needs {
+        /// Bytes.
+        bytes: u64,
+    },
+    /// The solver could go on with more memory, and asks whether there is room; if not it ends with what it has.
+    Room {
         /// Bytes.
         bytes: u64,
     },
@@ -96,11 +101,14 @@ pub fn run(
                 number,
                 elements,
                 error,
-            } => Update::Mesh {
-                number,
-                elements,
-                error,
-            },
+            } => {
+                watch.on_mesh(number);
+                Update::Mesh {
+                    number,
+                    elements,
+                    error,
+                }
+            }
             Progress::Tentative(row) => {
                 non_finite |= !is_finite(row);
                 watch.done_tentatively(row);
@@ -121,6 +129,7 @@ pub fn run(
             }),
             Progress::Pulse => Update::Pulse,
             Progress::Needs { bytes } => Update::Needs { bytes },
+            Progress::Room { bytes } => Update::Room { bytes },
             Progress::OutOfMemory { bytes } => Update::OutOfMemory { bytes },
         };
         match non_finite {
@@ -205,6 +214,46 @@ mod tests {
         assert_eq!(&told, history);
         let by_step = document.steps.iter().flat_map(|step| &step.history);
         assert!(by_step.eq(history) && document.steps.len() == 2);
+    }
+
+    /// The history of the mesh before, where the next one finds no room on the way.
+    #[test]
+    fn rows_of_the_mesh_before_keep_their_times() {
+        let mut problem = fake::problem();
+        problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.05 });
+        let solve = |observe: &mut Observer<'_>| solver::solve(&problem, observe);
+        let start = Instant::now();
+        let (mut meshes, mut second_s, mut asked) = (vec![], f64::INFINITY, 0);
+        let document = run(&problem, 0.0, solve, &mut |update| {
+            match update {
+                Update::Mesh { number, .. } => {
+                    meshes.push(number);
+                    if number == 2 {
+                        second_s = start.elapsed().as_secs_f64();
+                    }
+                }
+                // the estimate of the second mesh; its factor, Ŝ and some matrices; then no more
+                // after its factor, Ŝ and matrices of some iterations
+                Update::Room { .. } if meshes == [1, 2] => {
+                    asked += 1;
+                    if asked > 5 {
+                        return ControlFlow::Break(());
+                    }
+                }
+                _ => {}
+            }
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert_eq!(meshes, [1, 2, 1]);
+        assert_eq!(document.summary.solution.refinements.len(), 1);
+        assert!(!document.history.is_empty());
+        let rows = document.history.iter();
+        assert!(
+            rows.clone()
+                .all(|row| 0.0 < row.wall_s && row.wall_s < second_s)
+        );
+        assert!(rows.is_sorted_by(|a, b| a.wall_s < b.wall_s));
     }
 
     #[test]

@@ -15,6 +15,10 @@ pub(super) struct Stopwatch {
     start: Instant,
     current: Option<(Phase, Instant)>,
     times: Times,
+    /// The mesh of adaptive refinement that `times` are of; 0 without it.
+    mesh: u32,
+    /// The iterations on the mesh before it.
+    before: Vec<f64>,
 }
 
 /// What it shows.
@@ -38,7 +42,19 @@ impl Stopwatch {
                 phases,
                 iterations: vec![],
             },
+            mesh: 0,
+            before: vec![],
         }
+    }
+
+    /// Adaptive refinement begins on a mesh of this number, or returns to the one before.
+    pub(super) fn on_mesh(&mut self, number: u32) {
+        let iterations = &mut self.times.iterations;
+        match number > self.mesh {
+            true => self.before = std::mem::take(iterations),
+            false => *iterations = std::mem::take(&mut self.before),
+        }
+        self.mesh = number;
     }
 
     /// A phase begins, and with it the one before ends.

@@ -16,7 +16,7 @@ use crate::model::estimate::{MOST_ADAPTIVE_CONTACT_ELEMENTS, MOST_ADAPTIVE_ELEME
 use crate::model::{ContactModel, Model};
 use crate::origins::Origins;
 use crate::problem::{AdaptiveRefine, Algorithm, Problem};
-use crate::solution::{Observer, Progress, Refinement, Solution, Warning};
+use crate::solution::{Observer, Outcome, Progress, Refinement, Solution, Warning};
 use unmet::{Unmet, given_up, unfinished};
 use watched::{WatchedResults, largest_error};
 
@@ -53,6 +53,7 @@ pub fn run(
     let mut parts: Vec<u32> = (0..first.mesh.elements.len() as u32).collect();
     let mut model = first;
     let mut sequence: Vec<Refinement> = Vec::new();
+    let mut before: Option<Solved> = None;
     loop {
         let elements = model.mesh.elements.len() as u64;
         let answer = observe(Progress::Refinement {
@@ -65,30 +66,33 @@ pub fn run(
         }
         let mut origins = Origins::new(&model, goal.tolerance);
         let (mesh, contacts) = (model.mesh.clone(), model.contacts.clone());
-        let mut warnings: Vec<Warning> = Vec::new();
-        let mut stopped = false;
-        let mut solution = solve(model, &mut origins, &mut |progress| {
-            let answer = match progress {
-                Progress::Iteration(row) => observe(Progress::Tentative(row)),
-                Progress::Step(_) => observe(Progress::Pulse),
-                Progress::Warning(warning) => {
-                    warnings.push(warning.clone());
-                    ControlFlow::Continue(())
-                }
-                other => observe(other),
-            };
-            stopped |= answer.is_break();
-            answer
-        })?;
+        let unknowns = model.estimate_of_mesh().dofs;
+        let (solved, mut on_mesh) = solve_on(model, &mut origins, solve, before.is_some(), observe);
+        if let (Some(unmet), Some(before)) = (on_mesh.failed(&solved, unknowns), before.take()) {
+            let of_before = sequence.iter().rev().nth(1);
+            let _ = observe(Progress::Refinement {
+                number: sequence.len() as u32,
+                elements: before.mesh.elements.len() as u64,
+                error: of_before.and_then(|row| row.error),
+            });
+            return Ok(before.ended(problem, goal, sequence, Some(unmet), observe));
+        }
+        let solution = solved?;
         let cut = cut_edges(&contacts, &solution, &mesh, goal.tolerance);
         let results = WatchedResults::new(&solution);
         let change = sequence.last().map(|before| results.change(before));
-        let error = largest_error(&solution).max(cut.error);
+        let unsolved = unsolved(solution.summary.outcome);
+        let error = match unsolved {
+            None => largest_error(&solution).max(cut.error),
+            Some(_) => f64::INFINITY,
+        };
         sequence.push(results.row(change, error));
 
         let mut next = None;
-        let unmet = if stopped || !solution.summary.converged {
+        let unmet = if on_mesh.stopped || solution.summary.outcome == Outcome::Canceled {
             None
+        } else if let Some(why) = unsolved {
+            Some(Unmet::First(why))
         } else if error <= goal.tolerance {
             Some(Unmet::Nothing)
         } else if let Some(unmet) = given_up(&sequence, goal.tolerance) {
@@ -100,35 +104,169 @@ pub fn run(
                     let warnings = notes.clone();
                     let given = ExternalMesh { mesh, warnings };
                     let model = Model::on_mesh(problem, given).map_err(SolveError::Invalid)?;
-                    let at_contacts = model.contacts.iter().zip(&most_at_contacts);
-                    let too_many = at_contacts
-                        .map(|(contact, most)| (contact.boundary.edge_count(), *most))
-                        .find(|(count, most)| count > most);
-                    next = too_many.is_none().then_some(model);
-                    too_many.map(|(count, most)| Unmet::ContactElements(count, most))
+                    let too_large = too_large(&model, &most_at_contacts, observe)?;
+                    next = too_large.is_none().then_some(model);
+                    too_large
                 }
                 Err(unmet) => Some(unmet),
             }
         };
-        if let Some(finer) = next {
-            model = finer;
-            continue;
+        let here = Solved {
+            solution,
+            mesh,
+            warnings: std::mem::take(&mut on_mesh.warnings),
+            cut: cut.error,
+        };
+        match next {
+            Some(finer) => (model, before) = (finer, Some(here)),
+            None => return Ok(here.ended(problem, goal, sequence, unmet, observe)),
         }
-        if let Some(warning) = unmet
-            .and_then(|unmet| unfinished(problem, goal, &solution, &sequence, unmet, cut.error))
-        {
+    }
+}
+
+/// A mesh and the solution on it.
+struct Solved {
+    solution: Solution,
+    mesh: Mesh,
+    /// What was found while it was solved.
+    warnings: Vec<Warning>,
+    /// [`Cut::error`].
+    cut: f64,
+}
+
+impl Solved {
+    /// This is the result: with the sequence of meshes, why it ends here, and what the observer has not seen yet.
+    fn ended(
+        mut self,
+        problem: &Problem,
+        goal: &AdaptiveRefine,
+        sequence: Vec<Refinement>,
+        unmet: Option<Unmet>,
+        observe: &mut Observer<'_>,
+    ) -> (Solution, Mesh) {
+        let solution = &mut self.solution;
+        let unmet =
+            unmet.and_then(|unmet| unfinished(problem, goal, solution, &sequence, unmet, self.cut));
+        if let Some(warning) = unmet {
             solution.summary.warnings.push(warning.clone());
-            warnings.push(warning);
+            self.warnings.push(warning);
         }
         solution.summary.refinements = sequence;
-        for warning in &warnings {
+        for warning in &self.warnings {
             let _ = observe(Progress::Warning(warning));
         }
         for row in &solution.history {
             let _ = observe(Progress::Iteration(row));
         }
-        return Ok((solution, mesh));
+        (self.solution, self.mesh)
     }
+}
+
+/// What the observer was asked while a mesh was solved, and what it said.
+#[derive(Default)]
+struct OnMesh {
+    warnings: Vec<Warning>,
+    /// It is to end.
+    stopped: bool,
+    /// So much memory was needed that there is not (bytes).
+    short: Option<u64>,
+}
+
+impl OnMesh {
+    /// Why a mesh has no solution that could take the place of the one before.
+    fn failed(&self, solved: &Result<Solution, SolveError>, unknowns: u64) -> Option<Unmet> {
+        match (self.short, solved) {
+            _ if self.stopped => None,
+            (Some(bytes), _) => Some(Unmet::Memory { unknowns, bytes }),
+            (_, Err(SolveError::Stopped | SolveError::Invalid(_))) => None,
+            (_, Err(error)) => Some(Unmet::Failed(unknowns, error.to_string())),
+            (_, Ok(solution)) => {
+                let why = unsolved(solution.summary.outcome)?;
+                Some(Unmet::Failed(unknowns, why.to_owned()))
+            }
+        }
+    }
+}
+
+/// Why an outcome is no solution, unless it is one or was stopped.
+fn unsolved(outcome: Outcome) -> Option<&'static str> {
+    match outcome {
+        Outcome::Converged | Outcome::Canceled => None,
+        Outcome::NotConverged => Some("its iteration does not converge"),
+        Outcome::ContactCycling => Some("its contact and slip repeat themselves"),
+        Outcome::FalseConvergence => Some("its state is not a solution"),
+    }
+}
+
+/// Solves on one mesh. `later`: it is not the first, and if it needs too much memory the solution before remains; the observer is
+/// asked whether there is room, and not told that there has to be.
+fn solve_on(
+    model: Model,
+    origins: &mut Origins,
+    solve: &Solve<'_>,
+    later: bool,
+    observe: &mut Observer<'_>,
+) -> (Result<Solution, SolveError>, OnMesh) {
+    let mut on_mesh = OnMesh::default();
+    let solved = solve(model, origins, &mut |progress| {
+        if on_mesh.short.is_some() {
+            return ControlFlow::Break(());
+        }
+        let answer = match progress {
+            Progress::Iteration(row) => observe(Progress::Tentative(row)),
+            Progress::Step(_) => observe(Progress::Pulse),
+            Progress::Warning(warning) => {
+                on_mesh.warnings.push(warning.clone());
+                ControlFlow::Continue(())
+            }
+            Progress::Needs { bytes } if later => match has_room(bytes, observe) {
+                Ok(true) => ControlFlow::Continue(()),
+                Ok(false) => {
+                    on_mesh.short = Some(bytes);
+                    return ControlFlow::Break(());
+                }
+                Err(_) => ControlFlow::Break(()),
+            },
+            Progress::OutOfMemory { bytes } if later => {
+                on_mesh.short = Some(bytes);
+                return ControlFlow::Break(());
+            }
+            other => observe(other),
+        };
+        on_mesh.stopped |= answer.is_break();
+        answer
+    });
+    (solved, on_mesh)
+}
+
+/// Whether there is so much memory; an error if the solution is to end anyhow.
+fn has_room(bytes: u64, observe: &mut Observer<'_>) -> Result<bool, SolveError> {
+    match observe(Progress::Room { bytes }) {
+        ControlFlow::Continue(()) => Ok(true),
+        ControlFlow::Break(()) => match observe(Progress::Pulse) {
+            ControlFlow::Continue(()) => Ok(false),
+            ControlFlow::Break(()) => Err(SolveError::Stopped),
+        },
+    }
+}
+
+/// Why a mesh is not solved: too many elements at a contact, or too much memory.
+fn too_large(
+    model: &Model,
+    most_at_contacts: &[usize],
+    observe: &mut Observer<'_>,
+) -> Result<Option<Unmet>, SolveError> {
+    let at_contacts = model.contacts.iter().zip(most_at_contacts);
+    let too_many = at_contacts
+        .map(|(contact, most)| (contact.boundary.edge_count(), *most))
+        .find(|(count, most)| count > most);
+    if let Some((count, most)) = too_many {
+        return Ok(Some(Unmet::ContactElements(count, most)));
+    }
+    let estimate = model.estimate_of_mesh();
+    let (unknowns, bytes) = (estimate.dofs, estimate.memory_bytes);
+    let fits = has_room(bytes, observe)?;
+    Ok((!fits).then_some(Unmet::Memory { unknowns, bytes }))
 }
 
 /// Most elements at a contact, which are as many as the estimate of the memory assumes.
@@ -155,9 +293,7 @@ fn finer(
         for (part, _) in parts.iter().zip(marked).filter(|(_, marked)| **marked) {
             divided[*part as usize] = true;
         }
-        if !graded.refine(&divided) {
-            return Err(Unmet::Folded);
-        }
+        graded.refine(&divided);
         let (finer, of) = graded.closed();
         *parts = of;
         finer

@@ -4,7 +4,8 @@ use super::watched::relative_error;
 use crate::model::estimate::MOST_ADAPTIVE_ELEMENTS;
 use crate::problem::{AdaptiveRefine, Interpolation, Obstacle, Problem};
 use crate::solution::{
-    ErrorMethod, EstimatedQuantity, QuantityName, Refinement, Solution, Warning, WarningCode,
+    ErrorMethod, EstimatedQuantity, QuantityName, Refinement, Solution, Summary, Warning,
+    WarningCode,
 };
 
 /// Most meshes: each about halves the smallest element.
@@ -32,6 +33,12 @@ pub(super) enum Unmet {
     Stalled,
     /// The linearised problem has no unique solution, or the obstacle reaches between the nodes.
     Unknown,
+    /// The finer mesh, of so many unknowns, would need so much memory (bytes).
+    Memory { unknowns: u64, bytes: u64 },
+    /// The finer mesh, of so many unknowns, has no solution: why.
+    Failed(u64, String),
+    /// The first mesh has no solution: why.
+    First(&'static str),
     /// An element of the first mesh is so curved or crooked that its parts would be folded.
     Folded,
 }
@@ -79,7 +86,11 @@ pub(super) fn unfinished(
         format!("`{}` of contact `{}`", <&str>::from(q.quantity), q.contact)
     };
     let mut sentences = Vec::new();
-    if !matches!(unmet, Unmet::Nothing) {
+    if let Unmet::First(why) = unmet {
+        sentences.push(format!(
+            "There is no finer mesh than the first, which has no solution: {why}."
+        ));
+    } else if !matches!(unmet, Unmet::Nothing) {
         let tolerance = percent(goal.tolerance);
         let mut above: Vec<&EstimatedQuantity> = accuracy.quantities.iter().collect();
         above.retain(|q| relative_error(q) > goal.tolerance);
@@ -107,6 +118,13 @@ pub(super) fn unfinished(
             Unmet::ContactElements(count, most) => format!(
                 "the next mesh would have {count} elements at one contact, more than {most}"
             ),
+            Unmet::Memory { unknowns, bytes } => format!(
+                "the next mesh, of {unknowns} unknowns, would need {} MiB, more than this job has left",
+                bytes.div_ceil(1 << 20)
+            ),
+            Unmet::Failed(unknowns, why) => {
+                format!("the next mesh, of {unknowns} unknowns, has no solution ({why})")
+            }
             Unmet::Meshes => "there are no more meshes than that".to_owned(),
             Unmet::Stalled => {
                 format!("the last {PATIENCE} have made it so little smaller that no more are tried")
@@ -116,7 +134,7 @@ pub(super) fn unfinished(
                 "an element of the first mesh is so curved or crooked that its parts would be folded"
                     .to_owned()
             }
-            Unmet::Nothing => return None,
+            Unmet::Nothing | Unmet::First(_) => return None,
         };
         sentences.push(format!(
             "After {} {known}{others}, and the tolerance is {tolerance}: {why}.",
@@ -140,6 +158,13 @@ pub(super) fn unfinished(
             ),
             None => "Raise the tolerance, or begin with a mesh that is finer where the error is; see summary.refinements and summary.accuracy.".to_owned(),
         });
+    }
+    let touches = |summary: &Summary| summary.contacts.values().any(|c| !c.contact.is_empty());
+    if !touches(&solution.summary) && solution.steps.iter().any(|step| touches(&step.summary)) {
+        sentences.push(
+            "At the end of the last load step nothing touches, and errors are known there only: the steps before are those of a mesh that was not refined for them. End with the step that matters."
+                .to_owned(),
+        );
     }
     let unlimited = accuracy
         .quantities

@@ -11,7 +11,7 @@
 //! which the errors of the body's stresses are weighted.
 
 use crate::algorithm::convex::{dense, free_dofs};
-use crate::algorithm::newton::{jacobian, reaction_weights};
+use crate::algorithm::newton::jacobian;
 use crate::algorithm::system::{Point, State, System};
 use crate::elasticity::Dof;
 use crate::solution::Observer;
@@ -52,7 +52,7 @@ impl Gradient {
         let slope = law.bound.slope(point.source.nonlocal_pressure(pressures));
         let factor = -factor * law.phi(slip) * slope;
         if factor != 0.0 {
-            for (node, weight) in reaction_weights(system, state, point) {
+            for (node, weight) in system.reaction_weights(state, point) {
                 self.reaction[node] += factor * weight;
             }
         }
@@ -129,7 +129,7 @@ pub fn influences(
             let slope = law.bound.slope(point.source.nonlocal_pressure(&pressures));
             let factor = point.weight * law.phi(system.slip(&state.v, point)) * slope * moved;
             if factor != 0.0 {
-                for (node, weight) in reaction_weights(system, state, point) {
+                for (node, weight) in system.reaction_weights(state, point) {
                     if let Dof::Free(dof) = system.nodes[node].normal {
                         z[dof] -= factor * weight;
                     }

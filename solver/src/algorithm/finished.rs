@@ -1,8 +1,10 @@
 //! The end of an iteration: what every method returns, and what is kept of it.
 
+use crate::algorithm::rounding::{self, Rounding};
 use crate::algorithm::slides::Slide;
-use crate::algorithm::system::State;
+use crate::algorithm::system::{State, System};
 use crate::algorithm::track::{Cycle, Measured, Track};
+use crate::problem::Algorithm;
 use crate::solution::{Iteration, Outcome, Residuals, Stage};
 
 /// The end of the iterations at one load level.
@@ -30,6 +32,8 @@ pub struct Finished {
     pub cycle: Option<Cycle>,
     /// Why there is no equilibrium, where the body slides away.
     pub slide: Option<Slide>,
+    /// Present where rounding keeps residuals above the tolerance.
+    pub rounding: Option<Rounding>,
 }
 
 /// Where a method ended.
@@ -42,6 +46,8 @@ pub(super) struct End {
     pub(super) contraction: Option<f64>,
     /// The limit of iterations is reached.
     pub(super) exhausted: bool,
+    /// Rounding keeps residuals above the tolerance.
+    pub(super) rounding: Option<Rounding>,
 }
 
 impl End {
@@ -54,7 +60,38 @@ impl End {
             cycle: None,
             contraction: None,
             exhausted: false,
+            rounding: None,
         }
+    }
+
+    /// Where rounding is all that keeps the residuals above the tolerance, nothing more can be reached: this is converged,
+    /// or if rounding is not small, no method gets any further. What follows from it alone is no cycle and no
+    /// contraction.
+    pub(super) fn settled(
+        mut self,
+        system: &System<'_>,
+        tolerance: f64,
+        rows: &[Iteration],
+    ) -> Self {
+        use Outcome::{ContactCycling, Converged, NotConverged};
+        if !matches!(self.outcome, Converged | NotConverged | ContactCycling) {
+            return self;
+        }
+        let Some((rounding, friction)) = rounding::limit(system, &self.measured, tolerance) else {
+            return self;
+        };
+        self.outcome = match rounding.negligible() {
+            true => Converged,
+            false => NotConverged,
+        };
+        self.rounding = Some(rounding);
+        self.cycle = None;
+        let known = rows
+            .iter()
+            .rev()
+            .filter(|row| row.friction_residual > friction);
+        self.contraction = known.filter_map(|row| row.contraction).next();
+        self
     }
 
     /// A method that does not converge, and has no cycle, is reported with the cycle found by the other method.
@@ -66,13 +103,20 @@ impl End {
         self
     }
 
-    /// No other method is to be tried: it converged, or the observer or the limit ended it.
+    /// No other method is to be tried: it converged, or rounding, the observer or the limit ended it.
     pub(super) fn ended(&self) -> bool {
-        matches!(self.outcome, Outcome::Converged | Outcome::Canceled) || self.exhausted
+        matches!(self.outcome, Outcome::Converged | Outcome::Canceled)
+            || self.exhausted
+            || self.rounding.is_some()
     }
 }
 
 pub(super) fn finish(track: Track<'_, '_>, end: End) -> Finished {
+    let end = match track.controls.algorithm {
+        // stops by a test of its own
+        Algorithm::Thesis => end,
+        _ => end.settled(track.system, track.controls.tolerance, &track.history),
+    };
     let measured = end.measured;
     Finished {
         tractions: track.system.tractions(&measured.state.v, &measured.bound),
@@ -84,6 +128,7 @@ pub(super) fn finish(track: Track<'_, '_>, end: End) -> Finished {
         history: track.history,
         cycle: end.cycle,
         slide: None,
+        rounding: end.rounding,
         state: measured.state,
         bound: measured.bound,
     }

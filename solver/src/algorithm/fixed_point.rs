@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 
 use crate::algorithm::convex::{Minimum, minimise};
 use crate::algorithm::finished::End;
+use crate::algorithm::rounding;
 use crate::algorithm::system::{State, System};
 use crate::algorithm::track::{Measured, Row, Track};
 use crate::elasticity::Dof;
@@ -22,6 +23,9 @@ const DEPTH: usize = 5;
 /// Sweeps without progress after which another method is tried.
 const PATIENCE: usize = 15;
 
+/// Sweeps in a row with nothing but rounding left after which no better one is expected: each has tried several steps.
+const SETTLED: u32 = 3;
+
 /// Solves one convex problem; its solution is measured and reported.
 pub(super) fn sweep(
     track: &mut Track<'_, '_>,
@@ -36,6 +40,7 @@ pub(super) fn sweep(
         state,
         steps,
         residual,
+        ..
     } = minimise(track.system, &bound, start, tolerance, observe);
     let measured = Measured::new(track.system, state, bound);
     let row = Row {
@@ -75,6 +80,7 @@ pub(super) fn run(
     let mut change_before: Option<f64> = None;
     let mut slow = 0;
     let mut accelerated = false;
+    let mut rounded: Option<(Measured, u32)> = None;
     let mut next = swept.measured.implied_bound.clone();
     for count in 0..track.controls.max_iterations {
         let before = change_before.filter(|_| !accelerated);
@@ -96,6 +102,13 @@ pub(super) fn run(
         }
         if answer.is_break() {
             swept.outcome = Outcome::Canceled;
+            return swept;
+        }
+        rounded = nearer(rounded, &swept.measured, track.system, tolerance);
+        if let Some((nearest, _)) = rounded.take_if(|(_, count)| *count >= SETTLED) {
+            swept.measured = nearest;
+            swept.outcome = Outcome::Converged;
+            swept.cycle = None;
             return swept;
         }
         let better = |b: &Measured| friction < 0.9 * b.residuals.friction;
@@ -125,7 +138,8 @@ pub(super) fn run(
         } else {
             swept.measured.implied_bound.clone()
         };
-        change_before = Some(change);
+        // the quotient of changes that are rounding is no contraction
+        change_before = (friction > tolerance).then_some(change);
         if give_up_early && accelerated && since_best >= PATIENCE {
             break;
         }
@@ -140,6 +154,22 @@ pub(super) fn run(
         swept.measured = best;
     }
     swept
+}
+
+/// The best of the sweeps in a row that have nothing but rounding left above the tolerance, and their number.
+fn nearer(
+    before: Option<(Measured, u32)>,
+    now: &Measured,
+    system: &System<'_>,
+    tolerance: f64,
+) -> Option<(Measured, u32)> {
+    rounding::limit(system, now, tolerance)?;
+    let monolithic = |measured: &Measured| measured.residuals.monolithic;
+    match before {
+        Some((best, count)) if monolithic(&best) <= monolithic(now) => Some((best, count + 1)),
+        Some((_, count)) => Some((now.clone(), count + 1)),
+        None => Some((now.clone(), 1)),
+    }
 }
 
 /// The last sweeps: the bounds tried, and the difference of each from the bound that it implied.

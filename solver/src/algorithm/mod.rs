@@ -11,6 +11,7 @@ mod large_slip;
 mod newton;
 mod profile;
 mod report;
+mod rounding;
 mod slides;
 mod small_strain;
 mod system;
@@ -23,10 +24,13 @@ pub use convex::{Minimum, minimise};
 pub use finished::Finished;
 pub use profile::{Missed, Quantity};
 pub use report::{Reported, report};
+pub use rounding::Rounding;
 pub use slides::Slide;
 pub use system::{ContactNode, Patch, Point, State, System};
 pub use track::{Cycle, Place};
-pub use uniqueness::{compared, note_doubled_increments, note_uniqueness, other_solution};
+pub use uniqueness::{
+    compared, note_doubled_increments, note_uniqueness, other_solution, rounding_of_forces,
+};
 
 use std::ops::ControlFlow;
 
@@ -145,7 +149,9 @@ fn start(
     if system.points.is_empty() || solved || answer.is_break() {
         return (measured, answer);
     }
-    if system.semidefinite && measured.residuals.kkt > track.controls.tolerance {
+    let tolerance = track.controls.tolerance;
+    let rounded = || rounding::limit(system, &measured, tolerance).is_some();
+    if system.semidefinite && measured.residuals.kkt > tolerance && !rounded() {
         // only friction holds this body: without it, it slides away
         let (bonded, answer) = bonded_state(system, track.controls, observe);
         return (bonded, answer);
@@ -199,6 +205,7 @@ fn auto(mut track: Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -
     track.forget();
     let second = both(&mut track, bonded, observe);
     let nearer = second.outcome == Outcome::Converged
+        || second.rounding.is_some()
         || second.outcome == Outcome::Canceled
         || second.measured.residuals.monolithic < first.measured.residuals.monolithic;
     let (nearest, other) = if nearer {
@@ -211,13 +218,17 @@ fn auto(mut track: Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -
 
 /// Sweeps, then Newton's method from the best of them.
 fn both(track: &mut Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> End {
+    let (system, tolerance) = (track.system, track.controls.tolerance);
     let swept = fixed_point::run(track, start, true, observe);
+    let swept = swept.settled(system, tolerance, &track.history);
     if swept.ended() {
         return swept;
     }
     track.forget();
     let newton = newton::run(track, &swept.measured, NEWTON_STEPS, observe);
+    let newton = newton.settled(system, tolerance, &track.history);
     let nearer = newton.outcome == Outcome::Converged
+        || newton.rounding.is_some()
         || newton.outcome == Outcome::Canceled
         || newton.measured.residuals.monolithic < swept.measured.residuals.monolithic;
     let contraction = swept.contraction;

@@ -15,10 +15,10 @@ use crate::algorithm::convex::{
     close, dense, free_dofs, least_along, semidefinite_shift, update_active,
 };
 use crate::algorithm::finished::End;
+use crate::algorithm::rounding;
 use crate::algorithm::system::{Point, State, System};
 use crate::algorithm::track::{Measured, Row, Track};
 use crate::elasticity::Dof;
-use crate::friction::Source;
 use crate::linear::{Breaks, Dense, General, Unsolved};
 use crate::solution::{Observer, Outcome, Progress, Stage};
 
@@ -37,7 +37,7 @@ pub(super) fn run(
     let mut end = End::new(start.clone(), Stage::Newton, Outcome::NotConverged);
     let mut state = start.state.clone();
     let (mut best, mut residual_before) = (f64::INFINITY, f64::INFINITY);
-    let mut since_best = 0;
+    let (mut since_best, mut rounded) = (0, 0);
     for _ in 0..most_steps {
         close(system, &mut state);
         let Some((measured, changed)) = next(system, &state, residual_before, observe) else {
@@ -68,8 +68,16 @@ pub(super) fn run(
             end.outcome = Outcome::Converged;
             return end;
         }
+        rounded = match rounding::limit(system, &end.measured, tolerance) {
+            Some(_) => rounded + 1,
+            None => 0,
+        };
         if answer.is_break() {
             end.outcome = Outcome::Canceled;
+            return end;
+        }
+        if rounded >= rounding::PATIENCE {
+            end.outcome = Outcome::Converged;
             return end;
         }
         end.cycle = track.note(&state, residual);
@@ -187,7 +195,7 @@ pub(super) fn jacobian(
         if coupling == 0.0 {
             continue;
         }
-        for (node, weight) in reaction_weights(system, state, point) {
+        for (node, weight) in system.reaction_weights(state, point) {
             let Dof::Free(dof) = system.nodes[node].normal else {
                 continue;
             };
@@ -206,23 +214,4 @@ pub(super) fn jacobian(
 
 fn averaged(point: &Point, pressures: &[f64]) -> f64 {
     point.source.nonlocal_pressure(pressures)
-}
-
-/// The averaged pressure of a point as a sum over reactions, W P: nodes in contact and their weights.
-pub(super) fn reaction_weights(
-    system: &System<'_>,
-    state: &State,
-    point: &Point,
-) -> Vec<(usize, f64)> {
-    let Source::Average(row) = &point.source else {
-        return Vec::new();
-    };
-    let mut weights: Vec<(usize, f64)> = Vec::with_capacity(row.weights.len());
-    for (i, &weight) in row.weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-        let node = row.first + i;
-        if state.active[node] {
-            weights.push((node, weight / system.nodes[node].weight));
-        }
-    }
-    weights
 }

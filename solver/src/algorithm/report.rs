@@ -107,6 +107,7 @@ pub fn report(
         contacts.insert(name.clone(), summary);
     }
     warn_of_iteration(finished, &mut warnings);
+    warn_of_rounding(model, finished, &mut warnings);
     // how far a body that slides away has come means nothing
     if finished.slide.is_none() {
         let slides = warn_of_large_slip(system, v, &forces.reactions, &mut warnings);
@@ -390,7 +391,10 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
             ),
         );
     }
-    if finished.outcome == Outcome::NotConverged {
+    let by_rounding = finished
+        .rounding
+        .is_some_and(|rounding| !rounding.negligible());
+    if finished.outcome == Outcome::NotConverged && !by_rounding {
         let r = finished.residuals;
         warn(
             WarningCode::NotConverged,
@@ -421,4 +425,46 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
             ),
         );
     }
+}
+
+/// Says where rounding keeps residuals above the tolerance, and what would lower them.
+fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warning>) {
+    let Some(rounding) = finished.rounding else {
+        return;
+    };
+    let (floor, tolerance) = (rounding.floor, model.controls.tolerance);
+    let slip = rounding.slip.and_then(|slip| {
+        let contact = &model.contacts[slip.patch];
+        Some((slip.displacement, contact, contact.friction.as_ref()?))
+    });
+    let mut message = format!(
+        "A residual of {:.1e} remains, which rounding cannot bring below some {floor:.1e} (tolerance {tolerance:.1e}): ",
+        rounding.residual
+    );
+    let pointer = match slip {
+        Some((displacement, contact, friction)) => {
+            let slip = friction.elastic_slip;
+            message += &format!(
+                "slip is the difference of displacements of {displacement:.1e}, {:.1e} times the `elastic_slip` of {slip:.1e}.",
+                displacement / slip
+            );
+            if !rounding.negligible() {
+                message += " Rounding may decide what sticks and what slips: this does not count as converged.";
+            }
+            message += &format!(
+                " Raise elastic_slip, to {:.1e} for this tolerance, or let the obstacle move less far.",
+                slip * floor / tolerance
+            );
+            format!("{}/friction/elastic_slip", contact.pointer)
+        }
+        None => {
+            message += "displacements are large beside those that strain the body. Prescribe supports and obstacles relative to one another, or raise the tolerance.";
+            "/solver/tolerance".to_owned()
+        }
+    };
+    warnings.push(Warning {
+        code: WarningCode::RoundingLimitsResidual,
+        pointer,
+        message,
+    });
 }

@@ -550,6 +550,21 @@ impl<'a> System<'a> {
             .collect()
     }
 
+    /// The averaged pressure of a point as a sum over reactions, W P: nodes in contact and their weights.
+    pub fn reaction_weights(&self, state: &State, point: &Point) -> Vec<(usize, f64)> {
+        let Source::Average(row) = &point.source else {
+            return Vec::new();
+        };
+        let mut weights: Vec<(usize, f64)> = Vec::with_capacity(row.weights.len());
+        for (i, &weight) in row.weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+            let node = row.first + i;
+            if state.active[node] {
+                weights.push((node, weight / self.nodes[node].weight));
+            }
+        }
+        weights
+    }
+
     /// ∫p over some nodes by their reactions (without 2π).
     pub fn normal_force(&self, nodes: std::ops::Range<usize>, reactions: &[f64]) -> f64 {
         nodes.map(|i| self.nodes[i].force() * reactions[i]).sum()
@@ -594,19 +609,30 @@ impl<'a> System<'a> {
                 (false, _) => force[dof].abs().max(-stiffness * opening),
             });
         }
-        let largest = |values: &[f64]| values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
-        let scale = match largest(&reactions) {
-            0.0 => largest(&self.load)
-                .max(largest(&friction))
-                .max(self.reference_force),
-            reaction => reaction,
-        };
         // a problem without any force has no scale, and no defect
         if defect == 0.0 {
             0.0
         } else {
-            defect / scale.max(f64::MIN_POSITIVE)
+            defect / self.scale(&reactions, &friction)
         }
+    }
+
+    /// The force that [`System::kkt_residual`] divides by, > 0.
+    pub fn force_scale(&self, state: &State, bound: &[f64]) -> f64 {
+        let mut friction = vec![0.0; state.v.len()];
+        self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
+        self.scale(&self.reactions(state), &friction)
+    }
+
+    fn scale(&self, reactions: &[f64], friction: &[f64]) -> f64 {
+        let largest = |values: &[f64]| values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+        let scale = match largest(reactions) {
+            0.0 => largest(&self.load)
+                .max(largest(friction))
+                .max(self.reference_force),
+            reaction => reaction,
+        };
+        scale.max(f64::MIN_POSITIVE)
     }
 }
 

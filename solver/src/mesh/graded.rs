@@ -1,7 +1,7 @@
 //! Refinement of single elements, without hanging nodes: red where it is asked for, green beside.
 //!
-//! A *red* division makes four elements of one; a quadrilateral much longer than wide is halved across instead. An
-//! element with a split side of which nothing more is asked is *closed*, for the mesh of one solution only:
+//! A *red* division makes four elements of one; a quadrilateral much longer than wide is halved across before, so often
+//! that divisions end (`halving`). An element with a split side of which nothing more is asked is *closed*, for the mesh of one solution only:
 //!
 //! ```text
 //!   +-------+    +-------+    +---+---+    +-------+        +
@@ -15,15 +15,10 @@
 
 use std::collections::BTreeMap;
 
+use super::halving::{Halving, halvings, must_divide};
 use super::refine::Finer;
 use super::{Edge, Mesh};
 use crate::element::Element;
-
-/// A quadrilateral longer than this many times its width is halved, which brings its sides together.
-const LONG: f64 = 3.0;
-
-/// A division asks for others about as far as it is levels finer than its surroundings; a few passes are usual.
-const MOST_PASSES: u32 = 100;
 
 /// So often folded closures are replaced by divisions; those of an element that is all but folded itself remain.
 const MOST_UNFOLDING: u32 = 4;
@@ -33,12 +28,24 @@ const MOST_UNFOLDING: u32 = 4;
 pub struct GradedMesh {
     /// Nodes, split sides and node sets, without those of closures.
     finer: Finer,
-    /// Elements, some of them with split sides, and the element of the first mesh that each is a part of.
-    elements: Vec<(Element, u32)>,
+    /// Elements, some of them with split sides.
+    elements: Vec<Part>,
+    /// Of the elements of the first mesh.
+    halvings: Vec<Halving>,
     boundaries: BTreeMap<String, Vec<Edge>>,
     /// Elements of the first mesh by group.
     groups: BTreeMap<String, Vec<u32>>,
     set_names: Vec<String>,
+}
+
+/// A part of an element of the first mesh.
+#[derive(Clone, Copy)]
+struct Part {
+    element: Element,
+    /// That element.
+    origin: u32,
+    /// How often it was halved on the way to this part.
+    halved: u32,
 }
 
 impl GradedMesh {
@@ -46,7 +53,14 @@ impl GradedMesh {
     pub fn new(mesh: &Mesh) -> Self {
         GradedMesh {
             finer: Finer::new(mesh),
-            elements: mesh.elements.iter().copied().zip(0..).collect(),
+            elements: (mesh.elements.iter().zip(0..))
+                .map(|(element, origin)| Part {
+                    element: *element,
+                    origin,
+                    halved: 0,
+                })
+                .collect(),
+            halvings: halvings(mesh),
             boundaries: mesh.boundaries.clone(),
             groups: mesh.groups.clone(),
             set_names: mesh.node_sets.keys().cloned().collect(),
@@ -58,30 +72,20 @@ impl GradedMesh {
         self.elements.len()
     }
 
-    /// Divides the elements that are marked, and others until the rest can be closed. Whether that was possible: among
-    /// elements of odd shapes one division may ask for another without end, and `self` is of no use then.
-    pub fn refine(&mut self, marked: &[bool]) -> bool {
+    /// Divides the elements that are marked, and others until the rest can be closed.
+    pub fn refine(&mut self, marked: &[bool]) {
         let mut marked = marked.to_vec();
-        let (mut passes, mut unfolding) = (0, 0);
+        let mut unfolding = 0;
         while marked.contains(&true) {
-            passes += 1;
-            if passes > MOST_PASSES {
-                return false;
-            }
-            let elements = std::mem::take(&mut self.elements);
-            for ((element, origin), marked) in elements.into_iter().zip(marked) {
+            let parts = std::mem::take(&mut self.elements);
+            for (part, marked) in parts.into_iter().zip(marked) {
                 match marked {
-                    true => {
-                        let children = self.divided(&element).into_iter();
-                        self.elements.extend(children.map(|child| (child, origin)));
-                    }
-                    false => self.elements.push((element, origin)),
+                    true => self.divide(part),
+                    false => self.elements.push(part),
                 }
             }
-            let elements = self.elements.iter();
-            marked = elements
-                .map(|(element, _)| self.must_divide(element))
-                .collect();
+            let parts = self.elements.iter();
+            marked = parts.map(|part| self.must_divide(&part.element)).collect();
             if !marked.contains(&true) && unfolding < MOST_UNFOLDING {
                 unfolding += 1;
                 marked = self.folded();
@@ -94,7 +98,6 @@ impl GradedMesh {
             }
             *edges = finer;
         }
-        true
     }
 
     /// The mesh without hanging nodes, and for each of its elements that of `self` which it is a part of.
@@ -109,14 +112,14 @@ impl GradedMesh {
                 groups_of.entry(*e).or_default().push(name);
             }
         }
-        for ((element, origin), part) in self.elements.iter().zip(0..) {
-            for closing in closure(&mut finer, element) {
-                for name in groups_of.get(origin).into_iter().flatten() {
+        for (part, number) in self.elements.iter().zip(0..) {
+            for closing in closure(&mut finer, &part.element) {
+                for name in groups_of.get(&part.origin).into_iter().flatten() {
                     let group = groups.entry(name).or_default();
                     group.push(elements.len() as u32);
                 }
                 elements.push(closing);
-                parts.push(part);
+                parts.push(number);
             }
         }
         let mesh = Mesh {
@@ -132,49 +135,56 @@ impl GradedMesh {
         (mesh, parts)
     }
 
-    /// Four elements, or two halves of a long one.
-    fn divided(&mut self, element: &Element) -> Vec<Element> {
-        if let Element::Quad(p) = element {
-            let side = |a: usize, b: usize| {
-                let [[x0, y0], [x1, y1]] = [p[a], p[b]].map(|n| self.finer.nodes[n as usize]);
-                (x1 - x0).hypot(y1 - y0)
-            };
-            let (along, across) = (side(0, 1) + side(2, 3), side(1, 2) + side(3, 0));
-            if along.max(across) > LONG * along.min(across) {
-                let turned = turned(*p, usize::from(across > along));
+    /// Adds four parts of a part, or two halves of a long one.
+    fn divide(&mut self, part: Part) {
+        let Part {
+            element,
+            origin,
+            halved,
+        } = part;
+        let halving = self.halvings[origin as usize];
+        let (children, halved) = match element {
+            Element::Quad(p) if halved < halving.times => {
+                let across = turned(p, halving.sides);
                 for i in [0, 2] {
-                    let (a, b) = (turned[i], turned[(i + 1) % 4]);
-                    self.finer.split([a, b, turned[4 + i]]);
+                    let (a, b) = (across[i], across[(i + 1) % 4]);
+                    self.finer.split([a, b, across[4 + i]]);
                 }
-                return halves(&mut self.finer, turned).unwrap_or_default();
+                let halves = halves(&mut self.finer, across).unwrap_or_default();
+                // sides keep their numbers, which say how they are split
+                let back = |half: Element| match half {
+                    Element::Quad(p) => Element::Quad(turned(p, 4 - halving.sides)),
+                    triangle => triangle,
+                };
+                (halves.into_iter().map(back).collect(), halved + 1)
             }
-        }
-        self.finer.children(element).to_vec()
+            _ => (self.finer.children(&element).to_vec(), halved),
+        };
+        self.elements
+            .extend(children.into_iter().map(|element| Part {
+                element,
+                origin,
+                halved,
+            }));
     }
 
-    /// A half of a side is split again, or too many sides are.
+    /// Whether the sides of an element are split so often that it cannot be closed.
     fn must_divide(&self, element: &Element) -> bool {
-        let mut split = 0;
-        for [start, _, mid] in element.sides() {
+        let split = element.sides().map(|[start, _, mid]| {
             let Some((first, second)) = self.finer.halves(mid, start) else {
-                continue;
+                return 0;
             };
-            split += 1;
-            if [first, second]
-                .iter()
-                .any(|half| self.finer.halves(*half, start).is_some())
-            {
-                return true;
-            }
-        }
-        split + 1 >= element.family().corners()
+            let again = |half: u32| self.finer.halves(half, start).is_some();
+            1 + u32::from(again(first) || again(second))
+        });
+        must_divide(element.family().corners(), split)
     }
 
     /// The elements that closing would fold: those with sides curved as strongly.
     fn folded(&self) -> Vec<bool> {
         let mut finer = self.finer.clone();
-        let mut folds = |(element, _): &(Element, u32)| {
-            let closing = closure(&mut finer, element);
+        let mut folds = |part: &Part| {
+            let closing = closure(&mut finer, &part.element);
             closing.len() > 1
                 && closing.iter().any(|part| {
                     let nodes = part.gather(|n| finer.nodes[n as usize]);
@@ -186,15 +196,15 @@ impl GradedMesh {
         };
         let folded: Vec<bool> = self.elements.iter().map(&mut folds).collect();
         // what is folded itself is no better when it is divided
-        let upright = |(element, _): &(Element, u32)| {
-            let nodes = element.gather(|n| self.finer.nodes[n as usize]);
-            let family = element.family();
+        let upright = |part: &Part| {
+            let nodes = part.element.gather(|n| self.finer.nodes[n as usize]);
+            let family = part.element.family();
             let mut places = family.places().iter();
             places.all(|place| family.map(&nodes, *place).det > 0.0)
         };
         let pairs = folded.iter().zip(&self.elements);
         pairs
-            .map(|(folded, element)| *folded && upright(element))
+            .map(|(folded, part)| *folded && upright(part))
             .collect()
     }
 }

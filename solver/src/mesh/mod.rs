@@ -4,6 +4,7 @@ mod build;
 mod coincident;
 mod graded;
 mod grid;
+mod halving;
 mod inline;
 mod inverted;
 mod refine;

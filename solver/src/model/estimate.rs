@@ -105,7 +105,16 @@ impl Model {
     /// What it will take to solve this model of `problem`: more rather than less than it does. Of adaptive refinement
     /// the largest mesh.
     pub fn estimate(&self, problem: &Problem) -> Estimate {
-        let adaptive = matches!(problem.mesh.refine, Refine::Adaptive(_));
+        self.estimate_with(matches!(problem.mesh.refine, Refine::Adaptive(_)))
+    }
+
+    /// The same of this mesh alone.
+    pub fn estimate_of_mesh(&self) -> Estimate {
+        self.estimate_with(false)
+    }
+
+    /// `adaptive`: of the largest mesh of adaptive refinement.
+    fn estimate_with(&self, adaptive: bool) -> Estimate {
         let nodes = self.mesh.nodes.len() as f64;
         let contacts = self.contacts.iter();
         let contacts = contacts.map(|contact| Along::new(contact, adaptive));

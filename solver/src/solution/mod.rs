@@ -78,7 +78,8 @@ pub struct StepSolution {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Contact set unchanged, every residual below the tolerance.
+    /// Contact set unchanged, every residual below the tolerance, or (warning `rounding_limits_residual`) no larger than
+    /// what rounding leaves of it.
     Converged,
     /// `max_iterations` reached.
     NotConverged,
@@ -154,7 +155,7 @@ pub struct Summary {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Comparison {
     /// True where the two agree: forces and friction bounds to 1e-6 (uniqueness only; for doubled
-    /// increments to `tolerance`).
+    /// increments to `tolerance`), or to what rounding leaves of them.
     pub agrees: bool,
     /// Whether the second one converged; if not, `agrees` has no meaning.
     pub converged: bool,
@@ -315,6 +316,8 @@ pub enum WarningCode {
     SlowContraction,
     /// Residuals above the tolerance after all iterations.
     NotConverged,
+    /// Residuals that rounding keeps above the tolerance.
+    RoundingLimitsResidual,
     /// An iteration of the thesis that settles in a state that is not a solution.
     FalseConvergence,
     /// Contact and slip that repeat themselves.
@@ -593,9 +596,9 @@ pub enum Progress<'a> {
     Phase(Phase),
     /// An iteration is done.
     Iteration(&'a Iteration),
-    /// Adaptive refinement begins to solve on a mesh.
+    /// Adaptive refinement begins to solve on a mesh, or returns to the one before, whose results are final.
     Refinement {
-        /// Number of the mesh, from 1.
+        /// Number of the mesh, from 1; that of the one before if it returns to it.
         number: u32,
         /// Its elements.
         elements: u64,
@@ -615,6 +618,12 @@ pub enum Progress<'a> {
     Pulse,
     /// The solver is about to take this much more memory at once, and asks whether it may.
     Needs {
+        /// Bytes.
+        bytes: u64,
+    },
+    /// The solver could go on with this much more memory, and asks whether there is room for it. If not it ends with what
+    /// it has: the answer does not stop it.
+    Room {
         /// Bytes.
         bytes: u64,
     },

@@ -93,3 +93,26 @@ async fn a_job_that_outgrows_its_share_fails_with_figures_and_its_worker_goes_on
         assert!(detail.contains("a share of 74.0 MiB"), "{detail}");
     }
 }
+
+/// A solver that asks whether there is room for more, and returns what it has if not.
+fn solve_with_what_there_is(
+    _: &Problem,
+    _: Option<External>,
+    observe: &mut Observer<'_>,
+) -> Result<Solution, SolveError> {
+    let mut room = |bytes| observe(Progress::Room { bytes }).is_continue();
+    let asked = [room(MIB), room(1 << 40), room(MIB)];
+    // no answer stops it
+    match asked == [true, false, true] && observe(Progress::Pulse).is_continue() {
+        true => Ok(fake::solution()),
+        false => Err(SolveError::Stopped),
+    }
+}
+
+#[tokio::test]
+async fn a_job_that_finds_no_room_for_more_goes_on_without() {
+    let rig = rig_of_100_mib(solve_with_what_there_is).await;
+    let job = rig.submit_as(needing(10)).await;
+    let ended = rig.until_done(&job).await;
+    assert_eq!(ended.status, Status::Succeeded, "{:?}", ended.failure);
+}

@@ -1,6 +1,7 @@
 //! Primal–dual active set with semi-smooth Newton steps.
 
 use super::step::{AIM, Minimum, close, free_dofs, gradient, newton_direction};
+use crate::algorithm::rounding::{PATIENCE, is_rounding};
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 use crate::solution::{Observer, Progress};
@@ -18,6 +19,7 @@ pub(super) fn run(
 ) -> Minimum {
     let mut state = start.clone();
     let mut best: Option<Minimum> = None;
+    let mut without_gain = 0;
     for step in 1..=ACTIVE_SET_STEPS {
         close(system, &mut state);
         let free: Vec<usize> = free_dofs(system, |i| state.active[i]);
@@ -31,16 +33,26 @@ pub(super) fn run(
         let changed = update_active(system, &mut state);
         let residual = system.kkt_residual(&state, bound);
         // with settled sets a step is exact up to rounding: no further gain is possible
-        let settled = !changed && best.as_ref().is_some_and(|b| residual > 0.5 * b.residual);
+        let gained = best.as_ref().is_none_or(|b| residual <= 0.5 * b.residual);
+        let settled = !changed && !gained;
+        without_gain = if gained { 0 } else { without_gain + 1 };
         if best.as_ref().is_none_or(|b| residual < b.residual) {
             best = Some(Minimum {
                 state: state.clone(),
                 steps: step,
                 residual,
+                rounded: false,
             });
         }
         let reached = best.as_ref().map_or(f64::INFINITY, |b| b.residual);
         let arrived = !changed && residual <= AIM * tolerance || settled && reached <= tolerance;
+        if let Some(best) = &mut best
+            && without_gain >= PATIENCE
+            && is_rounding(system, (&best.state, bound), best.residual, tolerance)
+        {
+            best.rounded = true;
+            break;
+        }
         if arrived || observe(Progress::Pulse).is_break() {
             break;
         }
@@ -50,6 +62,7 @@ pub(super) fn run(
         state,
         steps,
         residual: f64::INFINITY,
+        rounded: false,
     })
 }
 

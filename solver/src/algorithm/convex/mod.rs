@@ -28,7 +28,7 @@ pub fn minimise(
     observe: &mut Observer<'_>,
 ) -> Minimum {
     let mut by_active_set = active_set::run(system, bound, start, tolerance, observe);
-    if by_active_set.residual <= tolerance {
+    if by_active_set.residual <= tolerance || by_active_set.rounded {
         return by_active_set;
     }
     if observe(Progress::Pulse).is_break() {

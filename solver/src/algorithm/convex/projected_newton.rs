@@ -1,6 +1,7 @@
 //! Projected Newton (Bertsekas 1982) with a line search: slower, but J decreases at every step.
 
 use super::step::{AIM, Minimum, close, free_dofs, gradient, newton_direction};
+use crate::algorithm::rounding::{PATIENCE, is_rounding};
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::elasticity::Dof;
 use crate::friction::FrictionLaw;
@@ -8,9 +9,6 @@ use crate::solution::{Observer, Progress};
 
 /// Steps of projected Newton; a dozen are usual.
 const PROJECTED_STEPS: u32 = 300;
-
-/// Steps without gain after which a residual below the tolerance is accepted.
-const PATIENCE: u32 = 5;
 
 /// Projected Newton (Bertsekas): hold the nodes that press against the obstacle, step in the
 /// others, and let the step end on the obstacle where it would pass it.
@@ -25,6 +23,7 @@ pub(super) fn run(
         state: start.clone(),
         steps: 0,
         residual: f64::INFINITY,
+        rounded: false,
     };
     let mut begin = start.clone();
     close(system, &mut begin);
@@ -42,11 +41,16 @@ pub(super) fn run(
                 state,
                 steps,
                 residual,
+                rounded: false,
             };
         }
         let stale = steps - best.steps.min(steps);
-        let arrived =
-            best.residual <= AIM * tolerance || best.residual <= tolerance && stale >= PATIENCE;
+        let patient = stale < PATIENCE;
+        best.rounded =
+            !patient && is_rounding(system, (&best.state, bound), best.residual, tolerance);
+        let arrived = best.residual <= AIM * tolerance
+            || best.residual <= tolerance && !patient
+            || best.rounded;
         if arrived || observe(Progress::Pulse).is_break() {
             break;
         }

@@ -13,6 +13,8 @@ pub struct Minimum {
     pub steps: u32,
     /// Its KKT residual.
     pub residual: f64,
+    /// What is left of it above the tolerance is rounding.
+    pub rounded: bool,
 }
 
 /// Aim at a tenth of the tolerance so that the error of the inner problem does not disturb the outer residuals.
