@@ -221,11 +221,11 @@ fn load_steps_are_those_of_the_last_mesh() {
     let summary = &pressed.solution.summary;
     assert!(summary.refinements.len() > 2 && summary.converged);
     assert!(summary.refinements.last().unwrap().error.unwrap() <= 0.01);
-    let nodes = pressed.solution.profiles["top"].s.len();
+    let nodes = pressed.solution.node_profiles["top"].s.len();
     assert_eq!(pressed.solution.steps.len(), 2);
     for step in &pressed.solution.steps {
         assert!(step.summary.converged && step.summary.refinements.is_empty());
-        assert_eq!(step.profiles["top"].s.len(), nodes);
+        assert_eq!(step.node_profiles["top"].s.len(), nodes);
     }
     assert_eq!(pressed.rows, pressed.solution.history.len());
     assert!(
