@@ -48,3 +48,4 @@ mod thesis;
 mod thick_cylinder;
 mod tolerance;
 mod traps;
+mod verify;

@@ -6,8 +6,8 @@ use crate::error::{AllChecks, Checked, MOST_LISTED, Reason, escape};
 use crate::finite::not_finite;
 use crate::mesh::Mesh;
 use crate::problem::{
-    Algorithm, Analysis, Condition, Friction, FrictionPoints, History, Measure, NormalOf, Problem,
-    Step, ThesisPressure, Units,
+    AccuracyMode, Algorithm, Analysis, Condition, Friction, FrictionPoints, History, Measure,
+    NormalOf, Problem, Step, ThesisPressure, Units,
 };
 
 impl Checks {
@@ -113,6 +113,15 @@ impl Checks {
                 "true without steps",
                 "true with `steps` only",
                 "Without steps there are no increments to double.",
+            ));
+        }
+        if controls.accuracy == AccuracyMode::Verify && problem.contacts.is_empty() {
+            all.fail(self.report(
+                "/solver/accuracy",
+                Reason::NotUsed,
+                "`verify` without a contact",
+                "`verify` with `contacts` only",
+                "It verifies the forces, peak stresses and extents of contacts.",
             ));
         }
         all.check(self.require(
