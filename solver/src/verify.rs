@@ -10,7 +10,7 @@ use crate::error::SolveError;
 use crate::mesh::{External, ExternalMesh, Mesh, refine};
 use crate::model::Model;
 use crate::model::estimate::MostElements;
-use crate::problem::{AccuracyMode, Problem, Refine};
+use crate::problem::{Problem, Refine};
 use crate::solution::{Accuracy, Observer, Outcome, Phase, Progress, Solution};
 use crate::steps;
 
@@ -25,7 +25,7 @@ pub struct Verification {
 impl Verification {
     /// For a problem that asks for it. `external`: the mesh that it only names or quotes.
     pub fn of(problem: &Problem, external: &Option<External>) -> Option<Verification> {
-        (problem.solver.accuracy == AccuracyMode::Verify).then(|| Verification {
+        problem.solver.verifies().then(|| Verification {
             // only a mesh that is refined is needed again
             external: match problem.mesh.refine {
                 Refine::Times(1..) => external.clone(),

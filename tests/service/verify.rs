@@ -86,8 +86,11 @@ async fn both_protocols_verify_and_show_the_same() {
         .unwrap();
     assert_eq!(refused.status(), 422);
     let refused: Value = refused.json().await.unwrap();
-    let violation = &refused["violations"][0];
-    assert_eq!(violation["pointer"], "/problem/solver/accuracy");
+    let violation = &refused["errors"][0];
+    assert_eq!(
+        violation["pointer"], "/problem/solver/accuracy",
+        "{refused:#}"
+    );
     assert!(violation["got"].as_str().unwrap().contains("certain"));
     assert!(violation["expected"].as_str().unwrap().contains("verify"));
 }

@@ -40,7 +40,7 @@ fn solved(number: u64, refine: u32, ratio: Option<f64>, mode: AccuracyMode) -> O
         *poissons_ratio = ratio;
     }
     problem.mesh.refine = Refine::Times(refine);
-    problem.solver.accuracy = mode;
+    problem.solver.accuracy = Some(mode);
     let summary = solver::solve(&problem, &mut quiet).unwrap().summary;
     summary.converged.then_some(summary)
 }

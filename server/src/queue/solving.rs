@@ -5,7 +5,7 @@ use std::{ops::ControlFlow, time::Duration, time::Instant};
 use solver::{
     error::SolveError,
     mesh::Mesh,
-    problem::{AccuracyMode, Problem, Refine, Step},
+    problem::{Problem, Refine, Step},
     solution::{Observer, Phase},
 };
 
@@ -52,7 +52,7 @@ pub(super) fn solve_and_report(
     if problem.steps.len() <= 1
         && problem.steps.iter().all(single)
         && matches!(problem.mesh.refine, Refine::Times(_))
-        && problem.solver.accuracy == AccuracyMode::Estimate
+        && !problem.solver.verifies()
     {
         // the next report asks again whether to stop
         let _ = tell(Told::Report(Report::OneLevel));

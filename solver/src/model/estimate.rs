@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::{ContactModel, Model};
 use crate::error::{Reason, Violation};
-use crate::problem::{AccuracyMode, FrictionPoints, MeshSource, Problem, Refine};
+use crate::problem::{FrictionPoints, MeshSource, Problem, Refine};
 
 /// The cost of solving a problem on one core.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -106,7 +106,7 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate
     };
     // powers of two as floats end in infinity, and nothing overflows
     let elements = 4f64.powi(times.min(1000) as i32) * elements;
-    let all = match verifies(problem) {
+    let all = match problem.solver.verifies() {
         true => 4.0 * elements,
         false => elements,
     };
@@ -132,18 +132,13 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate
         ..Size::default()
     };
     let own = size.estimate(1.0);
-    Ok(match verifies(problem) {
+    Ok(match problem.solver.verifies() {
         true => Estimate {
             dofs: own.dofs,
             ..size.split().estimate(1.0)
         },
         false => own,
     })
-}
-
-/// The problem is solved on the mesh split in two as well.
-fn verifies(problem: &Problem) -> bool {
-    problem.solver.accuracy == AccuracyMode::Verify
 }
 
 impl Model {
@@ -153,7 +148,7 @@ impl Model {
         let adaptive = matches!(problem.mesh.refine, Refine::Adaptive(_));
         let own = self.size(adaptive);
         let solved = own.estimate(MARGIN);
-        if !verifies(problem) {
+        if !problem.solver.verifies() {
             return solved;
         }
         let halved = match adaptive {

@@ -6,8 +6,8 @@ use crate::error::{AllChecks, Checked, MOST_LISTED, Reason, escape};
 use crate::finite::not_finite;
 use crate::mesh::Mesh;
 use crate::problem::{
-    AccuracyMode, Algorithm, Analysis, Condition, Friction, FrictionPoints, History, Measure,
-    NormalOf, Problem, Step, ThesisPressure, Units,
+    Algorithm, Analysis, Condition, Friction, FrictionPoints, History, Measure, NormalOf, Problem,
+    Step, ThesisPressure, Units,
 };
 
 impl Checks {
@@ -115,7 +115,7 @@ impl Checks {
                 "Without steps there are no increments to double.",
             ));
         }
-        if controls.accuracy == AccuracyMode::Verify && problem.contacts.is_empty() {
+        if controls.verifies() && problem.contacts.is_empty() {
             all.fail(self.report(
                 "/solver/accuracy",
                 Reason::NotUsed,

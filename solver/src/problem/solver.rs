@@ -77,10 +77,10 @@ pub struct SolverControls {
     pub check_uniqueness: bool,
     /// Solve once more with twice the increments, and report how much the result changes.
     pub check_increments: bool,
-    /// How the errors in `summary.accuracy` are found: `verify` solves once more on the mesh split in two, which takes
-    /// several times as long and as much memory.
-    #[serde(skip_serializing_if = "AccuracyMode::is_estimate")]
-    pub accuracy: AccuracyMode,
+    /// How the errors in `summary.accuracy` are found; absent: `estimate`. `verify` solves once more on the mesh split in
+    /// two, which takes several times as long and as much memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<AccuracyMode>,
     /// Options that the thesis leaves open; for `algorithm: thesis` only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub thesis: Option<ThesisOptions>,
@@ -114,10 +114,10 @@ pub enum AccuracyMode {
     Verify,
 }
 
-impl AccuracyMode {
-    /// The default, which is not written: fingerprints of problems from before there was a choice stay.
-    fn is_estimate(&self) -> bool {
-        *self == AccuracyMode::Estimate
+impl SolverControls {
+    /// The errors are to be verified.
+    pub fn verifies(&self) -> bool {
+        self.accuracy == Some(AccuracyMode::Verify)
     }
 }
 
@@ -174,7 +174,7 @@ impl Default for SolverControls {
             max_iterations: 200,
             check_uniqueness: false,
             check_increments: false,
-            accuracy: AccuracyMode::Estimate,
+            accuracy: None,
             thesis: None,
         }
     }

@@ -146,7 +146,7 @@ fn verify_until_stopped(
     observe: &mut Observer<'_>,
 ) -> std::result::Result<Solution, SolveError> {
     let mut problem = problem.clone();
-    problem.solver.accuracy = AccuracyMode::Verify;
+    problem.solver.accuracy = Some(AccuracyMode::Verify);
     solver::solve_on(&problem, mesh, &mut |progress| {
         let verifies = matches!(progress, Progress::Phase(Phase::Verify));
         let mut answer = observe(progress);

@@ -18,7 +18,7 @@ fn solve_with_a_step(
     observe: &mut Observer<'_>,
 ) -> std::result::Result<Solution, SolveError> {
     let mut problem = problem.clone();
-    problem.solver.accuracy = AccuracyMode::Verify;
+    problem.solver.accuracy = Some(AccuracyMode::Verify);
     let solution = solver::solve_on(&problem, mesh, observe)?;
     match observe(Progress::Step(&solution)).is_break() {
         true => Err(SolveError::Stopped),
