@@ -88,6 +88,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("ThesisOptions", "problem::ThesisOptions").defaulted(),
     names("ThesisPressure", "problem::ThesisPressure").defaulted(),
     names("Algorithm", "problem::Algorithm").defaulted(),
+    names("AccuracyMode", "problem::AccuracyMode").defaulted(),
 
     // the checks of a problem
     fields("ValidateProblemResponse", "problems::Validation").answer(),

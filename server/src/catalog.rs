@@ -162,7 +162,7 @@ catalog! {
     PayloadTooLarge: of_request("The body or message is too large", 413, Grpc::OutOfRange, None,
         "The body, or a message over gRPC, is larger than this service accepts or sends. Upload a large mesh once (POST /v1/meshes or UploadMesh) and refer to it in the problem as mesh.stored."),
     ProblemTooLarge: of_request("The problem is too large", 413, Grpc::OutOfRange, None,
-        "According to the estimate that comes with this error, the job would need more memory than the budget allows. Use a coarser mesh or less refinement, or ask the operator for a larger budget."),
+        "According to the estimate that comes with this error, the job would need more memory than the budget allows. Use a coarser mesh or less refinement, or ask the operator for a larger budget. With solver.accuracy verify the mesh split in two is counted."),
     UriTooLong: of_request("The address is too long", 414, Grpc::Unimplemented, None,
         "The path and the query together are longer than this service accepts. Use fewer or shorter filters."),
     UnsupportedMedia: of_request("Unsupported media type", 415, Grpc::Unimplemented, None,

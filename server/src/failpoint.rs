@@ -35,6 +35,7 @@ pub(crate) enum Point {
     Condensing,
     Iterating,
     Recovering,
+    Verifying,
     /// It has events that are not stored.
     EventsReported,
     /// They are stored, but not announced.
@@ -65,6 +66,7 @@ impl Point {
             Phase::Condense => Point::Condensing,
             Phase::Iterate => Point::Iterating,
             Phase::Recover => Point::Recovering,
+            Phase::Verify => Point::Verifying,
         })
     }
 }

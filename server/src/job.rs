@@ -401,7 +401,7 @@ pub enum Waiting {
 /// The progress of a job.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Progress {
-    /// The phase that began last: mesh, assemble, …, recover.
+    /// The phase that began last: mesh, assemble, …, recover, and verify.
     pub stage: String,
     /// Iterations so far.
     pub iteration: u32,

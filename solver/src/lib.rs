@@ -47,6 +47,9 @@ pub mod origins;
 // Load steps, one after the other.
 pub mod steps;
 
+// The errors by solving on the mesh split in two.
+pub mod verify;
+
 // Finer meshes until the errors are small enough.
 pub mod adapt;
 
@@ -57,6 +60,7 @@ use model::Model;
 use origins::Origins;
 use problem::{Problem, Refine};
 use solution::{Observer, Phase, Progress, Solution, Warning};
+use verify::Verification;
 
 /// Solves a problem: the whole flow on one screen.
 ///
@@ -81,27 +85,34 @@ pub fn solve_with_mesh(
     external: Option<External>,
     observe: &mut Observer<'_>,
 ) -> Result<(Solution, Mesh), SolveError> {
-    match problem.mesh.refine {
+    let mut verification = Verification::of(problem, &external);
+    let (mut solution, mesh) = match problem.mesh.refine {
         Refine::Times(_) => {
             let prepared = prepare(problem, external, observe)?;
-            Ok((prepared.solve(observe)?, prepared.model.mesh))
+            (prepared.solve(observe)?, prepared.model.mesh)
         }
         Refine::Adaptive(goal) => {
             let first = Model::new(problem, external).map_err(SolveError::Invalid)?;
+            verification = verification.map(|verification| verification.limited(&first));
             let solve = |model: Model, origins: &mut Origins, observe: &mut Observer<'_>| {
                 notify(observe, Progress::Phase(Phase::Mesh))?;
                 let Prepared { model, body } = prepared(model, observe)?;
                 steps::run(&model, &body, Some(origins), observe)
             };
-            adapt::run(problem, &goal, first, &solve, observe)
+            adapt::run(problem, &goal, first, &solve, observe)?
         }
+    };
+    if let Some(verification) = verification {
+        verification.verify(problem, &mesh, &mut solution, observe);
     }
+    Ok((solution, mesh))
 }
 
 /// A problem up to its iterations: checked, and its body factored and condensed onto its contacts.
 ///
 /// This is most of the work, and problems that differ only in friction, indentation, drag, load steps or tolerances
-/// share it. (An obstacle of another shape may face other nodes, or turn their normals.)
+/// share it. (An obstacle of another shape may face other nodes, or turn their normals.) Errors are estimated here, whatever
+/// `solver.accuracy` is: [`solve`] verifies them.
 pub struct Prepared {
     /// The checked problem.
     pub model: Model,

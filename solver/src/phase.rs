@@ -38,6 +38,8 @@ pub enum Phase {
     Iterate,
     /// Back-substitution, stresses, profiles.
     Recover,
+    /// Solving once more on the mesh split in two, with `"accuracy": "verify"` only.
+    Verify,
 }
 
 impl Phase {

@@ -1,8 +1,10 @@
 //! Load steps and their increments: the incremental law (formulation 1.5), and results along a load
 //! history for both laws.
 
+use std::borrow::Cow;
+
 use crate::accuracy;
-use crate::algorithm::{self, Finished, Place, Rounding, System, report};
+use crate::algorithm::{self, Finished, Place, Reported, Rounding, System, report};
 use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::model::{Level, Model};
@@ -24,12 +26,7 @@ pub fn run(
     mut origins: Option<&mut Origins>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
-    let whole = [Step::whole()];
-    let steps = if model.steps.is_empty() {
-        &whole[..]
-    } else {
-        &model.steps
-    };
+    let steps = &steps_of(model);
     let mut load_history = LoadHistory::new(model, System::new(model, body, observe)?);
     let mut so_far: Option<Solution> = None;
     let mut fields = Fields::default();
@@ -108,6 +105,31 @@ pub fn run(
     Ok(solution)
 }
 
+/// The same path to its end, of which nothing is assessed, and which is not compared with another: for a solution that is
+/// compared itself.
+pub fn run_to_compare(
+    model: &Model,
+    body: &ElasticBody,
+    observe: &mut Observer<'_>,
+) -> Result<Reported, SolveError> {
+    let mut load_history = LoadHistory::new(model, System::new(model, body, observe)?);
+    let last = load_history.to_the_end(&steps_of(model), 1, observe);
+    match last {
+        Some(finished) if finished.outcome != Outcome::Canceled => {
+            report(model, body, &load_history.system, &finished)
+        }
+        _ => Err(SolveError::Stopped),
+    }
+}
+
+/// The load steps; a problem without steps is one step.
+fn steps_of(model: &Model) -> Cow<'_, [Step]> {
+    match &model.steps[..] {
+        [] => Cow::Owned(vec![Step::whole()]),
+        steps => Cow::Borrowed(steps),
+    }
+}
+
 /// The forces after twice the increments, without reporting to the observer.
 fn doubled(
     model: &Model,
@@ -120,15 +142,7 @@ fn doubled(
     let (mut system, rounding) = (first.system, first.rounding);
     system.restart();
     let mut load_history = LoadHistory::new(model, system);
-    let mut last = None;
-    for (number, step) in steps.iter().enumerate() {
-        let (finished, _) = load_history.step(number as u32, step, 2, quiet);
-        let converged = finished.outcome == Outcome::Converged;
-        last = Some(finished);
-        if !converged {
-            break;
-        }
-    }
+    let last = load_history.to_the_end(steps, 2, quiet);
     let rounding = algorithm::rounding_of_forces([rounding, load_history.rounding]);
     let tolerance = model.controls.tolerance.max(rounding);
     algorithm::compared(&load_history.system, solution, last.as_ref(), tolerance)
@@ -172,6 +186,25 @@ impl<'a> LoadHistory<'a> {
             cut_backs: 0,
             rounding: None,
         }
+    }
+
+    /// Solves one step after the other, each in `multiple` times its increments, until one does not converge: the last end.
+    fn to_the_end(
+        &mut self,
+        steps: &[Step],
+        multiple: u32,
+        observe: &mut Observer<'_>,
+    ) -> Option<Finished> {
+        let mut last = None;
+        for (number, step) in steps.iter().enumerate() {
+            let (finished, _) = self.step(number as u32, step, multiple, observe);
+            let hopeful = can_continue(finished.outcome);
+            last = Some(finished);
+            if !hopeful {
+                break;
+            }
+        }
+        last
     }
 
     /// Solves one step in `multiple` times its increments: its end, and its rows.

@@ -25,6 +25,7 @@ mod same_errors;
 mod solve_command;
 mod submit;
 mod validate;
+mod verify;
 mod waiting;
 mod watch;
 

@@ -52,3 +52,4 @@ mod thick_cylinder;
 mod tolerance;
 mod traps;
 mod unmerged;
+mod verify;

@@ -2,12 +2,23 @@
 
 use std::fmt::Write;
 
-use solver::solution::{ContactProfile, ContactSummary, Iteration, NodeState, Outcome, Peak};
+use solver::solution::{
+    Accuracy, ContactProfile, ContactSummary, ErrorMethod, Iteration, NodeState, Outcome, Peak,
+    Phase,
+};
 
 use crate::run::Document;
 
 /// Reasons of a verdict that are shown.
 const MOST_REASONS: usize = 5;
+
+/// A phase that begins.
+pub(super) fn phase(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Verify => "verify: solving once more, on the mesh split in two",
+        phase => phase.as_str(),
+    }
+}
 
 /// The mesh that adaptive refinement is on.
 pub(super) fn mesh(number: u32, elements: u64, error: Option<f64>) -> String {
@@ -63,13 +74,19 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
         line("title", title.into());
     }
     if let Some(accuracy) = &s.accuracy {
-        line("accuracy", accuracy.verdict.in_words().into());
+        let verdict = accuracy.verdict.in_words();
+        let verified = match accuracy.verified {
+            Some(true) => "; compared with the mesh split in two",
+            _ => "",
+        };
+        line("accuracy", format!("{verdict}{verified}"));
         for reason in accuracy.reasons.iter().take(MOST_REASONS) {
             line("", reason.clone());
         }
         if let more @ 1.. = accuracy.reasons.len().saturating_sub(MOST_REASONS) {
             line("", format!("and {more} more, in summary.accuracy.reasons"));
         }
+        verified_lines(accuracy, &mut line);
     }
     let seconds: f64 = document.summary.timings.values().sum();
     line(
@@ -144,6 +161,33 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
     }
     line("digest", document.summary.digest.clone());
     text
+}
+
+/// A line for each quantity that was compared with the mesh split in two.
+fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
+    for q in &accuracy.quantities {
+        let (Some(finer), Some(difference)) = (q.finer, q.difference) else {
+            continue;
+        };
+        let order = q
+            .order
+            .map_or(String::new(), |order| format!(", order {order:.1}"));
+        let error = match (q.error, q.method) {
+            (Some(error), _) => format!("error at most {error:.1e}"),
+            (None, ErrorMethod::NoLimit) => "without a limit".to_owned(),
+            (None, _) => "error unknown".to_owned(),
+        };
+        line(
+            "  verified",
+            format!(
+                "{} of {:?}: {}, finer {}, difference {difference:.1e}{order}; {error}",
+                <&str>::from(q.quantity),
+                q.contact,
+                number(q.value),
+                number(finer),
+            ),
+        );
+    }
 }
 
 /// Six digits, plain where that is readable.

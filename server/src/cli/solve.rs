@@ -93,7 +93,7 @@ pub(super) fn run(
     };
     let solved = run::run(&problem, parse_s, solve, &mut |update| {
         match update {
-            Update::Phase(phase) => eprintln!("{} …", phase.as_str()),
+            Update::Phase(phase) => eprintln!("{} …", report::phase(phase)),
             Update::Mesh {
                 number,
                 elements,

@@ -180,7 +180,7 @@ fn changed_messages_are_converted_or_refused() {
             "top",
             "\0\0\0\0\0\0\u{0}\u{7f}",
         ],
-        cases: 10_000,
+        cases: 40_000,
     };
     let figures = target.attack(|input| {
         let kind = |found: Vec<Violation>| {

@@ -19,6 +19,8 @@ use crate::{
 /// A solution ready to be stored.
 pub(super) struct Solved {
     pub(super) ending: Ending,
+    /// It was to be verified on a finer mesh, and is not.
+    pub(super) unverified: bool,
     pub(super) iterations: usize,
     pub(super) parts: Parts,
 }
@@ -107,12 +109,19 @@ pub(super) fn ending_of_attempt(
     let no_solution = match solved {
         Ok(Solved {
             ending,
+            unverified,
             iterations,
             parts,
         }) => {
+            // a verification that fails is told in the result; one that is stopped leaves the job unfinished
+            let unfinished = unverified && stopped.is_some();
             let ending = match ending.status {
                 Status::Canceled => Ending {
                     result: ending.result,
+                    ..stopped_for(job, stopped)
+                },
+                Status::Succeeded if unfinished => Ending {
+                    result: ResultAvailable::Partial,
                     ..stopped_for(job, stopped)
                 },
                 _ => ending,

@@ -6,7 +6,7 @@ use solver::{
     error::SolveError,
     mesh::Mesh,
     problem::{Problem, Refine, Step},
-    solution::Observer,
+    solution::{Observer, Phase},
 };
 
 use super::{
@@ -52,6 +52,7 @@ pub(super) fn solve_and_report(
     if problem.steps.len() <= 1
         && problem.steps.iter().all(single)
         && matches!(problem.mesh.refine, Refine::Times(_))
+        && !problem.solver.verifies()
     {
         // the next report asks again whether to stop
         let _ = tell(Told::Report(Report::OneLevel));
@@ -60,8 +61,10 @@ pub(super) fn solve_and_report(
     let mut partials = Partials::default();
     let solve =
         |observe: &mut Observer<'_>| solve(&problem, files::external_mesh(&problem, mesh), observe);
+    let mut verifying = false;
     let document = run::run(&problem, parse_s, solve, &mut |update| {
         let (mut needed, mut room) = (0, 0);
+        verifying |= matches!(update, Update::Phase(Phase::Verify));
         // what is reported belongs to the recorder then, whose thread frees it
         let told = meter.hand_over(|| {
             let report = match update {
@@ -98,18 +101,22 @@ pub(super) fn solve_and_report(
             })
         });
         told?;
-        tell(match meter.check(needed) {
-            ControlFlow::Break(outgrown) => Told::OutOfMemory(outgrown),
-            ControlFlow::Continue(()) => Told::Nothing,
-        })?;
+        match meter.check(needed) {
+            // the solution is there, and stays
+            ControlFlow::Break(_) if verifying => return ControlFlow::Break(()),
+            ControlFlow::Break(outgrown) => tell(Told::OutOfMemory(outgrown))?,
+            ControlFlow::Continue(()) => tell(Told::Nothing)?,
+        }
         // no room is an answer, and no reason to stop
         meter.check(room).map_break(|_| ())
     })?;
     let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite {
-        phase: solver::solution::Phase::Recover,
+        phase: Phase::Recover,
     })?;
+    let accuracy = document.summary.solution.accuracy.as_ref();
     Ok(Solved {
         ending: ending_of_solution(&document),
+        unverified: accuracy.and_then(|accuracy| accuracy.verified) == Some(false),
         iterations: document.history.len(),
         parts,
     })

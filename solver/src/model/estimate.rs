@@ -26,6 +26,29 @@ pub const MOST_ADAPTIVE_ELEMENTS: usize = 60_000;
 /// Most elements of such a mesh at one contact: the dense system of the contact grows with their square.
 pub const MOST_ADAPTIVE_CONTACT_ELEMENTS: usize = 600;
 
+/// Most elements of the mesh on which the last mesh of adaptive refinement is verified: as many as refinement itself may
+/// make, or as the first mesh split in two has.
+#[derive(Clone, Debug)]
+pub struct MostElements {
+    /// In all.
+    pub elements: usize,
+    /// At each contact.
+    pub at_contacts: Vec<usize>,
+}
+
+impl MostElements {
+    /// For refinement that begins with this model.
+    pub fn of(first: &Model) -> Self {
+        let at_contact = |contact: &ContactModel| {
+            MOST_ADAPTIVE_CONTACT_ELEMENTS.max(2 * contact.boundary.edge_count())
+        };
+        MostElements {
+            elements: MOST_ADAPTIVE_ELEMENTS.max(4 * first.mesh.elements.len()),
+            at_contacts: first.contacts.iter().map(at_contact).collect(),
+        }
+    }
+}
+
 /// Size of a stored mesh, for the estimate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshSize {
@@ -43,6 +66,8 @@ struct Size {
     contact: f64,
     /// Entries of all averages.
     weights: f64,
+    /// Friction points on all contacts.
+    points: f64,
     /// Nodes and friction points on all contacts, with results for each step.
     profile: f64,
     steps: f64,
@@ -81,8 +106,16 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate
     };
     // powers of two as floats end in infinity, and nothing overflows
     let elements = 4f64.powi(times.min(1000) as i32) * elements;
-    if elements > MOST_ELEMENTS {
+    let all = match problem.solver.verifies() {
+        true => 4.0 * elements,
+        false => elements,
+    };
+    if all > MOST_ELEMENTS {
         let (place, found) = match times {
+            _ if elements <= MOST_ELEMENTS => (
+                "/solver/accuracy",
+                format!("`verify`, on {all:.1e} elements"),
+            ),
             0 => ("/mesh", format!("{elements:.1e} elements")),
             _ => ("/mesh/refine", format!("{times}: {elements:.1e} elements")),
         };
@@ -98,23 +131,69 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate
         nodes: nodes * elements,
         ..Size::default()
     };
-    Ok(size.estimate(1.0))
+    let own = size.estimate(1.0);
+    Ok(match problem.solver.verifies() {
+        true => Estimate {
+            dofs: own.dofs,
+            ..size.split().estimate(1.0)
+        },
+        false => own,
+    })
 }
 
 impl Model {
     /// What it will take to solve this model of `problem`: more rather than less than it does. Of adaptive refinement
-    /// the largest mesh.
+    /// the largest mesh. With `accuracy: verify` the mesh split in two is counted, too.
     pub fn estimate(&self, problem: &Problem) -> Estimate {
-        self.estimate_with(matches!(problem.mesh.refine, Refine::Adaptive(_)))
+        let adaptive = matches!(problem.mesh.refine, Refine::Adaptive(_));
+        let own = self.size(adaptive);
+        let solved = own.estimate(MARGIN);
+        if !problem.solver.verifies() {
+            return solved;
+        }
+        let halved = match adaptive {
+            true => self.largest_halved(&own),
+            false => own.split(),
+        };
+        let compared = Size {
+            // no step is reported, nothing assessed, and no solution looked for once more
+            steps: 1.0,
+            repeats: 1.0,
+            ..halved
+        };
+        let compared = compared.estimate(MARGIN);
+        Estimate {
+            dofs: solved.dofs,
+            memory_bytes: solved
+                .memory_bytes
+                .max(compared.memory_bytes.saturating_add(own.held())),
+            // the mesh of one refinement less takes a fraction
+            run_s: 1.3 * solved.run_s + compared.run_s,
+        }
     }
 
-    /// The same of this mesh alone.
+    /// What this mesh alone takes.
     pub fn estimate_of_mesh(&self) -> Estimate {
-        self.estimate_with(false)
+        self.size(false).estimate(MARGIN)
     }
 
-    /// `adaptive`: of the largest mesh of adaptive refinement.
-    fn estimate_with(&self, adaptive: bool) -> Estimate {
+    /// The largest mesh on which the last mesh of adaptive refinement is verified.
+    fn largest_halved(&self, own: &Size) -> Size {
+        let most = MostElements::of(self);
+        let at_contacts: f64 = most.at_contacts.iter().map(|most| *most as f64).sum();
+        let along = self.contacts.iter().zip(&most.at_contacts);
+        let weights = along.filter(|(contact, _)| acts(contact));
+        let weights = weights.map(|(_, most)| every_average(*most as f64).weights);
+        Size {
+            nodes: own.nodes.max(NODES * most.elements as f64),
+            contact: own.contact.max(4.0 * at_contacts + 2.0),
+            weights: weights.sum(),
+            profile: own.profile.max(5.0 * at_contacts),
+            ..*own
+        }
+    }
+
+    fn size(&self, adaptive: bool) -> Size {
         let nodes = self.mesh.nodes.len() as f64;
         let contacts = self.contacts.iter();
         let contacts = contacts.map(|contact| Along::new(contact, adaptive));
@@ -126,26 +205,47 @@ impl Model {
         let controls = &self.controls;
         let again = u32::from(controls.check_uniqueness) + 2 * u32::from(controls.check_increments);
         let increments: f64 = self.steps.iter().map(|s| f64::from(s.increments)).sum();
-        let size = Size {
+        Size {
             nodes: match adaptive {
-                true => nodes.max(3.1 * MOST_ADAPTIVE_ELEMENTS as f64),
+                true => nodes.max(NODES * MOST_ADAPTIVE_ELEMENTS as f64),
                 false => nodes,
             },
             contact: 2.0 * all.nodes,
             weights: all.weights,
+            points: all.points,
             profile: all.nodes + all.points,
             steps: self.steps.len().max(1) as f64,
             increments: increments.max(1.0),
             repeats: f64::from(1 + again),
-        };
-        size.estimate(MARGIN)
+        }
     }
 }
+
+/// Nodes of an element in a large mesh, overestimated.
+const NODES: f64 = 3.1;
 
 /// How far the factors of meshes of other shapes lie above those that the fill is fitted to.
 const MARGIN: f64 = 1.2;
 
 impl Size {
+    /// Every element split in two in each direction: an average reaches twice as many nodes from twice as many points.
+    fn split(&self) -> Size {
+        let of_points = (POINT + BESIDE) * self.points;
+        Size {
+            nodes: 4.0 * self.nodes,
+            contact: 2.0 * self.contact,
+            weights: 4.0 * (self.weights - of_points).max(0.0) + 2.0 * of_points,
+            points: 2.0 * self.points,
+            profile: 2.0 * self.profile,
+            ..*self
+        }
+    }
+
+    /// The bytes of a solution with its mesh and all steps, while another is computed.
+    fn held(&self) -> u64 {
+        (500.0 * self.nodes + self.history()) as u64
+    }
+
     /// The constants are those of `server/src/queue/tests/estimates.rs`, which compares estimates with measurements.
     fn estimate(&self, margin: f64) -> Estimate {
         let dofs = 2.0 * self.nodes;
@@ -159,11 +259,7 @@ impl Size {
         let dense = 2.0 * contact * contact;
         // mesh, stiffness, graph and symbolic factor; later displacements and stresses, and the stored result
         let of_nodes = 1500.0 * margin * self.nodes;
-        // profiles and rows are held as numbers and as text; a step is also part of what is stored on the way
-        let history = 1.2e4 * self.increments
-            + self.steps * (6e3 + 600.0 * self.profile)
-            + 300.0 * self.profile;
-        let memory = 8.0 * (factor + dense + self.weights) + of_nodes + history + FLOOR;
+        let memory = 8.0 * (factor + dense + self.weights) + of_nodes + self.history() + FLOOR;
         let sweeps = contact.powi(3) * (1.0 + 2.0 * self.increments * self.repeats);
         let time = 6e-6 * dofs + 4e-9 * dofs.powf(1.5) + 1e-9 * sweeps + 2.5e-6 * self.weights;
         Estimate {
@@ -171,6 +267,11 @@ impl Size {
             memory_bytes: memory as u64,
             run_s: time,
         }
+    }
+
+    /// Profiles and rows are held as numbers and as text; a step is also part of what is stored on the way (bytes).
+    fn history(&self) -> f64 {
+        1.2e4 * self.increments + self.steps * (6e3 + 600.0 * self.profile) + 300.0 * self.profile
     }
 }
 
@@ -189,17 +290,18 @@ struct Along {
 impl Along {
     fn new(contact: &ContactModel, adaptive: bool) -> Along {
         let s = &contact.boundary.s;
-        let friction = contact.friction.as_ref().filter(|law| law.bound.acts());
         if adaptive {
             let elements = (MOST_ADAPTIVE_CONTACT_ELEMENTS as f64).max(0.5 * s.len() as f64);
-            let (nodes, points) = (2.0 * elements + 1.0, 3.0 * elements);
-            let weights = friction.map_or(0.0, |_| nodes * points);
-            return Along {
-                nodes,
-                points,
-                weights,
+            let along = every_average(elements);
+            return match acts(contact) {
+                true => along,
+                false => Along {
+                    weights: 0.0,
+                    ..along
+                },
             };
         }
+        let friction = contact.friction.as_ref().filter(|_| acts(contact));
         let mut along = Along {
             nodes: s.len() as f64,
             ..Along::default()
@@ -211,7 +313,7 @@ impl Along {
             let first = s.partition_point(|node| *node < at - radius);
             let last = s.partition_point(|node| *node <= at + radius);
             along.points += 1.0;
-            along.weights += (last - first) as f64 + 4.0 + POINT;
+            along.weights += (last - first) as f64 + BESIDE + POINT;
         };
         match law.points {
             FrictionPoints::Gauss3 => contact
@@ -225,8 +327,27 @@ impl Along {
     }
 }
 
+/// Whether friction acts there.
+fn acts(contact: &ContactModel) -> bool {
+    let law = contact.friction.as_ref();
+    law.is_some_and(|law| law.bound.acts())
+}
+
+/// A contact of so many elements where every average reaches all nodes.
+fn every_average(elements: f64) -> Along {
+    let (nodes, points) = (2.0 * elements + 1.0, 3.0 * elements);
+    Along {
+        nodes,
+        points,
+        weights: nodes * points,
+    }
+}
+
 /// What a friction point takes beside its average, in numbers.
 const POINT: f64 = 24.0;
+
+/// Nodes beyond those within the radius that an average reaches.
+const BESIDE: f64 = 4.0;
 
 #[cfg(test)]
 mod tests {

@@ -31,8 +31,8 @@ use checks::Checks;
 
 use crate::elasticity::{Loads, Section};
 use crate::error::{AllChecks, Checked, Violation};
-use crate::mesh::{External, ExternalMesh, Mesh};
-use crate::problem::{Problem, SolverControls, Step};
+use crate::mesh::{self, External, ExternalMesh, Mesh};
+use crate::problem::{MeshInput, Problem, SolverControls, Step};
 use crate::solution::Warning;
 
 /// A problem that can be solved.
@@ -84,6 +84,13 @@ impl Model {
         checks.found.conclude(model)
     }
 
+    /// The same problem with every element of its mesh split in two in each direction: that of one more `refine`.
+    pub fn split(problem: &Problem, mesh: &Mesh) -> Result<Model, Vec<Violation>> {
+        let mut checks = Checks::default();
+        let model = checks.model(problem, Source::Split(mesh::refine(mesh)));
+        checks.found.conclude(model)
+    }
+
     /// Force per volume along x and y at a load level.
     pub fn body_force(&self, level: &Level) -> [f64; 2] {
         self.loads.body_force.map(|f| level.loads * f)
@@ -107,6 +114,8 @@ enum Source {
     Given(Option<External>),
     /// An earlier model of the problem, refined.
     Ready(Mesh),
+    /// The same, with parts of boundaries and groups to be named anew: more sides and elements may lie in their ranges.
+    Split(Mesh),
 }
 
 impl Checks {
@@ -137,6 +146,16 @@ impl Checks {
                 mesh
             }
             Source::Ready(mesh) => mesh,
+            Source::Split(mut mesh) => {
+                let MeshInput {
+                    boundaries, groups, ..
+                } = &problem.mesh;
+                mesh.boundaries
+                    .retain(|name, _| !boundaries.contains_key(name));
+                mesh.groups.retain(|name, _| !groups.contains_key(name));
+                all.check(self.names(&mut mesh, &problem.mesh));
+                mesh
+            }
         };
         all.check(self.thesis_elements(problem, &mesh));
         // faults of materials are reported; the following checks need only the theory

@@ -115,6 +115,15 @@ impl Checks {
                 "Without steps there are no increments to double.",
             ));
         }
+        if controls.verifies() && problem.contacts.is_empty() {
+            all.fail(self.report(
+                "/solver/accuracy",
+                Reason::NotUsed,
+                "`verify` without a contact",
+                "`verify` with `contacts` only",
+                "It verifies the forces, peak stresses and extents of contacts.",
+            ));
+        }
         all.check(self.require(
             controls.tolerance >= 1e-14 && controls.tolerance < 1.0,
             "/solver/tolerance",

@@ -20,7 +20,9 @@ pub use material::{Elasticity, Material, MaterialFields, Orthotropic};
 pub use mesh::{
     AdaptiveRefine, BoundaryPart, ElementRange, Grid, InlineMesh, MeshInput, MeshSource, Refine,
 };
-pub use solver::{Algorithm, SolverControls, Spacing, Step, ThesisOptions, ThesisPressure};
+pub use solver::{
+    AccuracyMode, Algorithm, SolverControls, Spacing, Step, ThesisOptions, ThesisPressure,
+};
 pub use support::{BoundaryValue, Support};
 
 use schemars::JsonSchema;

@@ -77,6 +77,10 @@ pub struct SolverControls {
     pub check_uniqueness: bool,
     /// Solve once more with twice the increments, and report how much the result changes.
     pub check_increments: bool,
+    /// How the errors in `summary.accuracy` are found; absent: `estimate`. `verify` solves once more on the mesh split in
+    /// two, which takes several times as long and as much memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<AccuracyMode>,
     /// Options that the thesis leaves open; for `algorithm: thesis` only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub thesis: Option<ThesisOptions>,
@@ -96,6 +100,25 @@ pub enum Algorithm {
     /// The thesis's own iteration (3.1), to the letter. At the thesis's parameters it does not
     /// solve the problem; the outcome is then `false_convergence`.
     Thesis,
+}
+
+/// How the errors of the results are found, docs/formulation.md section 3.9.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AccuracyMode {
+    /// Estimated on the mesh of the solution, at little cost.
+    #[default]
+    Estimate,
+    /// By solving once more with every element split in two in each direction; with `refine` of 1 or more also on the
+    /// mesh before the last refinement, which gives orders of convergence.
+    Verify,
+}
+
+impl SolverControls {
+    /// The errors are to be verified.
+    pub fn verifies(&self) -> bool {
+        self.accuracy == Some(AccuracyMode::Verify)
+    }
 }
 
 /// Options of the thesis's own iteration.
@@ -151,6 +174,7 @@ impl Default for SolverControls {
             max_iterations: 200,
             check_uniqueness: false,
             check_increments: false,
+            accuracy: None,
             thesis: None,
         }
     }

@@ -13,6 +13,10 @@ pub struct Accuracy {
     pub reasons: Vec<String>,
     /// Every force, extent and peak with its error.
     pub quantities: Vec<EstimatedQuantity>,
+    /// With `"accuracy": "verify"`: whether the problem was solved on the mesh split in two as well. If not, the errors are
+    /// estimates, and the first reason says why. Absent unless asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verified: Option<bool>,
 }
 
 /// Whether a solution can be relied on.
@@ -60,8 +64,19 @@ pub struct EstimatedQuantity {
     pub contact: String,
     /// Its value, as in the summary.
     pub value: f64,
-    /// Error that the mesh causes, in the unit of the value; absent where the quantity has no limit, or
-    /// nothing is known.
+    /// Its value on the mesh split in two; absent unless verified.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finer: Option<f64>,
+    /// How much the two differ (≥ 0); of peak tangential stresses, the size of which may occur twice with both signs,
+    /// how much their sizes do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub difference: Option<f64>,
+    /// Observed order of convergence, log₂ of the difference to the mesh one refinement coarser over this one; absent where
+    /// there is no such mesh (`refine` of 0 or by a tolerance), or a difference is only rounding.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<f64>,
+    /// The error that the mesh causes, in the unit of the value; absent where the quantity has no limit, or nothing is
+    /// known.
     pub error: Option<f64>,
     /// The error as a part: of the value; of the friction force for a tangential one; of the length of the contact for
     /// an extent.
@@ -114,6 +129,8 @@ pub enum ErrorMethod {
     WeightedRecovery,
     /// The distance between nodes.
     NodeSpacing,
+    /// The difference to the solution on the mesh split in two.
+    MeshHalved,
     /// There is no limit that a finer mesh would approach.
     NoLimit,
     /// Not found.

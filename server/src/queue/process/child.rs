@@ -103,8 +103,12 @@ fn solve_task(
     {
         Ok(solved) => {
             send_parts(solved.parts, service)?;
-            let (ending, iterations) = (solved.ending, solved.iterations);
-            send(service, &Reply::Solved { ending, iterations }, &[])
+            let reply = Reply::Solved {
+                ending: solved.ending,
+                unverified: solved.unverified,
+                iterations: solved.iterations,
+            };
+            send(service, &reply, &[])
         }
         Err(no_solution) => send(service, &Reply::NoSolution(no_solution), &[]),
     }

@@ -54,7 +54,11 @@ enum Reply {
     /// The parts so far are a partial result.
     Partial,
     /// The parts so far are the result.
-    Solved { ending: Ending, iterations: usize },
+    Solved {
+        ending: Ending,
+        unverified: bool,
+        iterations: usize,
+    },
     /// There is no result.
     NoSolution(NoSolution),
 }

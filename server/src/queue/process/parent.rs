@@ -217,9 +217,14 @@ impl Process {
                         let parts = Parts::from_parts(std::mem::take(&mut parts));
                         Told::Report(Report::Partial(Box::new(parts)))
                     }
-                    Reply::Solved { ending, iterations } => {
+                    Reply::Solved {
+                        ending,
+                        unverified,
+                        iterations,
+                    } => {
                         return Ok(Ok(Solved {
                             ending,
+                            unverified,
                             iterations,
                             parts: Parts::from_parts(parts),
                         }));

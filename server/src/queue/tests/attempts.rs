@@ -1,5 +1,7 @@
 //! How attempts end: by themselves, canceled, timed out, requeued when the service stops.
 
+use solver::{phase::Phase, problem::AccuracyMode};
+
 use super::*;
 
 #[tokio::test]
@@ -135,6 +137,64 @@ async fn a_canceled_running_job_keeps_its_last_state() {
             .is_none(),
         "a canceled job has no fields"
     );
+}
+
+/// Verifies until it is stopped.
+fn verify_until_stopped(
+    problem: &Problem,
+    mesh: Option<External>,
+    observe: &mut Observer<'_>,
+) -> std::result::Result<Solution, SolveError> {
+    let mut problem = problem.clone();
+    problem.solver.accuracy = Some(AccuracyMode::Verify);
+    solver::solve_on(&problem, mesh, &mut |progress| {
+        let verifies = matches!(progress, Progress::Phase(Phase::Verify));
+        let mut answer = observe(progress);
+        while verifies && answer.is_continue() {
+            std::thread::sleep(Duration::from_millis(1));
+            answer = observe(Progress::Pulse);
+        }
+        answer
+    })
+}
+
+/// A limit on a job is one on its verification; the solution is kept, with what is estimated.
+#[tokio::test]
+async fn a_job_that_is_stopped_while_it_verifies_keeps_its_solution() {
+    let rig = rig(verify_until_stopped).await;
+    rig.queue.start();
+    let timeout_s = 0.5;
+    let limited = NewJob {
+        limits: Limits {
+            timeout_s,
+            ..Limits::default()
+        },
+        ..new(0)
+    };
+    for (new, ends) in [
+        (new(0), (Status::Canceled, Reason::UserCancel)),
+        (limited, (Status::Failed, Reason::TimedOut)),
+    ] {
+        let job = rig.submit_as(new).await;
+        let verifies = |event: &Event| {
+            matches!(
+                event.payload,
+                Payload::Stage {
+                    stage: Phase::Verify
+                }
+            )
+        };
+        rig.until(&job, verifies).await;
+        if ends.0 == Status::Canceled {
+            rig.queue.cancel(job.key).await.unwrap();
+        }
+        let done = rig.until_done(&job).await;
+        assert_eq!((done.status, done.reason), (ends.0, Some(ends.1)));
+        assert_eq!(done.result_available, ResultAvailable::Partial);
+        assert_eq!(done.progress.unwrap().stage, "verify");
+        let fields = rig.store.piece(job.key, "fields", 0).await.unwrap();
+        assert!(fields.is_some(), "{ends:?}");
+    }
 }
 
 /// Converges to a state whose forces do not balance.

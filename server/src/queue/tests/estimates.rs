@@ -57,6 +57,10 @@ fn problems() -> Vec<(String, Value)> {
             with(&|p| p["solver"] = json!({"check_uniqueness": true})),
         ));
         problems.push((
+            format!("{name}, verified"),
+            with(&|p| p["solver"] = json!({"accuracy": "verify"})),
+        ));
+        problems.push((
             format!("{name}, 40 steps"),
             with(&|p| {
                 let step = |k: u32| {
@@ -86,6 +90,9 @@ fn problems() -> Vec<(String, Value)> {
         problems.push((format!("wall of {lines} lines"), wall(lines, 2.0)));
     }
     problems.push(("wall of 100 lines, wide average".into(), wall(100, 200.0)));
+    let mut verified = wall(100, 20.0);
+    verified["solver"] = json!({"accuracy": "verify"});
+    problems.push(("wall of 100 lines, verified".into(), verified));
     let mut newton = wall(150, 20.0);
     newton["solver"] = json!({"algorithm": "newton"});
     problems.push(("wall of 150 lines, Newton".into(), newton));
@@ -198,4 +205,28 @@ fn a_job_that_needs_more_than_its_share_is_stopped() {
         outgrown.needed > 16 << 20 && outgrown.used < 16 << 20,
         "{outgrown:?}"
     );
+}
+
+/// A verification that outgrows the share ends alone: the job has its solution, and was not asked to stop.
+#[test]
+fn a_verification_that_needs_more_than_the_share_leaves_the_solution() {
+    let mut problem = wall(100, 2.0);
+    let (taken, _) = taken_and_told(&problem);
+    problem["solver"] = json!({"accuracy": "verify"});
+    let (needed, _) = taken_and_told(&problem);
+    assert!(needed > 2 * taken, "{needed} and {taken}");
+    let share = taken + taken / 4;
+    let solved = solve_and_report(
+        &problem.to_string(),
+        None,
+        solver::solve_on,
+        share,
+        |told| {
+            assert!(!matches!(told, Told::OutOfMemory(_)));
+            ControlFlow::Continue(())
+        },
+    );
+    let solved = solved.unwrap();
+    assert_eq!(solved.ending.status, Status::Succeeded);
+    assert!(solved.unverified);
 }

@@ -2,6 +2,7 @@
 //! at most, and neither the job beside it, nor a later one, nor a worker.
 
 use futures_util::StreamExt;
+use solver::problem::AccuracyMode;
 use strum::VariantArray;
 
 use super::*;
@@ -10,13 +11,15 @@ use crate::failpoint::{self, Failing, Point};
 /// How long anything may take: a job that was lost is found within a second.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Solves, and finds a partial result.
+/// Solves and verifies, and finds a partial result.
 fn solve_with_a_step(
     problem: &Problem,
     mesh: Option<External>,
     observe: &mut Observer<'_>,
 ) -> std::result::Result<Solution, SolveError> {
-    let solution = solver::solve_on(problem, mesh, observe)?;
+    let mut problem = problem.clone();
+    problem.solver.accuracy = Some(AccuracyMode::Verify);
+    let solution = solver::solve_on(&problem, mesh, observe)?;
     match observe(Progress::Step(&solution)).is_break() {
         true => Err(SolveError::Stopped),
         false => Ok(solution),
@@ -45,6 +48,7 @@ fn may_be_an_error(point: Point) -> bool {
         | Point::Condensing
         | Point::Iterating
         | Point::Recovering
+        | Point::Verifying
         | Point::EventsStored
         | Point::Unannounced
         | Point::Done => false,

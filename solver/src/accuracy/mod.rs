@@ -9,6 +9,11 @@
 //! each with a factor that makes the sum a bound: they are calibrated on random problems by
 //! `tests/verification/calibration.rs`, which also says how often the bound holds.
 
+mod halved;
+mod verdict;
+
+pub use halved::{OnOtherMesh, unverified, verified};
+
 use crate::algorithm::{Finished, Quantity, Reported, System, influences};
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::contact::edge_nodes;
@@ -16,8 +21,9 @@ use crate::elasticity::Dof;
 use crate::model::Model;
 use crate::origins::{Added, Origins};
 use crate::solution::{
-    Accuracy, ErrorMethod, EstimatedQuantity, Observer, Outcome, Progress, QuantityName, Verdict,
+    Accuracy, ErrorMethod, EstimatedQuantity, Observer, Outcome, Progress, QuantityName,
 };
+use verdict::{Doubt, conclude, length, relative, scale};
 
 /// What is known of the error of a quantity, in its unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -81,10 +87,6 @@ fn factors(name: QuantityName) -> [f64; 8] {
     factors
 }
 
-/// Relative errors up to which a verdict is `good`, and `fair`: of forces, and of peaks and extents.
-const FORCES: [f64; 2] = [0.01, 0.05];
-const OTHERS: [f64; 2] = [0.05, 0.2];
-
 /// The errors of all quantities, and the verdict.
 pub fn assess(
     model: &Model,
@@ -112,43 +114,33 @@ pub fn assess(
             (Some(error), _) if error.is_finite() => (Some(error), ErrorMethod::WeightedRecovery),
             _ => (None, ErrorMethod::Unknown),
         };
-        let relative = |error: f64| match error {
-            0.0 => 0.0,
-            error => error / scale(quantity, quantities),
-        };
+        let scale = scale_of(quantity, quantities);
         found.push(EstimatedQuantity {
             quantity: quantity.name,
             contact: system.patches[quantity.patch].contact.name.clone(),
             value: quantity.value,
+            finer: None,
+            difference: None,
+            order: None,
             error,
-            relative: error.map(relative).filter(|r| r.is_finite()),
+            relative: error.and_then(|error| relative(error, scale)),
             method,
         });
     }
-    let unseen: Vec<bool> = quantities.iter().map(|quantity| quantity.unseen).collect();
-    conclude(reported.summary.outcome, found, &unseen)
+    let doubt = |quantity: &Quantity| quantity.unseen.then_some(Doubt::Unseen);
+    let doubts: Vec<_> = quantities.iter().map(doubt).collect();
+    conclude(reported.summary.outcome, found, &doubts, &[])
 }
 
 /// What the error of a quantity is compared with.
-fn scale(quantity: &Quantity, all: &[Quantity]) -> f64 {
+fn scale_of(quantity: &Quantity, all: &[Quantity]) -> f64 {
     let own = |name: QuantityName| {
-        let same = move |q: &&Quantity| q.patch == quantity.patch && q.name == name;
-        all.iter().filter(same).map(|q| q.value)
+        let same = all
+            .iter()
+            .filter(|q| q.patch == quantity.patch && q.name == name);
+        same.map(|q| q.value).collect()
     };
-    let scale = match quantity.name {
-        QuantityName::TangentialForce => own(QuantityName::FrictionForce).sum(),
-        QuantityName::ContactStart | QuantityName::ContactEnd | QuantityName::StickEnd => length(
-            own(QuantityName::ContactStart),
-            own(QuantityName::ContactEnd),
-        ),
-        _ => quantity.value,
-    };
-    f64::abs(scale)
-}
-
-/// From the first start of contact to its last end.
-fn length(starts: impl Iterator<Item = f64>, ends: impl Iterator<Item = f64>) -> f64 {
-    ends.fold(f64::NEG_INFINITY, f64::max) - starts.fold(f64::INFINITY, f64::min)
+    scale(quantity.name, quantity.value, own)
 }
 
 /// The bounds of the errors of all quantities; none if the linearised problem has no unique solution, or the observer
@@ -197,7 +189,11 @@ fn bounds(
         let bound = parts.bound(quantity.name);
         if let Some(origins) = origins.as_deref_mut().filter(|_| !quantity.unlimited) {
             by_spacing(quantity, quantities, &parts, &mut added);
-            origins.add(quantity.patch, bound / scale(quantity, quantities), &added);
+            origins.add(
+                quantity.patch,
+                bound / scale_of(quantity, quantities),
+                &added,
+            );
         }
         bounds.push(bound);
     }
@@ -341,107 +337,4 @@ fn gap_between_nodes(system: &System<'_>, finished: &Finished, force: &[f64]) ->
         }
     }
     sum
-}
-
-/// The verdict and its reasons; `unseen`: quantities of obstacles that reach into the body between the nodes.
-fn conclude(outcome: Outcome, quantities: Vec<EstimatedQuantity>, unseen: &[bool]) -> Accuracy {
-    let mut verdict = Verdict::Good;
-    let mut reasons: Vec<(f64, String)> = Vec::new();
-    if outcome != Outcome::Converged {
-        verdict = Verdict::Poor;
-        let reason = "The iterations did not converge: nothing is known of the errors.";
-        reasons.push((f64::INFINITY, reason.to_owned()));
-    }
-    let assessed = quantities.iter().zip(unseen);
-    for (q, unseen) in assessed.filter(|_| outcome == Outcome::Converged) {
-        let (name, contact) = (<&str>::from(q.quantity), &q.contact);
-        let [good, fair] = match q.quantity {
-            QuantityName::NormalForce
-            | QuantityName::TangentialForce
-            | QuantityName::FrictionForce => FORCES,
-            _ => OTHERS,
-        };
-        let (own, reason) = match (q.error, q.relative, q.method) {
-            (Some(_), Some(relative), _) if relative <= good => continue,
-            (_, _, ErrorMethod::NoLimit) => (
-                Verdict::Good,
-                (
-                    0.0,
-                    format!(
-                        "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge, a tip or a kink of the obstacle: do not use it. Forces have a limit, and so has the averaged pressure."
-                    ),
-                ),
-            ),
-            // nothing acts, and nothing is wrong
-            (Some(error), None, _) if q.value == 0.0 && error == 0.0 => continue,
-            (Some(error), relative, ErrorMethod::NodeSpacing) => {
-                let relative = relative.unwrap_or(f64::INFINITY);
-                (
-                    if relative <= fair {
-                        Verdict::Fair
-                    } else {
-                        Verdict::Poor
-                    },
-                    (
-                        relative / good,
-                        format!(
-                            "`{name}` of contact `{contact}`, s = {:.4}, is known to ±{error:.1e} only, {} of the length of the contact: the nodes there are as far apart.",
-                            q.value,
-                            percent(relative)
-                        ),
-                    ),
-                )
-            }
-            (Some(error), Some(relative), _) => (
-                if relative <= fair {
-                    Verdict::Fair
-                } else {
-                    Verdict::Poor
-                },
-                (
-                    relative / good,
-                    format!(
-                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}, that is {error:.1e}: the mesh is too coarse for it.",
-                        q.value,
-                        percent(relative)
-                    ),
-                ),
-            ),
-            _ if *unseen => (
-                Verdict::Poor,
-                (
-                    f64::INFINITY,
-                    format!(
-                        "Of `{name}` of contact `{contact}` the error is not known: the obstacle reaches into the body between the nodes."
-                    ),
-                ),
-            ),
-            _ => (
-                Verdict::Poor,
-                (
-                    f64::INFINITY,
-                    format!(
-                        "Of `{name}` of contact `{contact}` the error is not known: the linearised problem has no unique solution."
-                    ),
-                ),
-            ),
-        };
-        verdict = verdict.max(own);
-        reasons.push(reason);
-    }
-    // the most serious first; equal ones stay in order
-    reasons.sort_by(|a, b| b.0.total_cmp(&a.0));
-    Accuracy {
-        verdict,
-        reasons: reasons.into_iter().map(|(_, reason)| reason).collect(),
-        quantities,
-    }
-}
-
-fn percent(part: f64) -> String {
-    match 100.0 * part {
-        p if p > 100.0 => "more than 100 %".to_owned(),
-        p if p < 10.0 => format!("{p:.1} %"),
-        p => format!("{p:.0} %"),
-    }
 }

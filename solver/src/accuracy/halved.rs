@@ -1,0 +1,221 @@
+//! Errors of quantities by the mesh split in two.
+//!
+//! With q_h on the mesh of the solution and q_h/2 on the finer one, a quantity of order p is off by
+//!
+//!   |q_h − q| = |q_h − q_h/2| / (1 − 2⁻ᵖ)
+//!
+//! p is taken as 1, which covers what is smoother, and where q_2h is known and shows less, as that, but at least ½. Two
+//! values may agree by chance, so that the bound is never below a part of the estimate on one mesh. The factors are
+//! calibrated on random problems by `tests/verification/calibration.rs`.
+
+use super::verdict::{Doubt, Unpaired, conclude, relative, scale};
+use crate::algorithm::Quantity;
+use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName};
+
+/// The least order that is assumed, of a peak at an edge of its neighbourhood, say.
+const LEAST_ORDER: f64 = 0.5;
+
+/// Differences below this part of what a quantity is compared with are those of the iterations, and have no order.
+const ROUNDING: f64 = 1e-9;
+
+/// Factors on the difference, and on the estimate as the least error: calibrated.
+fn factors(name: QuantityName) -> [f64; 2] {
+    use QuantityName::*;
+    match name {
+        NormalForce => [2.0, 0.3],
+        TangentialForce | FrictionForce => [2.0, 0.4],
+        PeakNormalStress | PeakTangentialStress => [2.5, 0.4],
+        // to the end on the finer mesh, and from there as far as that is known: half as far as on this one
+        ContactStart | ContactEnd => [1.0, 0.5],
+        StickEnd => [3.0, 0.6],
+    }
+}
+
+/// A quantity on another mesh of the same problem.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OnOtherMesh {
+    name: QuantityName,
+    contact: String,
+    value: f64,
+    unlimited: bool,
+    unseen: bool,
+}
+
+impl OnOtherMesh {
+    /// A quantity of this contact.
+    pub fn new(quantity: &Quantity, contact: &str) -> Self {
+        OnOtherMesh {
+            name: quantity.name,
+            contact: contact.to_owned(),
+            value: quantity.value,
+            unlimited: quantity.unlimited,
+            unseen: quantity.unseen,
+        }
+    }
+}
+
+/// Errors by comparison with the mesh split in two, and with the one that this mesh was split from, if there is one.
+/// `estimated`: of a converged solution.
+pub fn verified(
+    estimated: &Accuracy,
+    finer: &[OnOtherMesh],
+    coarser: Option<&[OnOtherMesh]>,
+) -> Accuracy {
+    let all = &estimated.quantities;
+    let (mut quantities, mut doubts) = (Vec::new(), Vec::new());
+    let mut unpaired: Vec<Unpaired> = Vec::new();
+    let mut note = |name: QuantityName, contact: &str, here: usize, there: usize| {
+        let noted = unpaired
+            .iter()
+            .any(|other| other.name == name && other.contact == contact);
+        if here != there && !noted {
+            let contact = contact.to_owned();
+            unpaired.push(Unpaired {
+                name,
+                contact,
+                here,
+                there,
+            });
+        }
+    };
+    for (i, own) in all.iter().enumerate() {
+        let same = |q: &&EstimatedQuantity| q.quantity == own.quantity && q.contact == own.contact;
+        let (before, here) = (
+            all[..i].iter().filter(same).count(),
+            all.iter().filter(same).count(),
+        );
+        let there = of_kind(own.quantity, &own.contact, finer);
+        note(own.quantity, &own.contact, here, there.len());
+        let mut quantity = own.clone();
+        doubts.push(if there.len() == here {
+            let coarser = coarser.map(|coarser| of_kind(own.quantity, &own.contact, coarser));
+            let coarser = coarser.filter(|coarser| coarser.len() == here);
+            let coarser = coarser.map(|coarser| coarser[before]);
+            compare(&mut quantity, there[before], coarser, scale_of(own, all))
+        } else {
+            Some(Doubt::Alone)
+        });
+        quantities.push(quantity);
+    }
+    for other in finer {
+        let same = |q: &&EstimatedQuantity| q.quantity == other.name && q.contact == other.contact;
+        let there = of_kind(other.name, &other.contact, finer).len();
+        let here = all.iter().filter(same).count();
+        note(other.name, &other.contact, here, there);
+    }
+    Accuracy {
+        verified: Some(true),
+        ..conclude(Outcome::Converged, quantities, &doubts, &unpaired)
+    }
+}
+
+/// Estimates that could not be verified, and why.
+pub fn unverified(mut estimated: Accuracy, why: &str) -> Accuracy {
+    let why = why.trim_end_matches('.');
+    let reason = format!("The errors are estimates, and not verified: {why}.");
+    estimated.reasons.insert(0, reason);
+    Accuracy {
+        verified: Some(false),
+        ..estimated
+    }
+}
+
+/// The quantities of a kind on another mesh, in order of arc length.
+fn of_kind<'a>(
+    name: QuantityName,
+    contact: &str,
+    others: &'a [OnOtherMesh],
+) -> Vec<&'a OnOtherMesh> {
+    let same = |q: &&OnOtherMesh| q.name == name && q.contact == contact;
+    others.iter().filter(same).collect()
+}
+
+fn scale_of(quantity: &EstimatedQuantity, all: &[EstimatedQuantity]) -> f64 {
+    let own = |name: QuantityName| {
+        let same = all
+            .iter()
+            .filter(|q| q.contact == quantity.contact && q.quantity == name);
+        same.map(|q| q.value).collect()
+    };
+    scale(quantity.quantity, quantity.value, own)
+}
+
+/// Gives a quantity what the other meshes say of it.
+fn compare(
+    quantity: &mut EstimatedQuantity,
+    finer: &OnOtherMesh,
+    coarser: Option<&OnOtherMesh>,
+    scale: f64,
+) -> Option<Doubt> {
+    let size = |value: f64| match quantity.quantity {
+        QuantityName::PeakTangentialStress => value.abs(),
+        _ => value,
+    };
+    let own = size(quantity.value);
+    let difference = (own - size(finer.value)).abs();
+    let before = coarser.map(|coarser| (own - size(coarser.value)).abs());
+    quantity.finer = Some(finer.value);
+    quantity.difference = Some(difference);
+    quantity.order = before
+        .filter(|before| before.min(difference) > ROUNDING * scale)
+        .map(|before| (before / difference).log2());
+    if quantity.method == ErrorMethod::NoLimit || finer.unlimited {
+        quantity.method = ErrorMethod::NoLimit;
+        (quantity.error, quantity.relative) = (None, None);
+        return None;
+    }
+    let estimate = match quantity.error {
+        Some(estimate) if !finer.unseen => estimate,
+        _ => {
+            quantity.method = ErrorMethod::Unknown;
+            (quantity.error, quantity.relative) = (None, None);
+            return Some(match finer.unseen {
+                true => Doubt::Unseen,
+                false => Doubt::Unestimated,
+            });
+        }
+    };
+    let error = bound(quantity.quantity, difference, quantity.order, estimate);
+    quantity.method = ErrorMethod::MeshHalved;
+    quantity.error = Some(error);
+    quantity.relative = relative(error, scale);
+    None
+}
+
+/// The bound of an error by the difference to the finer mesh and the estimate on this one.
+fn bound(name: QuantityName, difference: f64, order: Option<f64>, estimate: f64) -> f64 {
+    let [factor, least] = factors(name);
+    if matches!(name, QuantityName::ContactStart | QuantityName::ContactEnd) {
+        return factor * difference + least * estimate;
+    }
+    let slow = order.map_or(0.0, |order| 1.0 / (1.0 - (-order.max(LEAST_ORDER)).exp2()));
+    f64::max(factor.max(slow) * difference, least * estimate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a quantity q + c hᵖ the bound is not below its error, c hᵖ, whatever its order from ½ on and whether that is known.
+    #[test]
+    fn richardsons_error_is_bounded() {
+        for order in [0.5f64, 0.7, 1.0, 1.5, 2.0, 3.0] {
+            let difference = 1.0 - (-order).exp2();
+            let known = bound(QuantityName::NormalForce, difference, Some(order), 0.0);
+            assert!(known >= 1.0 - 1e-12, "{order}: {known}");
+            let unknown = bound(QuantityName::NormalForce, difference, None, 0.0);
+            assert_eq!(unknown >= 1.0, order >= 1.0, "{order}: {unknown}");
+        }
+        // below ½, and where the differences grow, no more is concluded
+        let [slow, growing] =
+            [0.5, -1.0].map(|p| bound(QuantityName::NormalForce, 1.0, Some(p), 0.0));
+        assert_eq!(slow, growing);
+    }
+
+    #[test]
+    fn values_that_agree_by_chance_keep_a_part_of_the_estimate() {
+        assert_eq!(bound(QuantityName::NormalForce, 0.0, None, 1.0), 0.3);
+        assert_eq!(bound(QuantityName::ContactEnd, 0.0, None, 1.0), 0.5);
+        assert_eq!(bound(QuantityName::NormalForce, 1.0, None, 1.0), 2.0);
+    }
+}

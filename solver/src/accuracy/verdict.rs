@@ -1,0 +1,212 @@
+//! The verdict on a solution by the errors of its quantities, and its reasons in words.
+
+use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName, Verdict};
+
+/// Relative errors up to which a verdict is `good`, and `fair`: of forces, and of peaks and extents.
+const FORCES: [f64; 2] = [0.01, 0.05];
+const OTHERS: [f64; 2] = [0.05, 0.2];
+
+/// Why a quantity has no error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Doubt {
+    /// Its obstacle reaches into the body between the nodes.
+    Unseen,
+    /// It has a value on a finer mesh, but no estimate that would tell whether the two agree by chance.
+    Unestimated,
+    /// It has neither an estimate nor a counterpart on the finer mesh.
+    Alone,
+}
+
+/// Quantities of a kind and a contact of which the mesh split in two has another number.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unpaired {
+    pub(super) name: QuantityName,
+    pub(super) contact: String,
+    /// How many on the mesh of the solution.
+    pub(super) here: usize,
+    /// How many on the finer one.
+    pub(super) there: usize,
+}
+
+/// A reason of a verdict, and how serious it is: its error in parts of what would be good.
+type Reason = (f64, String);
+
+/// What the error of a quantity is compared with, as a size: of a force or a peak its own; of a tangential force the friction
+/// force; of an end the length of the contact. `own`: values of that kind of the same contact.
+pub(super) fn scale(name: QuantityName, value: f64, own: impl Fn(QuantityName) -> Vec<f64>) -> f64 {
+    let scale = match name {
+        QuantityName::TangentialForce => own(QuantityName::FrictionForce).iter().sum(),
+        QuantityName::ContactStart | QuantityName::ContactEnd | QuantityName::StickEnd => length(
+            own(QuantityName::ContactStart).into_iter(),
+            own(QuantityName::ContactEnd).into_iter(),
+        ),
+        _ => value,
+    };
+    f64::abs(scale)
+}
+
+/// From the first start of contact to its last end.
+pub(super) fn length(starts: impl Iterator<Item = f64>, ends: impl Iterator<Item = f64>) -> f64 {
+    ends.fold(f64::NEG_INFINITY, f64::max) - starts.fold(f64::INFINITY, f64::min)
+}
+
+/// An error in parts of what it is compared with; none if that is 0.
+pub(super) fn relative(error: f64, scale: f64) -> Option<f64> {
+    let relative = match error {
+        0.0 => 0.0,
+        error => error / scale,
+    };
+    Some(relative).filter(|relative| relative.is_finite())
+}
+
+/// The verdict and its reasons; `doubts`: of the quantities; `unpaired`: what a finer mesh has in another number.
+pub(super) fn conclude(
+    outcome: Outcome,
+    quantities: Vec<EstimatedQuantity>,
+    doubts: &[Option<Doubt>],
+    unpaired: &[Unpaired],
+) -> Accuracy {
+    let mut found: Vec<(Verdict, Reason)> = Vec::new();
+    if outcome == Outcome::Converged {
+        let assessed = quantities.iter().zip(doubts);
+        found.extend(assessed.filter_map(|(quantity, doubt)| by_error(quantity, *doubt)));
+        found.extend(unpaired.iter().map(by_number));
+    } else {
+        let reason = "The iterations did not converge: nothing is known of the errors.";
+        found.push((Verdict::Poor, (f64::INFINITY, reason.to_owned())));
+    }
+    let verdicts = found.iter().map(|(verdict, _)| *verdict);
+    let verdict = verdicts.fold(Verdict::Good, Verdict::max);
+    let mut reasons: Vec<Reason> = found.into_iter().map(|(_, reason)| reason).collect();
+    // the most serious first; equal ones stay in order
+    reasons.sort_by(|a, b| b.0.total_cmp(&a.0));
+    Accuracy {
+        verdict,
+        reasons: reasons.into_iter().map(|(_, reason)| reason).collect(),
+        quantities,
+        verified: None,
+    }
+}
+
+/// What the error of a quantity, or that there is none, says against it.
+fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Reason)> {
+    let (name, contact) = (<&str>::from(q.quantity), &q.contact);
+    let [good, fair] = match q.quantity {
+        QuantityName::NormalForce | QuantityName::TangentialForce | QuantityName::FrictionForce => {
+            FORCES
+        }
+        _ => OTHERS,
+    };
+    let judged = |relative: f64| match relative <= fair {
+        true => Verdict::Fair,
+        false => Verdict::Poor,
+    };
+    let unknown = |why: String| {
+        let reason = format!("Of `{name}` of contact `{contact}` the error is not known: {why}.");
+        Some((Verdict::Poor, (f64::INFINITY, reason)))
+    };
+    let finer = q.finer.unwrap_or_default();
+    let end = matches!(
+        q.quantity,
+        QuantityName::ContactStart | QuantityName::ContactEnd | QuantityName::StickEnd
+    );
+    match (q.error, q.relative, q.method) {
+        (Some(_), Some(relative), _) if relative <= good => None,
+        (_, _, ErrorMethod::NoLimit) => Some((
+            Verdict::Good,
+            (
+                0.0,
+                format!(
+                    "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge, a tip or a kink of the obstacle: do not use it. Forces have a limit, and so has the averaged pressure."
+                ),
+            ),
+        )),
+        // nothing acts, and nothing is wrong
+        (Some(error), None, _) if q.value == 0.0 && error == 0.0 => None,
+        (Some(error), relative, ErrorMethod::NodeSpacing) => {
+            let relative = relative.unwrap_or(f64::INFINITY);
+            Some((
+                judged(relative),
+                (
+                    relative / good,
+                    format!(
+                        "`{name}` of contact `{contact}`, s = {:.4}, is known to ±{error:.1e} only, {} of the length of the contact: the nodes there are as far apart.",
+                        q.value,
+                        percent(relative)
+                    ),
+                ),
+            ))
+        }
+        (Some(error), relative, ErrorMethod::MeshHalved) if end => {
+            let relative = relative.unwrap_or(f64::INFINITY);
+            Some((
+                judged(relative),
+                (
+                    relative / good,
+                    format!(
+                        "`{name}` of contact `{contact}`, s = {:.4}, is known to ±{error:.1e} only, {} of the length of the contact: with every element split in two it is s = {finer:.4}.",
+                        q.value,
+                        percent(relative)
+                    ),
+                ),
+            ))
+        }
+        (Some(error), relative, method) => {
+            let relative = relative.unwrap_or(f64::INFINITY);
+            let why = match method {
+                ErrorMethod::MeshHalved => {
+                    format!("with every element split in two it is {finer:.5e}")
+                }
+                _ => "the mesh is too coarse for it".to_owned(),
+            };
+            Some((
+                judged(relative),
+                (
+                    relative / good,
+                    format!(
+                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}, that is {error:.1e}: {why}.",
+                        q.value,
+                        percent(relative)
+                    ),
+                ),
+            ))
+        }
+        (None, ..) => match doubt {
+            Some(Doubt::Unseen) => {
+                unknown("the obstacle reaches into the body between the nodes".to_owned())
+            }
+            Some(Doubt::Unestimated) => unknown(format!(
+                "there is no estimate of it, and that it is {finer:.5e} with every element split in two is no bound by itself"
+            )),
+            Some(Doubt::Alone) => unknown(
+                "there is no estimate of it, and nothing to compare it with where every element is split in two"
+                    .to_owned(),
+            ),
+            None => unknown("the linearised problem has no unique solution".to_owned()),
+        },
+    }
+}
+
+/// That contact or stick begins or ends where it does not on the mesh split in two, or the other way round.
+fn by_number(unpaired: &Unpaired) -> (Verdict, Reason) {
+    let Unpaired {
+        name,
+        contact,
+        here,
+        there,
+    } = unpaired;
+    let name = <&str>::from(*name);
+    let reason = format!(
+        "Contact `{contact}` has {here} of `{name}`, and {there} with every element split in two: they cannot be compared, and what is stated for them is estimated."
+    );
+    // after what is known to be wrong
+    (Verdict::Fair, (1.0, reason))
+}
+
+fn percent(part: f64) -> String {
+    match 100.0 * part {
+        p if p > 100.0 => "more than 100 %".to_owned(),
+        p if p < 10.0 => format!("{p:.1} %"),
+        p => format!("{p:.0} %"),
+    }
+}
