@@ -111,7 +111,7 @@ pub fn run_to_compare(
     observe: &mut Observer<'_>,
 ) -> Result<Reported, SolveError> {
     let mut load_history = LoadHistory::new(model, System::new(model, body, observe)?);
-    let last = load_history.to_the_end(&steps_of(model), 1, observe);
+    let last = load_history.follow(&steps_of(model), 1, observe);
     match last {
         Some(finished) if finished.outcome != Outcome::Canceled => {
             report(model, body, &load_history.system, &finished)
@@ -139,7 +139,7 @@ fn doubled(
     let quiet: &mut Observer<'_> = &mut algorithm::quiet(observe);
     system.restart();
     let mut load_history = LoadHistory::new(model, system);
-    let last = load_history.to_the_end(steps, 2, quiet);
+    let last = load_history.follow(steps, 2, quiet);
     let tolerance = model.controls.tolerance;
     algorithm::compared(&load_history.system, solution, last.as_ref(), tolerance)
 }
@@ -182,7 +182,7 @@ impl<'a> LoadHistory<'a> {
     }
 
     /// Solves one step after the other, each in `multiple` times its increments, until one does not converge: the last end.
-    fn to_the_end(
+    fn follow(
         &mut self,
         steps: &[Step],
         multiple: u32,
