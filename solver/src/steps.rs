@@ -113,7 +113,7 @@ pub fn run_to_compare(
     observe: &mut Observer<'_>,
 ) -> Result<Reported, SolveError> {
     let mut load_history = LoadHistory::new(model, System::new(model, body, observe)?);
-    let last = load_history.to_the_end(&steps_of(model), 1, observe);
+    let last = load_history.follow(&steps_of(model), 1, observe);
     match last {
         Some(finished) if finished.outcome != Outcome::Canceled => {
             report(model, body, &load_history.system, &finished)
@@ -142,7 +142,7 @@ fn doubled(
     let (mut system, rounding) = (first.system, first.rounding);
     system.restart();
     let mut load_history = LoadHistory::new(model, system);
-    let last = load_history.to_the_end(steps, 2, quiet);
+    let last = load_history.follow(steps, 2, quiet);
     let rounding = algorithm::rounding_of_forces([rounding, load_history.rounding]);
     let tolerance = model.controls.tolerance.max(rounding);
     algorithm::compared(&load_history.system, solution, last.as_ref(), tolerance)
@@ -189,7 +189,7 @@ impl<'a> LoadHistory<'a> {
     }
 
     /// Solves one step after the other, each in `multiple` times its increments, until one does not converge: the last end.
-    fn to_the_end(
+    fn follow(
         &mut self,
         steps: &[Step],
         multiple: u32,

@@ -79,9 +79,9 @@ impl Verification {
         if watched.observe(Progress::Phase(Phase::Verify)).is_break() {
             return Err(watched.why_not(&SolveError::Stopped));
         }
-        let finer = self
-            .finer(problem, mesh)
-            .and_then(|model| Ok(solved(&model, &mut watched)))?;
+        let model = self.finer(problem, mesh)?;
+        let finer = solved(&model, &mut watched);
+        drop(model);
         let finer = finer.map_err(|error| watched.why_not(&error))??;
         let coarser = match problem.mesh.refine {
             Refine::Times(times @ 1..) => {
