@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 use solver::problem::{AccuracyMode, Elasticity, Refine};
-use solver::solution::{ErrorMethod, EstimatedQuantity, QuantityName, Summary, Verdict};
+use solver::solution::{ErrorMethod, QuantityName, Summary, Verdict};
 
 use crate::catalogue;
+use crate::pairs::{distance, pairs};
 use crate::record::keep_table;
 use crate::support::{numbers, quiet};
 
@@ -47,18 +48,6 @@ fn solved(number: u64, refine: u32, ratio: Option<f64>, mode: AccuracyMode) -> O
     problem.solver.accuracy = Some(mode);
     let summary = solver::solve(&problem, &mut quiet).unwrap().summary;
     summary.converged.then_some(summary)
-}
-
-/// Quantities of one kind in the order of their values.
-fn by_kind(summary: &Summary) -> BTreeMap<QuantityName, Vec<&EstimatedQuantity>> {
-    let mut kinds: BTreeMap<QuantityName, Vec<&EstimatedQuantity>> = BTreeMap::new();
-    for estimated in &summary.accuracy.as_ref().unwrap().quantities {
-        kinds.entry(estimated.quantity).or_default().push(estimated);
-    }
-    for kind in kinds.values_mut() {
-        kind.sort_by(|a, b| a.value.total_cmp(&b.value));
-    }
-    kinds
 }
 
 #[test]
@@ -116,41 +105,29 @@ fn hold(table_name: &str, ratio: Option<f64>, mode: AccuracyMode) {
             let called_good = own.accuracy.as_ref().unwrap().verdict == Verdict::Good;
             good += u32::from(called_good);
             let mut wrong = Vec::new();
-            for (name, kind) in by_kind(&own) {
-                // ends that appear or vanish have no true error
-                let fine = by_kind(&fine);
-                let Some(finer) = fine.get(&name).filter(|finer| finer.len() == kind.len()) else {
+            for (coarse, fine) in pairs(&own, &fine) {
+                let name = coarse.quantity;
+                let row = rows.entry(name).or_default();
+                let (Some(error), Some(relative)) = (coarse.error, coarse.relative) else {
+                    row.unknown += u32::from(coarse.method == ErrorMethod::Unknown);
                     continue;
                 };
-                for (coarse, fine) in kind.into_iter().zip(finer) {
-                    let row = rows.entry(name).or_default();
-                    let (Some(error), Some(relative)) = (coarse.error, coarse.relative) else {
-                        row.unknown += u32::from(coarse.method == ErrorMethod::Unknown);
-                        continue;
-                    };
-                    // a peak has the same size on both sides of a symmetric problem
-                    let value = |q: &EstimatedQuantity| match name {
-                        QuantityName::PeakTangentialStress => q.value.abs(),
-                        _ => q.value,
-                    };
-                    if error == 0.0 {
-                        continue;
-                    }
-                    let off = (value(coarse) - value(fine)).abs();
-                    let scale = error / relative;
-                    if off <= KNOWN * scale {
-                        continue;
-                    }
-                    if off > promised(name) * scale {
-                        wrong.push(format!("{name:?} off by {:.3}", off / scale));
-                    }
-                    row.ratios.push(off / error);
-                    row.errors.push(off / scale);
-                    worst.push((
-                        off / error,
-                        format!("{number} refine {refine}: {name:?} {off:.1e}, stated {error:.1e}"),
-                    ));
+                if error == 0.0 {
+                    continue;
                 }
+                let (off, scale) = (distance(coarse, fine), error / relative);
+                if off <= KNOWN * scale {
+                    continue;
+                }
+                if off > promised(name) * scale {
+                    wrong.push(format!("{name:?} off by {:.3}", off / scale));
+                }
+                row.ratios.push(off / error);
+                row.errors.push(off / scale);
+                worst.push((
+                    off / error,
+                    format!("{number} refine {refine}: {name:?} {off:.1e}, stated {error:.1e}"),
+                ));
             }
             if called_good && !wrong.is_empty() {
                 good_but_wrong.push(format!("{number} refine {refine}: {}", wrong.join(", ")));

@@ -36,6 +36,7 @@ mod nearly_incompressible;
 mod oblique;
 mod obstacle_normals;
 mod obstacle_points;
+mod pairs;
 mod patch;
 mod profiles;
 mod random;

@@ -1,14 +1,13 @@
 //! `refine: {"tolerance": …}` on random problems of the catalogue, every other one on an unstructured mesh: every
 //! quantity changes by less than the tolerance on a mesh twice as fine.
 
-use std::collections::BTreeMap;
-
 use serde_json::json;
 use solver::mesh;
 use solver::problem::{AdaptiveRefine, Refine};
-use solver::solution::{EstimatedQuantity, QuantityName, Summary, Warning, WarningCode};
+use solver::solution::{Warning, WarningCode};
 
 use crate::catalogue;
+use crate::pairs::{distance, pairs};
 use crate::record::keep_table;
 use crate::support::{numbers, quiet};
 
@@ -16,18 +15,6 @@ use crate::support::{numbers, quiet};
 const NUMBERS: std::ops::Range<u64> = 0..6;
 
 const TOLERANCE: f64 = 0.01;
-
-/// Quantities of one kind in the order of their values.
-fn by_kind(summary: &Summary) -> BTreeMap<QuantityName, Vec<&EstimatedQuantity>> {
-    let mut kinds: BTreeMap<QuantityName, Vec<&EstimatedQuantity>> = BTreeMap::new();
-    for estimated in &summary.accuracy.as_ref().unwrap().quantities {
-        kinds.entry(estimated.quantity).or_default().push(estimated);
-    }
-    for kind in kinds.values_mut() {
-        kind.sort_by(|a, b| a.value.total_cmp(&b.value));
-    }
-    kinds
-}
 
 #[test]
 fn a_tolerance_holds_against_a_mesh_twice_as_fine() {
@@ -59,28 +46,17 @@ fn a_tolerance_holds_against_a_mesh_twice_as_fine() {
         let finer = solver::prepare_on_mesh(&problem, mesh::refine(&last), &mut quiet).unwrap();
         let finer = finer.solve(&mut quiet).unwrap().summary;
         assert!(finer.converged, "{number} on the finer mesh");
-        let finer = by_kind(&finer);
-        for (name, kind) in by_kind(&own) {
-            // ends that appear or vanish cannot be compared
-            let Some(fine) = finer.get(&name).filter(|finer| finer.len() == kind.len()) else {
+        for (coarse, fine) in pairs(&own, &finer) {
+            let (Some(error), Some(relative)) = (coarse.error, coarse.relative) else {
                 continue;
             };
-            for (coarse, fine) in kind.into_iter().zip(fine) {
-                let (Some(error), Some(relative)) = (coarse.error, coarse.relative) else {
-                    continue;
-                };
-                // a peak has the same size on both sides of a symmetric problem
-                let value = |q: &EstimatedQuantity| match name {
-                    QuantityName::PeakTangentialStress => q.value.abs(),
-                    _ => q.value,
-                };
-                if error > 0.0 {
-                    let off = (value(coarse) - value(fine)).abs() * relative / error;
-                    all.push((
-                        off / TOLERANCE,
-                        format!("{number}: {name:?}, stated {relative:.1e}, off {off:.1e}"),
-                    ));
-                }
+            if error > 0.0 {
+                let off = distance(coarse, fine) * relative / error;
+                let name = coarse.quantity;
+                all.push((
+                    off / TOLERANCE,
+                    format!("{number}: {name:?}, stated {relative:.1e}, off {off:.1e}"),
+                ));
             }
         }
     }
