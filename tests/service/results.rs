@@ -89,6 +89,9 @@ async fn a_result_has_its_summary_profiles_and_fields() {
         .await;
     let nodes = fields["x"].as_array().unwrap().len();
     assert!(nodes > 100 && fields["stress_zz"].as_array().unwrap().len() == nodes);
+    let profile = server
+        .json(&format!("/v1/jobs/{id}/profiles/top?points=nodes"))
+        .await;
     // the contact state of the profile's nodes is also in the fields, and that of no other node
     let states = fields["contact_state"].as_array().unwrap();
     assert_eq!(states.len(), nodes);
