@@ -12,7 +12,7 @@ use crate::origins::Origins;
 use crate::problem::{Algorithm, Spacing, Step};
 use crate::solution::{
     Comparison, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution, StepSolution,
-    Summary,
+    Summary, Warning, WarningCode,
 };
 
 /// An increment that does not converge is halved this often before the step ends there.
@@ -98,11 +98,37 @@ pub fn run(
         let second = doubled(model, load_history, steps, summary, observe);
         algorithm::note_doubled_increments(summary, second);
     }
+    tell_of_earlier_steps(&mut solution);
     if model.steps.is_empty() {
         solution.steps.clear();
     }
     solution.fields = fields;
     Ok(solution)
+}
+
+/// Adds to the end of the path what was told of an earlier step alone and the end rests on: kinematics that were not small.
+fn tell_of_earlier_steps(solution: &mut Solution) {
+    let Some((_, earlier)) = solution.steps.split_last() else {
+        return;
+    };
+    for step in earlier {
+        for warning in &step.summary.warnings {
+            let kinematic = matches!(
+                warning.code,
+                WarningCode::LargeSlip | WarningCode::LargeStrain | WarningCode::LargeDisplacement
+            );
+            let told = &mut solution.summary.warnings;
+            let known = told
+                .iter()
+                .any(|other| other.code == warning.code && other.pointer == warning.pointer);
+            if kinematic && !known {
+                told.push(Warning {
+                    message: format!("In load step {:?}: {}", step.name, warning.message),
+                    ..warning.clone()
+                });
+            }
+        }
+    }
 }
 
 /// The same path to its end, of which nothing is assessed, and which is not compared with another: for a solution that is
@@ -255,6 +281,8 @@ impl<'a> LoadHistory<'a> {
             && self.model.controls.algorithm != Algorithm::Thesis
             // in half an increment displacements are as large
             && finished.rounding.is_none()
+            // loads that slide the body away do so in smaller parts too
+            && finished.slide.is_none()
             && halvings < MOST_HALVINGS;
         match finished.outcome {
             Outcome::NotConverged | Outcome::ContactCycling if hopeful => {

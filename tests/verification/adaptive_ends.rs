@@ -168,7 +168,7 @@ fn a_later_mesh_that_does_not_converge_leaves_the_one_before() {
 #[test]
 fn a_first_mesh_without_a_solution_is_named() {
     for (signed, why) in [
-        (false, "its state is not a solution"),
+        (false, "the stiffness is nearly singular"),
         (true, "its contact and slip repeat themselves"),
     ] {
         let mut thesis = cylinder();

@@ -164,8 +164,14 @@ fn hold(table_name: &str, ratio: Option<f64>, mode: AccuracyMode) {
         println!("{ratio:.2} {line}");
     }
     let (least, most) = match mode {
+        // of all 240 problems; a dozen alone may lie above or below, and steel is what the factors are fitted to
+        Estimate if problems >= 200 && ratio.is_none() => (0.95, 3.0 + 1e-6),
         Estimate => (0.9, 5.0),
         Verify => (0.95, 3.0),
     };
     assert!(within >= least && over <= most, "{table:#}");
+    assert!(
+        20 * good_but_wrong.len() <= 20 + good as usize,
+        "{good_but_wrong:#?}"
+    );
 }

@@ -360,3 +360,24 @@ fn a_plate_that_is_turned_beyond_its_friction_is_said_to_turn() {
         ],
     );
 }
+
+/// A slip that was too large in an earlier load step is told at the end, which rests on it.
+#[test]
+fn the_end_of_a_path_tells_of_a_large_slip_before_it() {
+    let contact = json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8}, "indentation": 0.02,
+        "tangential_displacement": 3,
+        "friction": {"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4, "history": "incremental"}});
+    let mut whole = block(&contact, 1.0);
+    whole["steps"] = json!([
+        {"name": "away", "indentation": 1, "tangential_displacement": 1},
+        {"name": "back", "indentation": 1, "tangential_displacement": 0},
+    ]);
+    let problem = problem(&whole.to_string());
+    let solution = solver::solve(&problem, &mut crate::support::quiet).unwrap();
+    let of_step = &solution.steps[0].summary.warnings;
+    let slid = of_step.iter().any(|w| w.code == WarningCode::LargeSlip);
+    assert!(slid, "{of_step:#?}");
+    let at_end = &solution.summary.warnings;
+    let told = at_end.iter().find(|w| w.code == WarningCode::LargeSlip);
+    assert!(told.unwrap().message.starts_with("In load step \"away\": "));
+}

@@ -257,3 +257,25 @@ fn the_profile_holds_the_peaks() {
     }
     assert!(peaks > 80 && beside_nodes > 20, "{beside_nodes} of {peaks}");
 }
+
+/// Between the points of the law u_t, a parabola, overshoots by more than a tiny ε: a σ_t of a sign that no point beside it
+/// has is no peak. The row of a peak is the law's: σ_t = τ φ.
+#[test]
+fn a_peak_has_the_sign_of_the_points_beside_it() {
+    let mut problem = example("cylinder");
+    let mut most = 0.0f64;
+    for slip in [5.3e-6, 5e-6, 1e-5] {
+        let friction = problem.contacts[0].friction.as_mut().unwrap();
+        (friction.nonlocal_radius, friction.elastic_slip) = (Some(0.5), slip);
+        let solution = solver::solve(&problem, &mut quiet).unwrap();
+        let peak = solution.summary.contacts["top"].peak_tangential_stress;
+        let peak = peak.unwrap();
+        assert!(peak.value > 30.0, "ε = {slip:e}: {peak:?}");
+        let all = &solution.profiles["top"];
+        let row = all.tangential_stress.iter().position(|v| *v == peak.value);
+        let row = row.unwrap();
+        let law = all.friction_bound[row] * all.friction_ratio[row];
+        most = most.max((law / peak.value - 1.0).abs());
+    }
+    assert!(most < 1e-9, "{most:e}");
+}

@@ -173,7 +173,7 @@ fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
             .order
             .map_or(String::new(), |order| format!(", order {order:.1}"));
         let error = match (q.error, q.method) {
-            (Some(error), _) => format!("error at most {error:.1e}"),
+            (Some(error), _) => format!("stated error {error:.1e}"),
             (None, ErrorMethod::NoLimit) => "without a limit".to_owned(),
             (None, _) => "error unknown".to_owned(),
         };

@@ -154,9 +154,9 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
         (Some(error), relative, method) => {
             let relative = relative.unwrap_or(f64::INFINITY);
             let why = match method {
-                ErrorMethod::MeshHalved => {
-                    format!("with every element split in two it is {finer:.5e}")
-                }
+                ErrorMethod::MeshHalved => format!(
+                    "with every element split in two it is {finer:.5e}, and two meshes may agree by chance"
+                ),
                 _ => "the mesh is too coarse for it".to_owned(),
             };
             Some((

@@ -194,7 +194,9 @@ fn unsolved(outcome: Outcome) -> Option<&'static str> {
         Outcome::Converged | Outcome::Canceled => None,
         Outcome::NotConverged => Some("its iteration does not converge"),
         Outcome::ContactCycling => Some("its contact and slip repeat themselves"),
-        Outcome::FalseConvergence => Some("its state is not a solution"),
+        Outcome::FalseConvergence => Some(
+            "its forces do not balance, or its residual is false: the stiffness is nearly singular",
+        ),
     }
 }
 

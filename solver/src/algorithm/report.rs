@@ -101,7 +101,8 @@ pub fn report(
             });
         }
         let (name, friction) = (&patch.contact.name, view.friction_profile(&profile));
-        profiles.insert(name.clone(), at_all_points(&profile, &friction, &summary));
+        let peaks = view.peak_profile(&profile);
+        profiles.insert(name.clone(), at_all_points(&profile, &friction, &peaks));
         node_profiles.insert(name.clone(), profile);
         friction_profiles.insert(name.clone(), friction);
         contacts.insert(name.clone(), summary);
@@ -438,7 +439,7 @@ fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warni
         Some((slip.displacement, contact, contact.friction.as_ref()?))
     });
     let mut message = format!(
-        "A residual of {:.1e} remains, which rounding cannot bring below some {floor:.1e} (tolerance {tolerance:.1e}): ",
+        "A residual of {:.1e} remains, above the tolerance of {tolerance:.1e}. It is rounding, which may leave up to {floor:.1e} here: ",
         rounding.residual
     );
     let pointer = match slip {
@@ -452,7 +453,7 @@ fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warni
                 message += " Rounding may decide what sticks and what slips: this does not count as converged.";
             }
             message += &format!(
-                " Raise elastic_slip, to {:.1e} for this tolerance, or let the obstacle move less far.",
+                " Raise elastic_slip, to {:.1e} for this tolerance (less may do), or let the obstacle move less far.",
                 slip * floor / tolerance
             );
             format!("{}/friction/elastic_slip", contact.pointer)

@@ -12,8 +12,8 @@ use crate::solution::Residuals;
 /// Operations that round one after the other: a sum, a product, the interpolation between nodes, the division by ε.
 const OPERATIONS: f64 = 4.0;
 
-/// Where rounding may leave more than this, no state counts as a solution: no error is ever stated smaller (formulation
-/// 3.9), and rounding is not to add to it. What is left is mostly less, by 30 times, but by chance, and in other units by
+/// Where rounding may leave more than this, no state counts as a solution: the estimated error of a force or a peak is never
+/// a smaller part of it (formulation 3.9), and rounding is not to add to it. What is left is mostly less, by 30 times, but by chance, and in other units by
 /// another: the outcome follows from the bound.
 const MOST: f64 = 1e-4;
 

@@ -2,8 +2,9 @@
 
 use super::Mesh;
 
-/// Nodes nearer to each other than this part of the shortest side at them are at the same place.
-const SAME_PLACE: f64 = 1e-6;
+/// Nodes nearer to each other than this part of the shortest side at them are at the same place: a slit that thin is meant
+/// by nobody, and files print six digits.
+const SAME_PLACE: f64 = 3e-4;
 
 /// Nodes that each one is compared with: in a mesh of any use far fewer are as near to it along one direction.
 const MOST_COMPARED: usize = 200;

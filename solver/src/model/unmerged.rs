@@ -29,7 +29,7 @@ impl Checks {
             WarningCode::CoincidentNodes,
             "/mesh",
             format!(
-                "Nodes {first} and {second} are both at ({x}, {y}) and belong to different elements{others}: the body has a crack there, along which its parts do not hold each other. Merge them, in Gmsh with `Coherence Mesh;` or `removeDuplicateNodes`, unless the crack is meant."
+                "Two nodes, {first} and {second} counted from 0, are both at ({x}, {y}) and belong to different elements{others}: the body has a crack there, along which its parts do not hold each other. Merge them where the mesh was made, in Gmsh with `Coherence Mesh;` or `removeDuplicateNodes`, unless the crack is meant."
             ),
         );
     }
@@ -41,7 +41,7 @@ impl Checks {
         };
         let [x, y] = mesh.nodes[first as usize];
         format!(
-            " Nodes {first} and {second} are both at ({x}, {y}) and not connected, {} such pairs in all: merge them, in Gmsh with `Coherence Mesh;`.",
+            " Two nodes, {first} and {second} counted from 0, are both at ({x}, {y}) and not connected, {} such pairs in all: merge them where the mesh was made, in Gmsh with `Coherence Mesh;`.",
             self.unmerged.len()
         )
     }

@@ -508,12 +508,19 @@ impl ContactProfile {
         self.state.push(other.state[row]);
     }
 
-    /// Inserts the first row of another profile.
-    fn insert_row(&mut self, row: usize, other: &ContactProfile) {
+    /// Inserts a row of another profile before one of this.
+    fn insert_row(&mut self, before: usize, other: &ContactProfile, row: usize) {
         for (to, from) in self.columns_mut().into_iter().zip(other.columns()) {
-            to.insert(row, from[0]);
+            to.insert(before, from[row]);
         }
-        self.state.insert(row, other.state[0]);
+        self.state.insert(before, other.state[row]);
+    }
+
+    fn remove_row(&mut self, row: usize) {
+        for column in self.columns_mut() {
+            column.remove(row);
+        }
+        self.state.remove(row);
     }
 }
 

@@ -1,6 +1,6 @@
 //! A stored profile at any number of points, without solving again.
 
-use super::{ContactProfile, ContactSummary};
+use super::ContactProfile;
 use crate::element::edge3;
 
 /// A place counts as a node within this part of the whole length: the rounding of `s`.
@@ -44,39 +44,26 @@ pub fn sample(profile: &ContactProfile, friction: &ContactProfile, count: usize)
 }
 
 /// The columns of a profile at all points where the solution is known: the nodes, the points where friction acts, and
-/// the places of the two peaks, which have the values of the summary. So the largest stresses of these columns are
+/// the places of the peaks, each of one contact and in order of arc length. So the largest stresses of these columns are
 /// the peaks.
-///
-/// `profile` and `friction` as for [`sample`], by which the other columns are found at the peaks; `summary`: that of the
-/// same contact in the same step.
 pub fn at_all_points(
     profile: &ContactProfile,
     friction: &ContactProfile,
-    summary: &ContactSummary,
+    peaks: &ContactProfile,
 ) -> ContactProfile {
     let edges = edges(profile);
     if edges == 0 {
         return profile.clone();
     }
-    let known = Known::new(profile, friction);
     let close = ROUNDING * (profile.s[2 * edges] - profile.s[0]);
-    let mut all = known.values.clone();
-    // where a row is, or is inserted
-    let row_at = |all: &mut ContactProfile, s: f64| {
+    let mut all = Known::new(profile, friction).values;
+    for (k, s) in peaks.s.iter().enumerate() {
         let row = all.s.partition_point(|other| *other < s - close);
-        if all.s.get(row).is_none_or(|other| *other > s + close) {
-            all.insert_row(row, &known.at(s));
+        // at a node the law may have two values, of which the profile shows the mean: here the larger
+        if all.s.get(row).is_some_and(|other| *other <= s + close) {
+            all.remove_row(row);
         }
-        row
-    };
-    if let Some(peak) = summary.peak_normal_stress {
-        let row = row_at(&mut all, peak.s);
-        all.normal_stress[row] = peak.value;
-    }
-    if let Some(peak) = summary.peak_tangential_stress {
-        let row = row_at(&mut all, peak.s);
-        all.tangential_stress[row] = peak.value;
-        all.friction_bound[row] = all.friction_bound[row].max(peak.value.abs());
+        all.insert_row(row, peaks, k);
     }
     all
 }

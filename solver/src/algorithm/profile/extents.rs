@@ -1,8 +1,11 @@
 //! Forces of a contact, where it touches, sticks and slips, and its peaks.
 
+use std::cmp::Ordering;
+
 use super::PatchView;
 use crate::contact::edge_nodes;
 use crate::element::edge3;
+use crate::element::gauss::GAUSS_3;
 use crate::problem::Condition;
 use crate::solution::{ContactSummary, Peak};
 
@@ -173,6 +176,15 @@ impl PatchView<'_> {
             .max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
+    /// The places on an edge at which σ_t is known: the nodes, and the points where friction acts.
+    fn places_of_law(&self) -> &'static [f64] {
+        const WITH_GAUSS_POINTS: [f64; 5] = [-1.0, GAUSS_3[0].0, 0.0, GAUSS_3[2].0, 1.0];
+        match self.at_gauss_points() {
+            true => &WITH_GAUSS_POINTS,
+            false => &[-1.0, 0.0, 1.0],
+        }
+    }
+
     fn peak_tangential_stress(&self) -> Option<Peak> {
         let (value, edge, xi) = self.highest_traction()?;
         Some(self.peak(value, edge, xi))
@@ -183,13 +195,31 @@ impl PatchView<'_> {
         if self.patch.law.is_none() && self.tractions.is_none() {
             return None;
         }
-        let size = |edge: usize, xi: f64| self.tangential_stress_at(edge, xi).abs();
         let step = 2.0 / SAMPLES as f64;
-        let samples = (0..self.patch.contact.boundary.edge_count())
-            .flat_map(|edge| (0..=SAMPLES).map(move |k| (edge, -1.0 + step * k as f64)));
-        let (_, edge, centre) = samples
-            .map(|(edge, xi)| (size(edge, xi), edge, xi))
-            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let mut highest: Option<(f64, usize, f64)> = None;
+        for edge in 0..self.patch.contact.boundary.edge_count() {
+            let stress = |xi: f64| self.tangential_stress_at(edge, xi);
+            // Between the points of the law u_t, a parabola, may overshoot to the other side of ε: a sign that no point
+            // beside it has is not one of the solution.
+            let points = self.places_of_law();
+            let signs: Vec<Option<Ordering>> = points
+                .iter()
+                .map(|xi| stress(*xi).partial_cmp(&0.0))
+                .collect();
+            for k in 0..=SAMPLES {
+                let xi = -1.0 + step * k as f64;
+                let after = points.partition_point(|point| *point < xi);
+                let beside = [after.saturating_sub(1), after.min(points.len() - 1)];
+                let value = stress(xi);
+                let sign = value.partial_cmp(&0.0);
+                let seen = value == 0.0 || beside.iter().any(|i| signs[*i] == sign);
+                if seen && highest.is_none_or(|(most, ..)| value.abs() >= most.abs()) {
+                    highest = Some((value, edge, xi));
+                }
+            }
+        }
+        let (value, edge, centre) = highest?;
+        let size = |edge: usize, xi: f64| value.signum() * self.tangential_stress_at(edge, xi);
         // golden section between the neighbouring samples
         let (mut low, mut high) = ((centre - step).max(-1.0), (centre + step).min(1.0));
         let ratio = 0.5 * (5f64.sqrt() - 1.0);

@@ -245,46 +245,89 @@ impl<'a> PatchView<'a> {
             }
             return profile;
         }
-        let law = self.patch.law.as_ref();
         let places = self.patch.contact.boundary.friction_points.iter();
         for (k, place) in places.enumerate() {
             let (edge, xi) = (k / 3, GAUSS_3[k % 3].0);
-            let along = |column: &[f64]| {
-                edge3::interpolate(&place.shape, &place.nodes.map(|i| column[i])) + 0.0
-            };
-            let (averaged, bound) = self.averaged_and_bound(place.s);
-            let slip = self.slip_at(edge, xi);
             let stress = match own.get(k) {
                 Some(&g) => tractions[g],
                 None => self.tangential_stress_at(edge, xi),
             };
-            let sticks = match law {
-                None => self.patch.contact.condition == Condition::Bonded,
-                Some(law) => slip.abs() < law.elastic_slip,
-            };
-            let [start, end, middle] = place.nodes;
-            let beside = [[start, middle], [middle; 2], [middle, end]][k % 3];
-            profile.s.push(place.s);
-            profile.x.push(along(&nodal.x));
-            profile.y.push(along(&nodal.y));
-            profile.gap.push(along(&nodal.gap));
-            profile
-                .normal_displacement
-                .push(along(&nodal.normal_displacement));
-            profile
-                .tangential_displacement
-                .push(along(&nodal.tangential_displacement));
-            profile.normal_stress.push(along(&nodal.normal_stress));
-            profile.tangential_stress.push(stress + 0.0);
-            profile.nonlocal_pressure.push(averaged);
-            profile.friction_bound.push(bound);
-            profile
-                .friction_ratio
-                .push(law.map_or(0.0, |law| law.phi(slip)).abs());
-            let engaged = beside.iter().all(|&i| self.engaged(i));
-            profile.state.push(state(engaged, sticks));
+            self.push_place(&mut profile, nodal, (edge, xi), place.s, stress);
         }
         profile
+    }
+
+    /// The columns at the places of the peaks, by the law there, in order of arc length; `nodal` are those at the nodes.
+    pub(super) fn peak_profile(&self, nodal: &ContactProfile) -> ContactProfile {
+        let pressure = self.highest_pressure();
+        let traction = self.highest_traction();
+        let places = [pressure, traction].into_iter().flatten();
+        let arc = |(_, edge, xi): (f64, usize, f64)| {
+            let h = edge3::shape(xi);
+            let s = edge3::interpolate(&h, &self.patch.contact.boundary.edge_arc(edge));
+            (s, edge, xi)
+        };
+        let mut places: Vec<(f64, usize, f64)> = places.map(arc).collect();
+        places.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut profile = ContactProfile::default();
+        for (s, edge, xi) in places {
+            let stress = self.tangential_stress_at(edge, xi);
+            self.push_place(&mut profile, nodal, (edge, xi), s, stress);
+        }
+        profile
+    }
+
+    /// Adds the columns at ξ of an edge, with the σ_t given; open if one of the nodes beside it is.
+    fn push_place(
+        &self,
+        profile: &mut ContactProfile,
+        nodal: &ContactProfile,
+        (edge, xi): (usize, f64),
+        s: f64,
+        stress: f64,
+    ) {
+        let nodes = edge_nodes(edge);
+        let shape = edge3::shape(xi);
+        let along = |column: &[f64]| edge3::interpolate(&shape, &nodes.map(|i| column[i])) + 0.0;
+        let law = self.patch.law.as_ref();
+        let (averaged, bound) = self.averaged_and_bound(s);
+        let slip = self.slip_at(edge, xi);
+        let sticks = match law {
+            None => self.patch.contact.condition == Condition::Bonded,
+            Some(law) => slip.abs() < law.elastic_slip,
+        };
+        let [start, end, middle] = nodes;
+        let beside = match xi {
+            _ if xi <= -1.0 => [start; 2],
+            _ if xi < 0.0 => [start, middle],
+            0.0 => [middle; 2],
+            _ if xi < 1.0 => [middle, end],
+            _ => [end; 2],
+        };
+        let engaged = beside.iter().all(|&i| self.engaged(i));
+        let ratio = law.map_or(0.0, |law| law.phi(slip)).abs();
+        for (column, value) in [
+            (&mut profile.s, s),
+            (&mut profile.x, along(&nodal.x)),
+            (&mut profile.y, along(&nodal.y)),
+            (&mut profile.gap, along(&nodal.gap)),
+            (
+                &mut profile.normal_displacement,
+                along(&nodal.normal_displacement),
+            ),
+            (
+                &mut profile.tangential_displacement,
+                along(&nodal.tangential_displacement),
+            ),
+            (&mut profile.normal_stress, along(&nodal.normal_stress)),
+            (&mut profile.tangential_stress, stress + 0.0),
+            (&mut profile.nonlocal_pressure, averaged),
+            (&mut profile.friction_bound, bound),
+            (&mut profile.friction_ratio, ratio),
+        ] {
+            column.push(value);
+        }
+        profile.state.push(state(engaged, sticks));
     }
 }
 
