@@ -232,8 +232,7 @@ mod tests {
                         second_s = start.elapsed().as_secs_f64();
                     }
                 }
-                // the estimate of the second mesh; its factor, Ŝ and some matrices; then no more
-                // after its factor, Ŝ and matrices of some iterations
+                // no more room after the factor of the second mesh, Ŝ and matrices of some iterations
                 Update::Room { .. } if meshes == [1, 2] => {
                     asked += 1;
                     if asked > 5 {

@@ -64,11 +64,7 @@ impl StressDifference {
         quadrature: u32,
         other: &StressDifference,
     ) -> Vec<f64> {
-        let compliances: Vec<Moduli> = section
-            .materials()
-            .iter()
-            .map(|moduli| inverse(moduli).unwrap_or_default())
-            .collect();
+        let compliances = compliances(section);
         let mut pairs = self.stress.iter().zip(&other.stress);
         let product = |(e, element): (usize, &Element)| {
             let (family, nodes) = (element.family(), mesh.element_nodes(element));
@@ -97,11 +93,7 @@ impl StressDifference {
         other: &StressDifference,
         products: &mut [f64],
     ) {
-        let compliances: Vec<Moduli> = section
-            .materials()
-            .iter()
-            .map(|moduli| inverse(moduli).unwrap_or_default())
-            .collect();
+        let compliances = compliances(section);
         let own = self.stress.iter().zip(&self.dilatation_gap);
         let other = other.stress.iter().zip(&other.dilatation_gap);
         let mut pairs = own.zip(other);
@@ -148,8 +140,7 @@ impl StressDifference {
             return fields.iter().map(products).collect();
         }
         let mut products = vec![vec![0.0; mesh.elements.len()]; fields.len()];
-        for (material, moduli) in section.materials().iter().enumerate() {
-            let compliance = inverse(moduli).unwrap_or_default();
+        for (material, compliance) in compliances(section).iter().enumerate() {
             let smooth = recover_nodal_stresses(mesh, section, material, fields, stop)?;
             let mut first = 0;
             for (e, element) in mesh.elements.iter().enumerate() {
@@ -204,6 +195,14 @@ impl StressDifference {
         let norm = |square: f64| square.max(0.0).sqrt();
         squares.into_iter().map(norm).collect()
     }
+}
+
+/// C⁻¹ of every material.
+fn compliances(section: &Section) -> Vec<Moduli> {
+    let moduli = section.materials().iter();
+    moduli
+        .map(|moduli| inverse(moduli).unwrap_or_default())
+        .collect()
 }
 
 #[cfg(test)]
