@@ -25,9 +25,10 @@ SLOW, QUICK = 200, 200
 KINDS = ("events", "grpc", "poll")
 JOBS = 20_000 if SOAK else 1_000
 WAITERS = 10_000 if SOAK else 2_000
-# The promise, which needs a processor for the solver and one for the rest, since these clients take most of one. The
-# small form runs beside other tests: there only the time of processors that the server takes tells something.
-MOST_LONGER = 1.05 if SOAK else None
+# With slow watchers, which is R9's promise; with all. It needs a processor for the solver and one for the rest, since these
+# clients take most of one: what serves those that read at once then also waits for the solver's processor, and so takes
+# from it. The small form runs beside other tests: there only the time of processors that the server takes tells something.
+MOST_LONGER = (1.05, 1.25) if SOAK else (None, None)
 # With slow watchers; with all. Of the rounds the least counts: what else the machine does only adds to it. A measurement that
 # was disturbed is repeated, so many rounds at most; a cost that is real stays.
 MOST_PROCESSOR, MOST_ROUNDS = (1.2, 1.5), 100 if SOAK else 15
@@ -228,8 +229,8 @@ def many_watchers():
                   SLOW, median(lambda alone, slow, both: alone[0]), slow, QUICK, both, len(rounds), *cpu, memory / 1024,
                   max(wal) / MIB))
     print(figure, flush=True)
-    for ratio, who in zip((slow, both), ("slow", "all")):
-        check(MOST_LONGER is None or ratio <= MOST_LONGER, "with %s watchers the solve took %.2f × as long" % (who, ratio))
+    for ratio, most, who in zip((slow, both), MOST_LONGER, ("slow", "all")):
+        check(most is None or ratio <= most, "with %s watchers the solve took %.2f × as long" % (who, ratio))
     equal(too_dear(rounds), [], "with slow watchers, and with all")
     check(memory <= MOST_MEMORY, "a watcher takes %.0f KiB" % (memory / 1024))
     check(max(wal) <= MOST_WAL, "the write-ahead log grew to %.0f MiB" % (max(wal) / MIB))

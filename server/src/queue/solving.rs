@@ -42,6 +42,18 @@ pub(super) fn solve_and_report(
     mesh: Option<Mesh>,
     solve: Solve,
     share: u64,
+    tell: impl FnMut(Told) -> ControlFlow<()>,
+) -> Result<Solved, SolveError> {
+    solve_and_store(problem, mesh, solve, share, Partials::paced(), tell)
+}
+
+/// As [`solve_and_report`], with partial results as `partials` decides.
+pub(super) fn solve_and_store(
+    problem: &str,
+    mesh: Option<Mesh>,
+    solve: Solve,
+    share: u64,
+    mut partials: Partials,
     mut tell: impl FnMut(Told) -> ControlFlow<()>,
 ) -> Result<Solved, SolveError> {
     let mut meter = Meter::new(share);
@@ -58,7 +70,6 @@ pub(super) fn solve_and_report(
         let _ = tell(Told::Report(Report::OneLevel));
     }
     let event = |payload| Some(Report::Event(Time::now(), payload));
-    let mut partials = Partials::default();
     let solve =
         |observe: &mut Observer<'_>| solve(&problem, files::external_mesh(&problem, mesh), observe);
     let mut verifying = false;
@@ -124,28 +135,50 @@ pub(super) fn solve_and_report(
 
 /// Decides when the results of finished load steps are stored as a partial result: not after each, since all of it is
 /// written each time and a problem may have a thousand steps; and not at all once the partial result has grown large.
-#[derive(Default)]
-struct Partials {
-    /// The earliest time of the next one.
+pub(super) struct Partials {
+    /// The least time between two.
+    pause: Duration,
+    /// Storing takes at most one part in so many of the time.
+    part: u32,
+    /// When the next one may be stored; `None` once one was too large.
     next: Option<Instant>,
 }
 
 impl Partials {
+    /// At most once a second, and at most a tenth of the time.
+    fn paced() -> Self {
+        Partials {
+            pause: Duration::from_secs(1),
+            part: 10,
+            next: Some(Instant::now()),
+        }
+    }
+
+    /// After every step: what a slow machine may do, so that tests do not depend on the clock.
+    #[cfg(test)]
+    pub(super) fn every_step() -> Self {
+        Partials {
+            pause: Duration::ZERO,
+            part: 0,
+            ..Partials::paced()
+        }
+    }
+
     /// The partial result, if it is time to store it.
     fn next(&mut self, partial: &PartialSolution<'_>) -> Option<Report> {
         /// A result of this size is written in one transaction, which occupies the single writer for some 40 ms.
         const MOST_BYTES: usize = 4 << 20;
-        /// Storing takes at most a tenth of the time, and happens at most once a second.
-        const SHARE: u32 = 10;
-        const PAUSE: Duration = Duration::from_secs(1);
         let start = Instant::now();
-        if self.next.is_some_and(|next| start < next) {
+        if self.next.is_none_or(|next| start < next) {
             return None;
         }
         // numbers that are not finite, and so have no JSON, are reported at the end
-        let parts = Parts::of(&partial.document().ok()?).ok();
-        self.next = Some(start + (start.elapsed() * SHARE).max(PAUSE));
-        let parts = parts.filter(|parts| parts.bytes() <= MOST_BYTES)?;
+        let parts = Parts::of(&partial.document().ok()?).ok()?;
+        if parts.bytes() > MOST_BYTES {
+            self.next = None;
+            return None;
+        }
+        self.next = Some(start + (start.elapsed() * self.part).max(self.pause));
         Some(Report::Partial(Box::new(parts)))
     }
 }

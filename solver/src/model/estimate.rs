@@ -269,9 +269,10 @@ impl Size {
         }
     }
 
-    /// Profiles and rows are held as numbers and as text; a step is also part of what is stored on the way (bytes).
+    /// Profiles and rows are held as numbers and as text; a step is also part of a partial result, which is a copy of
+    /// all steps so far and their text (bytes).
     fn history(&self) -> f64 {
-        1.2e4 * self.increments + self.steps * (6e3 + 600.0 * self.profile) + 300.0 * self.profile
+        1.2e4 * self.increments + self.steps * (1e4 + 1000.0 * self.profile) + 300.0 * self.profile
     }
 }
 

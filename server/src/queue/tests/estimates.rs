@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use std::ops::ControlFlow;
 
 use super::*;
-use crate::queue::{report::Told, solving::solve_and_report};
+use crate::queue::{report::Told, solving::{Partials, solve_and_report, solve_and_store}};
 
 /// Problems of different shapes, by what is large in them.
 fn problems() -> Vec<(String, Value)> {
@@ -141,7 +141,8 @@ fn taken_and_told(problem: &Value) -> (u64, u64) {
         drop(told);
         ControlFlow::Continue(())
     };
-    let solved = solve_and_report(&text, None, solver::solve_on, u64::MAX, go_on);
+    let partials = Partials::every_step();
+    let solved = solve_and_store(&text, None, solver::solve_on, u64::MAX, partials, go_on);
     let taken = allocator::highest() - before;
     drop(solved.map(|solved| solved.parts));
     (taken as u64, told.memory_bytes)
