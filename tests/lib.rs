@@ -6,6 +6,15 @@ pub mod harness;
 
 use serde_json::{Value, json};
 
+/// The names of the five problems of the thesis.
+pub const EXAMPLES: [&str; 5] = [
+    "rectangular_punch",
+    "cylinder",
+    "annular_punch",
+    "cylinder_on_end",
+    "sheet",
+];
+
 /// One of the five problems on meshes of the thesis's size, as text; `examples/` has them on refined meshes.
 pub fn example(name: &str) -> String {
     let path = format!("{}/data/thesis/{name}.json", env!("CARGO_MANIFEST_DIR"));

@@ -40,8 +40,6 @@ ROWS = [
         "connections.py", "connections.py --soak"),
     Row("R9", "Hundreds of watchers, slow or not: a solve takes no longer, and thousands who wait are soon answered",
         "watchers.py", "watchers.py --soak",
-        missing="beside 200 slow watchers a solve takes 1.02 times as long (118 rounds on 2026-11-22), but with 200 more that "
-                "read at once 1.10 times, for which the bound is 1.05 too: two processors, of which the clients take one",
         before="200 slow watchers made a solve 4 times as long; 10,000 watchers of one end wrote 6,800 warnings"),
     Row("R10", "Streams that are cut and resumed have each event exactly once",
         "../clients/cut_streams.py", "../clients/cut_streams.py"),

@@ -67,13 +67,7 @@ fn thesis_iteration() -> String {
     let mut out = String::from(
         "## The thesis's own iteration\n\n`algorithm: \"thesis\"` at the thesis's parameters, against `auto`. *Residual* is that of the true problem.\nWhere the unsigned iteration meets its own test R_F, it does so in a false state of full slip; with the sign it\ncycles at full steps, and relaxed it creeps to the truth or stops short of it. Ways 1 and 2 are those of 3.2;\nchapter 4 calls their results very similar.\n\n| example | pressure | local points | way | sign | relaxation | ends | iterations | T | residual |\n|---|---|---|---|---|---|---|---|---|---|\n",
     );
-    for name in [
-        "rectangular_punch",
-        "cylinder",
-        "annular_punch",
-        "cylinder_on_end",
-        "sheet",
-    ] {
+    for name in suite::EXAMPLES {
         let problem = example(name);
         let truth = solve(&problem).summary;
         let title = name.replace('_', " ");

@@ -16,21 +16,13 @@ use crate::{
     server,
 };
 
-const EXAMPLES: [&str; 5] = [
-    "rectangular_punch",
-    "cylinder",
-    "annular_punch",
-    "cylinder_on_end",
-    "sheet",
-];
-
 /// Operations: CreateJob, GetResult
 #[tokio::test]
 async fn rest_grpc_and_the_command_line_give_bit_identical_results() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     let folder = tempfile::tempdir().unwrap();
-    for name in EXAMPLES {
+    for name in suite::EXAMPLES {
         let by_rest = server.submit(&example_json(name)).await;
         server.until_done(&by_rest).await;
         let by_rest = server.json(&format!("/v1/jobs/{by_rest}/result")).await["summary"].take();
@@ -215,7 +207,7 @@ async fn both_protocols_return_a_problem_as_it_was_submitted() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     server.post("/v1/queue/pause").send().await.unwrap();
-    for name in EXAMPLES {
+    for name in suite::EXAMPLES {
         let by_rest = server.submit(&example_json(name)).await;
         let by_rest = server.json(&format!("/v1/jobs/{by_rest}/problem")).await;
         let request = pb::CreateJobRequest {

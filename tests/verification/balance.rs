@@ -13,14 +13,6 @@ use solver::problem::{Kernel, Measure, Normalization};
 use crate::record::held;
 use crate::support::{example, quiet, solve};
 
-const EXAMPLES: [&str; 5] = [
-    "rectangular_punch",
-    "cylinder",
-    "annular_punch",
-    "cylinder_on_end",
-    "sheet",
-];
-
 fn with_solved(name: &str, check: impl FnOnce(&Model, &ElasticBody, &System<'_>, &Finished)) {
     let model = Model::new(&example(name), None).unwrap();
     let body = ElasticBody::new(&model, &mut quiet).unwrap();
@@ -31,7 +23,7 @@ fn with_solved(name: &str, check: impl FnOnce(&Model, &ElasticBody, &System<'_>,
 
 #[test]
 fn forces_balance_to_1e_9() {
-    for name in EXAMPLES {
+    for name in suite::EXAMPLES {
         let residuals = solve(&example(name)).summary.residuals;
         let what = format!("{name}: force balance");
         held(25, &what, "thesis mesh", residuals.equilibrium, 0.0, 1e-9);
@@ -46,7 +38,7 @@ fn forces_balance_to_1e_9() {
 /// the depth (three Gauss points in axisymmetry, where the integrand is cubic).
 #[test]
 fn the_pressure_profile_integrates_to_the_reactions_and_vanishes_off_the_contact() {
-    for name in EXAMPLES {
+    for name in suite::EXAMPLES {
         let problem = example(name);
         let solution = solve(&problem);
         let (summary, profile) = (
@@ -95,7 +87,7 @@ fn the_pressure_profile_integrates_to_the_reactions_and_vanishes_off_the_contact
 /// on the obstacle, friction by its final tangent (exact for the linear φ), by Gaussian elimination.
 #[test]
 fn condensed_equals_uncondensed_to_1e_10() {
-    for name in EXAMPLES {
+    for name in suite::EXAMPLES {
         with_solved(name, |model, body, system, finished| {
             let graph = Graph::from_cliques(
                 model.mesh.nodes.len(),
@@ -226,7 +218,7 @@ fn sequence(mut seed: u64) -> impl FnMut() -> f64 {
 /// a(u, v − u) + j(v) − j(u) ≥ f(v − u).
 #[test]
 fn no_admissible_state_has_less_energy_and_the_variational_inequality_holds() {
-    for name in EXAMPLES {
+    for name in suite::EXAMPLES {
         with_solved(name, |_, _, system, finished| {
             let u = &finished.state.v;
             let size = u.iter().fold(1e-6f64, |m, x| m.max(x.abs()));

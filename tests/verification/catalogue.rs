@@ -11,6 +11,8 @@ use crate::support::{Lattice, problem, union};
 pub(crate) struct Case {
     /// What it consists of, in words.
     pub(crate) words: String,
+    /// Of a whole body, or one half of a symmetric one.
+    whole: bool,
     pub(crate) problem: Problem,
 }
 
@@ -139,6 +141,7 @@ pub(crate) fn case(number: u64) -> Case {
         "quadrilaterals"
     };
     Case {
+        whole: body == "whole",
         words: format!(
             "{body} {kind}, {law}, drag {:.2}, {elements} {load} {history}",
             drag / depth
@@ -337,6 +340,20 @@ pub(crate) fn unstructured(number: u64) -> Problem {
     let (nodes, elements) = lattice.cut(|e| cut[e]);
     problem.mesh = serde_json::from_value(inline_of(&lattice, columns, rows, nodes, elements))
         .unwrap_or_else(|error| panic!("{number}: {error}"));
+    problem
+}
+
+/// The problem of this number on a mesh of Gmsh's (`tests/data/gmsh/block.geo`), which knows nothing of the obstacle.
+pub(crate) fn gmsh(number: u64) -> Problem {
+    let Case {
+        whole, mut problem, ..
+    } = case(number);
+    let part = if whole { "whole" } else { "half" };
+    let family = one_of(&mut Rng::with_seed(number), &["quad8", "tri6", "mixed"]);
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/data/gmsh");
+    let path = format!("{folder}/block-{part}-{family}.msh");
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    problem.mesh = serde_json::from_value(json!({"gmsh": text})).unwrap();
     problem
 }
 

@@ -225,13 +225,7 @@ fn oscillating_stick_tractions_have_their_published_size_and_a_warning() {
 /// The examples as they are shipped are the same problems, on meshes refined until all that has a limit is known to 0.2 %.
 #[test]
 fn the_shipped_examples_are_the_same_problems_and_known_to_two_thousandths() {
-    for name in [
-        "rectangular_punch",
-        "cylinder",
-        "annular_punch",
-        "cylinder_on_end",
-        "sheet",
-    ] {
+    for name in suite::EXAMPLES {
         let mut shipped = crate::support::problem(&suite::shipped_example(name));
         let summary = solve(&shipped).summary;
         let accuracy = summary.accuracy.unwrap();

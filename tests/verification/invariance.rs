@@ -6,14 +6,6 @@ use solver::problem::{Algorithm, Elasticity, Problem};
 use crate::record::held;
 use crate::support::{Lattice, example, problem, solve};
 
-const EXAMPLES: [&str; 5] = [
-    "rectangular_punch",
-    "cylinder",
-    "annular_punch",
-    "cylinder_on_end",
-    "sheet",
-];
-
 /// The problem with all its lengths times `length` and all its stresses times `stress`.
 fn scaled(problem: &Problem, length: f64, stress: f64) -> Problem {
     let mut value = serde_json::to_value(problem).unwrap();
@@ -58,7 +50,7 @@ fn scaled(problem: &Problem, length: f64, stress: f64) -> Problem {
 /// Scales are no powers of two, so bits differ; 1e-9 is what the tolerance leaves of forces.
 #[test]
 fn units_change_no_iteration_and_scale_the_result() {
-    for name in EXAMPLES {
+    for name in suite::EXAMPLES {
         for algorithm in [Algorithm::Auto, Algorithm::Newton] {
             let mut original = example(name);
             original.solver.algorithm = algorithm;

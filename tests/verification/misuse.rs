@@ -115,13 +115,7 @@ fn sliding_along_a_plane_and_in_the_examples_is_sound() {
         json!({"kind": "line", "point": [0, 0], "angle": 0}),
         10.0
     ));
-    for name in [
-        "rectangular_punch",
-        "cylinder",
-        "annular_punch",
-        "cylinder_on_end",
-        "sheet",
-    ] {
+    for name in suite::EXAMPLES {
         for refine in 0..=2 {
             let mut problem = example(name);
             problem.mesh.refine = Refine::Times(refine);

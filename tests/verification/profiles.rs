@@ -7,14 +7,6 @@ use solver::solution::{ContactProfile, NodeState, Solution, sample};
 
 use crate::support::{close, example, quiet, solve};
 
-const EXAMPLES: [&str; 5] = [
-    "rectangular_punch",
-    "cylinder",
-    "annular_punch",
-    "cylinder_on_end",
-    "sheet",
-];
-
 /// ∫f over Γ_C by the Gauss rule of the friction points: `values` has three to an edge.
 fn integral(problem: &Problem, nodal: &ContactProfile, values: impl Fn(usize) -> f64) -> f64 {
     let depth = |x: f64| match problem.analysis {
@@ -47,7 +39,7 @@ fn profiles(solution: &Solution) -> (&ContactProfile, &ContactProfile) {
 /// iteration did not converge, or its tractions are not the law's.
 #[test]
 fn stresses_at_the_friction_points_add_up_to_the_forces() {
-    let mut problems: Vec<Problem> = EXAMPLES.map(example).to_vec();
+    let mut problems: Vec<Problem> = suite::EXAMPLES.map(example).to_vec();
     let mut early = example("cylinder");
     early.solver.max_iterations = 2;
     let mut thesis = example("rectangular_punch");
@@ -84,7 +76,7 @@ fn stresses_at_the_friction_points_add_up_to_the_forces() {
 /// and the midside's own values at the middle point.
 #[test]
 fn the_law_holds_at_every_friction_point() {
-    for name in EXAMPLES {
+    for name in suite::EXAMPLES {
         let problem = example(name);
         let law = problem.contacts[0].friction.clone().unwrap();
         let solution = solve(&problem);
@@ -213,7 +205,7 @@ fn a_sampled_profile_is_the_continuous_one() {
 /// exceed one by what the iteration leaves, 1e-9.
 #[test]
 fn the_profile_holds_the_peaks() {
-    let mut problems: Vec<Problem> = EXAMPLES.map(example).to_vec();
+    let mut problems: Vec<Problem> = suite::EXAMPLES.map(example).to_vec();
     problems.extend((0..40).map(|number| crate::catalogue::case(number).problem));
     let (mut peaks, mut beside_nodes) = (0, 0);
     for problem in &problems {

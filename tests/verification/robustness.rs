@@ -169,13 +169,7 @@ fn the_jammed_sheet_is_found_beside_the_free_one() {
 /// All three algorithms are of one mind; 1e-8 is far above what their tolerances leave.
 #[test]
 fn newton_and_the_sweeps_find_what_auto_finds() {
-    for name in [
-        "rectangular_punch",
-        "cylinder",
-        "annular_punch",
-        "cylinder_on_end",
-        "sheet",
-    ] {
+    for name in suite::EXAMPLES {
         let mut problem = example(name);
         let auto = solve(&problem).summary;
         for algorithm in [Algorithm::FixedPoint, Algorithm::Newton] {

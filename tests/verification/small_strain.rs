@@ -37,13 +37,7 @@ fn strains_are_judged_where_the_load_acts() {
         assert!(warned(&punch(size, 2.0)), "size {size}");
         assert!(!warned(&punch(size, 0.2)), "size {size}");
     }
-    for name in [
-        "rectangular_punch",
-        "cylinder",
-        "annular_punch",
-        "cylinder_on_end",
-        "sheet",
-    ] {
+    for name in suite::EXAMPLES {
         let mut problem = example(name);
         problem.mesh.refine = Refine::Times(2);
         assert!(!warned(&solve(&problem)), "{name}");

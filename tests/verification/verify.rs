@@ -55,13 +55,7 @@ fn estimated(problem: &Problem, refine: u32) -> Solution {
 /// more: for each of the examples, and with steps, unstructured meshes and friction that depends on the path.
 #[test]
 fn the_solution_stays_and_is_compared_with_one_refinement_more() {
-    let mut problems: Vec<(String, Problem)> = [
-        "rectangular_punch",
-        "cylinder",
-        "annular_punch",
-        "cylinder_on_end",
-        "sheet",
-    ]
+    let mut problems: Vec<(String, Problem)> = suite::EXAMPLES
     .map(|name| (name.to_owned(), example(name)))
     .into();
     let mut stepped = example("cylinder");

@@ -167,9 +167,10 @@ pub(super) fn recover_nodal_stresses(
             .iter()
             .map(|point| family.map(&nodes, point.place))
             .collect();
+        let body = Undeformed::new(section, material, family, &nodes);
         for (sum, u) in sums.iter_mut().zip(fields) {
             let u = element.gather(|n| u[n as usize]);
-            let deformed = Deformed::new(section, material, family, &nodes, &u, [0.0; 2]);
+            let deformed = body.displaced(&u, [0.0; 2]);
             let mut stresses = [[0.0; COMPONENTS]; 4];
             for ((own, m), point) in stresses.iter_mut().zip(&points).zip(family.stress_points()) {
                 *own = deformed.at(m, point.place).stress;
@@ -189,6 +190,16 @@ pub(super) fn recover_nodal_stresses(
     Some(sums)
 }
 
+/// An element before its nodes are displaced.
+pub(super) struct Undeformed<'a> {
+    section: &'a Section,
+    material: usize,
+    family: Family,
+    nodes: &'a AtNodes<[f64; 2]>,
+    /// Of a nearly incompressible material.
+    mixed: Option<Mixed<'a>>,
+}
+
 /// An element with the displacements of its nodes.
 pub struct Deformed<'a> {
     section: &'a Section,
@@ -203,11 +214,54 @@ pub struct Deformed<'a> {
 
 /// Strain and stress at a place of an element.
 #[derive(Clone, Copy, Debug)]
-struct DeformedAt {
+pub(super) struct DeformedAt {
     strain: [f64; COMPONENTS],
-    stress: [f64; COMPONENTS],
+    pub(super) stress: [f64; COMPONENTS],
     /// θ̄ − div u; 0 of other materials.
-    dilatation_gap: f64,
+    pub(super) dilatation_gap: f64,
+}
+
+impl<'a> Undeformed<'a> {
+    /// `material`: its number in the section.
+    pub(super) fn new(
+        section: &'a Section,
+        material: usize,
+        family: Family,
+        nodes: &'a AtNodes<[f64; 2]>,
+    ) -> Self {
+        let split = section.split(material);
+        Undeformed {
+            section,
+            material,
+            family,
+            nodes,
+            mixed: split.map(|split| Mixed::new(section, split, family, nodes)),
+        }
+    }
+
+    /// `body_force`: the one (force/volume) that the displacements belong to.
+    pub(super) fn displaced(
+        &self,
+        u: &'a AtNodes<[f64; 2]>,
+        body_force: [f64; 2],
+    ) -> Deformed<'a> {
+        let (mut inside, mut work_on_bubble) = (None, 0.0);
+        if let Some(mixed) = &self.mixed {
+            let force = mixed.force_on_bubble(body_force);
+            let state = mixed.inside(u, &force);
+            work_on_bubble = force[0] * state.bubble[0] + force[1] * state.bubble[1];
+            inside = Some(state);
+        }
+        Deformed {
+            section: self.section,
+            material: self.material,
+            family: self.family,
+            nodes: self.nodes,
+            u,
+            inside,
+            work_on_bubble,
+        }
+    }
 }
 
 impl<'a> Deformed<'a> {
@@ -220,23 +274,7 @@ impl<'a> Deformed<'a> {
         u: &'a AtNodes<[f64; 2]>,
         body_force: [f64; 2],
     ) -> Self {
-        let mut deformed = Deformed {
-            section,
-            material,
-            family,
-            nodes,
-            u,
-            inside: None,
-            work_on_bubble: 0.0,
-        };
-        if let Some(split) = section.split(material) {
-            let mixed = Mixed::new(section, split, family, nodes);
-            let force = mixed.force_on_bubble(body_force);
-            let inside = mixed.inside(u, &force);
-            deformed.work_on_bubble = force[0] * inside.bubble[0] + force[1] * inside.bubble[1];
-            deformed.inside = Some(inside);
-        }
-        deformed
+        Undeformed::new(section, material, family, nodes).displaced(u, body_force)
     }
 
     /// The points of its integrals.
@@ -253,7 +291,8 @@ impl<'a> Deformed<'a> {
         self.at(&m, place).stress
     }
 
-    fn at(&self, m: &Mapped, place: [f64; 2]) -> DeformedAt {
+    /// At a place in master coordinates, which is mapped to `m`.
+    pub(super) fn at(&self, m: &Mapped, place: [f64; 2]) -> DeformedAt {
         let mut strain = self.strain_of_nodes(m);
         let Some(inside) = &self.inside else {
             return DeformedAt {

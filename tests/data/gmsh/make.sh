@@ -24,3 +24,9 @@ mesh fillet fillet-mixed1-msh41-ascii -setnumber family 0 -setnumber order 1 -fo
 mesh fillet fillet-quad9-msh22-ascii -setnumber family 8 -setnumber complete 1 -format msh22
 # half a cylinder's contact with a block, unstructured, fine at the contact
 mesh hertz hertz-tri6-msh41-binary -format msh41 -bin
+# blocks for random obstacles, whole and halves
+for family in quad8=8 tri6=6 mixed=0; do
+  name=${family%=*} number=${family#*=}
+  mesh block "block-half-$name" -setnumber family $number -setnumber width 6 -setnumber height 4 -setnumber step 0.25 -format msh41
+  mesh block "block-whole-$name" -setnumber family $number -setnumber whole 1 -setnumber width 5 -setnumber height 5 -setnumber step 0.35 -format msh41
+done

@@ -1,0 +1,229 @@
+//! Whether supports and contacts hold every part of the body against rigid motions.
+
+mod parts;
+mod words;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+pub(super) use parts::Hold;
+
+use super::checks::Checks;
+use super::contact_model::ContactModel;
+use super::supports::Held;
+use crate::elasticity::Section;
+use crate::error::{AllChecks, Checked, Reason, Refused};
+use crate::friction::{Average, FrictionLaw};
+use crate::mesh::Mesh;
+use crate::problem::Condition;
+use parts::{Free, MOST_HINGED, MOST_IN_MECHANISMS, Motion, Part, Parts, Unheld};
+
+impl Checks {
+    /// Every part of the body must be held against rigid motions, by supports or by contacts (if they touch).
+    /// True if a contact is needed for that.
+    pub(super) fn freedom(
+        &mut self,
+        mesh: &Mesh,
+        section: &Section,
+        fixed: &BTreeMap<u32, Held>,
+        contacts: &[ContactModel],
+    ) -> Checked<bool> {
+        let mut held = directions(fixed);
+        let parts = Parts::new(mesh, section.axisymmetric());
+        if parts.unheld(&held).is_empty() {
+            return Ok(false);
+        }
+        held.extend(contacts.iter().flat_map(hindered));
+        let mut all = AllChecks::default();
+        for unheld in parts.unheld(&held) {
+            all.fail(self.unheld(&parts, &unheld, contacts.is_empty()));
+        }
+        all.finish(true)
+    }
+
+    fn unheld(&mut self, parts: &Parts<'_>, unheld: &Unheld, without_contacts: bool) -> Refused {
+        let mesh = parts.mesh;
+        let free = match unheld {
+            Unheld::Free(free) => free,
+            Unheld::TooMany(count, node) => {
+                let [x, y] = mesh.nodes[*node as usize];
+                return self.report(
+                    "/mesh",
+                    Reason::TooMany,
+                    format!("{count} parts that hang together at single nodes only, e.g. at node {node} ({x}, {y}), and are not held one by one"),
+                    format!("at most {MOST_HINGED} of them in one mechanism, and {MOST_IN_MECHANISMS} in all"),
+                    "Elements that share a side (all three nodes of it) form one part: join them along sides, or support each part.",
+                );
+            }
+        };
+        let (words, node, turns) = in_words(parts, free);
+        let Free {
+            number,
+            together,
+            more,
+            ..
+        } = free;
+        let count = parts.parts.len();
+        let [x, y] = mesh.nodes[node as usize];
+        let what = match (count, together) {
+            (1, _) => "a body".to_owned(),
+            (_, 1) => format!("part {number} of {count} of the body"),
+            _ => format!("{together} of {count} parts of the body, hinged to one another,"),
+        };
+        let more = match more {
+            0 => String::new(),
+            1 => "; and 1 more motion of parts hinged to it".to_owned(),
+            more => format!("; and {more} more motions of parts hinged to it"),
+        };
+        let mut hint = match (turns, words.contains(" and ")) {
+            (false, false) => format!("Add a support with {}.", towards(&words)),
+            (true, false) => {
+                "Add a support at another place, along a direction that does not point to the centre of the rotation."
+                    .to_owned()
+            }
+            _ => "Add supports with `ux` and `uy`; against rotation at two places.".to_owned(),
+        };
+        if count > 1 {
+            hint.push_str(
+                " Parts hold each other along a side that they share, all three nodes of it; at a single node they are hinged, and without common nodes apart.",
+            );
+        }
+        hint.push_str(&self.hint_to_merge(mesh));
+        if !without_contacts {
+            hint.push_str(" A contact holds along its normal, and along its tangent if it has friction or is bonded.");
+        }
+        self.report(
+            "/supports",
+            Reason::FreeBody,
+            format!("{what} free to move: {words}, e.g. node {node} at ({x}, {y}){more}"),
+            "supports or contacts against every rigid motion",
+            hint,
+        )
+    }
+}
+
+/// The motions in words, after "free to move"; a node that moves most by one of them; whether that is a rotation.
+fn in_words(parts: &Parts<'_>, free: &Free) -> (String, u32, bool) {
+    let (words, motion, turns) = parts.words(&free.moved, &free.motions);
+    let moved = |node: &u32| {
+        let place = parts.mesh.nodes[*node as usize];
+        let [x, y] = free.moved.displacement(place, &motion);
+        x.hypot(y)
+    };
+    let nodes = free.moved.nodes.iter();
+    let node = nodes.max_by(|a, b| moved(a).total_cmp(&moved(b)));
+    (words, node.copied().unwrap_or_default(), turns)
+}
+
+/// The support that ends a translation.
+fn towards(words: &str) -> &'static str {
+    match words {
+        "along x" => "`ux`",
+        "along y" | "along the axis" => "`uy`",
+        _ => "`ux` or `uy`",
+    }
+}
+
+/// A rigid motion of a part of the body that neither the supports nor the given nodes and directions prevent.
+pub(super) fn motion_left(
+    mesh: &Mesh,
+    section: &Section,
+    fixed: &BTreeMap<u32, Held>,
+    hindered: &[Hold],
+) -> Option<(String, u32)> {
+    let mut held = directions(fixed);
+    held.extend(hindered);
+    let parts = Parts::new(mesh, section.axisymmetric());
+    match parts.unheld(&held).into_iter().next()? {
+        Unheld::Free(free) => {
+            let (words, node, _) = in_words(&parts, &free);
+            Some((words, node))
+        }
+        // only with contacts that do not touch: the model was examined with all of them
+        Unheld::TooMany(_, node) => Some(("at single nodes that join its parts".to_owned(), node)),
+    }
+}
+
+/// A rigid motion of a part of the body, or of several hinged parts as one.
+#[derive(Clone, Debug)]
+pub struct RigidMotion {
+    /// In words, after "free to move".
+    pub words: String,
+    /// The nodes that move, and how: by 1 in a translation; in a rotation the farthest from the centre of the part by 1.
+    pub moves: Vec<(u32, [f64; 2])>,
+    /// In a rotation, the distance of that node (length): times the power of a force it is the moment.
+    pub arm: Option<f64>,
+}
+
+/// All rigid motions that neither the supports nor the given nodes and directions prevent, but those that bend hinges.
+pub(super) fn free_motions(
+    mesh: &Mesh,
+    section: &Section,
+    fixed: &BTreeMap<u32, Held>,
+    hindered: &[Hold],
+) -> Vec<RigidMotion> {
+    let mut held = directions(fixed);
+    held.extend(hindered);
+    let parts = Parts::new(mesh, section.axisymmetric());
+    let rows = parts.rows(&held);
+    let mut found = Vec::new();
+    for together in parts.mechanisms(&rows) {
+        let nodes = together
+            .iter()
+            .flat_map(|p| &parts.parts[*p as usize].nodes);
+        let nodes: BTreeSet<u32> = nodes.copied().collect();
+        let whole = Part::new(mesh, nodes.into_iter().collect());
+        for motion in parts.as_one(&whole, &together, &rows, whole.tolerance) {
+            let motion: Motion = [motion[0], motion[1], motion[2]];
+            let (words, ..) = parts.words(&whole, &[motion]);
+            let turn = motion[2].abs();
+            let length = if turn > 1e-6 {
+                turn
+            } else {
+                motion[0].hypot(motion[1])
+            };
+            let motion = motion.map(|m| m / length);
+            let moved = |node: &u32| {
+                let place = mesh.nodes[*node as usize];
+                (*node, whole.displacement(place, &motion))
+            };
+            found.push(RigidMotion {
+                words,
+                moves: whole.nodes.iter().map(moved).collect(),
+                arm: (turn > 1e-6).then_some(whole.size),
+            });
+        }
+    }
+    found
+}
+
+/// Nodes and the directions they are held along.
+fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<Hold> {
+    let mut held = Vec::new();
+    for (&node, what) in fixed {
+        match what {
+            Held::Along { direction, .. } => held.push((node, *direction)),
+            Held::Both(_) => held.extend([(node, [1.0, 0.0]), (node, [0.0, 1.0])]),
+        }
+    }
+    held
+}
+
+/// The motions of its nodes that a contact prevents while it touches.
+fn hindered(contact: &ContactModel) -> Vec<Hold> {
+    let holds = |law: &FrictionLaw<Average>| law.bound.holds();
+    let normal = contact.condition != Condition::None;
+    let tangent =
+        contact.condition == Condition::Bonded || contact.friction.as_ref().is_some_and(holds);
+    let boundary = &contact.boundary;
+    let mut hindered = Vec::new();
+    for (i, &node) in boundary.nodes.iter().enumerate() {
+        if normal {
+            hindered.push((node, boundary.normals[i]));
+        }
+        if tangent {
+            hindered.push((node, boundary.tangent(i)));
+        }
+    }
+    hindered
+}
+

@@ -1,0 +1,440 @@
+//! The rigid motions of a body, by its parts.
+//!
+//! Elements that share a side form one rigid part; parts that share only single nodes are hinged there. Each part has
+//! two translations and a rotation about its centre, scaled by its size, so that all three displace its farthest node
+//! by 1 and no unit of length matters; in axisymmetry it has the translation along the axis only. What is held, and
+//! every hinge, is a row of coefficients of these motions. The rows of a part are made orthonormal one by one; a part
+//! with three of them is held, and holds its neighbours at the nodes that they share. What remains are parts alone,
+//! with at most two rows, and mechanisms of hinged parts: their motions are the null space of all their rows, by
+//! elimination with full pivoting.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::super::checks::ALIGNED;
+use crate::mesh::Mesh;
+
+/// Parts in one mechanism that are examined: the elimination is cubic in them.
+pub(super) const MOST_HINGED: usize = 64;
+
+/// Parts in all mechanisms together.
+pub(super) const MOST_IN_MECHANISMS: usize = 10 * MOST_HINGED;
+
+/// Rows for each part of a mechanism. Parts that do not overlap share nodes in at most 3 k pairs, and a pair gives
+/// four rows at most; each part has two of its own.
+const MOST_ROWS: usize = 14;
+
+/// A node and a direction (unit vector) it is held along.
+pub(in crate::model) type Hold = (u32, [f64; 2]);
+
+/// What is found of parts that nothing holds.
+pub(super) enum Unheld {
+    Free(Free),
+    /// This many hinged parts, more than are examined; and one of their nodes.
+    TooMany(usize, u32),
+}
+
+/// Rigid motions that nothing prevents.
+pub(super) struct Free {
+    /// What they move as one: a part, or several.
+    pub(super) moved: Part,
+    pub(super) motions: Vec<Motion>,
+    /// The number of the part, or of the first.
+    pub(super) number: usize,
+    /// Parts that move as one.
+    pub(super) together: usize,
+    /// Further motions of parts hinged to these.
+    pub(super) more: usize,
+}
+
+/// Translation along x, along y, and rotation (counter-clockwise, by 1/size) of a part.
+pub(super) type Motion = [f64; 3];
+
+/// The parts of a body, and where they are hinged.
+pub(super) struct Parts<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) parts: Vec<Part>,
+    /// The first part that each node belongs to.
+    first: Vec<u32>,
+    /// All parts of the nodes that belong to several.
+    pub(super) shared: BTreeMap<u32, Vec<u32>>,
+    /// Motions that no part has: in axisymmetry the first and the last.
+    pub(super) never: &'static [Motion],
+}
+
+/// Elements that hold each other, as one rigid body.
+#[derive(Clone)]
+pub(super) struct Part {
+    pub(super) nodes: Vec<u32>,
+    pub(super) centre: [f64; 2],
+    /// Distance of the farthest node from the centre (length).
+    pub(super) size: f64,
+    /// A row whose remainder is below this adds nothing: coordinates are known to rounding only.
+    pub(super) tolerance: f64,
+}
+
+impl Part {
+    pub(super) fn new(mesh: &Mesh, nodes: Vec<u32>) -> Part {
+        let at = |n: &u32| mesh.nodes[*n as usize];
+        let count = nodes.len() as f64;
+        let centre = [0, 1].map(|a| nodes.iter().map(|n| at(n)[a] / count).sum::<f64>());
+        let distance = |from: [f64; 2]| {
+            let away = |n: &u32| (at(n)[0] - from[0]).hypot(at(n)[1] - from[1]);
+            nodes.iter().map(away).fold(0.0, f64::max)
+        };
+        let size = distance(centre).max(f64::MIN_POSITIVE);
+        let rounding = 64.0 * f64::EPSILON * distance([0.0; 2]) / size;
+        Part {
+            centre,
+            size,
+            tolerance: ALIGNED.max(rounding),
+            nodes,
+        }
+    }
+
+    /// The displacement of a place along a direction, by each motion.
+    fn row(&self, place: [f64; 2], [a, b]: [f64; 2]) -> Motion {
+        let [x, y] = [0, 1].map(|i| (place[i] - self.centre[i]) / self.size);
+        [a, b, b * x - a * y]
+    }
+
+    /// The displacement of a place by a motion.
+    pub(super) fn displacement(&self, place: [f64; 2], motion: &Motion) -> [f64; 2] {
+        [[1.0, 0.0], [0.0, 1.0]].map(|axis| dot(&self.row(place, axis), motion))
+    }
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Makes a row orthonormal to others and adds it; a row that they contain adds nothing.
+pub(super) fn add(rows: &mut Vec<Motion>, mut row: Motion, tolerance: f64) {
+    // twice is enough
+    for _ in 0..2 {
+        for other in rows.iter() {
+            let part = dot(other, &row);
+            (0..3).for_each(|i| row[i] -= part * other[i]);
+        }
+    }
+    let length = dot(&row, &row).sqrt();
+    if rows.len() < 3 && length > tolerance {
+        rows.push(row.map(|v| v / length));
+    }
+}
+
+impl<'a> Parts<'a> {
+    pub(super) fn new(mesh: &'a Mesh, axisymmetric: bool) -> Self {
+        let mut first = vec![u32::MAX; mesh.nodes.len()];
+        let mut shared: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        let parts: Vec<Part> = mesh
+            .connected_parts()
+            .into_iter()
+            .map(|nodes| Part::new(mesh, nodes))
+            .collect();
+        for (number, part) in (0u32..).zip(&parts) {
+            for &node in &part.nodes {
+                match &mut first[node as usize] {
+                    none if *none == u32::MAX => *none = number,
+                    other => shared
+                        .entry(node)
+                        .or_insert_with(|| vec![*other])
+                        .push(number),
+                }
+            }
+        }
+        Parts {
+            mesh,
+            parts,
+            first,
+            shared,
+            never: match axisymmetric {
+                true => &[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+                false => &[],
+            },
+        }
+    }
+
+    /// The parts that a node belongs to.
+    fn of(&self, node: u32) -> &[u32] {
+        match self.shared.get(&node) {
+            Some(parts) => parts,
+            None => {
+                let first = &self.first[node as usize];
+                std::slice::from_ref(first)
+            }
+        }
+    }
+
+    /// The free motions that are left where these nodes are held.
+    pub(super) fn unheld(&self, held: &[Hold]) -> Vec<Unheld> {
+        let rows = self.rows(held);
+        let mut found = Vec::new();
+        let mut examined = 0;
+        for parts in self.mechanisms(&rows) {
+            if let [part] = parts[..] {
+                let number = part as usize;
+                let free = null_space(&rows[number], 3, self.parts[number].tolerance);
+                found.push(Unheld::Free(Free {
+                    moved: self.parts[number].clone(),
+                    motions: motions(&free),
+                    number: number + 1,
+                    together: 1,
+                    more: 0,
+                }));
+                continue;
+            }
+            examined += parts.len();
+            if parts.len() > MOST_HINGED || examined > MOST_IN_MECHANISMS {
+                let node = self.parts[parts[0] as usize].nodes[0];
+                found.push(Unheld::TooMany(parts.len(), node));
+                continue;
+            }
+            found.extend(self.of_mechanism(&parts, &rows));
+        }
+        found
+    }
+
+    /// What holds each part: by itself, or by parts that are held.
+    pub(super) fn rows(&self, held: &[Hold]) -> Vec<Vec<Motion>> {
+        let mut rows: Vec<Vec<Motion>> = vec![self.never.to_vec(); self.parts.len()];
+        let hold = |rows: &mut Vec<Vec<Motion>>, part: u32, node: u32, direction: [f64; 2]| {
+            let (rows, part) = (&mut rows[part as usize], &self.parts[part as usize]);
+            let row = part.row(self.mesh.nodes[node as usize], direction);
+            add(rows, row, part.tolerance);
+        };
+        for &(node, direction) in held {
+            for &part in self.of(node).iter().filter(|part| **part != u32::MAX) {
+                hold(&mut rows, part, node, direction);
+            }
+        }
+        let mut settled: Vec<u32> = (0..self.parts.len() as u32)
+            .filter(|part| rows[*part as usize].len() == 3)
+            .collect();
+        let mut passed: BTreeSet<u32> = BTreeSet::new();
+        while let Some(part) = settled.pop() {
+            for &node in &self.parts[part as usize].nodes {
+                let Some(others) = self.shared.get(&node).filter(|_| passed.insert(node)) else {
+                    continue;
+                };
+                for &other in others {
+                    if rows[other as usize].len() == 3 {
+                        continue;
+                    }
+                    hold(&mut rows, other, node, [1.0, 0.0]);
+                    hold(&mut rows, other, node, [0.0, 1.0]);
+                    if rows[other as usize].len() == 3 {
+                        settled.push(other);
+                    }
+                }
+            }
+        }
+        rows
+    }
+
+    /// Parts that are not held, those hinged to one another together.
+    pub(super) fn mechanisms(&self, rows: &[Vec<Motion>]) -> Vec<Vec<u32>> {
+        let free = |part: u32| rows[part as usize].len() < 3;
+        let mut seen = vec![false; self.parts.len()];
+        let mut found = Vec::new();
+        for start in (0..self.parts.len() as u32).filter(|part| free(*part)) {
+            if std::mem::replace(&mut seen[start as usize], true) {
+                continue;
+            }
+            let mut together = vec![start];
+            let mut next = 0;
+            while let Some(&part) = together.get(next) {
+                next += 1;
+                for node in &self.parts[part as usize].nodes {
+                    for &other in self.shared.get(node).into_iter().flatten() {
+                        if free(other) && !std::mem::replace(&mut seen[other as usize], true) {
+                            together.push(other);
+                        }
+                    }
+                }
+            }
+            together.sort_unstable();
+            found.push(together);
+        }
+        found
+    }
+
+    /// The free motion of hinged parts, if there is one.
+    fn of_mechanism(&self, parts: &[u32], rows: &[Vec<Motion>]) -> Option<Unheld> {
+        let place: BTreeMap<u32, usize> = parts.iter().copied().zip(0..).collect();
+        let columns = 3 * parts.len();
+        let tolerance = parts
+            .iter()
+            .map(|part| self.parts[*part as usize].tolerance)
+            .fold(0.0, f64::max);
+        let mut matrix: Vec<Vec<f64>> = Vec::new();
+        for (i, &part) in parts.iter().enumerate() {
+            for row in &rows[part as usize] {
+                let mut whole = vec![0.0; columns];
+                whole[3 * i..3 * i + 3].copy_from_slice(row);
+                matrix.push(whole);
+            }
+        }
+        for [p, q, node] in self.hinges(&place) {
+            let at = self.mesh.nodes[node as usize];
+            for axis in [[1.0, 0.0], [0.0, 1.0]] {
+                let mut whole = vec![0.0; columns];
+                for (part, sign) in [(p, 1.0), (q, -1.0)] {
+                    let row = self.parts[part as usize].row(at, axis);
+                    let start = 3 * place[&part];
+                    (0..3).for_each(|i| whole[start + i] = sign * row[i]);
+                }
+                matrix.push(whole);
+            }
+            if matrix.len() > MOST_ROWS * parts.len() {
+                return Some(Unheld::TooMany(parts.len(), node));
+            }
+        }
+        let free = null_space(&matrix, columns, tolerance);
+        let motion = free.first()?;
+        // first as one rigid body: hinged parts that nothing holds together
+        let whole = Part::new(self.mesh, {
+            let nodes = parts.iter().flat_map(|p| &self.parts[*p as usize].nodes);
+            nodes
+                .copied()
+                .collect::<BTreeSet<u32>>()
+                .into_iter()
+                .collect()
+        });
+        let as_one = self.as_one(&whole, parts, rows, tolerance);
+        if !as_one.is_empty() {
+            return Some(Unheld::Free(Free {
+                moved: whole,
+                more: free.len().saturating_sub(as_one.len()),
+                motions: motions(&as_one),
+                number: parts[0] as usize + 1,
+                together: parts.len(),
+            }));
+        }
+        let size = |i: &usize| {
+            let part = &motion[3 * i..3 * i + 3];
+            dot(part, part)
+        };
+        let moved = (0..parts.len()).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        let number = parts[moved] as usize;
+        Some(Unheld::Free(Free {
+            moved: self.parts[number].clone(),
+            motions: vec![[0, 1, 2].map(|i| motion[3 * moved + i])],
+            number: number + 1,
+            together: 1,
+            more: free.len() - 1,
+        }))
+    }
+
+    /// Nodes that two unheld parts share, as (part, part, node): for each pair at most two, as far apart as possible,
+    /// since two hinges join them rigidly.
+    fn hinges(&self, place: &BTreeMap<u32, usize>) -> Vec<[u32; 3]> {
+        let mut pairs: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
+        let away = |a: u32, b: u32| {
+            let [[x0, y0], [x1, y1]] = [a, b].map(|n| self.mesh.nodes[n as usize]);
+            (x1 - x0).hypot(y1 - y0)
+        };
+        let nodes: BTreeSet<u32> = place
+            .keys()
+            .flat_map(|part| &self.parts[*part as usize].nodes)
+            .copied()
+            .filter(|node| self.shared.contains_key(node))
+            .collect();
+        for node in nodes {
+            let parts: Vec<u32> = self.of(node).to_vec();
+            let members: Vec<u32> = parts
+                .into_iter()
+                .filter(|p| place.contains_key(p))
+                .collect();
+            for pair in members.windows(2) {
+                let nodes = pairs.entry([pair[0], pair[1]]).or_default();
+                match nodes[..] {
+                    [first, second] if away(first, node) > away(first, second) => nodes[1] = node,
+                    [_, _] => {}
+                    _ => nodes.push(node),
+                }
+            }
+        }
+        let each = |([p, q], nodes): (&[u32; 2], &Vec<u32>)| {
+            let (p, q) = (*p, *q);
+            nodes
+                .iter()
+                .map(move |node| [p, q, *node])
+                .collect::<Vec<_>>()
+        };
+        pairs.iter().flat_map(each).collect()
+    }
+
+    /// The free motions of several parts as one rigid body.
+    pub(super) fn as_one(
+        &self,
+        whole: &Part,
+        parts: &[u32],
+        rows: &[Vec<Motion>],
+        tolerance: f64,
+    ) -> Vec<Vec<f64>> {
+        let mut own = Vec::new();
+        for &number in parts {
+            let part = &self.parts[number as usize];
+            // the motions of a part by those of the whole
+            let [x, y] = whole.displacement(part.centre, &[0.0, 0.0, 1.0]);
+            let scale = part.size / whole.size;
+            for row in &rows[number as usize] {
+                let [a, b, c] = *row;
+                add(&mut own, [a, b, a * x + b * y + c * scale], tolerance);
+            }
+        }
+        null_space(&own, 3, tolerance)
+    }
+
+}
+
+fn motions(of_three: &[Vec<f64>]) -> Vec<Motion> {
+    of_three.iter().map(|v| [v[0], v[1], v[2]]).collect()
+}
+
+/// A basis of the motions on which all rows are zero, by Gauss–Jordan elimination with full pivoting: coefficients
+/// below the tolerance are zero, where rows and motions are of size 1.
+fn null_space<R: AsRef<[f64]>>(rows: &[R], columns: usize, tolerance: f64) -> Vec<Vec<f64>> {
+    let mut rows: Vec<Vec<f64>> = rows.iter().map(|row| row.as_ref().to_vec()).collect();
+    let mut pivots: Vec<usize> = Vec::new();
+    let mut is_pivot = vec![false; columns];
+    while pivots.len() < rows.len() {
+        let done = pivots.len();
+        let (mut most, mut row, mut column) = (tolerance, usize::MAX, 0);
+        for (i, values) in rows.iter().enumerate().skip(done) {
+            for (j, value) in values.iter().enumerate() {
+                if !is_pivot[j] && value.abs() > most {
+                    (most, row, column) = (value.abs(), i, j);
+                }
+            }
+        }
+        if row == usize::MAX {
+            break;
+        }
+        rows.swap(done, row);
+        is_pivot[column] = true;
+        pivots.push(column);
+        let pivot = rows[done][column];
+        let normal: Vec<f64> = rows[done].iter().map(|v| v / pivot).collect();
+        for (i, values) in rows.iter_mut().enumerate() {
+            let factor = values[column];
+            if i != done && factor != 0.0 {
+                values
+                    .iter_mut()
+                    .zip(&normal)
+                    .for_each(|(v, n)| *v -= factor * n);
+                values[column] = 0.0;
+            }
+        }
+        rows[done] = normal;
+    }
+    let basis = |free: usize| {
+        let mut motion = vec![0.0; columns];
+        motion[free] = 1.0;
+        for (row, &pivot) in rows.iter().zip(&pivots) {
+            motion[pivot] = -row[free];
+        }
+        motion
+    };
+    (0..columns).filter(|j| !is_pivot[*j]).map(basis).collect()
+}
