@@ -9,7 +9,7 @@
 //! of the estimate on one mesh. The factors are calibrated on random problems by `tests/verification/calibration.rs`.
 
 use super::verdict::{Doubt, Unpaired, conclude, relative, scale};
-use crate::algorithm::Quantity;
+use crate::algorithm::{Quantity, Unknown};
 use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName};
 
 /// The least order that is assumed, of a peak at an edge of its neighbourhood, say.
@@ -38,7 +38,7 @@ pub struct OnOtherMesh {
     contact: String,
     value: f64,
     unlimited: bool,
-    unseen: bool,
+    unknown: Option<Unknown>,
 }
 
 impl OnOtherMesh {
@@ -49,7 +49,7 @@ impl OnOtherMesh {
             contact: contact.to_owned(),
             value: quantity.value,
             unlimited: quantity.unlimited,
-            unseen: quantity.unseen,
+            unknown: quantity.unknown,
         }
     }
 }
@@ -165,14 +165,12 @@ fn compare(
         return None;
     }
     let estimate = match quantity.error {
-        Some(estimate) if !finer.unseen => estimate,
+        Some(estimate) if finer.unknown.is_none() => estimate,
         _ => {
             quantity.method = ErrorMethod::Unknown;
             (quantity.error, quantity.relative) = (None, None);
-            return Some(match finer.unseen {
-                true => Doubt::Unseen,
-                false => Doubt::Unestimated,
-            });
+            let inherent = finer.unknown.map(Doubt::Inherent);
+            return Some(inherent.unwrap_or(Doubt::Unestimated));
         }
     };
     let error = bound(quantity.quantity, difference, quantity.order, estimate);

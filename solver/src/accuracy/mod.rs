@@ -107,7 +107,7 @@ pub fn assess(
         let error = bounds.as_ref().map(|bounds| bounds[i]);
         let (error, method) = match (error, quantity.name) {
             _ if quantity.unlimited => (None, ErrorMethod::NoLimit),
-            _ if quantity.unseen => (None, ErrorMethod::Unknown),
+            _ if quantity.unknown.is_some() => (None, ErrorMethod::Unknown),
             (Some(error), QuantityName::ContactStart | QuantityName::ContactEnd) => {
                 (Some(error), ErrorMethod::NodeSpacing)
             }
@@ -127,8 +127,10 @@ pub fn assess(
             method,
         });
     }
-    let doubt = |quantity: &Quantity| quantity.unseen.then_some(Doubt::Unseen);
-    let doubts: Vec<_> = quantities.iter().map(doubt).collect();
+    let doubts: Vec<_> = quantities
+        .iter()
+        .map(|quantity| quantity.unknown.map(Doubt::Inherent))
+        .collect();
     conclude(reported.summary.outcome, found, &doubts, &[])
 }
 

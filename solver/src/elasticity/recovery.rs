@@ -240,11 +240,7 @@ impl<'a> Undeformed<'a> {
     }
 
     /// `body_force`: the one (force/volume) that the displacements belong to.
-    pub(super) fn displaced(
-        &self,
-        u: &'a AtNodes<[f64; 2]>,
-        body_force: [f64; 2],
-    ) -> Deformed<'a> {
+    pub(super) fn displaced(&self, u: &'a AtNodes<[f64; 2]>, body_force: [f64; 2]) -> Deformed<'a> {
         let (mut inside, mut work_on_bubble) = (None, 0.0);
         if let Some(mixed) = &self.mixed {
             let force = mixed.force_on_bubble(body_force);

@@ -5,7 +5,10 @@ use serde_json::{Value, json};
 use std::ops::ControlFlow;
 
 use super::*;
-use crate::queue::{report::Told, solving::{Partials, solve_and_report, solve_and_store}};
+use crate::queue::{
+    report::Told,
+    solving::{Partials, solve_and_report, solve_and_store},
+};
 
 /// Problems of different shapes, by what is large in them.
 fn problems() -> Vec<(String, Value)> {

@@ -31,8 +31,17 @@ pub struct Quantity {
     pub between_at: Vec<(usize, f64)>,
     /// No finer mesh approaches a limit of it.
     pub unlimited: bool,
-    /// The obstacle reaches into the body between the nodes: what that changes is not known.
-    pub unseen: bool,
+    /// Why its error cannot be known.
+    pub unknown: Option<Unknown>,
+}
+
+/// Why the error of a quantity cannot be known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unknown {
+    /// The obstacle reaches into the body between the nodes.
+    ObstacleBetweenNodes,
+    /// Stick and slip alternate: it is one of so many ends of stick.
+    Alternating(usize),
 }
 
 /// An end of an interval of contact.
@@ -46,8 +55,8 @@ pub(super) struct EndOfContact {
     pub(super) edge: usize,
 }
 
-/// Ends of stick with an error: each costs as much as another recovery of the stresses, and a rough obstacle has
-/// hundreds.
+/// Ends of stick that are told: a rough obstacle has hundreds. If there are more, stick and slip alternate from point to
+/// point, another mesh has others, and no error is stated for them.
 const MOST_STICK_ENDS: usize = 8;
 
 /// A slip that changes by less than this part of ε along an edge is ε on all of it, to rounding, and stick does not end
@@ -67,10 +76,11 @@ impl PatchView<'_> {
         let mut found = self.forces();
         found.extend(self.peaks());
         found.extend(self.ends());
-        let unseen = !self.missed().is_empty();
-        found
-            .iter_mut()
-            .for_each(|quantity| quantity.unseen = unseen);
+        if !self.missed().is_empty() {
+            for quantity in &mut found {
+                quantity.unknown = Some(Unknown::ObstacleBetweenNodes);
+            }
+        }
         found
     }
 
@@ -86,7 +96,7 @@ impl PatchView<'_> {
             spacing_at: Vec::new(),
             between_at: Vec::new(),
             unlimited: false,
-            unseen: false,
+            unknown: None,
         }
     }
 
@@ -218,6 +228,7 @@ impl PatchView<'_> {
         };
         let mut found: Vec<Quantity> = ends.map(quantity).collect();
         let mut turns = self.turns();
+        let many = Some(turns.len()).filter(|count| *count > MOST_STICK_ENDS);
         turns.truncate(MOST_STICK_ENDS);
         for (edge, xi) in turns {
             let touches = edge_nodes(edge).iter().all(|&i| self.active(i));
@@ -237,6 +248,7 @@ impl PatchView<'_> {
                 factor: length / slope,
                 spacing: length.abs(),
                 spacing_at: vec![(edge, 1.0)],
+                unknown: many.map(Unknown::Alternating),
                 ..self.quantity(QuantityName::StickEnd, point.s, Some(gradient))
             });
         }

@@ -109,6 +109,47 @@ impl PatchView<'_> {
                 found.push((edge, AT_KINKS * self.friction_on(edge)));
             }
         }
+        found.extend(self.unseen_stick());
+        found
+    }
+
+    /// Where the motion turns, a part of the contact sticks. If all of it lies between two points where friction acts, or
+    /// between a line of symmetry and the first of them, none feels it: the friction there, by edges (force, without 2π).
+    fn unseen_stick(&self) -> Vec<(usize, f64)> {
+        let Some(law) = &self.patch.law else {
+            return Vec::new();
+        };
+        let own = self.system.points.iter().zip(&self.finished.tractions);
+        let own = own.filter(|(point, _)| point.patch == self.p);
+        let mut points: Vec<(f64, f64, bool)> = own
+            .map(|(point, traction)| {
+                let slips = self.system.slip(self.v, point).abs() >= law.elastic_slip;
+                (point.s, *traction, slips)
+            })
+            .collect();
+        let last = self.count() - 1;
+        let s = &self.patch.contact.boundary.s;
+        if let (true, Some(first)) = (self.symmetric(0), points.first().copied()) {
+            points.insert(0, (2.0 * s[0] - first.0, -first.1, first.2));
+        }
+        if let (true, Some(end)) = (self.symmetric(last), points.last().copied()) {
+            points.push((2.0 * s[last] - end.0, -end.1, end.2));
+        }
+        let mut found = Vec::new();
+        for pair in points.windows(2) {
+            let [(from, a, slips), (to, b, slips_too)] = [pair[0], pair[1]];
+            if slips && slips_too && a * b < 0.0 {
+                let (from, to) = (from.max(s[0]), to.min(s[last]));
+                let edge = s
+                    .partition_point(|node| *node < to)
+                    .saturating_sub(1)
+                    .min(last - 1)
+                    / 2;
+                let length = s[2 * edge + 2] - s[2 * edge];
+                let weight = self.weight(edge) * (to - from) / length;
+                found.push((edge, 0.5 * (a - b).abs() * weight));
+            }
+        }
         found
     }
 

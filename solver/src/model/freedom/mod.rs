@@ -226,4 +226,3 @@ fn hindered(contact: &ContactModel) -> Vec<Hold> {
     }
     hindered
 }
-

@@ -385,7 +385,6 @@ impl<'a> Parts<'a> {
         }
         null_space(&own, 3, tolerance)
     }
-
 }
 
 fn motions(of_three: &[Vec<f64>]) -> Vec<Motion> {

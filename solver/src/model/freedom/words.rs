@@ -102,4 +102,3 @@ fn rounded(value: f64, size: f64) -> f64 {
     // the shortest number that is this multiple
     format!("{rounded:.9e}").parse().unwrap_or(value) + 0.0
 }
-
