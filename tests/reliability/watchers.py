@@ -3,7 +3,7 @@
     watchers.py [--soak]
 
 A solve alone, one with 200 watchers that read a byte a second, and one with 200 more that read at once, in turn:
-server-sent events, gRPC and long polls. It takes as long, who reads hears of all, a watcher costs little memory, and the
+server-sent events, gRPC and long polls. Beside slow ones it takes as long, beside all at most a quarter longer; who reads hears of all, a watcher costs little memory, and the
 write-ahead log stays small. Then a job ends for which thousands wait: all are answered, and the log says nothing of it.
 Nor is anybody forgotten who begins to wait just when a job ends.
 """

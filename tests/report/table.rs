@@ -213,7 +213,7 @@ pub(crate) fn adaptive(records: &Path) -> String {
     let held = last("tolerance.jsonl");
     let percent = |part: &Value| 100.0 * part.as_f64().unwrap();
     let mut out = format!(
-        "## Adaptive refinement\n\n`refine: {{\"tolerance\": {}}}` on problems of the catalogue (`tests/verification/tolerance.rs`): every quantity was computed\nagain on the last mesh with every element divided into four. *Within*: it changed by less than the tolerance. *Worst*,\n*median*: the changes in parts of the tolerance. *Ended before*: refinement said that it could not reach the tolerance.\n\n| begun with | problems | quantities | within | worst | median | ended before |\n|---|---|---|---|---|---|---|\n",
+        "## Adaptive refinement\n\n`refine: {{\"tolerance\": {}}}` on problems of the catalogue (`tests/verification/tolerance.rs`): every quantity was computed\nagain on the last mesh with every element divided into four. *Within*: it changed by less than the tolerance. *Worst*,\n*median*: the changes in parts of the tolerance. *Ended before*: refinement said that it could not reach the tolerance,\nor did not converge.\n\n| begun with | problems | quantities | within | worst | median | ended before |\n|---|---|---|---|---|---|---|\n",
         held["tolerance"],
     );
     for row in held["meshes"].as_array().unwrap() {

@@ -11,7 +11,7 @@ use crate::support::{Lattice, problem, union};
 pub(crate) struct Case {
     /// What it consists of, in words.
     pub(crate) words: String,
-    /// Of a whole body, or one half of a symmetric one.
+    /// The mesh is of the whole body; otherwise of its right half, or of the section of a body of revolution.
     whole: bool,
     pub(crate) problem: Problem,
 }
@@ -349,7 +349,7 @@ pub(crate) fn gmsh(number: u64) -> Problem {
         whole, mut problem, ..
     } = case(number);
     let part = if whole { "whole" } else { "half" };
-    let family = one_of(&mut Rng::with_seed(number), &["quad8", "tri6", "mixed"]);
+    let family = one_of(&mut Rng::with_seed(!number), &["quad8", "tri6", "mixed"]);
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/data/gmsh");
     let path = format!("{folder}/block-{part}-{family}.msh");
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));

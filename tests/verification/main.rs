@@ -47,6 +47,7 @@ mod rounding;
 mod sliding;
 mod small_strain;
 mod stick;
+mod stick_ends;
 mod support;
 mod thesis;
 mod thick_cylinder;

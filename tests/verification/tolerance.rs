@@ -20,7 +20,7 @@ const TOLERANCE: f64 = 0.01;
 #[derive(Default)]
 struct Tally {
     problems: usize,
-    /// Refinement ended before the tolerance.
+    /// Refinement ended before the tolerance, or did not converge.
     unfinished: Vec<(u64, String)>,
     changes: Vec<(f64, String)>,
 }
@@ -93,7 +93,12 @@ fn a_tolerance_holds_against_a_mesh_twice_as_fine() {
             _ => kinds[2].1.add(number, catalogue::gmsh(number)),
         }
     }
-    let rows = kinds.each_mut().map(|(mesh, tally)| tally.row(mesh));
+    let kinds = kinds.iter_mut().filter(|(_, tally)| tally.problems > 0);
+    let mut kinds: Vec<_> = kinds.collect();
+    let rows: Vec<Value> = kinds
+        .iter_mut()
+        .map(|(mesh, tally)| tally.row(mesh))
+        .collect();
     let table = json!({"tolerance": TOLERANCE, "meshes": rows});
     keep_table("tolerance", &table);
     for (mesh, tally) in &kinds {

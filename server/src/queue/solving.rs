@@ -173,12 +173,13 @@ impl Partials {
             return None;
         }
         // numbers that are not finite, and so have no JSON, are reported at the end
-        let parts = Parts::of(&partial.document().ok()?).ok()?;
-        if parts.bytes() > MOST_BYTES {
-            self.next = None;
-            return None;
-        }
-        self.next = Some(start + (start.elapsed() * self.part).max(self.pause));
+        let document = partial.document().ok();
+        let parts = document.and_then(|document| Parts::of(&document).ok());
+        self.next = match &parts {
+            Some(parts) if parts.bytes() > MOST_BYTES => None,
+            _ => Some(start + (start.elapsed() * self.part).max(self.pause)),
+        };
+        let parts = parts.filter(|parts| parts.bytes() <= MOST_BYTES)?;
         Some(Report::Partial(Box::new(parts)))
     }
 }

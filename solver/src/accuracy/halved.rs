@@ -9,7 +9,7 @@
 //! of the estimate on one mesh. The factors are calibrated on random problems by `tests/verification/calibration.rs`.
 
 use super::verdict::{Doubt, Unpaired, conclude, relative, scale};
-use crate::algorithm::{Quantity, Unknown};
+use crate::algorithm::{Estimable, Quantity};
 use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName};
 
 /// The least order that is assumed, of a peak at an edge of its neighbourhood, say.
@@ -37,8 +37,7 @@ pub struct OnOtherMesh {
     name: QuantityName,
     contact: String,
     value: f64,
-    unlimited: bool,
-    unknown: Option<Unknown>,
+    estimable: Estimable,
 }
 
 impl OnOtherMesh {
@@ -48,8 +47,7 @@ impl OnOtherMesh {
             name: quantity.name,
             contact: contact.to_owned(),
             value: quantity.value,
-            unlimited: quantity.unlimited,
-            unknown: quantity.unknown,
+            estimable: quantity.estimable,
         }
     }
 }
@@ -85,8 +83,16 @@ pub fn verified(
             all.iter().filter(same).count(),
         );
         let there = of_kind(own.quantity, &own.contact, finer);
-        note(own.quantity, &own.contact, here, there.len());
         let mut quantity = own.clone();
+        let too_many = there.iter().any(|q| q.estimable == Estimable::TooMany);
+        if too_many || own.method == ErrorMethod::TooMany {
+            (quantity.error, quantity.relative) = (None, None);
+            quantity.method = ErrorMethod::TooMany;
+            quantities.push(quantity);
+            doubts.push(None);
+            continue;
+        }
+        note(own.quantity, &own.contact, here, there.len());
         doubts.push(if there.len() == here {
             let coarser = coarser.map(|coarser| of_kind(own.quantity, &own.contact, coarser));
             let coarser = coarser.filter(|coarser| coarser.len() == here);
@@ -101,6 +107,13 @@ pub fn verified(
         let same = |q: &&EstimatedQuantity| q.quantity == other.name && q.contact == other.contact;
         let there = of_kind(other.name, &other.contact, finer).len();
         let here = all.iter().filter(same).count();
+        let too_many = all
+            .iter()
+            .filter(same)
+            .any(|q| q.method == ErrorMethod::TooMany);
+        if too_many || other.estimable == Estimable::TooMany {
+            continue;
+        }
         note(other.name, &other.contact, here, there);
     }
     Accuracy {
@@ -159,18 +172,20 @@ fn compare(
     quantity.order = before
         .filter(|before| before.min(difference) > ROUNDING * scale)
         .map(|before| (before / difference).log2());
-    if quantity.method == ErrorMethod::NoLimit || finer.unlimited {
+    if quantity.method == ErrorMethod::NoLimit || finer.estimable == Estimable::NoLimit {
         quantity.method = ErrorMethod::NoLimit;
         (quantity.error, quantity.relative) = (None, None);
         return None;
     }
     let estimate = match quantity.error {
-        Some(estimate) if finer.unknown.is_none() => estimate,
+        Some(estimate) if finer.estimable != Estimable::Unseen => estimate,
         _ => {
             quantity.method = ErrorMethod::Unknown;
             (quantity.error, quantity.relative) = (None, None);
-            let inherent = finer.unknown.map(Doubt::Inherent);
-            return Some(inherent.unwrap_or(Doubt::Unestimated));
+            return Some(match finer.estimable {
+                Estimable::Unseen => Doubt::Unseen,
+                _ => Doubt::Unestimated,
+            });
         }
     };
     let error = bound(quantity.quantity, difference, quantity.order, estimate);

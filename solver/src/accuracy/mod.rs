@@ -14,7 +14,7 @@ mod verdict;
 
 pub use halved::{OnOtherMesh, unverified, verified};
 
-use crate::algorithm::{Finished, Quantity, Reported, System, influences};
+use crate::algorithm::{Estimable, Finished, Quantity, Reported, System, influences};
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
@@ -105,13 +105,18 @@ pub fn assess(
     let mut found = Vec::with_capacity(quantities.len());
     for (i, quantity) in quantities.iter().enumerate() {
         let error = bounds.as_ref().map(|bounds| bounds[i]);
-        let (error, method) = match (error, quantity.name) {
-            _ if quantity.unlimited => (None, ErrorMethod::NoLimit),
-            _ if quantity.unknown.is_some() => (None, ErrorMethod::Unknown),
-            (Some(error), QuantityName::ContactStart | QuantityName::ContactEnd) => {
-                (Some(error), ErrorMethod::NodeSpacing)
+        let (error, method) = match (quantity.estimable, error, quantity.name) {
+            (Estimable::NoLimit, ..) => (None, ErrorMethod::NoLimit),
+            (Estimable::TooMany, ..) => (None, ErrorMethod::TooMany),
+            (Estimable::Unseen, ..) => (None, ErrorMethod::Unknown),
+            (
+                Estimable::Yes,
+                Some(error),
+                QuantityName::ContactStart | QuantityName::ContactEnd,
+            ) => (Some(error), ErrorMethod::NodeSpacing),
+            (Estimable::Yes, Some(error), _) if error.is_finite() => {
+                (Some(error), ErrorMethod::WeightedRecovery)
             }
-            (Some(error), _) if error.is_finite() => (Some(error), ErrorMethod::WeightedRecovery),
             _ => (None, ErrorMethod::Unknown),
         };
         let scale = scale_of(quantity, quantities);
@@ -127,10 +132,9 @@ pub fn assess(
             method,
         });
     }
-    let doubts: Vec<_> = quantities
-        .iter()
-        .map(|quantity| quantity.unknown.map(Doubt::Inherent))
-        .collect();
+    let unseen = |quantity: &Quantity| quantity.estimable == Estimable::Unseen;
+    let doubt = |quantity: &Quantity| unseen(quantity).then_some(Doubt::Unseen);
+    let doubts: Vec<_> = quantities.iter().map(doubt).collect();
     conclude(reported.summary.outcome, found, &doubts, &[])
 }
 
@@ -189,7 +193,8 @@ fn bounds(
             }
         }
         let bound = parts.bound(quantity.name);
-        if let Some(origins) = origins.as_deref_mut().filter(|_| !quantity.unlimited) {
+        let stated = matches!(quantity.estimable, Estimable::Yes | Estimable::Unseen);
+        if let Some(origins) = origins.as_deref_mut().filter(|_| stated) {
             by_spacing(quantity, quantities, &parts, &mut added);
             origins.add(
                 quantity.patch,

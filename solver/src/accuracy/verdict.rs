@@ -1,6 +1,7 @@
 //! The verdict on a solution by the errors of its quantities, and its reasons in words.
 
-use crate::algorithm::Unknown;
+use std::collections::BTreeSet;
+
 use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName, Verdict};
 
 /// Relative errors up to which a verdict is `good`, and `fair`: of forces, and of peaks and extents. `good` promises 1 %
@@ -12,8 +13,8 @@ const OTHERS: [f64; 2] = [0.0375, 0.2];
 /// Why a quantity has no error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Doubt {
-    /// For what it is.
-    Inherent(Unknown),
+    /// Its obstacle reaches into the body between the nodes.
+    Unseen,
     /// It has a value on a finer mesh, but no estimate that would tell whether the two agree by chance.
     Unestimated,
     /// It has neither an estimate nor a counterpart on the finer mesh.
@@ -83,7 +84,8 @@ pub(super) fn conclude(
     let mut reasons: Vec<Reason> = found.into_iter().map(|(_, reason)| reason).collect();
     // the most serious first; equal ones stay in order
     reasons.sort_by(|a, b| b.0.total_cmp(&a.0));
-    reasons.dedup_by(|a, b| a.1 == b.1);
+    let mut told = BTreeSet::new();
+    reasons.retain(|(_, reason)| told.insert(reason.clone()));
     Accuracy {
         verdict,
         reasons: reasons.into_iter().map(|(_, reason)| reason).collect(),
@@ -122,6 +124,15 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                 0.0,
                 format!(
                     "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge, a tip or a kink of the obstacle: do not use it. Forces have a limit, and so has the averaged pressure."
+                ),
+            ),
+        )),
+        (_, _, ErrorMethod::TooMany) => Some((
+            Verdict::Fair,
+            (
+                1.0,
+                format!(
+                    "Contact `{contact}` has more ends of stick (`{name}`) than are followed, and no error is stated for them: where stick and slip alternate from point to point, another mesh has them elsewhere. Refine the contact, or raise elastic_slip."
                 ),
             ),
         )),
@@ -176,14 +187,8 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
             ))
         }
         (None, ..) => match doubt {
-            Some(Doubt::Inherent(Unknown::ObstacleBetweenNodes)) => {
+            Some(Doubt::Unseen) => {
                 unknown("the obstacle reaches into the body between the nodes".to_owned())
-            }
-            Some(Doubt::Inherent(Unknown::Alternating(count))) => {
-                let reason = format!(
-                    "Contact `{contact}` has {count} of `{name}`: stick and slip alternate from point to point, and on another mesh elsewhere. Refine the contact, or raise elastic_slip."
-                );
-                Some((Verdict::Fair, (1.0, reason)))
             }
             Some(Doubt::Unestimated) => unknown(format!(
                 "there is no estimate of it, and that it is {finer:.5e} with every element split in two is no bound by itself"

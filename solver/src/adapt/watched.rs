@@ -88,17 +88,17 @@ impl<'a> WatchedResults<'a> {
     }
 }
 
-/// The largest relative error of the quantities that have a limit; infinite if one is not known.
+/// The largest relative error of the quantities that have a limit and are followed; infinite if one is not known.
 pub(super) fn largest_error(solution: &Solution) -> f64 {
     let accuracy = solution.summary.accuracy.iter();
     let quantities = accuracy.flat_map(|accuracy| &accuracy.quantities);
     quantities.map(relative_error).fold(0.0, f64::max)
 }
 
-/// The relative error of a quantity: 0 if it has no limit, infinite if nothing is known.
+/// The relative error of a quantity: 0 if it has no limit or is one of too many, infinite if nothing is known.
 pub(super) fn relative_error(quantity: &EstimatedQuantity) -> f64 {
     match (quantity.method, quantity.error, quantity.relative) {
-        (ErrorMethod::NoLimit, ..) | (_, Some(0.0), _) => 0.0,
+        (ErrorMethod::NoLimit | ErrorMethod::TooMany, ..) | (_, Some(0.0), _) => 0.0,
         (_, _, Some(relative)) => relative,
         _ => f64::INFINITY,
     }

@@ -22,7 +22,7 @@ mod uniqueness;
 pub use adjoint::{Gradient, influences};
 pub use convex::{Minimum, minimise};
 pub use finished::Finished;
-pub use profile::{Missed, Quantity, Unknown};
+pub use profile::{Estimable, Missed, Quantity};
 pub use report::{Reported, report};
 pub use rounding::Rounding;
 pub use slides::Slide;

@@ -48,19 +48,8 @@ impl StressDifference {
         quadrature: u32,
         other: &StressDifference,
     ) -> Vec<f64> {
-        let weights = weights(section);
-        let mut pairs = self.points().zip(other.points());
-        let product = |(e, element): (usize, &Element)| {
-            let (family, nodes) = (element.family(), mesh.element_nodes(element));
-            let weights = &weights[section.material_of(e)];
-            let mut sum = 0.0;
-            for (point, (own, other)) in family.rule(quadrature).iter().zip(&mut pairs) {
-                let m = family.map(&nodes, point.place);
-                sum += point.weight * m.det * section.depth(m.x) * weights.density(&own, &other);
-            }
-            sum
-        };
-        mesh.elements.iter().enumerate().map(product).collect()
+        let pairs = self.points().zip(other.points());
+        integrate(mesh, section, quadrature, pairs)
     }
 
     /// The difference at every integration point.
@@ -189,14 +178,37 @@ impl StressDifference {
 
     /// The norm of the difference in every element ((force × length)^½, without 2π).
     pub fn norms(&self, mesh: &Mesh, section: &Section, quadrature: u32) -> Vec<f64> {
-        let alone = StressDifference {
-            stress: self.stress.clone(),
-            dilatation_gap: Vec::new(),
-        };
-        let squares = alone.products(mesh, section, quadrature, &alone);
+        let stress = self.points().map(|point| Difference { gap: 0.0, ..point });
+        let squares = integrate(
+            mesh,
+            section,
+            quadrature,
+            stress.map(|point| (point, point)),
+        );
         let norm = |square: f64| square.max(0.0).sqrt();
         squares.into_iter().map(norm).collect()
     }
+}
+
+/// What the two of every pair, one for each integration point, have in common in each element.
+fn integrate(
+    mesh: &Mesh,
+    section: &Section,
+    quadrature: u32,
+    mut pairs: impl Iterator<Item = (Difference, Difference)>,
+) -> Vec<f64> {
+    let weights = weights(section);
+    let product = |(e, element): (usize, &Element)| {
+        let (family, nodes) = (element.family(), mesh.element_nodes(element));
+        let weights = &weights[section.material_of(e)];
+        let mut sum = 0.0;
+        for (point, (own, other)) in family.rule(quadrature).iter().zip(&mut pairs) {
+            let m = family.map(&nodes, point.place);
+            sum += point.weight * m.det * section.depth(m.x) * weights.density(&own, &other);
+        }
+        sum
+    };
+    mesh.elements.iter().enumerate().map(product).collect()
 }
 
 /// Σ h_i σ_i − σ.
@@ -240,7 +252,7 @@ impl Weights {
     }
 }
 
-/// Of every material.
+/// The weights of every material.
 fn weights(section: &Section) -> Vec<Weights> {
     let of = |(material, moduli): (usize, &Moduli)| {
         let compliance = inverse(moduli).unwrap_or_default();

@@ -36,11 +36,13 @@ pub struct Accuracy {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Verdict {
-    /// Every force is known to 1 %, every peak that has a limit and every extent to 5 %.
+    /// Every force is known to 1 %, every peak that has a limit and every extent to 5 %. Stated errors are at most three
+    /// quarters of that, since one in twenty is too small.
     Good,
-    /// Every force is known to 5 %, every peak and every extent to 20 %.
+    /// To 5 % and 20 %; also where a contact has too many ends of stick to follow, or another number of ends on the mesh
+    /// split in two.
     Fair,
-    /// Something is known to less than that, or not at all.
+    /// Something else is known to less than that, or not at all.
     Poor,
 }
 
@@ -133,6 +135,9 @@ pub enum ErrorMethod {
     MeshHalved,
     /// There is no limit that a finer mesh would approach.
     NoLimit,
-    /// Not found.
+    /// More ends of stick than are followed: where stick and slip alternate from point to point, another mesh has them
+    /// elsewhere.
+    TooMany,
+    /// The error is not known; the reasons of the verdict say why.
     Unknown,
 }

@@ -8,7 +8,7 @@ mod resolution;
 mod warnings;
 
 pub use between::Missed;
-pub use quantities::{Quantity, Unknown};
+pub use quantities::{Estimable, Quantity};
 
 use super::system::{Patch, System, shape_without_oblique};
 use crate::algorithm::finished::Finished;

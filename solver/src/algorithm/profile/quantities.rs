@@ -20,7 +20,8 @@ pub struct Quantity {
     /// Its error per change of what `gradient` is of; 1 but for the end of stick, which moves with the slip there.
     pub factor: f64,
     /// What the place of nodes alone leaves open, in the unit of the value: the distance to the next node at an end of
-    /// contact, the drop beside a peak, in friction forces what cancels within edges and what is beside singularities.
+    /// contact, the drop beside a peak, in friction forces what cancels within edges, what is beside singularities, and stick
+    /// between points.
     pub spacing: f64,
     /// What the law has between the points where friction acts, likewise: in friction forces; beside a peak of the pressure
     /// a jump of σ_t; at a peak of σ_t the change of its bound.
@@ -29,19 +30,21 @@ pub struct Quantity {
     pub spacing_at: Vec<(usize, f64)>,
     /// The edges that `between` comes from, likewise.
     pub between_at: Vec<(usize, f64)>,
-    /// No finer mesh approaches a limit of it.
-    pub unlimited: bool,
-    /// Why its error cannot be known.
-    pub unknown: Option<Unknown>,
+    /// Whether an error can be stated.
+    pub estimable: Estimable,
 }
 
-/// Why the error of a quantity cannot be known.
+/// Whether an error of a quantity can be stated.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Unknown {
-    /// The obstacle reaches into the body between the nodes.
-    ObstacleBetweenNodes,
-    /// Stick and slip alternate: it is one of so many ends of stick.
-    Alternating(usize),
+pub enum Estimable {
+    /// It can.
+    Yes,
+    /// No finer mesh approaches a limit of it.
+    NoLimit,
+    /// It is an end of stick, of which there are more than are followed.
+    TooMany,
+    /// The obstacle reaches into the body between the nodes: what that changes is not known.
+    Unseen,
 }
 
 /// An end of an interval of contact.
@@ -55,8 +58,8 @@ pub(super) struct EndOfContact {
     pub(super) edge: usize,
 }
 
-/// Ends of stick that are told: a rough obstacle has hundreds. If there are more, stick and slip alternate from point to
-/// point, another mesh has others, and no error is stated for them.
+/// Ends of stick that are followed: each costs as much as another recovery of the stresses. A rough obstacle has hundreds, and
+/// where stick and slip alternate from point to point, another mesh has them elsewhere: no error is stated for more.
 const MOST_STICK_ENDS: usize = 8;
 
 /// A slip that changes by less than this part of ε along an edge is ε on all of it, to rounding, and stick does not end
@@ -65,6 +68,13 @@ const STEADY: f64 = 1e-6;
 
 /// How far from a peak of σ_t its neighbourhood is looked at, in half edges.
 const NEAR: f64 = 0.25;
+
+fn limited(has_limit: bool) -> Estimable {
+    match has_limit {
+        true => Estimable::Yes,
+        false => Estimable::NoLimit,
+    }
+}
 
 impl PatchView<'_> {
     /// Forces, peaks and extents. None where σ_t does not follow from the law: in a false state of the thesis's own
@@ -78,7 +88,9 @@ impl PatchView<'_> {
         found.extend(self.ends());
         if !self.missed().is_empty() {
             for quantity in &mut found {
-                quantity.unknown = Some(Unknown::ObstacleBetweenNodes);
+                if quantity.estimable == Estimable::Yes {
+                    quantity.estimable = Estimable::Unseen;
+                }
             }
         }
         found
@@ -95,8 +107,7 @@ impl PatchView<'_> {
             between: 0.0,
             spacing_at: Vec::new(),
             between_at: Vec::new(),
-            unlimited: false,
-            unknown: None,
+            estimable: Estimable::Yes,
         }
     }
 
@@ -133,10 +144,10 @@ impl PatchView<'_> {
         ];
         let (canceling, _) = self.oscillation();
         let by_edge = self.between_points();
-        let singular = self.beside_singularities();
-        let open: f64 = singular.iter().map(|(_, force)| force).sum();
+        let left_open = self.open_friction();
+        let open: f64 = left_open.iter().map(|(_, force)| force).sum();
         let canceling_at = self.canceling().into_iter().map(f64::abs).enumerate();
-        let open_at: Vec<(usize, f64)> = canceling_at.chain(singular).collect();
+        let open_at: Vec<(usize, f64)> = canceling_at.chain(left_open).collect();
         let between = [
             by_edge.iter().sum::<f64>(),
             by_edge.iter().map(|part| part.abs()).sum(),
@@ -169,7 +180,6 @@ impl PatchView<'_> {
             for (i, shape) in edge_nodes(edge).into_iter().zip(edge3::shape(xi)) {
                 gradient.add_pressure(system, self.patch.first + i, -shape);
             }
-            let unlimited = self.pressure_without_limit();
             let beside = [xi - NEAR, xi + NEAR].map(|xi| self.along(edge, xi, Self::pressure_at));
             let jumps: Vec<(usize, f64)> = self
                 .neighbours(edge)
@@ -180,7 +190,7 @@ impl PatchView<'_> {
                 spacing_at: vec![(edge, 1.0)],
                 between: jumps.iter().fold(0.0, |most, (_, jump)| most.max(*jump)),
                 between_at: jumps,
-                unlimited,
+                estimable: limited(!self.pressure_without_limit()),
                 ..self.quantity(QuantityName::PeakNormalStress, -pressure, Some(gradient))
             });
         }
@@ -199,7 +209,7 @@ impl PatchView<'_> {
                 spacing_at: vec![(edge, 1.0)],
                 between: self.change_of_bound(edge, xi),
                 between_at: vec![(edge, 1.0)],
-                unlimited: self.averages_nothing() && self.pressure_without_limit(),
+                estimable: limited(!self.averages_nothing() || !self.pressure_without_limit()),
                 ..self.quantity(QuantityName::PeakTangentialStress, stress, Some(gradient))
             });
         }
@@ -227,32 +237,45 @@ impl PatchView<'_> {
             ..self.quantity(end.name, end.s, None)
         };
         let mut found: Vec<Quantity> = ends.map(quantity).collect();
-        let mut turns = self.turns();
-        let many = Some(turns.len()).filter(|count| *count > MOST_STICK_ENDS);
+        let mut turns: Vec<(usize, f64, f64)> = self
+            .turns()
+            .into_iter()
+            .map(|(edge, xi)| (edge, xi, self.slope_of_slip(edge, xi)))
+            .collect();
+        let touches = |edge: usize| edge_nodes(edge).iter().all(|&i| self.active(i));
+        let steady = self
+            .patch
+            .law
+            .as_ref()
+            .map_or(0.0, |law| STEADY * law.elastic_slip);
+        turns.retain(|(edge, _, slope)| touches(*edge) && slope.abs() > steady);
+        let few = turns.len() <= MOST_STICK_ENDS;
         turns.truncate(MOST_STICK_ENDS);
-        for (edge, xi) in turns {
-            let touches = edge_nodes(edge).iter().all(|&i| self.active(i));
+        for (edge, xi, slope) in turns {
             let point = self.point(edge, xi);
-            let step = 1e-4;
-            let slope =
-                (self.slip_at(edge, xi + step) - self.slip_at(edge, xi - step)) / (2.0 * step);
             let arc = self.patch.contact.boundary.edge_arc(edge);
             let length = 0.5 * (arc[1] - arc[0]);
-            let law = self.system.law(&point);
-            if !touches || slope.abs() <= STEADY * law.elastic_slip {
-                continue;
-            }
             let mut gradient = Gradient::zero(self.system);
             gradient.add_slip(self.system, &point, 1.0);
             found.push(Quantity {
                 factor: length / slope,
                 spacing: length.abs(),
                 spacing_at: vec![(edge, 1.0)],
-                unknown: many.map(Unknown::Alternating),
-                ..self.quantity(QuantityName::StickEnd, point.s, Some(gradient))
+                estimable: if few {
+                    Estimable::Yes
+                } else {
+                    Estimable::TooMany
+                },
+                ..self.quantity(QuantityName::StickEnd, point.s, few.then_some(gradient))
             });
         }
         found
+    }
+
+    /// de/dξ.
+    fn slope_of_slip(&self, edge: usize, xi: f64) -> f64 {
+        let step = 1e-4;
+        (self.slip_at(edge, xi + step) - self.slip_at(edge, xi - step)) / (2.0 * step)
     }
 
     /// Where intervals of contact begin and end.

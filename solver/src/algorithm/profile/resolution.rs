@@ -86,10 +86,10 @@ impl PatchView<'_> {
         change(xi - 1.0).max(change(xi + 1.0))
     }
 
-    /// What places where the law or the pressure is singular leave open in the friction force, with their edges (force,
-    /// without 2π): cohesion acts up to the end of the contact, which lies between two nodes; and at a kink of the
-    /// obstacle the pressure has no limit.
-    pub(super) fn beside_singularities(&self) -> Vec<(usize, f64)> {
+    /// What is left open in the friction force, with its edges (force, without 2π): cohesion acts up to the end of the
+    /// contact, which lies between two nodes; at a kink of the obstacle the pressure has no limit; and no friction point may
+    /// feel that a part sticks ([`Self::unseen_stick`]).
+    pub(super) fn open_friction(&self) -> Vec<(usize, f64)> {
         let Some(law) = &self.patch.law else {
             return Vec::new();
         };
