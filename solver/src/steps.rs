@@ -40,7 +40,8 @@ pub fn run(
         let _ = observe(Progress::Phase(Phase::Recover));
         let reported = report(model, body, &load_history.system, &finished)?;
         let last = number + 1 == steps.len() || !can_continue(reported.summary.outcome);
-        let accuracy = last.then(|| {
+        let assessed = last && !model.contacts.is_empty();
+        let accuracy = assessed.then(|| {
             let (system, mut origins) = (&load_history.system, origins.take());
             if let Some(origins) = origins.as_deref_mut() {
                 let places = reported.missed.iter();

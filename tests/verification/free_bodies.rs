@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use solver::elasticity::{self, Dof, DofMap};
 use solver::linear::Graph;
 use solver::model::Model;
+use solver::problem::Problem;
 
 use crate::support::{Lattice, problem, solve};
 
@@ -376,6 +377,7 @@ fn contacts_hold_along_their_normal_and_with_friction_along_the_tangent() {
             "mesh": {"grid": {"x": [0, 1, 2], "y": [0, 1]}},
             "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
             "supports": supports, "contacts": [contact],
+            "loads": [{"body_force": [0, -1]}],
         })
     };
     let flat = json!({"boundary": "bottom", "obstacle": {"kind": "flat"}});
@@ -460,4 +462,42 @@ fn very_many_parts_are_refused_at_once() {
     };
     squares.held = [all(&squares), all(&squares)];
     assert!(squares.refusals("plane_strain").is_empty());
+}
+
+/// An obstacle pushed against a body that nothing else holds along its normal pushes it away: there is no pressure, whatever
+/// the iterations say. A load against the obstacle, or a contact on the other side, makes it a problem.
+#[test]
+fn a_body_that_is_only_pushed_away_is_refused() {
+    let block = |loads: Value, contacts: Value| {
+        json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": [0, 1, 2, 3, 4], "y": [0, 1, 2]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "left", "ux": 0}],
+            "loads": loads,
+            "contacts": contacts,
+        })
+    };
+    let on = |boundary: &str| {
+        json!({"boundary": boundary, "obstacle": {"kind": "flat"}, "indentation": 0.01,
+            "friction": {"coefficient": 0.3, "nonlocal_radius": 1, "elastic_slip": 1e-4}})
+    };
+    let refused = |problem: &Value| {
+        let problem: Problem = serde_json::from_value(problem.clone()).unwrap();
+        match solver::check(&problem, None) {
+            Ok(_) => None,
+            Err(violations) => Some(violations[0].got.clone()),
+        }
+    };
+    let told = refused(&block(json!([]), json!([on("top")]))).unwrap();
+    assert!(told.contains("along y on one side only"), "{told}");
+    // the load does nothing along y
+    let aside = json!([{"boundary": "right", "pressure": 1}]);
+    assert!(refused(&block(aside, json!([on("top")]))).is_some());
+    let pressed = json!([{"boundary": "bottom", "pressure": 1}]);
+    assert_eq!(refused(&block(pressed, json!([on("top")]))), None);
+    assert_eq!(
+        refused(&block(json!([]), json!([on("top"), on("bottom")]))),
+        None
+    );
 }

@@ -4,7 +4,9 @@ use fastrand::Rng;
 use serde_json::{Value, json};
 use solver::algorithm::{self, Missed, Place, System, report};
 use solver::problem::{NormalOf, Problem, Refine};
-use solver::solution::{ErrorMethod, QuantityName, Solution, Verdict, Warning, WarningCode};
+use solver::solution::{
+    ErrorMethod, EstimatedQuantity, QuantityName, Solution, Verdict, Warning, WarningCode,
+};
 
 use crate::support::{close, example, problem, quiet, solve};
 
@@ -416,6 +418,65 @@ fn an_obstacle_that_ends_inside_an_edge_is_told_whatever_its_kind() {
         // both ends
         let rounded = json!({"kind": "rounded_flat", "half_width": 0.2, "radius": end - 0.2});
         assert_eq!(ends(end, rounded), 2 * cut, "{end}");
+    }
+}
+
+/// What is left out of the contact by an obstacle that ends inside an edge is in the errors of its end and of the forces: a
+/// flat punch from −3 to an end between lines 1 apart, against one on a grid with a line on that end.
+#[test]
+fn what_an_obstacle_covers_of_a_cut_edge_is_in_the_errors() {
+    let y: Vec<f64> = (0..=16)
+        .map(|k| 40.0 - 1.4f64.powi(k))
+        .filter(|y| *y > 0.0)
+        .collect();
+    let y: Vec<f64> = [0.0]
+        .into_iter()
+        .chain(y.into_iter().rev())
+        .chain([40.0])
+        .collect();
+    let punch = |x: Vec<f64>, end: f64, refine: u32| {
+        let problem = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": x, "y": y}, "refine": refine},
+            "materials": [{"youngs_modulus": 210_000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+            "contacts": [{"boundary": "top", "obstacle": {"kind": "flat", "from": -3, "to": end},
+                "indentation": 0.05,
+                "friction": {"coefficient": 0.3, "nonlocal_radius": 0.5, "elastic_slip": 1e-4}}],
+        });
+        let solution = solve(&crate::support::problem(&problem.to_string()));
+        let accuracy = solution.summary.accuracy.unwrap();
+        let all = accuracy.quantities.into_iter();
+        let of = |name: QuantityName| move |q: &EstimatedQuantity| q.quantity == name;
+        let names = [
+            QuantityName::NormalForce,
+            QuantityName::FrictionForce,
+            QuantityName::ContactEnd,
+        ];
+        let all: Vec<EstimatedQuantity> = all.collect();
+        (
+            accuracy.verdict,
+            names.map(|name| all.iter().find(|q| of(name)(q)).unwrap().clone()),
+        )
+    };
+    for (end, refine) in [(3.24, 2), (3.45, 1), (3.95, 0), (3.12, 3)] {
+        let x: Vec<f64> = (-40..=40).map(f64::from).collect();
+        let (verdict, own) = punch(x.clone(), end, refine);
+        let mut on_end: Vec<f64> = x
+            .into_iter()
+            .chain([-3.05, -2.95, end - 0.05, end, end + 0.05])
+            .collect();
+        on_end.sort_by(f64::total_cmp);
+        on_end.dedup();
+        let (_, fine) = punch(on_end, end, 3);
+        for (own, fine) in own.iter().zip(&fine) {
+            let (off, error) = ((own.value - fine.value).abs(), own.error.unwrap());
+            assert!(
+                off <= error * (1.0 + 1e-9),
+                "{end}: off {off:.1e} of {own:?}"
+            );
+        }
+        assert_ne!(verdict, Verdict::Good, "{end}");
     }
 }
 

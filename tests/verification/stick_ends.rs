@@ -24,7 +24,10 @@ fn the_friction_force_may_be_off_by_stick_that_no_point_feels() {
     let (own, fine) = (at(1), at(3));
     let profile = &own.friction_profiles["top"];
     let slip = problem.contacts[0].friction.as_ref().unwrap().elastic_slip;
-    let pressed = profile.normal_stress.iter().zip(&profile.tangential_displacement);
+    let pressed = profile
+        .normal_stress
+        .iter()
+        .zip(&profile.tangential_displacement);
     let mut pressed = pressed.filter(|(stress, _)| **stress < 0.0);
     assert!(
         pressed.all(|(_, u)| u.abs() >= slip),

@@ -1,5 +1,7 @@
 //! The page of a figure: size, background, title, and how numbers and names are written.
 
+use std::collections::BTreeSet;
+
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -7,7 +9,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::theme::Theme;
 use solver::error::shortened;
 use solver::problem::Units;
-use solver::solution::Accuracy;
+use solver::solution::{Accuracy, ErrorMethod, Verdict};
 
 /// Width of every figure (pixels).
 pub(super) const WIDTH: i32 = 720;
@@ -113,7 +115,22 @@ pub(super) fn width(words: &str) -> i32 {
 
 /// The verdict on a result, for the note of a figure.
 pub(super) fn verdict(accuracy: Option<&Accuracy>) -> Option<String> {
-    accuracy.map(|accuracy| format!("accuracy: {}", accuracy.verdict.in_words()))
+    let accuracy = accuracy?;
+    let unlimited = accuracy.quantities.iter();
+    let unlimited = unlimited.filter(|q| q.method == ErrorMethod::NoLimit);
+    let names: BTreeSet<&str> = unlimited.map(|q| <&str>::from(q.quantity)).collect();
+    let names: Vec<String> = names.iter().map(|name| name.replace('_', " ")).collect();
+    let without = match &names[..] {
+        [] => String::new(),
+        names => format!("; no limit: {}", names.join(", ")),
+    };
+    let verdict = match accuracy.verdict {
+        // the note has one line
+        Verdict::Good if !names.is_empty() => "good",
+        Verdict::Fair if !names.is_empty() => "fair",
+        other => other.in_words(),
+    };
+    Some(format!("accuracy: {verdict}{without}"))
 }
 
 /// A quantity with its unit, where there is one.

@@ -111,7 +111,7 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
         output::print(&format!(
             "Stresses of {SHOWN} along {boundary:?}, at {PLACES} places:\n\n{}\n{}",
             report::profile(&profile),
-            report::contact(boundary, contact)
+            report::contact(boundary, contact, summary.solution.accuracy.as_ref())
         ))?;
     }
     Ok(Exit::Ok)

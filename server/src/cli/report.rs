@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use solver::solution::{
-    Accuracy, ContactProfile, ContactSummary, ErrorMethod, Iteration, NodeState, Outcome, Peak,
-    Phase,
+    Accuracy, ContactProfile, ContactSummary, ErrorMethod, EstimatedQuantity, Iteration, NodeState,
+    Outcome, Peak, Phase, QuantityName,
 };
 
 use crate::run::Document;
@@ -100,9 +100,22 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
             s.dofs, s.contact_dofs
         ),
     );
-    line("normal force", number(s.normal_force));
-    line("tangential force", number(s.tangential_force));
-    line("friction force", number(s.friction_force));
+    for (words, value, name) in [
+        ("normal force", s.normal_force, QuantityName::NormalForce),
+        (
+            "tangential force",
+            s.tangential_force,
+            QuantityName::TangentialForce,
+        ),
+        (
+            "friction force",
+            s.friction_force,
+            QuantityName::FrictionForce,
+        ),
+    ] {
+        let stated = stated(s.accuracy.as_ref(), name, None);
+        line(words, number(value) + &stated);
+    }
     line(
         "residuals",
         format!(
@@ -151,7 +164,7 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
         line("unique", found);
     }
     for (name, contact) in &s.contacts {
-        contact_lines(name, contact, &mut line);
+        contact_lines(name, contact, s.accuracy.as_ref(), &mut line);
     }
     for warning in &s.warnings {
         line(
@@ -175,6 +188,7 @@ fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
         let error = match (q.error, q.method) {
             (Some(error), _) => format!("stated error {error:.1e}"),
             (None, ErrorMethod::NoLimit) => "without a limit".to_owned(),
+            (None, ErrorMethod::TooMany) => "one of too many".to_owned(),
             (None, _) => "error unknown".to_owned(),
         };
         line(
@@ -202,7 +216,12 @@ fn number(value: f64) -> String {
     }
 }
 
-fn contact_lines(name: &str, contact: &ContactSummary, line: &mut impl FnMut(&str, String)) {
+fn contact_lines(
+    name: &str,
+    contact: &ContactSummary,
+    accuracy: Option<&Accuracy>,
+    line: &mut impl FnMut(&str, String),
+) {
     let ranges = |ranges: &[[f64; 2]]| {
         let ranges: Vec<String> = ranges
             .iter()
@@ -219,17 +238,38 @@ fn contact_lines(name: &str, contact: &ContactSummary, line: &mut impl FnMut(&st
     line("  touches, s", ranges(&contact.contact));
     line("  sticks, s", ranges(&contact.stick));
     if let Some(value) = &contact.peak_normal_stress {
-        line("  peak σ_n", peak(value));
+        let stated = stated(accuracy, QuantityName::PeakNormalStress, Some(name));
+        line("  peak σ_n", peak(value) + &stated);
     }
     if let Some(value) = &contact.peak_tangential_stress {
-        line("  peak σ_t", peak(value));
+        let stated = stated(accuracy, QuantityName::PeakTangentialStress, Some(name));
+        line("  peak σ_t", peak(value) + &stated);
+    }
+}
+
+/// The error of a quantity of a contact, or of its sum over all contacts, after its value; nothing if none was assessed.
+fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>) -> String {
+    let all = accuracy.iter().flat_map(|accuracy| &accuracy.quantities);
+    let own = |contact: &str, of: &str| contact.is_empty() || contact == of;
+    let own = all.filter(|q| q.quantity == name && own(contact.unwrap_or_default(), &q.contact));
+    let own: Vec<&EstimatedQuantity> = own.collect();
+    if own.is_empty() {
+        return String::new();
+    }
+    if own.iter().any(|q| q.method == ErrorMethod::NoLimit) {
+        return ", but there is no limit".to_owned();
+    }
+    let errors: Option<Vec<f64>> = own.iter().map(|q| q.error).collect();
+    match errors.map(|errors| errors.iter().sum::<f64>()) {
+        Some(error) => format!(" ± {error:.1e}"),
+        None => ", error unknown".to_owned(),
     }
 }
 
 /// The lines of one contact.
-pub(super) fn contact(name: &str, contact: &ContactSummary) -> String {
+pub(super) fn contact(name: &str, contact: &ContactSummary, accuracy: Option<&Accuracy>) -> String {
     let mut text = String::new();
-    contact_lines(name, contact, &mut |name, value| {
+    contact_lines(name, contact, accuracy, &mut |name, value| {
         let _ = writeln!(text, "{name:<20}{value}");
     });
     text

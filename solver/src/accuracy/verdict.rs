@@ -145,7 +145,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                 (
                     relative / good,
                     format!(
-                        "`{name}` of contact `{contact}`, s = {:.4}, is known to ±{error:.1e} only, {} of the length of the contact: the nodes there are as far apart.",
+                        "`{name}` of contact `{contact}`, s = {:.4}, is known to ±{error:.1e} only, {} of the length of the contact: the nodes there are as far apart, or the obstacle ends between two of them.",
                         q.value,
                         percent(relative)
                     ),

@@ -29,7 +29,7 @@ use std::collections::BTreeMap;
 
 use checks::Checks;
 
-use crate::elasticity::{Loads, Section};
+use crate::elasticity::{self, Loads, Section};
 use crate::error::{AllChecks, Checked, Violation};
 use crate::mesh::{self, External, ExternalMesh, Mesh};
 use crate::problem::{MeshInput, Problem, SolverControls, Step};
@@ -170,6 +170,11 @@ impl Checks {
         all.check(sound);
         let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);
         all.finish(())?;
+        let (loads, held_by_contact) = (loads?, held_by_contact?);
+        if held_by_contact {
+            let nodal = elasticity::assemble_loads(&mesh, &section, problem.quadrature, &loads);
+            self.pressed(&mesh, &section, &fixed, &contacts, &nodal)?;
+        }
         self.warn_about_contacts(&contacts);
         self.warn_of_dragged_symmetry(&contacts, &fixed, &axis, &problem.steps);
         self.warn_of_unmerged(&mesh, &contacts);
@@ -180,9 +185,9 @@ impl Checks {
             quadrature: problem.quadrature,
             oblique: contacts::oblique(&contacts, &fixed),
             fixed,
-            loads: loads?,
+            loads,
             contacts,
-            held_by_contact: held_by_contact?,
+            held_by_contact,
             steps: problem.steps.clone(),
             controls: problem.solver.clone(),
             warnings: std::mem::take(&mut self.warnings),

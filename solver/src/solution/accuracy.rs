@@ -50,8 +50,10 @@ impl Verdict {
     /// What it says, for people.
     pub fn in_words(self) -> &'static str {
         match self {
-            Verdict::Good => "good: forces to 1 %, peaks and extents to 5 %, or better",
-            Verdict::Fair => "fair: forces to 5 %, peaks and extents to 20 %",
+            Verdict::Good => {
+                "good: forces to 1 %, extents and peaks with a limit to 5 %, or better"
+            }
+            Verdict::Fair => "fair: forces to 5 %, extents and peaks with a limit to 20 %",
             Verdict::Poor => "POOR: some numbers are not to be relied on",
         }
     }

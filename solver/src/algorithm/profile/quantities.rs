@@ -26,6 +26,9 @@ pub struct Quantity {
     /// What the law has between the points where friction acts, likewise: in friction forces; beside a peak of the pressure
     /// a jump of σ_t; at a peak of σ_t the change of its bound.
     pub between: f64,
+    /// What the part of the contact beyond its last node means, where an end of the obstacle lies inside an edge and that edge
+    /// is left out: its length for extents, else the quantity times that length in lengths of the contact.
+    pub cut: f64,
     /// The edges of the contact that `spacing` comes from, with their parts in any unit.
     pub spacing_at: Vec<(usize, f64)>,
     /// The edges that `between` comes from, likewise.
@@ -52,6 +55,8 @@ pub(super) struct EndOfContact {
     name: QuantityName,
     /// Of the outermost node in contact.
     s: f64,
+    /// From there to the end of the obstacle, if that lies inside the next edge, which is left out of the contact (length).
+    cut: f64,
     /// From there to the next node (length).
     pub(super) spacing: f64,
     /// The edge that this lies on.
@@ -86,6 +91,7 @@ impl PatchView<'_> {
         let mut found = self.forces();
         found.extend(self.peaks());
         found.extend(self.ends());
+        self.add_cuts(&mut found);
         if !self.missed().is_empty() {
             for quantity in &mut found {
                 if quantity.estimable == Estimable::Yes {
@@ -94,6 +100,37 @@ impl PatchView<'_> {
             }
         }
         found
+    }
+
+    /// What parts of edges that are left out of the contact mean for the quantities that do not begin or end there.
+    fn add_cuts(&self, quantities: &mut [Quantity]) {
+        let ends = self.ends_of_contact();
+        let cut: f64 = ends.iter().map(|end| end.cut).sum();
+        let (Some(first), Some(last)) = (ends.first(), ends.last()) else {
+            return;
+        };
+        // a contact of one node is not resolved at all
+        let part = (cut / (last.s - first.s)).min(1.0);
+        let friction = self.summary().friction_force;
+        for quantity in quantities.iter_mut().filter(|_| cut > 0.0) {
+            quantity.cut = match quantity.name {
+                QuantityName::ContactStart | QuantityName::ContactEnd => continue,
+                QuantityName::StickEnd => cut,
+                QuantityName::TangentialForce => part * friction,
+                _ => part * quantity.value.abs(),
+            };
+        }
+    }
+
+    /// The length that the obstacle covers beyond the first or the last node.
+    fn left_out(&self, node: usize) -> f64 {
+        let contact = &self.patch.contact;
+        let number = contact.boundary.nodes[node];
+        let here = contact
+            .cut
+            .iter()
+            .filter(|(edge, _)| edge.contains(&number));
+        here.map(|(_, covered)| covered).sum()
     }
 
     fn quantity(&self, name: QuantityName, value: f64, gradient: Option<Gradient>) -> Quantity {
@@ -105,6 +142,7 @@ impl PatchView<'_> {
             factor: 1.0,
             spacing: 0.0,
             between: 0.0,
+            cut: 0.0,
             spacing_at: Vec::new(),
             between_at: Vec::new(),
             estimable: Estimable::Yes,
@@ -233,6 +271,7 @@ impl PatchView<'_> {
         let ends = self.ends_of_contact().into_iter();
         let quantity = |end: EndOfContact| Quantity {
             spacing: end.spacing,
+            cut: end.cut,
             spacing_at: vec![(end.edge, 1.0)],
             ..self.quantity(end.name, end.s, None)
         };
@@ -288,6 +327,7 @@ impl PatchView<'_> {
                 found.push(EndOfContact {
                     name: QuantityName::ContactStart,
                     s: s[i],
+                    cut: if i == 0 { self.left_out(0) } else { 0.0 },
                     spacing: if i == 0 { 0.0 } else { s[i] - s[i - 1] },
                     edge: i.saturating_sub(1) / 2,
                 });
@@ -296,6 +336,7 @@ impl PatchView<'_> {
                 found.push(EndOfContact {
                     name: QuantityName::ContactEnd,
                     s: s[i],
+                    cut: if i == last { self.left_out(last) } else { 0.0 },
                     spacing: if i == last { 0.0 } else { s[i + 1] - s[i] },
                     edge: i.min(last - 1) / 2,
                 });

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) use parts::Hold;
 
-use super::checks::Checks;
+use super::checks::{ALIGNED, Checks};
 use super::contact_model::ContactModel;
 use super::supports::Held;
 use crate::elasticity::Section;
@@ -38,6 +38,57 @@ impl Checks {
             all.fail(self.unheld(&parts, &unheld, contacts.is_empty()));
         }
         all.finish(true)
+    }
+
+    /// A body that only contact holds along a motion, all of it on one side, must be pressed there by a load: an obstacle that
+    /// is pushed against it pushes it away. `loads`: at every node.
+    pub(super) fn pressed(
+        &mut self,
+        mesh: &Mesh,
+        section: &Section,
+        fixed: &BTreeMap<u32, Held>,
+        contacts: &[ContactModel],
+        loads: &[[f64; 2]],
+    ) -> Checked<()> {
+        let bonded = |contact: &&ContactModel| contact.condition == Condition::Bonded;
+        let glued: Vec<Hold> = contacts.iter().filter(bonded).flat_map(hindered).collect();
+        // several motions may be combined so that one side holds them: only the solution tells
+        let [motion] = &free_motions(mesh, section, fixed, &glued)[..] else {
+            return Ok(());
+        };
+        let moves: BTreeMap<u32, [f64; 2]> = motion.moves.iter().copied().collect();
+        let mut sides = [0.0f64; 2];
+        let mut tangential = 0.0f64;
+        for contact in contacts.iter().filter(|contact| !bonded(contact)) {
+            let boundary = &contact.boundary;
+            for (i, node) in boundary.nodes.iter().enumerate() {
+                let Some(moved) = moves.get(node) else {
+                    continue;
+                };
+                let along = |[x, y]: [f64; 2]| x * moved[0] + y * moved[1];
+                let normal = along(boundary.normals[i]);
+                sides = [sides[0].max(normal), sides[1].max(-normal)];
+                tangential = tangential.max(along(boundary.tangent(i)).abs());
+            }
+        }
+        let one_sided = sides[0].min(sides[1]) <= ALIGNED && tangential <= ALIGNED;
+        let (mut power, mut most) = (0.0f64, 0.0f64);
+        for (node, [x, y]) in &moves {
+            let [p, q] = loads[*node as usize];
+            power += p * x + q * y;
+            most += (p * x).abs() + (q * y).abs();
+        }
+        if !one_sided || power.abs() > ALIGNED * most {
+            return Ok(());
+        }
+        let words = &motion.words;
+        Err(self.report(
+            "/supports",
+            Reason::FreeBody,
+            format!("a body that contact holds {words} on one side only, and that nothing presses against it"),
+            "supports or contacts against every rigid motion, or a load that presses the body against its contact",
+            format!("An obstacle that is pushed against the body only pushes it away. Add a support with {}.", towards(words)),
+        ))
     }
 
     fn unheld(&mut self, parts: &Parts<'_>, unheld: &Unheld, without_contacts: bool) -> Refused {
