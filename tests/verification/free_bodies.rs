@@ -491,6 +491,11 @@ fn a_body_that_is_only_pushed_away_is_refused() {
     };
     let told = refused(&block(json!([]), json!([on("top")]))).unwrap();
     assert!(told.contains("along y on one side only"), "{told}");
+    // here it may also turn
+    let mut rolling = block(json!([]), json!([on("top")]));
+    rolling["supports"] = json!([{"boundary": "bottom", "ux": 0}]);
+    let told = refused(&rolling).unwrap();
+    assert!(told.contains("on one side only"), "{told}");
     // the load does nothing along y
     let aside = json!([{"boundary": "right", "pressure": 1}]);
     assert!(refused(&block(aside, json!([on("top")]))).is_some());

@@ -167,6 +167,15 @@ fn a_body_not_held_by_its_contacts_is_an_error_with_its_motion() {
     ] {
         let mut p = example(name);
         p.supports.remove(1);
+        let refused = solver::check(&p, None).err().unwrap();
+        assert!(
+            refused[0]
+                .got
+                .contains(&format!("{motion} on one side only")),
+            "{name}"
+        );
+        // a load along the motion may press or pull, as may those of some load steps: this one pulls
+        p.loads = serde_json::from_value(serde_json::json!([{"body_force": [0, -1]}])).unwrap();
         assert!(solver::check(&p, None).is_ok(), "{name}");
         match solver::solve(&p, &mut |_| std::ops::ControlFlow::Continue(())) {
             Err(SolveError::Unheld { motion: found, .. }) => assert_eq!(found, motion, "{name}"),

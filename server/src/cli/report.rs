@@ -261,6 +261,7 @@ fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>
     }
     let errors: Option<Vec<f64>> = own.iter().map(|q| q.error).collect();
     match errors.map(|errors| errors.iter().sum::<f64>()) {
+        Some(0.0) => String::new(),
         Some(error) => format!(" ± {error:.1e}"),
         None => ", error unknown".to_owned(),
     }

@@ -52,43 +52,21 @@ impl Checks {
     ) -> Checked<()> {
         let bonded = |contact: &&ContactModel| contact.condition == Condition::Bonded;
         let glued: Vec<Hold> = contacts.iter().filter(bonded).flat_map(hindered).collect();
-        // several motions may be combined so that one side holds them: only the solution tells
-        let [motion] = &free_motions(mesh, section, fixed, &glued)[..] else {
-            return Ok(());
-        };
-        let moves: BTreeMap<u32, [f64; 2]> = motion.moves.iter().copied().collect();
-        let mut sides = [0.0f64; 2];
-        let mut tangential = 0.0f64;
-        for contact in contacts.iter().filter(|contact| !bonded(contact)) {
-            let boundary = &contact.boundary;
-            for (i, node) in boundary.nodes.iter().enumerate() {
-                let Some(moved) = moves.get(node) else {
-                    continue;
-                };
-                let along = |[x, y]: [f64; 2]| x * moved[0] + y * moved[1];
-                let normal = along(boundary.normals[i]);
-                sides = [sides[0].max(normal), sides[1].max(-normal)];
-                tangential = tangential.max(along(boundary.tangent(i)).abs());
+        for motion in free_motions(mesh, section, fixed, &glued) {
+            let moves: BTreeMap<u32, [f64; 2]> = motion.moves.iter().copied().collect();
+            if !held_on_one_side(&moves, contacts) || works(&moves, loads) {
+                continue;
             }
+            let words = &motion.words;
+            return Err(self.report(
+                "/supports",
+                Reason::FreeBody,
+                format!("a body that contact holds {words} on one side only, and that nothing presses against it"),
+                "supports or contacts against every rigid motion, or a load that presses the body against its contact",
+                format!("An obstacle that is pushed against the body only pushes it away. Add a support with {}.", towards(words)),
+            ));
         }
-        let one_sided = sides[0].min(sides[1]) <= ALIGNED && tangential <= ALIGNED;
-        let (mut power, mut most) = (0.0f64, 0.0f64);
-        for (node, [x, y]) in &moves {
-            let [p, q] = loads[*node as usize];
-            power += p * x + q * y;
-            most += (p * x).abs() + (q * y).abs();
-        }
-        if !one_sided || power.abs() > ALIGNED * most {
-            return Ok(());
-        }
-        let words = &motion.words;
-        Err(self.report(
-            "/supports",
-            Reason::FreeBody,
-            format!("a body that contact holds {words} on one side only, and that nothing presses against it"),
-            "supports or contacts against every rigid motion, or a load that presses the body against its contact",
-            format!("An obstacle that is pushed against the body only pushes it away. Add a support with {}.", towards(words)),
-        ))
+        Ok(())
     }
 
     fn unheld(&mut self, parts: &Parts<'_>, unheld: &Unheld, without_contacts: bool) -> Refused {
@@ -163,6 +141,36 @@ fn in_words(parts: &Parts<'_>, free: &Free) -> (String, u32, bool) {
     let nodes = free.moved.nodes.iter();
     let node = nodes.max_by(|a, b| moved(a).total_cmp(&moved(b)));
     (words, node.copied().unwrap_or_default(), turns)
+}
+
+/// Whether a motion moves all nodes of contacts away from their obstacles or all towards them, and none along.
+fn held_on_one_side(moves: &BTreeMap<u32, [f64; 2]>, contacts: &[ContactModel]) -> bool {
+    let (mut away, mut towards, mut tangential) = (0.0f64, 0.0f64, 0.0f64);
+    let unilateral = |contact: &&ContactModel| contact.condition == Condition::Unilateral;
+    for contact in contacts.iter().filter(unilateral) {
+        let boundary = &contact.boundary;
+        for (i, node) in boundary.nodes.iter().enumerate() {
+            let Some(moved) = moves.get(node) else {
+                continue;
+            };
+            let along = |[x, y]: [f64; 2]| x * moved[0] + y * moved[1];
+            let normal = along(boundary.normals[i]);
+            (away, towards) = (away.max(-normal), towards.max(normal));
+            tangential = tangential.max(along(boundary.tangent(i)).abs());
+        }
+    }
+    away.max(towards) > ALIGNED && away.min(towards) <= ALIGNED && tangential <= ALIGNED
+}
+
+/// Whether loads do work along a motion.
+fn works(moves: &BTreeMap<u32, [f64; 2]>, loads: &[[f64; 2]]) -> bool {
+    let (mut power, mut most) = (0.0f64, 0.0f64);
+    for (node, [x, y]) in moves {
+        let [p, q] = loads[*node as usize];
+        power += p * x + q * y;
+        most += (p * x).abs() + (q * y).abs();
+    }
+    power.abs() > ALIGNED * most
 }
 
 /// The support that ends a translation.
