@@ -73,7 +73,9 @@ class Server:
 
     def __init__(self, folder):
         self.process = subprocess.Popen(
-            [SIGNORINI, "serve", "--listen", "127.0.0.1:0", "--data", folder / "data"],
+            [SIGNORINI, "serve", "--listen", "127.0.0.1:0", "--data", folder / "data",
+             # that the examples fit: what is sent may be wrong in other ways
+             "--memory-budget-bytes", str(4 << 30)],
             stdout=subprocess.PIPE,
             stderr=open(folder / "log", "w"),
             text=True,

@@ -81,7 +81,7 @@ def attack(isolation, jumps):
         faked = {"LD_PRELOAD": LIBRARY[0], "FAKETIME_TIMESTAMP_FILE": str(clock), "FAKETIME_NO_CACHE": "1",
                  "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
         wrapper = ["env", *("%s=%s" % pair for pair in faked.items())]
-        with Server("--workers", "2", "--isolation", isolation, wrapper=wrapper) as server:
+        with Server("--workers", "2", "--memory-budget-bytes", str(4 << 30), "--isolation", isolation, wrapper=wrapper) as server:
             for seconds in jumps:
                 order += jump(server, clock, seconds)
                 check("the clock of the machine was set" in server.log.read_text(), "the log tells of it")

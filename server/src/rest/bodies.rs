@@ -133,7 +133,7 @@ pub(super) fn submission(text: &str) -> Result<JobRequest, ApiError> {
         priority: body
             .take("priority", &PRIORITIES.expected())
             .unwrap_or_default(),
-        limits: body.take("limits", LIMITS).unwrap_or_default(),
+        limits: body.take_object("limits", LIMITS).unwrap_or_default(),
         cache: body
             .take("cache", "use, refresh or off")
             .unwrap_or_default(),
@@ -212,7 +212,7 @@ pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
     let NewLimits {
         timeout_s,
         queue_ttl_s,
-    } = body.take("limits", LIMITS).unwrap_or_default();
+    } = body.take_object("limits", LIMITS).unwrap_or_default();
     let changes = Changes {
         timeout_s,
         queue_ttl_s,
@@ -327,6 +327,14 @@ mod tests {
 
     #[test]
     fn all_violations_of_an_envelope_are_reported_together() {
+        let limits = retry(r#"{"limits": [null, null]}"#).err();
+        assert!(
+            matches!(limits, Some(ApiError::InvalidProblem(found)) if found[0].pointer == "/limits")
+        );
+        assert_eq!(
+            pointers(r#"{"problem": {}, "limits": [1, 2]}"#)[0],
+            "/limits"
+        );
         let text = r#"{"name": 7, "labels": {"a": 1}, "priority": 0.5, "wait": 3}"#;
         assert_eq!(
             pointers(text),

@@ -103,6 +103,24 @@ impl<'a> Object<'a> {
         value.map_err(|_| self.wrong_type(name, raw, expected)).ok()
     }
 
+    /// An optional field that is an object; null means absent. Serde also takes a list of a structure's fields in order.
+    pub(super) fn take_object<T: DeserializeOwned>(
+        &mut self,
+        name: &str,
+        expected: &str,
+    ) -> Option<T> {
+        let list = self
+            .fields
+            .get(name)
+            .filter(|raw| raw.get().starts_with('['));
+        if list.is_none() {
+            return self.take(name, expected);
+        }
+        let raw = self.fields.remove(name)?;
+        self.wrong_type(name, raw, expected);
+        None
+    }
+
     /// Records that a field has the wrong type.
     pub(super) fn wrong_type(&mut self, name: &str, raw: &RawValue, expected: &str) {
         self.violations
