@@ -331,9 +331,10 @@ mod tests {
         assert!(
             matches!(limits, Some(ApiError::InvalidProblem(found)) if found[0].pointer == "/limits")
         );
-        assert_eq!(
-            pointers(r#"{"problem": {}, "limits": [1, 2]}"#)[0],
-            "/limits"
+        let found = pointers(r#"{"problem": {}, "limits": [1, 2]}"#);
+        assert!(
+            found.iter().any(|pointer| pointer == "/limits"),
+            "{found:?}"
         );
         let text = r#"{"name": 7, "labels": {"a": 1}, "priority": 0.5, "wait": 3}"#;
         assert_eq!(
