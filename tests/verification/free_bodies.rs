@@ -496,6 +496,10 @@ fn a_body_that_is_only_pushed_away_is_refused() {
     rolling["supports"] = json!([{"boundary": "bottom", "ux": 0}]);
     let told = refused(&rolling).unwrap();
     assert!(told.contains("on one side only"), "{told}");
+    // friction at another side holds it along y, with or without an obstacle there
+    let grip = json!({"boundary": "right", "obstacle": {"kind": "flat"}, "condition": "none",
+        "friction": {"bound": 5, "elastic_slip": 1e-4}});
+    assert_eq!(refused(&block(json!([]), json!([on("top"), grip]))), None);
     // the load does nothing along y
     let aside = json!([{"boundary": "right", "pressure": 1}]);
     assert!(refused(&block(aside, json!([on("top")]))).is_some());

@@ -250,8 +250,8 @@ fn contact_lines(
 /// The error of a quantity of a contact, or of its sum over all contacts, after its value; nothing if none was assessed.
 fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>) -> String {
     let all = accuracy.iter().flat_map(|accuracy| &accuracy.quantities);
-    let own = |contact: &str, of: &str| contact.is_empty() || contact == of;
-    let own = all.filter(|q| q.quantity == name && own(contact.unwrap_or_default(), &q.contact));
+    let of_contact = |q: &EstimatedQuantity| contact.is_none_or(|contact| contact == q.contact);
+    let own = all.filter(|q| q.quantity == name && of_contact(q));
     let own: Vec<&EstimatedQuantity> = own.collect();
     if own.is_empty() {
         return String::new();

@@ -146,16 +146,18 @@ fn in_words(parts: &Parts<'_>, free: &Free) -> (String, u32, bool) {
 /// Whether a motion moves all nodes of contacts away from their obstacles or all towards them, and none along.
 fn held_on_one_side(moves: &BTreeMap<u32, [f64; 2]>, contacts: &[ContactModel]) -> bool {
     let (mut away, mut towards, mut tangential) = (0.0f64, 0.0f64, 0.0f64);
-    let unilateral = |contact: &&ContactModel| contact.condition == Condition::Unilateral;
-    for contact in contacts.iter().filter(unilateral) {
+    for contact in contacts {
         let boundary = &contact.boundary;
         for (i, node) in boundary.nodes.iter().enumerate() {
             let Some(moved) = moves.get(node) else {
                 continue;
             };
             let along = |[x, y]: [f64; 2]| x * moved[0] + y * moved[1];
-            let normal = along(boundary.normals[i]);
-            (away, towards) = (away.max(-normal), towards.max(normal));
+            if contact.condition == Condition::Unilateral {
+                let normal = along(boundary.normals[i]);
+                (away, towards) = (away.max(-normal), towards.max(normal));
+            }
+            // friction may hold it, also where there is no obstacle
             tangential = tangential.max(along(boundary.tangent(i)).abs());
         }
     }
