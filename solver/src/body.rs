@@ -4,9 +4,9 @@
 //! contact and friction iteration runs on it; [`ElasticBody::displacements`] computes
 //! the whole field by one back-substitution. The factor is private to this module.
 
-use crate::elasticity::{self, Axes, Dof, DofMap};
+use crate::elasticity::{self, Axes, Dof, DofMap, ElementStiffness, TOGETHER};
 use crate::error::SolveError;
-use crate::linear::{Breaks, Dense, Factor, FactorError, Graph, Ordering, SparseSymmetric};
+use crate::linear::{Breaks, Cells, Dense, Dissection, Factor, FactorError, Fronts};
 use crate::model::{Held, Level, Model};
 use crate::solution::{Observer, Phase, Progress};
 
@@ -27,12 +27,8 @@ pub struct ElasticBody {
     pub nodal_loads: Vec<[f64; 2]>,
     /// Which displacements are unknown.
     pub map: DofMap,
-    matrix: SparseSymmetric,
-    /// Forces of the loads, and of the prescribed displacements, on all unknowns.
-    right_hand_sides: [Vec<f64>; 2],
-    /// Added to the diagonal of the contact unknowns in `matrix`, and subtracted from Ŝ: without it a body that
-    /// only contact holds has no factor (force/length).
-    spring: f64,
+    /// L⁻¹ f of the unknowns away from contact, f the forces of the loads, and of the prescribed displacements.
+    reduced: [Vec<f64>; 2],
     factor: Factor,
     /// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it.
     axis_ends: Vec<[usize; 2]>,
@@ -47,81 +43,44 @@ impl ElasticBody {
     /// Assembles, factors and condenses, and reports each phase to the observer.
     pub fn new(model: &Model, observe: &mut Observer<'_>) -> Result<Self, SolveError> {
         notify(observe, Progress::Phase(Phase::Assemble))?;
-        let (map, interior) = number(model);
-        let graph = Graph::from_cliques(
-            model.mesh.nodes.len(),
-            model.mesh.elements.iter().map(|e| &e[..]),
-        );
-        let (mut matrix, of_supports) = elasticity::assemble_stiffness(
-            &model.mesh,
-            &model.section,
-            model.quadrature,
-            &map,
-            &graph,
-        );
         let nodal_loads =
             elasticity::assemble_loads(&model.mesh, &model.section, model.quadrature, &model.loads);
         let mut condensed = nodal_loads.clone();
         elasticity::condense_body_force(&model.mesh, &model.section, &model.loads, &mut condensed);
-        let of_loads = on_unknowns(&map, &condensed);
-        let right_hand_sides = [of_loads, of_supports];
-        let finite = |forces: &Vec<f64>| forces.iter().all(|f| f.is_finite());
-        if !matrix.is_finite() || !right_hand_sides.iter().all(finite) {
-            return Err(SolveError::NonFinite {
-                phase: Phase::Assemble,
-            });
-        }
-        let spring = if model.held_by_contact {
-            matrix.mean_diagonal(interior)
-        } else {
-            0.0
-        };
-        for i in interior..map.unknowns {
-            matrix.add(i, i, spring);
-        }
 
         notify(observe, Progress::Phase(Phase::Order))?;
-        let contact_unknowns = map.unknowns - interior;
-        let ordering = elimination_order(model, &map, interior)
-            .and_then(|order| Ordering::new(&matrix, &order, contact_unknowns))
-            .map_err(|error| solve_error(error, &map))?;
+        let (map, fronts) = number(model)?;
+        let mut of_loads = on_unknowns(&map, &condensed);
+        let mut of_supports = vec![0.0; map.unknowns];
 
         notify(observe, Progress::Phase(Phase::Factor))?;
-        let bytes = ordering.bytes();
+        let contact_unknowns = fronts.kept();
+        let bytes = fronts.bytes() + Dense::bytes(contact_unknowns);
         notify(observe, Progress::Needs { bytes })?;
-        let factor = Factor::new(
-            &matrix,
-            ordering,
+        let (mesh, section) = (&model.mesh, &model.section);
+        let mut elements = ElementStiffness::new(mesh, section, model.quadrature, &map);
+        let factored = Factor::new(
+            fronts,
+            |e, matrix| elements.put(e, matrix, &mut of_supports),
             &mut Breaks::new(&mut || observe(Progress::Pulse)),
         );
-        let factor = factor.map_err(|error| solve_error(error, &map))?;
+        let (factor, mut stiffness) = factored.map_err(|error| solve_error(error, &map))?;
 
         notify(observe, Progress::Phase(Phase::Condense))?;
-        let bytes = Dense::bytes(contact_unknowns);
-        notify(observe, Progress::Needs { bytes })?;
-        let stiffness =
-            factor.trailing_schur_complement(&mut Breaks::new(&mut || observe(Progress::Pulse)));
-        let mut stiffness = stiffness.map_err(|error| solve_error(error, &map))?;
-        // f̂ = Ŝ u_c with u_c of the whole system, springs included, under the loads alone
-        let condensed = |forces: &Vec<f64>| {
-            if forces.iter().all(|f| *f == 0.0) {
-                return vec![0.0; contact_unknowns];
-            }
-            let mut u = forces.clone();
-            factor.solve(&mut u);
-            stiffness.times(&u[interior..])
-        };
-        let (load_of_loads, load_of_supports) = (
-            condensed(&right_hand_sides[0]),
-            condensed(&right_hand_sides[1]),
-        );
-        for i in 0..contact_unknowns {
-            stiffness.set(i, i, stiffness.at(i, i) - spring);
+        let non_finite = |phase| Err(SolveError::NonFinite { phase });
+        if [&of_loads, &of_supports].iter().any(|f| !all_finite(f)) {
+            return non_finite(Phase::Assemble);
         }
-        if !(0..stiffness.size()).all(|j| stiffness.column(j).iter().all(|v| v.is_finite())) {
-            return Err(SolveError::NonFinite {
-                phase: Phase::Condense,
+        let interior = map.unknowns - contact_unknowns;
+        let [mut load_of_loads, mut load_of_supports] =
+            [&mut of_loads, &mut of_supports].map(|forces| {
+                if forces.iter().any(|f| *f != 0.0) {
+                    factor.forward(forces);
+                }
+                forces.split_off(interior)
             });
+        if !(0..stiffness.size()).all(|j| all_finite(stiffness.column(j))) {
+            return non_finite(Phase::Condense);
         }
         let to_contact = |dof| match dof {
             Dof::Free(i) => Dof::Free(i - interior),
@@ -144,7 +103,6 @@ impl ElasticBody {
             }
         }
         let axis_ends = axis_ends(model, &contact_dofs);
-        let (mut load_of_loads, mut load_of_supports) = (load_of_loads, load_of_supports);
         for &[end, beside] in &axis_ends {
             for load in [&mut load_of_loads, &mut load_of_supports] {
                 load[end] += AXIS_SHARE * load[beside];
@@ -164,9 +122,7 @@ impl ElasticBody {
             tangents,
             nodal_loads,
             map,
-            matrix,
-            right_hand_sides,
-            spring,
+            reduced: [of_loads, of_supports],
             factor,
             axis_ends,
         })
@@ -188,19 +144,6 @@ impl ElasticBody {
             displacements[beside] += AXIS_SHARE * displacements[end];
         }
         displacements
-    }
-
-    /// Forces on the contact nodes in the system with its springs, from forces on and values of the contact unknowns.
-    fn forces_with_springs<'a>(
-        &'a self,
-        contact_force: &[f64],
-        contact_displacement: &[f64],
-    ) -> impl Iterator<Item = f64> + 'a {
-        let forces = self.nodal_forces(contact_force).into_iter();
-        let displacements = self.nodal_displacements(contact_displacement);
-        forces
-            .zip(displacements)
-            .map(|(force, displacement)| force + self.spring * displacement)
     }
 
     /// Whether the body of one model is the body of another: all that [`ElasticBody::new`] reads is equal.
@@ -228,61 +171,37 @@ impl ElasticBody {
             .collect()
     }
 
-    /// Displacements along x and y of every node at a load level, under the given forces on the
-    /// contact unknowns; their displacements are known from the condensed system.
-    pub fn displacements(
-        &self,
-        contact_force: &[f64],
-        contact_displacement: &[f64],
-        level: &Level,
-    ) -> Vec<[f64; 2]> {
-        let [of_loads, of_supports] = &self.right_hand_sides;
+    /// Displacements along x and y of every node at a load level, from those of the contact unknowns.
+    pub fn displacements(&self, contact_displacement: &[f64], level: &Level) -> Vec<[f64; 2]> {
+        let [of_loads, of_supports] = &self.reduced;
         let both = of_loads.iter().zip(of_supports);
-        let mut rhs: Vec<f64> = both
-            .map(|(a, b)| level.loads * a + level.supports * b)
-            .collect();
-        let interior = rhs.len() - contact_force.len();
-        let forces = self.forces_with_springs(contact_force, contact_displacement);
-        rhs[interior..]
-            .iter_mut()
-            .zip(forces)
-            .for_each(|(rhs, force)| *rhs += force);
-        let mut u = rhs.clone();
-        self.factor.solve(&mut u);
-        // one step of iterative refinement: the residual is known to far more digits than u
-        let mut correction: Vec<f64> = self
-            .matrix
-            .times(&u)
-            .iter()
-            .zip(&rhs)
-            .map(|(a, b)| b - a)
-            .collect();
-        self.factor.solve(&mut correction);
-        u.iter_mut().zip(&correction).for_each(|(u, c)| *u += c);
-        self.map.displacements(&u, level.supports)
+        let reduced = both.map(|(a, b)| level.loads * a + level.supports * b);
+        let contact = self.nodal_displacements(contact_displacement);
+        let mut u: Vec<[f64; 1]> = reduced.chain(contact).map(|u| [u]).collect();
+        self.factor.backward(&mut u);
+        self.map.displacements(|i| u[i][0], level.supports)
     }
 
     /// Displacements along x and y of every node under the given displacements of the contact unknowns alone, of
-    /// several such fields at once. To fewer digits than [`ElasticBody::displacements`]: enough for an estimate.
+    /// [`TOGETHER`] such fields at most.
     pub fn displacements_without_loads(
         &self,
         contact_displacements: &[Vec<f64>],
-    ) -> Vec<Vec<[f64; 2]>> {
-        let n = self.map.unknowns;
-        let mut u = vec![0.0; n * contact_displacements.len()];
-        for (u, contact_displacement) in u.chunks_mut(n.max(1)).zip(contact_displacements) {
-            let contact_force = self.stiffness.times(contact_displacement);
-            let interior = n - contact_force.len();
-            let forces = self.forces_with_springs(&contact_force, contact_displacement);
-            u[interior..]
-                .iter_mut()
-                .zip(forces)
-                .for_each(|(u, force)| *u = force);
+    ) -> Vec<[[f64; TOGETHER]; 2]> {
+        let mut u = vec![[0.0; TOGETHER]; self.map.unknowns];
+        for (k, contact) in contact_displacements.iter().enumerate() {
+            let contact = self.nodal_displacements(contact);
+            let kept = &mut u[self.map.unknowns - contact.len()..];
+            let kept = kept.iter_mut().zip(contact);
+            kept.for_each(|(u, contact)| u[k] = contact);
         }
-        self.factor.solve(&mut u);
-        let fields = u.chunks(n.max(1));
-        fields.map(|u| self.map.displacements(u, 0.0)).collect()
+        self.factor.backward(&mut u);
+        self.map.displacements_together(&u)
     }
+}
+
+fn all_finite(values: &[f64]) -> bool {
+    values.iter().all(|value| value.is_finite())
 }
 
 /// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it, if both are free.
@@ -299,16 +218,9 @@ fn axis_ends(model: &Model, contact_dofs: &[[Dof; 2]]) -> Vec<[usize; 2]> {
     ends
 }
 
-/// Contact nodes of all contacts in a row.
-fn contact_nodes(model: &Model) -> impl Iterator<Item = u32> {
-    model
-        .contacts
-        .iter()
-        .flat_map(|contact| contact.boundary.nodes.iter().copied())
-}
-
-/// Numbers the unknowns, contact nodes last and turned to (n, t); also the number of the others.
-fn number(model: &Model) -> (DofMap, usize) {
+/// Numbers the unknowns in the order of their elimination, those of contact nodes last, turned to (n, t) and in the order
+/// of the contacts; and plans their elimination.
+fn number(model: &Model) -> Result<(DofMap, Fronts), SolveError> {
     let count = model.mesh.nodes.len();
     let mut axes = vec![None; count];
     // the axes of a node that is held along an oblique direction lie along it
@@ -323,6 +235,7 @@ fn number(model: &Model) -> (DofMap, usize) {
         }
     }
     let mut in_contact = vec![false; count];
+    let mut contact_nodes = Vec::new();
     for contact in &model.contacts {
         for (i, &node) in contact.boundary.nodes.iter().enumerate() {
             let (n, t) = (contact.boundary.normals[i], contact.boundary.tangent(i));
@@ -330,81 +243,69 @@ fn number(model: &Model) -> (DofMap, usize) {
                 Some(along) => Axes::oblique(*along),
                 None => Axes::perpendicular([n, t]),
             });
-            in_contact[node as usize] = true;
-        }
-    }
-    let mut map = DofMap {
-        dofs: vec![[Dof::Fixed(0.0); 2]; count],
-        axes,
-        unknowns: 0,
-    };
-    let assign = |map: &mut DofMap, node: u32| {
-        let axes = map.axes[node as usize].map_or([[1.0, 0.0], [0.0, 1.0]], |axes| axes.along);
-        let held = model.fixed.get(&node);
-        for a in 0..2 {
-            // Model::new checks that a single direction is one of the node's axes
-            map.dofs[node as usize][a] = match held.and_then(|held| held.along(axes[a])) {
-                Some(value) => Dof::Fixed(value),
-                None => {
-                    map.unknowns += 1;
-                    Dof::Free(map.unknowns - 1)
-                }
-            };
-        }
-    };
-    (0..count as u32)
-        .filter(|&node| !in_contact[node as usize])
-        .for_each(|node| assign(&mut map, node));
-    let interior = map.unknowns;
-    // a node of two contacts is numbered once
-    let new = |node: &u32| std::mem::replace(&mut in_contact[*node as usize], false);
-    contact_nodes(model)
-        .filter(new)
-        .for_each(|node| assign(&mut map, node));
-    (map, interior)
-}
-
-/// Minimum degree on the nodes away from contact, a node's unknowns together; then the contact
-/// unknowns in their own order.
-fn elimination_order(
-    model: &Model,
-    map: &DofMap,
-    interior: usize,
-) -> Result<Vec<usize>, FactorError> {
-    let free = |node: &u32| {
-        map.dofs[*node as usize]
-            .iter()
-            .any(|dof| matches!(dof, Dof::Free(i) if *i < interior))
-    };
-    let mut number = vec![u32::MAX; model.mesh.nodes.len()];
-    let mut nodes = Vec::new();
-    for node in (0..number.len() as u32).filter(free) {
-        number[node as usize] = nodes.len() as u32;
-        nodes.push(node);
-    }
-    let cliques: Vec<Vec<u32>> = model
-        .mesh
-        .elements
-        .iter()
-        .map(|element| {
-            element
-                .iter()
-                .map(|&n| number[n as usize])
-                .filter(|&n| n != u32::MAX)
-                .collect()
-        })
-        .collect();
-    let graph = Graph::from_cliques(nodes.len(), cliques.iter().map(|c| &c[..]));
-    let mut order = Vec::with_capacity(map.unknowns);
-    for vertex in Ordering::minimum_degree(&graph)? {
-        for dof in map.dofs[nodes[vertex] as usize] {
-            if let Dof::Free(i) = dof {
-                order.push(i);
+            // a node of two contacts is numbered once
+            if !std::mem::replace(&mut in_contact[node as usize], true) {
+                contact_nodes.push(node);
             }
         }
     }
-    order.extend(interior..map.unknowns);
-    Ok(order)
+    let along = |node: usize| {
+        let axes: Option<Axes> = axes[node];
+        axes.map_or([[1.0, 0.0], [0.0, 1.0]], |axes| axes.along)
+    };
+    // Model::new checks that a single direction is one of the node's axes
+    let held = |node: u32| {
+        let held = model.fixed.get(&node);
+        along(node as usize).map(|axis| held.and_then(|held| held.along(axis)))
+    };
+    let values: Vec<[Option<f64>; 2]> = (0..count as u32).map(held).collect();
+    let unknowns_of = |node: u32| values[node as usize].iter().filter(|v| v.is_none()).count();
+    let unknown: Vec<bool> = (0..count as u32)
+        .map(|node| unknowns_of(node) > 0)
+        .collect();
+    let cells = Cells {
+        elements: &model.mesh.elements,
+        positions: &model.mesh.nodes,
+        unknown: &unknown,
+    };
+    let dissection = Dissection::new(&cells, &contact_nodes);
+    let mut map = DofMap {
+        dofs: values
+            .iter()
+            .map(|values| values.map(|v| Dof::Fixed(v.unwrap_or(0.0))))
+            .collect(),
+        axes,
+        unknowns: 0,
+    };
+    for &node in &dissection.nodes {
+        for (dof, value) in map.dofs[node as usize]
+            .iter_mut()
+            .zip(values[node as usize])
+        {
+            if value.is_none() {
+                *dof = Dof::Free(map.unknowns);
+                map.unknowns += 1;
+            }
+        }
+    }
+    // a node of no element has no stiffness
+    let mut numbered = vec![false; count];
+    dissection
+        .nodes
+        .iter()
+        .for_each(|node| numbered[*node as usize] = true);
+    if let Some(node) = (0..count).find(|node| unknown[*node] && !numbered[*node]) {
+        let axes = map.axes[node].map_or([[1.0, 0.0], [0.0, 1.0]], |axes| axes.along);
+        let direction = axes[usize::from(values[node][0].is_some())];
+        let node = node as u32;
+        return Err(SolveError::SingularSystem { node, direction });
+    }
+    let kept = contact_nodes
+        .iter()
+        .filter(|node| unknown[**node as usize])
+        .count();
+    let fronts = Fronts::new(dissection, unknowns_of, kept);
+    Ok((map, fronts))
 }
 
 /// Nodal forces along x and y as forces on the unknowns.
@@ -426,6 +327,9 @@ fn solve_error(error: FactorError, map: &DofMap) -> SolveError {
             let (node, direction) = map.place_of(unknown);
             SolveError::SingularSystem { node, direction }
         }
+        FactorError::NonFinite => SolveError::NonFinite {
+            phase: Phase::Assemble,
+        },
         FactorError::TooLarge { bytes } => SolveError::ResourceExhausted { bytes },
         FactorError::Stopped => SolveError::Stopped,
     }

@@ -272,7 +272,7 @@ mod tests {
         }
     }
 
-    /// What it announces before it takes it: the factor, then Ŝ, then the matrices of the iterations.
+    /// What it announces before it takes it: the factor with Ŝ, then the matrices of the iterations.
     #[test]
     fn large_matrices_are_announced() {
         let mut needs = Vec::new();
@@ -283,8 +283,8 @@ mod tests {
             ControlFlow::Continue(())
         });
         let m = solution.unwrap().summary.contact_dofs;
-        assert!(needs[0] > 8 * m * m && needs[1] == 8 * m * m, "{needs:?}");
-        assert!(needs.len() > 4 && needs[2..].iter().all(|bytes| *bytes <= 8 * m * m));
+        assert!(needs[0] > 8 * m * m, "{needs:?}");
+        assert!(needs.len() > 3 && needs[1..].iter().all(|bytes| *bytes <= 8 * m * m));
     }
 
     #[test]

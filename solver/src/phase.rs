@@ -26,13 +26,13 @@ pub enum Phase {
     Parse,
     /// Meshing and checking.
     Mesh,
-    /// Element stiffnesses and loads.
+    /// Loads on the nodes.
     Assemble,
-    /// Fill-reducing ordering and symbolic factorisation.
+    /// The order of elimination, and the structure of the factor.
     Order,
-    /// Numerical factorisation.
+    /// Stiffnesses of the elements, and the factor.
     Factor,
-    /// Stiffness and load reduced to the contact boundary.
+    /// Load reduced to the contact boundary.
     Condense,
     /// Contact and friction.
     Iterate,

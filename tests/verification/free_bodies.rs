@@ -2,11 +2,11 @@
 
 use faer::Side;
 use serde_json::{Value, json};
-use solver::elasticity::{self, Dof, DofMap};
-use solver::linear::Graph;
+use solver::elasticity::{Dof, DofMap};
 use solver::model::Model;
 use solver::problem::Problem;
 
+use crate::assembled::Assembled;
 use crate::support::{Lattice, problem, solve};
 
 /// Inline mesh of squares side by side or corner to corner, with supports of nodes.
@@ -119,15 +119,8 @@ impl Squares {
                 map.unknowns += 1;
             }
         }
-        let graph =
-            Graph::from_cliques(self.nodes.len(), model.mesh.elements.iter().map(|e| &e[..]));
-        let (k, _) = elasticity::assemble_stiffness(&model.mesh, &model.section, 3, &map, &graph);
-        let column = |j: usize| {
-            let mut unit = vec![0.0; map.unknowns];
-            unit[j] = 1.0;
-            k.times(&unit)
-        };
-        let columns: Vec<Vec<f64>> = (0..map.unknowns).map(column).collect();
+        let (k, _) = Assembled::new(&model.mesh, &model.section, 3, &map);
+        let columns = k.dense();
         let values = faer::Mat::from_fn(map.unknowns, map.unknowns, |i, j| columns[j][i])
             .self_adjoint_eigenvalues(Side::Lower)
             .unwrap();

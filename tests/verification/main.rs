@@ -7,6 +7,7 @@ mod abaqus_files;
 mod adaptive;
 mod adaptive_ends;
 mod annular_punch;
+mod assembled;
 mod axis;
 mod balance;
 mod calibration;

@@ -19,12 +19,12 @@
 //! that is curved, so the test works with the library's own assembly and factorisation.
 
 use serde_json::json;
-use solver::elasticity::{Dof, DofMap, Mixed, Section, assemble_stiffness, isotropic, stress};
+use solver::elasticity::{Dof, DofMap, Mixed, Section, isotropic, stress};
 use solver::element::{Element, Family, GaussPoint, Mapped, gauss};
-use solver::linear::{Breaks, Factor, Graph, Ordering};
 use solver::mesh::{Mesh, grid_mesh, refine};
 use solver::problem::{Analysis, Grid};
 
+use crate::assembled::Assembled;
 use crate::record::{Line, keep_table};
 
 const E: f64 = 1000.0;
@@ -186,8 +186,7 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, ratio: f64, exact: Exact
             [Dof::Free(map.unknowns - 2), Dof::Free(map.unknowns - 1)]
         };
     }
-    let graph = Graph::from_cliques(mesh.nodes.len(), mesh.elements.iter().map(|e| &e[..]));
-    let (matrix, mut load) = assemble_stiffness(mesh, &section, points, &map, &graph);
+    let (matrix, mut load) = Assembled::new(mesh, &section, points, &map);
     // a rule finer than the element's own: integration of f and of the error is not what is tested
     let fine = [Family::Quad, Family::Triangle].map(fine_rule);
     let points_of = |element: &Element| -> Vec<Point> {
@@ -232,25 +231,8 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, ratio: f64, exact: Exact
             }
         }
     }
-    let cliques: Vec<Vec<u32>> = mesh
-        .elements
-        .iter()
-        .map(|element| {
-            let dofs = element.iter().flat_map(|n| map.dofs[*n as usize]);
-            let free = |dof| match dof {
-                Dof::Free(i) => Some(i as u32),
-                Dof::Fixed(_) => None,
-            };
-            dofs.filter_map(free).collect()
-        })
-        .collect();
-    let unknowns = Graph::from_cliques(map.unknowns, cliques.iter().map(|c| &c[..]));
-    let order = Ordering::minimum_degree(&unknowns).unwrap();
-    let ordering = Ordering::new(&matrix, &order, 0).unwrap();
-    let go_on = &mut || std::ops::ControlFlow::Continue(());
-    let factor = Factor::new(&matrix, ordering, &mut Breaks::new(go_on));
-    factor.unwrap().solve(&mut load);
-    let u = map.displacements(&load, 1.0);
+    let unknowns = matrix.solve(&load);
+    let u = map.displacements(|i| unknowns[i], 1.0);
     let (mut off, mut size) = ([0.0; 3], [0.0; 3]);
     let moduli = &section.materials()[0];
     let strain = |[[xx, xy], [yx, yy]]: [[f64; 2]; 2], u: f64, x: f64| {

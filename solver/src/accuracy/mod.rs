@@ -17,7 +17,7 @@ pub use halved::{OnOtherMesh, unverified, verified};
 use crate::algorithm::{Estimable, Finished, Quantity, Reported, System, influences};
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::contact::edge_nodes;
-use crate::elasticity::Dof;
+use crate::elasticity::{Dof, TOGETHER};
 use crate::model::Model;
 use crate::origins::{Added, Origins};
 use crate::solution::{
@@ -222,9 +222,6 @@ fn bounds(
     Some(bounds)
 }
 
-/// Duals that are solved for at once: each takes as much memory as the displacements and stresses of the solution.
-const DUALS_AT_ONCE: usize = 8;
-
 /// ∫ (σ* − σ_h) : C⁻¹ (σ_z* − σ_z,h) of every element, for every dual; none if the observer stops.
 fn weighted_errors(
     model: &Model,
@@ -235,14 +232,15 @@ fn weighted_errors(
 ) -> Option<Vec<Vec<f64>>> {
     let stop = &mut || observe(Progress::Pulse).is_break();
     let mut errors = Vec::with_capacity(influences.len());
-    for some in influences.chunks(DUALS_AT_ONCE) {
+    for some in influences.chunks(TOGETHER) {
         if stop() {
             return None;
         }
         let duals = body.displacements_without_loads(some);
         let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
         let difference = &reported.difference;
-        errors.extend(difference.products_with_fields(mesh, section, order, &duals, stop)?);
+        let products = difference.products_with_fields(mesh, section, order, &duals, stop)?;
+        errors.extend(products.into_iter().take(some.len()));
     }
     Some(errors)
 }

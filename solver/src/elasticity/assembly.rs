@@ -1,11 +1,11 @@
-//! `assemble_element`, `assemble_stiffness`, `assemble_loads`: thesis (2.18), (2.20), (2.27), (2.28).
+//! `assemble_element`, `ElementStiffness`, `assemble_loads`: thesis (2.18), (2.20), (2.27), (2.28).
 
 use crate::elasticity::Section;
-use crate::elasticity::material::{COMPONENTS, stress};
+use crate::elasticity::geometry::{ByShape, Masters, Shape};
 use crate::elasticity::mixed::Mixed;
 use crate::element::gauss::GAUSS_3;
 use crate::element::{Family, edge3};
-use crate::linear::{Graph, SparseSymmetric};
+use crate::linear::ElementMatrix;
 use crate::mesh::{Edge, Mesh};
 
 /// One component of one node's displacement.
@@ -60,10 +60,10 @@ pub struct DofMap {
 
 impl DofMap {
     /// Displacements along x and y of every node, from the unknowns; prescribed ones times `supports`.
-    pub fn displacements(&self, unknowns: &[f64], supports: f64) -> Vec<[f64; 2]> {
+    pub fn displacements(&self, unknown: impl Fn(usize) -> f64, supports: f64) -> Vec<[f64; 2]> {
         let node = |(dofs, axes): (&[Dof; 2], &Option<Axes>)| {
             let [a, b] = dofs.map(|dof| match dof {
-                Dof::Free(i) => unknowns[i],
+                Dof::Free(i) => unknown(i),
                 Dof::Fixed(value) => supports * value,
             });
             match axes {
@@ -73,6 +73,23 @@ impl DofMap {
                     [n[0] * a + t[0] * b, n[1] * a + t[1] * b]
                 }
             }
+        };
+        self.dofs.iter().zip(&self.axes).map(node).collect()
+    }
+
+    /// The same of several fields at once, without prescribed displacements.
+    pub fn displacements_together<const FIELDS: usize>(
+        &self,
+        unknowns: &[[f64; FIELDS]],
+    ) -> Vec<[[f64; FIELDS]; 2]> {
+        let node = |(dofs, axes): (&[Dof; 2], &Option<Axes>)| {
+            let [a, b] = dofs.map(|dof| match dof {
+                Dof::Free(i) => unknowns[i],
+                Dof::Fixed(_) => [0.0; FIELDS],
+            });
+            let Some(axes) = axes else { return [a, b] };
+            let [n, t] = axes.moves;
+            [0, 1].map(|c| std::array::from_fn(|k| n[c] * a[k] + t[c] * b[k]))
         };
         self.dofs.iter().zip(&self.axes).map(node).collect()
     }
@@ -120,91 +137,65 @@ pub fn assemble_element(
     if let Some(split) = section.split(material) {
         return Mixed::stiffness(section, split, family, nodes);
     }
-    let moduli = &section.materials()[material];
-    let mut k = [[0.0; 16]; 16];
-    for point in family.rule(quadrature) {
-        let m = family.map(nodes, point.place);
-        let weight = point.weight * m.det * section.depth(m.x);
-        let b: [_; 8] = std::array::from_fn(|i| section.strain(m.shape[i], m.gradient[i], m.x));
-        for j in 0..family.nodes() {
-            for q in 0..2 {
-                let strain: [f64; COMPONENTS] = std::array::from_fn(|c| b[j][c][q]);
-                let stress = stress(moduli, &strain);
-                for i in 0..=j {
-                    for p in 0..2 {
-                        let work: f64 = (0..COMPONENTS).map(|c| b[i][c][p] * stress[c]).sum();
-                        k[2 * i + p][2 * j + q] += weight * work;
-                    }
-                }
-            }
-        }
-    }
-    for i in 0..16 {
-        for j in 0..i {
-            k[i][j] = k[j][i];
-        }
-    }
-    k
+    let shape = Shape::new(family, nodes, section, material);
+    Masters::new(quadrature).stiffness(section, &shape)
 }
 
-/// The stiffness of the unknowns, and the load −K_fp u_p of the prescribed displacements on them.
-///
-/// `quadrature`: as in `assemble_element`; `graph`: neighbours among the nodes.
-pub fn assemble_stiffness(
-    mesh: &Mesh,
-    section: &Section,
-    quadrature: u32,
-    map: &DofMap,
-    graph: &Graph,
-) -> (SparseSymmetric, Vec<f64>) {
-    let mut node_of = vec![0u32; map.unknowns];
-    for (node, dofs) in map.dofs.iter().enumerate() {
-        for dof in dofs {
-            if let Dof::Free(i) = dof {
-                node_of[*i] = node as u32;
-            }
+/// The stiffness of a body's elements on its unknowns.
+pub struct ElementStiffness<'a> {
+    mesh: &'a Mesh,
+    section: &'a Section,
+    masters: Masters,
+    map: &'a DofMap,
+    known: ByShape<[[f64; 16]; 16]>,
+}
+
+impl<'a> ElementStiffness<'a> {
+    /// `quadrature`: as in `assemble_element`.
+    pub fn new(mesh: &'a Mesh, section: &'a Section, quadrature: u32, map: &'a DofMap) -> Self {
+        ElementStiffness {
+            mesh,
+            section,
+            masters: Masters::new(quadrature),
+            map,
+            known: ByShape::new(),
         }
     }
-    let mut stiffness = SparseSymmetric::zero(map.unknowns, |column, rows| {
-        let node = node_of[column];
-        for &other in graph.neighbours(node as usize).iter().chain([&node]) {
-            for dof in map.dofs[other as usize] {
-                if let Dof::Free(row) = dof
-                    && row >= column
-                {
-                    rows.push(row);
-                }
-            }
-        }
-    });
-    let mut load = vec![0.0; map.unknowns];
-    for (e, element) in mesh.elements.iter().enumerate() {
-        let nodes = mesh.element_nodes(element);
-        let mut k = assemble_element(
-            element.family(),
-            &nodes,
-            section,
-            section.material_of(e),
-            quadrature,
-        );
+
+    /// Puts the matrix of an element in place, and adds −K_fp u_p of its prescribed displacements to the load on the
+    /// unknowns.
+    pub fn put(&mut self, e: u32, matrix: &mut ElementMatrix, load: &mut [f64]) {
+        let (map, section, masters) = (self.map, self.section, &self.masters);
+        let element = &self.mesh.elements[e as usize];
+        let shape = Shape::of(self.mesh, section, e as usize);
+        let split = section.split(section.material_of(e as usize));
+        matrix.entries = *self.known.of(shape, |shape| match split {
+            Some(split) => Mixed::stiffness(section, split, element.family(), &shape.nodes),
+            None => masters.stiffness(section, shape),
+        });
+        let k = &mut matrix.entries;
+        matrix.unknowns = [None; 16];
+        let mut prescribed = [0.0; 16];
         for (i, &node) in element.iter().enumerate() {
             if let Some(axes) = map.axes[node as usize] {
-                rotate(&mut k, i, axes.moves);
+                rotate(k, i, axes.moves);
+            }
+            for (a, dof) in map.dofs[node as usize].iter().enumerate() {
+                match *dof {
+                    Dof::Free(unknown) => matrix.unknowns[2 * i + a] = Some(unknown as u32),
+                    Dof::Fixed(value) => prescribed[2 * i + a] = value,
+                }
             }
         }
-        let dof = |local: usize| map.dofs[element[local / 2] as usize][local % 2];
-        for i in 0..2 * element.len() {
-            let Dof::Free(row) = dof(i) else { continue };
-            for j in 0..2 * element.len() {
-                match dof(j) {
-                    Dof::Free(column) if column <= row => stiffness.add(row, column, k[i][j]),
-                    Dof::Free(_) => {}
-                    Dof::Fixed(value) => load[row] -= k[i][j] * value,
+        let prescribed = prescribed.into_iter().enumerate();
+        for (j, value) in prescribed.filter(|(_, value)| *value != 0.0) {
+            for (unknown, row) in matrix.unknowns.iter().zip(&*k) {
+                if let Some(unknown) = unknown {
+                    load[*unknown as usize] -= row[j] * value;
                 }
             }
         }
     }
-    (stiffness, load)
 }
 
 /// Rows and columns of node `i`, turned to its axes: k ← Q k Qᵀ.

@@ -1,16 +1,17 @@
 //! A standard elastic program, thesis 1.3 and 2.2; independent of contact.
 
 mod assembly;
+mod geometry;
 mod material;
 mod mixed;
 mod recovery;
 mod stress_difference;
 
 pub use assembly::{
-    Axes, Dof, DofMap, EdgeLoad, LoadAxes, Loads, assemble_element, assemble_loads,
-    assemble_stiffness, condense_body_force,
+    Axes, Dof, DofMap, EdgeLoad, ElementStiffness, LoadAxes, Loads, assemble_element,
+    assemble_loads, condense_body_force,
 };
 pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic, stress};
 pub use mixed::Mixed;
-pub use recovery::{Deformed, Recovered, recover};
+pub use recovery::{Deformed, Recovered, TOGETHER, recover};
 pub use stress_difference::StressDifference;

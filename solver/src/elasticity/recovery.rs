@@ -1,21 +1,22 @@
 //! From displacements to stresses, nodal forces and energy.
 
 use crate::elasticity::Section;
-use crate::elasticity::material::{COMPONENTS, stress};
+use crate::elasticity::geometry::{ByShape, Masters, Shape, Stations};
+use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::elasticity::mixed::{Inside, Mixed, dilatation, position};
-use crate::element::{AtNodes, Family, GaussPoint, Mapped};
+use crate::element::{AtNodes, Element, Family, Mapped};
 use crate::mesh::Mesh;
 
 /// Stresses, forces and energy of a displacement field.
 pub struct Recovered {
     /// Stress at every node: xx, yy, xy, zz (hoop), averaged over all elements that meet there.
     pub stress: Vec<[f64; COMPONENTS]>,
-    /// Stress at every element's nodes, averaged over the elements of its own material.
-    pub element_stress: Vec<[[f64; COMPONENTS]; 8]>,
-    /// Positions of the integration points, element by element, as in [`Family::rule`].
-    pub points: Vec<[f64; 2]>,
-    /// Stress there, not averaged.
-    pub point_stress: Vec<[f64; COMPONENTS]>,
+    /// Stress at every element's nodes, averaged over the elements of its own material; empty if there is one material.
+    element_stress: Vec<[[f64; COMPONENTS]; 8]>,
+    /// Positions of the integration points, x and y, element by element, as in [`Family::rule`].
+    pub points: [Vec<f64>; 2],
+    /// The components of the stress there, not averaged.
+    pub point_stress: [Vec<f64>; COMPONENTS],
     /// θ̄ − div u there: what the pressure of nearly incompressible elements leaves out of the dilatation. Empty if
     /// there are none.
     pub dilatation_gap: Vec<f64>,
@@ -25,6 +26,22 @@ pub struct Recovered {
     pub strain_energy: f64,
     /// Work of the body force on the bubbles of nearly incompressible elements (without 2π).
     pub work_on_bubbles: f64,
+}
+
+impl Recovered {
+    /// Stress at the nodes of an element, averaged over the elements of its own material.
+    pub fn at_nodes_of(&self, e: usize, element: &Element) -> [[f64; COMPONENTS]; 8] {
+        match self.element_stress.get(e) {
+            Some(stress) => *stress,
+            None => element.gather(|node| self.stress[node as usize]),
+        }
+    }
+
+    /// Stress at an integration point.
+    #[inline(always)]
+    pub fn at_point(&self, point: usize) -> [f64; COMPONENTS] {
+        std::array::from_fn(|c| self.point_stress[c][point])
+    }
 }
 
 /// Stresses at nodes are taken at the superconvergent points of each element (2 × 2 of a
@@ -38,83 +55,136 @@ pub fn recover(
     displacements: &[[f64; 2]],
     body_force: [f64; 2],
 ) -> Recovered {
-    let mut own = Vec::with_capacity(mesh.elements.len());
-    let mut internal_force = vec![[0.0; 2]; mesh.nodes.len()];
-    let (mut strain_energy, mut work_on_bubbles) = (0.0, 0.0);
-    let mut dilatation_gap = Vec::new();
-    let (mut points, mut point_stress) = (Vec::new(), Vec::new());
-    for (e, element) in mesh.elements.iter().enumerate() {
-        let (family, nodes) = (element.family(), mesh.element_nodes(element));
-        let u = element.gather(|n| displacements[n as usize]);
-        let deformed = Deformed::new(
-            section,
-            section.material_of(e),
-            family,
-            &nodes,
-            &u,
-            body_force,
-        );
-        work_on_bubbles += deformed.work_on_bubble;
-        let (rule, sampled) = (deformed.rule(quadrature), family.rule(quadrature));
-        let mut sample = |at: &DeformedAt, m: &Mapped| {
-            points.push(position(m, &nodes));
-            point_stress.push(at.stress);
-            if section.has_split() {
-                dilatation_gap.push(at.dilatation_gap);
+    let points = mesh
+        .elements
+        .iter()
+        .map(|e| e.family().rule(quadrature).len())
+        .sum();
+    let column = || Vec::with_capacity(points);
+    let mut found = Recovered {
+        stress: Vec::new(),
+        element_stress: Vec::new(),
+        points: [column(), column()],
+        point_stress: std::array::from_fn(|_| column()),
+        dilatation_gap: Vec::new(),
+        internal_force: vec![[0.0; 2]; mesh.nodes.len()],
+        strain_energy: 0.0,
+        work_on_bubbles: 0.0,
+    };
+    let mut at_nodes = Vec::with_capacity(mesh.elements.len());
+    let mut known = ByShape::new();
+    let masters = Masters::new(quadrature);
+    pulp::Arch::new().dispatch(|| {
+        for (e, element) in mesh.elements.iter().enumerate() {
+            let u = element.gather(|n| displacements[n as usize]);
+            let material = section.material_of(e);
+            if section.split(material).is_some() {
+                let body = (section, material);
+                let own = found.add_mixed(mesh, body, (element, &u), quadrature, body_force);
+                at_nodes.push(own);
+                continue;
             }
-        };
-        for point in rule {
+            let shape = Shape::of(mesh, section, e);
+            let stations = known.of(shape, |shape| masters.stations(section, shape));
+            let (ux, uy) = (u.map(|u| u[0]), u.map(|u| u[1]));
+            let moduli = &section.materials()[material];
+            found.add(mesh, (element, stations), moduli, (&ux, &uy));
+            if section.has_split() {
+                found.dilatation_gap.resize(found.points[0].len(), 0.0);
+            }
+            let mut stresses = [[0.0; COMPONENTS]; 4];
+            for (own, station) in stresses.iter_mut().zip(&stations.stress) {
+                *own = stress(moduli, &station.strain(&ux, &uy));
+            }
+            at_nodes.push(stations.carried_to_nodes(&stresses));
+        }
+    });
+    found.average(mesh, section, &at_nodes);
+    found
+}
+
+impl Recovered {
+    /// Adds what an element has at its integration points.
+    #[inline(always)]
+    fn add(
+        &mut self,
+        mesh: &Mesh,
+        (element, stations): (&Element, &Stations),
+        moduli: &Moduli,
+        (ux, uy): (&AtNodes<f64>, &AtNodes<f64>),
+    ) {
+        let nodes = mesh.element_nodes(element);
+        let (mut fx, mut fy) = ([0.0; 8], [0.0; 8]);
+        for station in &stations.rule {
+            let strain = station.strain(ux, uy);
+            let stress = stress(moduli, &strain);
+            let density: f64 = (0..COMPONENTS).map(|c| stress[c] * strain[c]).sum();
+            self.strain_energy += 0.5 * station.weight * density;
+            station.add_force(station.weight, &stress, &mut fx, &mut fy);
+            for a in 0..2 {
+                self.points[a].push((0..8).map(|i| station.shape[i] * nodes[i][a]).sum());
+            }
+            (0..COMPONENTS).for_each(|c| self.point_stress[c].push(stress[c]));
+        }
+        for (i, &node) in element.iter().enumerate() {
+            let force = &mut self.internal_force[node as usize];
+            *force = [force[0] + fx[i], force[1] + fy[i]];
+        }
+    }
+
+    /// The same of a nearly incompressible element, and its stresses at the nodes.
+    fn add_mixed(
+        &mut self,
+        mesh: &Mesh,
+        (section, material): (&Section, usize),
+        (element, u): (&Element, &AtNodes<[f64; 2]>),
+        quadrature: u32,
+        body_force: [f64; 2],
+    ) -> [[f64; COMPONENTS]; 8] {
+        let (family, nodes) = (element.family(), mesh.element_nodes(element));
+        let deformed = Deformed::new(section, material, family, &nodes, u, body_force);
+        self.work_on_bubbles += deformed.work_on_bubble;
+        for point in Mixed::rule(family) {
             let m = family.map(&nodes, point.place);
-            let at = deformed.at(&m, point.place);
-            let DeformedAt { strain, stress, .. } = at;
+            let DeformedAt { strain, stress, .. } = deformed.at(&m, point.place);
             let weight = point.weight * m.det * section.depth(m.x);
-            strain_energy +=
+            self.strain_energy +=
                 0.5 * weight * (0..COMPONENTS).map(|c| stress[c] * strain[c]).sum::<f64>();
             for (i, &node) in element.iter().enumerate() {
                 let b = section.strain(m.shape[i], m.gradient[i], m.x);
                 for p in 0..2 {
-                    internal_force[node as usize][p] +=
+                    self.internal_force[node as usize][p] +=
                         weight * (0..COMPONENTS).map(|c| b[c][p] * stress[c]).sum::<f64>();
                 }
             }
-            if rule.len() == sampled.len() {
-                sample(&at, &m);
-            }
         }
-        if rule.len() != sampled.len() {
-            for point in sampled {
-                let m = family.map(&nodes, point.place);
-                sample(&deformed.at(&m, point.place), &m);
-            }
+        for point in family.rule(quadrature) {
+            let m = family.map(&nodes, point.place);
+            let at = deformed.at(&m, point.place);
+            let place = position(&m, &nodes);
+            (0..2).for_each(|a| self.points[a].push(place[a]));
+            (0..COMPONENTS).for_each(|c| self.point_stress[c].push(at.stress[c]));
+            self.dilatation_gap.push(at.dilatation_gap);
         }
-        own.push(deformed.at_nodes());
+        deformed.at_nodes()
     }
-    let averaged = |of_material: Option<usize>| average(mesh, section, &own, of_material);
-    let stress = averaged(None);
-    let mut element_stress = vec![[[0.0; COMPONENTS]; 8]; mesh.elements.len()];
-    for material in 0..section.materials().len() {
-        let single = section.materials().len() == 1;
-        let of_material = if single {
-            None
-        } else {
-            Some(averaged(Some(material)))
-        };
-        let nodal = of_material.as_ref().unwrap_or(&stress);
-        for (e, element) in mesh.elements.iter().enumerate() {
-            if section.material_of(e) == material {
-                element_stress[e] = element.gather(|n| nodal[n as usize]);
+
+    /// Averages the stresses that elements have at their nodes.
+    fn average(&mut self, mesh: &Mesh, section: &Section, own: &[[[f64; COMPONENTS]; 8]]) {
+        let averaged = |of_material: Option<usize>| average(mesh, section, own, of_material);
+        self.stress = averaged(None);
+        if section.materials().len() == 1 {
+            return;
+        }
+        self.element_stress = vec![[[0.0; COMPONENTS]; 8]; mesh.elements.len()];
+        for material in 0..section.materials().len() {
+            let nodal = averaged(Some(material));
+            for (e, element) in mesh.elements.iter().enumerate() {
+                if section.material_of(e) == material {
+                    self.element_stress[e] = element.gather(|n| nodal[n as usize]);
+                }
             }
         }
-    }
-    Recovered {
-        stress,
-        element_stress,
-        points,
-        point_stress,
-        dilatation_gap,
-        internal_force,
-        strain_energy,
-        work_on_bubbles,
     }
 }
 
@@ -143,51 +213,127 @@ fn average(
 /// Elements between two questions whether to stop.
 pub(super) const ELEMENTS_PER_QUESTION: usize = 1 << 14;
 
+/// Displacement fields that are treated together: as many as a vector register of a common machine holds numbers.
+pub const TOGETHER: usize = 8;
+
+/// The components of a stress in each of several fields.
+pub(super) type Stresses = [[f64; TOGETHER]; COMPONENTS];
+
 /// The stresses of several displacement fields at the nodes, averaged over the elements of one material, as
 /// [`recover`] does; 0 at nodes of other materials. None if `stop` says so.
 pub(super) fn recover_nodal_stresses(
     mesh: &Mesh,
     section: &Section,
     material: usize,
-    fields: &[Vec<[f64; 2]>],
+    fields: &[[[f64; TOGETHER]; 2]],
     stop: &mut dyn FnMut() -> bool,
-) -> Option<Vec<Vec<[f64; COMPONENTS]>>> {
-    let mut sums = vec![vec![[0.0; COMPONENTS]; mesh.nodes.len()]; fields.len()];
+) -> Option<Vec<Stresses>> {
+    let mut sums = vec![[[0.0; TOGETHER]; COMPONENTS]; mesh.nodes.len()];
     let mut count = vec![0u32; mesh.nodes.len()];
-    for (e, element) in mesh.elements.iter().enumerate() {
-        if e % ELEMENTS_PER_QUESTION == 0 && stop() {
+    let (mut known, masters) = (ByShape::new(), Masters::new(3));
+    let moduli = &section.materials()[material];
+    for (k, elements) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
+        if stop() {
             return None;
         }
-        if section.material_of(e) != material {
-            continue;
-        }
-        let (family, nodes) = (element.family(), mesh.element_nodes(element));
-        let points: Vec<Mapped> = family
-            .stress_points()
-            .iter()
-            .map(|point| family.map(&nodes, point.place))
-            .collect();
-        let body = Undeformed::new(section, material, family, &nodes);
-        for (sum, u) in sums.iter_mut().zip(fields) {
-            let u = element.gather(|n| u[n as usize]);
-            let deformed = body.displaced(&u, [0.0; 2]);
-            let mut stresses = [[0.0; COMPONENTS]; 4];
-            for ((own, m), point) in stresses.iter_mut().zip(&points).zip(family.stress_points()) {
-                *own = deformed.at(m, point.place).stress;
+        pulp::Arch::new().dispatch(|| {
+            for (i, element) in elements.iter().enumerate() {
+                let e = k * ELEMENTS_PER_QUESTION + i;
+                if section.material_of(e) != material {
+                    continue;
+                }
+                element.iter().for_each(|&node| count[node as usize] += 1);
+                let own = if section.split(material).is_some() {
+                    mixed_stresses(mesh, (section, material), element, fields)
+                } else {
+                    let shape = Shape::of(mesh, section, e);
+                    let stations = known.of(shape, |shape| masters.stations(section, shape));
+                    stations.stresses_at_nodes(moduli, element, fields)
+                };
+                for (&node, own) in element.iter().zip(&own) {
+                    for (sum, own) in sums[node as usize].iter_mut().zip(own) {
+                        (0..TOGETHER).for_each(|k| sum[k] += own[k]);
+                    }
+                }
             }
-            let carried = carried_to_nodes(family, &stresses);
-            for (own, &node) in carried.iter().zip(element.iter()) {
-                (0..COMPONENTS).for_each(|c| sum[node as usize][c] += own[c]);
-            }
-        }
-        element.iter().for_each(|&node| count[node as usize] += 1);
+        });
     }
-    for sum in &mut sums {
-        for (stress, n) in sum.iter_mut().zip(&count) {
-            *stress = stress.map(|v| v / f64::from((*n).max(1)));
-        }
+    for (sum, n) in sums.iter_mut().zip(&count) {
+        let scale = f64::from((*n).max(1)).recip();
+        sum.iter_mut().flatten().for_each(|v| *v *= scale);
     }
     Some(sums)
+}
+
+/// The stresses of several fields at the nodes of a nearly incompressible element.
+fn mixed_stresses(
+    mesh: &Mesh,
+    (section, material): (&Section, usize),
+    element: &Element,
+    fields: &[[[f64; TOGETHER]; 2]],
+) -> [Stresses; 8] {
+    let (family, nodes) = (element.family(), mesh.element_nodes(element));
+    let body = Undeformed::new(section, material, family, &nodes);
+    let mut stresses = [[[0.0; TOGETHER]; COMPONENTS]; 8];
+    for k in 0..TOGETHER {
+        let u = element.gather(|n| fields[n as usize].map(|u| u[k]));
+        let at_nodes = body.displaced(&u, [0.0; 2]).at_nodes();
+        for (all, own) in stresses.iter_mut().zip(at_nodes) {
+            (0..COMPONENTS).for_each(|c| all[c][k] = own[c]);
+        }
+    }
+    stresses
+}
+
+impl Stations {
+    /// The stresses of several fields at the nodes.
+    #[inline(always)]
+    fn stresses_at_nodes(
+        &self,
+        moduli: &Moduli,
+        element: &Element,
+        fields: &[[[f64; TOGETHER]; 2]],
+    ) -> [Stresses; 8] {
+        let mut at_nodes = [[[0.0; TOGETHER]; COMPONENTS]; 8];
+        for (point, station) in self.stress.iter().enumerate() {
+            let mut strain = [[0.0; TOGETHER]; COMPONENTS];
+            for (i, &node) in element.iter().enumerate() {
+                let [ux, uy] = &fields[node as usize];
+                let (dx, dy, hoop) = (station.dx[i], station.dy[i], station.hoop[i]);
+                for k in 0..TOGETHER {
+                    strain[0][k] += dx * ux[k];
+                    strain[1][k] += dy * uy[k];
+                    strain[2][k] += dy * ux[k] + dx * uy[k];
+                    strain[3][k] += hoop * ux[k];
+                }
+            }
+            let mut stress = [[0.0; TOGETHER]; COMPONENTS];
+            for (stress, row) in stress.iter_mut().zip(moduli) {
+                for (strain, d) in strain.iter().zip(row) {
+                    (0..TOGETHER).for_each(|k| stress[k] += d * strain[k]);
+                }
+            }
+            for (at_node, weights) in at_nodes.iter_mut().zip(&self.to_nodes) {
+                let weight = weights[point];
+                for (all, own) in at_node.iter_mut().zip(&stress) {
+                    (0..TOGETHER).for_each(|k| all[k] += weight * own[k]);
+                }
+            }
+        }
+        at_nodes
+    }
+
+    /// The stresses at the superconvergent points, carried to the nodes.
+    #[inline(always)]
+    fn carried_to_nodes(&self, points: &[[f64; COMPONENTS]; 4]) -> [[f64; COMPONENTS]; 8] {
+        let mut at_nodes = [[0.0; COMPONENTS]; 8];
+        for (at_node, weights) in at_nodes.iter_mut().zip(&self.to_nodes) {
+            for (weight, point) in weights.iter().zip(points) {
+                (0..COMPONENTS).for_each(|c| at_node[c] += weight * point[c]);
+            }
+        }
+        at_nodes
+    }
 }
 
 /// An element before its nodes are displaced.
@@ -271,14 +417,6 @@ impl<'a> Deformed<'a> {
         body_force: [f64; 2],
     ) -> Self {
         Undeformed::new(section, material, family, nodes).displaced(u, body_force)
-    }
-
-    /// The points of its integrals.
-    fn rule(&self, quadrature: u32) -> &'static [GaussPoint] {
-        match self.inside {
-            Some(_) => Mixed::rule(self.family),
-            None => self.family.rule(quadrature),
-        }
     }
 
     /// Stress at a place in master coordinates.

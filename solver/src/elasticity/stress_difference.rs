@@ -3,11 +3,14 @@
 //!
 //!   ‖e‖² = ∫ (σ* − σ) : C⁻¹ (σ* − σ),   σ* = Σ h_i σ_i with the recovered nodal stresses σ_i
 
+use crate::elasticity::geometry::{ByShape, Masters, Shape, Stations};
 use crate::elasticity::material::{COMPONENTS, Moduli, inverse, stress};
 use crate::elasticity::mixed::dilatation;
-use crate::elasticity::recovery::{ELEMENTS_PER_QUESTION, Undeformed, recover_nodal_stresses};
+use crate::elasticity::recovery::{
+    ELEMENTS_PER_QUESTION, Stresses, TOGETHER, Undeformed, recover_nodal_stresses,
+};
 use crate::elasticity::{Recovered, Section};
-use crate::element::{Element, GaussPoint, Mapped};
+use crate::element::{Element, Family, GaussPoint, Mapped};
 use crate::mesh::Mesh;
 
 /// σ* − σ at the integration points.
@@ -20,15 +23,22 @@ pub struct StressDifference {
 impl StressDifference {
     /// `quadrature`: the one that `recovered` was made with.
     pub fn new(mesh: &Mesh, quadrature: u32, recovered: &Recovered) -> Self {
-        let mut stresses = recovered.point_stress.iter();
-        let mut differences = Vec::with_capacity(stresses.len());
-        for (e, element) in mesh.elements.iter().enumerate() {
-            let (family, smooth) = (element.family(), &recovered.element_stress[e]);
-            for (point, own) in family.rule(quadrature).iter().zip(&mut stresses) {
-                let shape = family.shape(point.place);
-                differences.push(difference(&shape, smooth, own));
+        let mut differences = Vec::with_capacity(recovered.points[0].len());
+        let shapes = [Family::Quad, Family::Triangle].map(|family| {
+            let points = family.rule(quadrature).iter();
+            points
+                .map(|point| family.shape(point.place))
+                .collect::<Vec<_>>()
+        });
+        pulp::Arch::new().dispatch(|| {
+            for (e, element) in mesh.elements.iter().enumerate() {
+                let smooth = recovered.at_nodes_of(e, element);
+                for shape in &shapes[element.family() as usize] {
+                    let own = recovered.at_point(differences.len());
+                    differences.push(difference(shape, &smooth, &own));
+                }
             }
-        }
+        });
         StressDifference {
             stress: differences,
             dilatation_gap: recovered.dilatation_gap.clone(),
@@ -63,8 +73,8 @@ impl StressDifference {
         })
     }
 
-    /// The same products with the differences of several fields, by their displacements at the nodes. None if `stop`
-    /// says so, which is asked now and then.
+    /// The same products with the differences of [`TOGETHER`] fields, by their displacements at the nodes. None if
+    /// `stop` says so, which is asked now and then.
     ///
     /// Both σ* and σ of those fields are linear in what is known at the nodes, so that each element's integral is a sum
     /// over its nodes: the points of integration are visited once for all fields. Nearly incompressible elements, whose
@@ -74,120 +84,131 @@ impl StressDifference {
         mesh: &Mesh,
         section: &Section,
         quadrature: u32,
-        fields: &[Vec<[f64; 2]>],
+        fields: &[[[f64; TOGETHER]; 2]],
         stop: &mut dyn FnMut() -> bool,
     ) -> Option<Vec<Vec<f64>>> {
-        if section.has_split() {
-            return self.products_field_by_field(mesh, section, quadrature, fields, stop);
-        }
-        let mut products = vec![vec![0.0; mesh.elements.len()]; fields.len()];
-        for (material, Weights { compliance, .. }) in weights(section).iter().enumerate() {
+        let mut products = vec![vec![0.0; mesh.elements.len()]; TOGETHER];
+        let (mut known, masters) = (ByShape::new(), Masters::new(quadrature));
+        for (material, weights) in weights(section).iter().enumerate() {
             let smooth = recover_nodal_stresses(mesh, section, material, fields, stop)?;
             let mut first = 0;
-            for (e, element) in mesh.elements.iter().enumerate() {
-                if e % ELEMENTS_PER_QUESTION == 0 && stop() {
+            for (k, elements) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
+                if stop() {
                     return None;
                 }
-                let (family, nodes) = (element.family(), mesh.element_nodes(element));
-                let rule = family.rule(quadrature);
-                let own = &self.stress[first..first + rule.len()];
-                first += rule.len();
-                if section.material_of(e) != material {
-                    continue;
-                }
-                // ∫ h_i C⁻¹ (σ* − σ), and the same as forces of a stress: ∫ B_iᵀ (σ* − σ)
-                let mut by_stress = [[0.0; COMPONENTS]; 8];
-                let mut by_displacement = [[0.0; 2]; 8];
-                for (point, own) in rule.iter().zip(own) {
-                    let m = family.map(&nodes, point.place);
-                    let weight = point.weight * m.det * section.depth(m.x);
-                    let strain: [f64; COMPONENTS] = std::array::from_fn(|i| {
-                        (0..COMPONENTS)
-                            .map(|j| compliance[i][j] * own[j])
-                            .sum::<f64>()
-                    });
-                    for i in 0..family.nodes() {
-                        let b = section.strain(m.shape[i], m.gradient[i], m.x);
-                        for c in 0..COMPONENTS {
-                            by_stress[i][c] += weight * m.shape[i] * strain[c];
-                            for p in 0..2 {
-                                by_displacement[i][p] += weight * b[c][p] * own[c];
-                            }
+                pulp::Arch::new().dispatch(|| {
+                    for (i, element) in elements.iter().enumerate() {
+                        let e = k * ELEMENTS_PER_QUESTION + i;
+                        let points = element.family().rule(quadrature).len();
+                        let own = first..first + points;
+                        first = own.end;
+                        if section.material_of(e) != material {
+                            continue;
+                        }
+                        let of_fields = (fields, &smooth[..]);
+                        let product = if weights.bulk == 0.0 {
+                            let shape = Shape::of(mesh, section, e);
+                            let stations =
+                                known.of(shape, |shape| masters.stations(section, shape));
+                            let compliance = &weights.compliance;
+                            product(stations, &self.stress[own], compliance, element, of_fields)
+                        } else {
+                            let own: Vec<Difference> = own.map(|p| self.point(p)).collect();
+                            let body = (section, material, weights);
+                            mixed_product(mesh, body, (element, &own), quadrature, of_fields)
+                        };
+                        for (products, product) in products.iter_mut().zip(product) {
+                            products[e] = product;
                         }
                     }
-                }
-                for ((product, u), smooth) in products.iter_mut().zip(fields).zip(&smooth) {
-                    let at_node = |(i, &node): (usize, &u32)| {
-                        let (u, smooth) = (u[node as usize], smooth[node as usize]);
-                        let recovered: f64 =
-                            (0..COMPONENTS).map(|c| by_stress[i][c] * smooth[c]).sum();
-                        recovered - (0..2).map(|p| by_displacement[i][p] * u[p]).sum::<f64>()
-                    };
-                    product[e] = element.iter().enumerate().map(at_node).sum();
-                }
+                });
             }
         }
         Some(products)
     }
 
-    fn products_field_by_field(
-        &self,
-        mesh: &Mesh,
-        section: &Section,
-        quadrature: u32,
-        fields: &[Vec<[f64; 2]>],
-        stop: &mut dyn FnMut() -> bool,
-    ) -> Option<Vec<Vec<f64>>> {
-        let mut products = vec![vec![0.0; mesh.elements.len()]; fields.len()];
-        for (material, weights) in weights(section).iter().enumerate() {
-            let smooth = recover_nodal_stresses(mesh, section, material, fields, stop)?;
-            let mut points = self.points();
-            for (e, element) in mesh.elements.iter().enumerate() {
-                if e % ELEMENTS_PER_QUESTION == 0 && stop() {
-                    return None;
-                }
-                let (family, nodes) = (element.family(), mesh.element_nodes(element));
-                let rule = family.rule(quadrature);
-                let own: Vec<Difference> = points.by_ref().take(rule.len()).collect();
-                if section.material_of(e) != material {
-                    continue;
-                }
-                let map = |point: &GaussPoint| family.map(&nodes, point.place);
-                let mapped: Vec<Mapped> = rule.iter().map(map).collect();
-                let body = Undeformed::new(section, material, family, &nodes);
-                for ((product, u), smooth) in products.iter_mut().zip(fields).zip(&smooth) {
-                    let u = element.gather(|n| u[n as usize]);
-                    let smooth = element.gather(|n| smooth[n as usize]);
-                    let deformed = body.displaced(&u, [0.0; 2]);
-                    for ((point, m), own) in rule.iter().zip(&mapped).zip(&own) {
-                        let at = deformed.at(m, point.place);
-                        let other = Difference {
-                            stress: difference(&m.shape, &smooth, &at.stress),
-                            gap: at.dilatation_gap,
-                        };
-                        product[e] += point.weight
-                            * m.det
-                            * section.depth(m.x)
-                            * weights.density(own, &other);
-                    }
-                }
-            }
+    fn point(&self, point: usize) -> Difference {
+        Difference {
+            stress: self.stress[point],
+            gap: self.dilatation_gap.get(point).copied().unwrap_or(0.0),
         }
-        Some(products)
     }
 
     /// The norm of the difference in every element ((force × length)^½, without 2π).
     pub fn norms(&self, mesh: &Mesh, section: &Section, quadrature: u32) -> Vec<f64> {
         let stress = self.points().map(|point| Difference { gap: 0.0, ..point });
-        let squares = integrate(
-            mesh,
-            section,
-            quadrature,
-            stress.map(|point| (point, point)),
-        );
+        let pairs = stress.map(|point| (point, point));
+        let squares = integrate(mesh, section, quadrature, pairs);
         let norm = |square: f64| square.max(0.0).sqrt();
         squares.into_iter().map(norm).collect()
     }
+}
+
+/// Nodal values of several fields: their displacements, and their recovered stresses.
+type OfFields<'a> = (&'a [[[f64; TOGETHER]; 2]], &'a [Stresses]);
+
+/// What an element has in common with several fields.
+#[inline(always)]
+fn product(
+    stations: &Stations,
+    own: &[[f64; COMPONENTS]],
+    compliance: &Moduli,
+    element: &Element,
+    (fields, smooth): OfFields<'_>,
+) -> [f64; TOGETHER] {
+    // ∫ h_i C⁻¹ (σ* − σ), and the same as forces of a stress: ∫ B_iᵀ (σ* − σ)
+    let mut by_stress = [[0.0; 8]; COMPONENTS];
+    let (mut by_ux, mut by_uy) = ([0.0; 8], [0.0; 8]);
+    for (station, own) in stations.rule.iter().zip(own) {
+        for (by_stress, row) in by_stress.iter_mut().zip(compliance) {
+            let strain: f64 = (0..COMPONENTS).map(|j| row[j] * own[j]).sum();
+            let strain = station.weight * strain;
+            (0..8).for_each(|i| by_stress[i] += station.shape[i] * strain);
+        }
+        station.add_force(station.weight, own, &mut by_ux, &mut by_uy);
+    }
+    let mut product = [0.0; TOGETHER];
+    for (i, &node) in element.iter().enumerate() {
+        let ([ux, uy], smooth) = (&fields[node as usize], &smooth[node as usize]);
+        for k in 0..TOGETHER {
+            product[k] -= by_ux[i] * ux[k] + by_uy[i] * uy[k];
+        }
+        for (by_stress, smooth) in by_stress.iter().zip(smooth) {
+            (0..TOGETHER).for_each(|k| product[k] += by_stress[i] * smooth[k]);
+        }
+    }
+    product
+}
+
+/// The same of a nearly incompressible element.
+fn mixed_product(
+    mesh: &Mesh,
+    (section, material, weights): (&Section, usize, &Weights),
+    (element, own): (&Element, &[Difference]),
+    quadrature: u32,
+    (fields, smooth): OfFields<'_>,
+) -> [f64; TOGETHER] {
+    let (family, nodes) = (element.family(), mesh.element_nodes(element));
+    let rule = family.rule(quadrature);
+    let map = |point: &GaussPoint| family.map(&nodes, point.place);
+    let mapped: Vec<Mapped> = rule.iter().map(map).collect();
+    let body = Undeformed::new(section, material, family, &nodes);
+    std::array::from_fn(|k| {
+        let u = element.gather(|n| fields[n as usize].map(|u| u[k]));
+        let smooth = element.gather(|n| smooth[n as usize].map(|stress| stress[k]));
+        let deformed = body.displaced(&u, [0.0; 2]);
+        let mut product = 0.0;
+        for ((point, m), own) in rule.iter().zip(&mapped).zip(own) {
+            let at = deformed.at(m, point.place);
+            let other = Difference {
+                stress: difference(&m.shape, &smooth, &at.stress),
+                gap: at.dilatation_gap,
+            };
+            let weight = point.weight * m.det * section.depth(m.x);
+            product += weight * weights.density(own, &other);
+        }
+        product
+    })
 }
 
 /// What the two of every pair, one for each integration point, have in common in each element.
@@ -198,20 +219,22 @@ fn integrate(
     mut pairs: impl Iterator<Item = (Difference, Difference)>,
 ) -> Vec<f64> {
     let weights = weights(section);
-    let product = |(e, element): (usize, &Element)| {
-        let (family, nodes) = (element.family(), mesh.element_nodes(element));
+    let (mut known, masters) = (ByShape::new(), Masters::new(quadrature));
+    let product = |e: usize| {
         let weights = &weights[section.material_of(e)];
+        let shape = Shape::of(mesh, section, e);
+        let stations = known.of(shape, |shape| masters.stations(section, shape));
         let mut sum = 0.0;
-        for (point, (own, other)) in family.rule(quadrature).iter().zip(&mut pairs) {
-            let m = family.map(&nodes, point.place);
-            sum += point.weight * m.det * section.depth(m.x) * weights.density(&own, &other);
+        for (station, (own, other)) in stations.rule.iter().zip(&mut pairs) {
+            sum += station.weight * weights.density(&own, &other);
         }
         sum
     };
-    mesh.elements.iter().enumerate().map(product).collect()
+    (0..mesh.elements.len()).map(product).collect()
 }
 
 /// Σ h_i σ_i − σ.
+#[inline(always)]
 fn difference(
     shape: &[f64; 8],
     smooth: &[[f64; COMPONENTS]; 8],
@@ -321,9 +344,13 @@ mod tests {
             let difference = |u: &[[f64; 2]]| {
                 StressDifference::new(mesh, order, &recover(mesh, section, order, u, [0.0; 2]))
             };
-            let (own, fields) = (difference(&field(0)), [field(1), field(2)]);
+            let own = difference(&field(0));
+            let fields: Vec<_> = (1..=TOGETHER).map(field).collect();
+            let together: Vec<_> = (0..mesh.nodes.len())
+                .map(|n| [0, 1].map(|a| std::array::from_fn(|k| fields[k][n][a])))
+                .collect();
             let never = &mut || false;
-            let found = own.products_with_fields(mesh, section, order, &fields, never);
+            let found = own.products_with_fields(mesh, section, order, &together, never);
             for (found, u) in found.unwrap().iter().zip(&fields) {
                 let expected = own.products(mesh, section, order, &difference(u));
                 let size: f64 = expected.iter().map(|p| p.abs()).sum();
@@ -332,7 +359,7 @@ mod tests {
                 }
             }
             assert!(
-                own.products_with_fields(mesh, section, order, &fields, &mut || true)
+                own.products_with_fields(mesh, section, order, &together, &mut || true)
                     .is_none()
             );
         }

@@ -241,25 +241,51 @@ impl Family {
 
     /// The map T_e of thesis (2.8) at a place, for an element with node positions `nodes`.
     pub fn map(self, nodes: &AtNodes<[f64; 2]>, place: [f64; 2]) -> Mapped {
-        let [xi, eta] = place;
-        let (shape, local) = match self {
+        self.tabulate(place).map(nodes)
+    }
+
+    /// What the map at a place needs of the master element.
+    pub fn tabulate(self, [xi, eta]: [f64; 2]) -> Tabulated {
+        let (shape, derivative) = match self {
             Family::Quad => (quad8::shape(xi, eta), quad8::derivative(xi, eta)),
             Family::Triangle => (tri6::shape(xi, eta), tri6::derivative(xi, eta)),
         };
+        Tabulated {
+            nodes: self.nodes(),
+            shape,
+            derivative,
+        }
+    }
+}
+
+/// A place of the master element.
+#[derive(Clone, Debug)]
+pub struct Tabulated {
+    nodes: usize,
+    shape: AtNodes<f64>,
+    /// dh_i/dξ and dh_i/dη.
+    derivative: AtNodes<[f64; 2]>,
+}
+
+impl Tabulated {
+    /// The place in an element with node positions `nodes`.
+    pub fn map(&self, nodes: &AtNodes<[f64; 2]>) -> Mapped {
         let mut jacobian = [[0.0; 2]; 2]; // jacobian[a][b] = dx_b / dξ_a
-        for i in 0..self.nodes() {
+        for i in 0..self.nodes {
             for a in 0..2 {
                 for b in 0..2 {
-                    jacobian[a][b] += local[i][a] * nodes[i][b];
+                    jacobian[a][b] += self.derivative[i][a] * nodes[i][b];
                 }
             }
         }
         let [[j00, j01], [j10, j11]] = jacobian;
         let det = j00 * j11 - j01 * j10;
-        let gradient = local.map(|[p, q]| [(j11 * p - j01 * q) / det, (j00 * q - j10 * p) / det]);
-        let x = (0..self.nodes()).map(|i| shape[i] * nodes[i][0]).sum();
+        let gradient = self
+            .derivative
+            .map(|[p, q]| [(j11 * p - j01 * q) / det, (j00 * q - j10 * p) / det]);
+        let x = (0..self.nodes).map(|i| self.shape[i] * nodes[i][0]).sum();
         Mapped {
-            shape,
+            shape: self.shape,
             gradient,
             det,
             x,

@@ -3,11 +3,10 @@
 mod blocked;
 mod breaks;
 mod dense;
-mod factor;
-mod sparse;
-mod supernodal;
+mod dissection;
+mod multifrontal;
 
 pub use breaks::{Breaks, Stopped};
 pub use dense::{Dense, General, Unsolved, least_squares, solve_positive_definite};
-pub use factor::{Factor, FactorError, Ordering};
-pub use sparse::{Graph, SparseSymmetric};
+pub use dissection::{Cells, Dissection};
+pub use multifrontal::{ElementMatrix, Factor, FactorError, Fronts};

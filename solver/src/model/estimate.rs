@@ -250,18 +250,17 @@ impl Size {
     fn estimate(&self, margin: f64) -> Estimate {
         let dofs = 2.0 * self.nodes;
         let contact = self.contact;
-        // entries of the factor for each unknown away from contact, by minimum degree in the plane
-        let log = dofs.max(2.0).log2();
-        let fill = 0.6 * log * log - 3.04 * log + 31.4;
-        // The contact's own block, and as much again below the columns that reach it. Beside them Ŝ, and a matrix of
-        // the same size that is factored (Cholesky's or Newton's).
-        let factor = margin * fill * dofs + 2.0 * contact * contact;
+        // entries of the factor, and of the fronts that wait, for each unknown away from contact
+        let fill = (10.6 * dofs.max(2.0).log2() - 27.0).max(40.0);
+        // Fronts of parts of the contact wait, too. Beside them Ŝ, and a matrix of the same size that is factored
+        // (Cholesky's or Newton's).
+        let factor = margin * fill * dofs + 0.8 * contact * contact;
         let dense = 2.0 * contact * contact;
-        // mesh, stiffness, graph and symbolic factor; later displacements and stresses, and the stored result
+        // mesh and structure of the factor; later displacements and stresses, and the stored result
         let of_nodes = 1500.0 * margin * self.nodes;
         let memory = 8.0 * (factor + dense + self.weights) + of_nodes + self.history() + FLOOR;
         let sweeps = contact.powi(3) * (1.0 + 2.0 * self.increments * self.repeats);
-        let time = 6e-6 * dofs + 4e-9 * dofs.powf(1.5) + 1e-9 * sweeps + 2.5e-6 * self.weights;
+        let time = 3e-6 * dofs + 3e-9 * dofs.powf(1.5) + 1e-9 * sweeps + 2.5e-6 * self.weights;
         Estimate {
             dofs: dofs as u64,
             memory_bytes: memory as u64,

@@ -54,7 +54,7 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
         };
         state.v = v;
         // step 3
-        let row_values = rows.evaluate(system, &state, &friction.traction, &options);
+        let row_values = rows.evaluate(system, &state, &options);
         // step 4
         let next = next_contact(system, &state, &row_values.node_stress);
         let unchanged = next == state.active;

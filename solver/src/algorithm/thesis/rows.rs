@@ -18,7 +18,7 @@ use super::average::{self, linear};
 use super::friction::{Friction, signed_ratio};
 use crate::algorithm::system::{State, System};
 use crate::contact::edge_nodes;
-use crate::elasticity::{Deformed, Dof};
+use crate::elasticity::Deformed;
 use crate::element::{Family, edge3, gauss, quad8};
 use crate::problem::{ThesisOptions, ThesisPressure};
 
@@ -99,7 +99,6 @@ impl Rows {
         &self,
         system: &System<'_>,
         state: &State,
-        traction: &[f64],
         options: &ThesisOptions,
     ) -> RowValues {
         let extrapolated = options.pressure == ThesisPressure::Extrapolated;
@@ -112,7 +111,7 @@ impl Rows {
             rule: self.rule,
         };
         if extrapolated || options.friction_force == 2 {
-            let displacements = self.displacements(system, state, traction);
+            let displacements = system.body.displacements(&state.v, &system.level);
             for rows in &self.edges {
                 let (stress, phi) = self.evaluate_edge(system, rows, &displacements);
                 row_values.stress.push(stress);
@@ -127,19 +126,6 @@ impl Rows {
             pressures.iter().map(|p| -p).collect()
         };
         row_values
-    }
-
-    /// Displacements of all nodes.
-    fn displacements(&self, system: &System<'_>, state: &State, traction: &[f64]) -> Vec<[f64; 2]> {
-        let mut friction = vec![0.0; state.v.len()];
-        system.add_traction_force(traction, &mut friction);
-        let mut force: Vec<f64> = friction.iter().map(|f| -f).collect();
-        for (node, reaction) in system.nodes.iter().zip(system.reactions(state)) {
-            if let Dof::Free(dof) = node.normal {
-                force[dof] -= reaction;
-            }
-        }
-        system.body.displacements(&force, &state.v, &system.level)
     }
 
     /// σ_n and φ at the Gauss points of both rows below an edge.

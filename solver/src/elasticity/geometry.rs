@@ -1,0 +1,274 @@
+//! What integrals over an element need of its shape, computed once for all elements of the same shape: a grid has few.
+
+use crate::elasticity::Section;
+use crate::elasticity::material::{COMPONENTS, Moduli};
+use crate::element::{AtNodes, Family, GaussPoint, Tabulated};
+use crate::mesh::Mesh;
+
+/// The strains of an element's nodes at one of its places, as rows of B.
+#[derive(Clone, Debug)]
+pub(super) struct Station {
+    /// h_i.
+    pub(super) shape: AtNodes<f64>,
+    /// dh_i/dx.
+    pub(super) dx: AtNodes<f64>,
+    /// dh_i/dy.
+    pub(super) dy: AtNodes<f64>,
+    /// h_i / r in axisymmetry, else 0.
+    pub(super) hoop: AtNodes<f64>,
+    /// Weight of the rule × det J × depth.
+    pub(super) weight: f64,
+}
+
+impl Station {
+    fn new(section: &Section, place: &Tabulated, weight: f64, nodes: &AtNodes<[f64; 2]>) -> Self {
+        let m = place.map(nodes);
+        let hoop = match section.axisymmetric() {
+            true => m.shape.map(|h| h / m.x),
+            false => [0.0; 8],
+        };
+        Station {
+            shape: m.shape,
+            dx: m.gradient.map(|[x, _]| x),
+            dy: m.gradient.map(|[_, y]| y),
+            hoop,
+            weight: weight * m.det * section.depth(m.x),
+        }
+    }
+
+    /// The strain of nodes displaced by `ux` and `uy`.
+    #[inline(always)]
+    pub(super) fn strain(&self, ux: &AtNodes<f64>, uy: &AtNodes<f64>) -> [f64; COMPONENTS] {
+        let mut strain = [0.0; COMPONENTS];
+        for i in 0..8 {
+            strain[0] += self.dx[i] * ux[i];
+            strain[1] += self.dy[i] * uy[i];
+            strain[2] += self.dy[i] * ux[i] + self.dx[i] * uy[i];
+            strain[3] += self.hoop[i] * ux[i];
+        }
+        strain
+    }
+
+    /// Adds `factor` Bᵀ σ to the forces on the nodes.
+    #[inline(always)]
+    pub(super) fn add_force(
+        &self,
+        factor: f64,
+        stress: &[f64; COMPONENTS],
+        fx: &mut AtNodes<f64>,
+        fy: &mut AtNodes<f64>,
+    ) {
+        let [xx, yy, xy, zz] = stress.map(|s| factor * s);
+        for i in 0..8 {
+            fx[i] += self.dx[i] * xx + self.dy[i] * xy + self.hoop[i] * zz;
+            fy[i] += self.dy[i] * yy + self.dx[i] * xy;
+        }
+    }
+}
+
+/// An element's stations.
+#[derive(Clone, Debug)]
+pub(super) struct Stations {
+    /// At the points of its integrals.
+    pub(super) rule: Vec<Station>,
+    /// At its superconvergent points.
+    pub(super) stress: Vec<Station>,
+    /// Weights of the superconvergent points in the linear map to each node; none beyond its nodes.
+    pub(super) to_nodes: AtNodes<[f64; 4]>,
+}
+
+/// The places of stations on the master elements.
+pub(super) struct Masters {
+    families: [Master; 2],
+}
+
+struct Master {
+    rule: Vec<(Tabulated, f64)>,
+    stress: Vec<(Tabulated, f64)>,
+    to_nodes: AtNodes<[f64; 4]>,
+}
+
+impl Master {
+    fn new(family: Family, quadrature: u32) -> Self {
+        let tabulate = |points: &[GaussPoint]| {
+            let point = |point: &GaussPoint| (family.tabulate(point.place), point.weight);
+            points.iter().map(point).collect()
+        };
+        let mut to_nodes = [[0.0; 4]; 8];
+        for (weights, place) in to_nodes.iter_mut().zip(family.places()) {
+            *weights = family.from_stress_points(*place);
+        }
+        Master {
+            rule: tabulate(family.rule(quadrature)),
+            stress: tabulate(family.stress_points()),
+            to_nodes,
+        }
+    }
+}
+
+impl Masters {
+    /// `quadrature`: as in `assemble_element`.
+    pub(super) fn new(quadrature: u32) -> Self {
+        Masters {
+            families: [Family::Quad, Family::Triangle].map(|f| Master::new(f, quadrature)),
+        }
+    }
+
+    fn of(&self, family: Family) -> &Master {
+        &self.families[family as usize]
+    }
+
+    /// The stations of elements of a shape.
+    pub(super) fn stations(&self, section: &Section, shape: &Shape) -> Stations {
+        let master = self.of(shape.family);
+        let at = |places: &[(Tabulated, f64)]| {
+            let station = |(place, weight): &(Tabulated, f64)| {
+                Station::new(section, place, *weight, &shape.nodes)
+            };
+            places.iter().map(station).collect()
+        };
+        Stations {
+            rule: at(&master.rule),
+            stress: at(&master.stress),
+            to_nodes: master.to_nodes,
+        }
+    }
+
+    /// The stiffness of elements of a shape, along x and y.
+    pub(super) fn stiffness(&self, section: &Section, shape: &Shape) -> [[f64; 16]; 16] {
+        let moduli = &section.materials()[usize::from(shape.material)];
+        let master = self.of(shape.family);
+        let mut k = [[[[0.0; 8]; 2]; 2]; 8];
+        for (place, weight) in &master.rule {
+            let station = Station::new(section, place, *weight, &shape.nodes);
+            pulp::Arch::new().dispatch(|| add_stiffness(&station, moduli, &mut k));
+        }
+        symmetric(&k)
+    }
+}
+
+/// The matrix with rows and columns (node, direction); its two triangles may differ in rounding before.
+fn symmetric(k: &[[[[f64; 8]; 2]; 2]; 8]) -> [[f64; 16]; 16] {
+    let mut whole = [[0.0; 16]; 16];
+    for row in 0..16 {
+        for column in 0..=row {
+            let value = k[row / 2][row % 2][column % 2][column / 2];
+            whole[row][column] = value;
+            whole[column][row] = value;
+        }
+    }
+    whole
+}
+
+/// Adds weight Bᵀ D B to k_ij, by the directions of i and j and then by j, so that eight values are computed at once.
+#[inline(always)]
+fn add_stiffness(station: &Station, moduli: &Moduli, k: &mut [[[[f64; 8]; 2]; 2]; 8]) {
+    let Station {
+        dx,
+        dy,
+        hoop,
+        weight,
+        ..
+    } = station;
+    // stresses of unit displacements along x and y, times the weight
+    let mut stress = [[[0.0; 8]; COMPONENTS]; 2];
+    for (c, row) in moduli.iter().enumerate() {
+        let [xx, yy, xy, zz] = row.map(|d| weight * d);
+        for j in 0..8 {
+            stress[0][c][j] = xx * dx[j] + xy * dy[j] + zz * hoop[j];
+            stress[1][c][j] = yy * dy[j] + xy * dx[j];
+        }
+    }
+    for i in 0..8 {
+        for (q, stress) in stress.iter().enumerate() {
+            let [xx, yy, xy, zz] = stress;
+            for j in 0..8 {
+                k[i][0][q][j] += dx[i] * xx[j] + dy[i] * xy[j] + hoop[i] * zz[j];
+                k[i][1][q][j] += dy[i] * yy[j] + dx[i] * xy[j];
+            }
+        }
+    }
+}
+
+/// Values of a function of an element's shape, remembered.
+pub(super) struct ByShape<T> {
+    /// Where the value of a shape may be among those remembered.
+    slots: [Option<u16>; SLOTS],
+    known: Vec<(Shape, T)>,
+}
+
+/// Shapes that are remembered at once: a grid with equal distances has some hundred, since they are equal up to
+/// rounding only.
+const SLOTS: usize = 512;
+
+/// What distinguishes elements: those that are equal here are moved onto each other by a shift that changes no integral.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shape {
+    family: Family,
+    material: u16,
+    /// Positions relative to the first node; in axisymmetry along the axis only.
+    pub(super) nodes: AtNodes<[f64; 2]>,
+}
+
+impl Shape {
+    /// The shape of an element of a mesh.
+    pub(super) fn of(mesh: &Mesh, section: &Section, e: usize) -> Self {
+        let (element, material) = (&mesh.elements[e], section.material_of(e));
+        Shape::new(
+            element.family(),
+            &mesh.element_nodes(element),
+            section,
+            material,
+        )
+    }
+
+    /// The shape of an element with these nodes.
+    pub(super) fn new(
+        family: Family,
+        nodes: &AtNodes<[f64; 2]>,
+        section: &Section,
+        material: usize,
+    ) -> Self {
+        let mut nodes = *nodes;
+        let [x, y] = nodes[0];
+        let x = if section.axisymmetric() { 0.0 } else { x };
+        let own = nodes.iter_mut().take(family.nodes());
+        own.for_each(|node| *node = [node[0] - x, node[1] - y]);
+        Shape {
+            family,
+            material: material as u16,
+            nodes,
+        }
+    }
+
+    fn slot(&self) -> usize {
+        let bits = self.nodes.iter().flatten().map(|x| x.to_bits());
+        let start = u64::from(self.material) << 1 | u64::from(self.family == Family::Quad);
+        let hash = bits.fold(start, |hash, bits| {
+            (hash.rotate_left(5) ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        });
+        (hash >> 32) as usize % SLOTS
+    }
+}
+
+impl<T> ByShape<T> {
+    /// Remembers nothing yet.
+    pub(super) fn new() -> Self {
+        ByShape {
+            slots: [None; SLOTS],
+            known: Vec::new(),
+        }
+    }
+
+    /// The value for a shape.
+    pub(super) fn of(&mut self, shape: Shape, make: impl FnOnce(&Shape) -> T) -> &T {
+        let slot = &mut self.slots[shape.slot()];
+        let place = usize::from(*slot.get_or_insert(self.known.len() as u16));
+        match self.known.get_mut(place) {
+            Some((known, _)) if *known == shape => {}
+            Some(other) => *other = (shape, make(&shape)),
+            None => self.known.push((shape, make(&shape))),
+        }
+        &self.known[place].1
+    }
+}

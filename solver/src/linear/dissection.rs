@@ -1,0 +1,485 @@
+//! An order of elimination for the nodes of a mesh in the plane: its elements are halved again and again by their
+//! centres, and the nodes that two halves share are eliminated after both.
+//!
+//! The result is a binary tree of *parts*. A part owns the nodes that lie in it alone, but in neither of its halves
+//! alone; a part that is not divided owns all that lie in it alone. Nodes that are kept are owned by none. Once its
+//! halves are eliminated, what is left of a part are the nodes it owns and its *boundary*: the nodes that it shares with
+//! the rest of the body, or that are kept.
+
+use std::ops::Deref;
+
+/// Parts with more elements are divided: smaller ones cost more administration than they save arithmetic.
+const LARGEST_LEAF: usize = 6;
+
+/// The smaller half of a part has at least this share of its elements, so that the tree is as deep as the logarithm of
+/// their number.
+const SMALLEST_SHARE: f64 = 0.25;
+
+/// Centres nearer to each other than this part of the extent lie on one line of a grid.
+const SAME_LINE: f64 = 1e-10;
+
+/// A mesh, as far as it matters here.
+pub struct Cells<'a, E> {
+    /// The nodes of every element.
+    pub elements: &'a [E],
+    /// Positions of the nodes.
+    pub positions: &'a [[f64; 2]],
+    /// Nodes with unknowns; the others are left out.
+    pub unknown: &'a [bool],
+}
+
+/// The tree. Halves come before their whole, so the last part is the mesh.
+#[derive(Default)]
+pub struct Dissection {
+    /// The parts.
+    pub parts: Vec<Part>,
+    /// Elements, those of each part in a row.
+    pub elements: Vec<u32>,
+    /// Nodes in the order of their elimination, then those that are kept.
+    pub nodes: Vec<u32>,
+    /// The boundaries of all parts, as places in `nodes`; each is sorted.
+    pub boundaries: Vec<u32>,
+}
+
+/// A range of elements, and what it leaves to the rest.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Part {
+    /// The halves, as numbers of parts; none of a part that is not divided.
+    pub halves: Option<[usize; 2]>,
+    /// How often the mesh was halved for it.
+    pub depth: u32,
+    /// Its elements: first and end in [`Dissection::elements`].
+    pub elements: [usize; 2],
+    /// The nodes it owns: first and end in [`Dissection::nodes`].
+    pub own: [usize; 2],
+    /// Its boundary: first and end in [`Dissection::boundaries`].
+    pub boundary: [usize; 2],
+}
+
+impl Dissection {
+    /// Dissects a mesh. The nodes `kept`, each named once, stay to the end in their order; nodes of no element are left
+    /// out.
+    pub fn new<E: Deref<Target = [u32]>>(cells: &Cells<'_, E>, kept: &[u32]) -> Self {
+        let mut state = Halving::new(cells, kept);
+        let mut elements: Vec<u32> = (0..cells.elements.len() as u32).collect();
+        state.divide(&mut elements, 0, 0);
+        let mut dissection = Dissection {
+            parts: state.parts,
+            elements,
+            nodes: state.nodes,
+            boundaries: Vec::new(),
+        };
+        let kept = kept.iter().filter(|node| cells.unknown[**node as usize]);
+        dissection.nodes.extend(kept);
+        dissection.find_boundaries(cells);
+        dissection
+    }
+
+    fn find_boundaries<E: Deref<Target = [u32]>>(&mut self, cells: &Cells<'_, E>) {
+        let mut place = vec![None; cells.positions.len()];
+        for (k, &node) in self.nodes.iter().enumerate() {
+            place[node as usize] = Some(k as u32);
+        }
+        let mut found: Vec<u32> = Vec::new();
+        for number in 0..self.parts.len() {
+            found.clear();
+            let part = &self.parts[number];
+            let end = part.own[1] as u32;
+            match part.halves {
+                None => {
+                    for &e in &self.elements[part.elements[0]..part.elements[1]] {
+                        let nodes = cells.elements[e as usize].iter();
+                        found.extend(nodes.filter_map(|node| place[*node as usize]));
+                    }
+                    found.retain(|place| *place >= end);
+                    found.sort_unstable();
+                    found.dedup();
+                }
+                Some([a, b]) => {
+                    let (a, b) = (self.boundary(a), self.boundary(b));
+                    merge(a, b, &mut found);
+                    // what the part owns comes before what is eliminated later
+                    let own = found.partition_point(|place| *place < end);
+                    found.drain(..own);
+                }
+            }
+            let first = self.boundaries.len();
+            self.boundaries.extend_from_slice(&found);
+            self.parts[number].boundary = [first, self.boundaries.len()];
+        }
+    }
+
+    /// The boundary of a part, as places in `nodes`.
+    pub fn boundary(&self, part: usize) -> &[u32] {
+        let [first, end] = self.parts[part].boundary;
+        &self.boundaries[first..end]
+    }
+}
+
+/// The union of two sorted lists.
+fn merge(a: &[u32], b: &[u32], into: &mut Vec<u32>) {
+    let (mut i, mut j) = (0, 0);
+    while let (Some(&x), Some(&y)) = (a.get(i), b.get(j)) {
+        into.push(x.min(y));
+        i += usize::from(x <= y);
+        j += usize::from(y <= x);
+    }
+    into.extend_from_slice(&a[i..]);
+    into.extend_from_slice(&b[j..]);
+}
+
+/// The state of the halving.
+struct Halving<'a, E> {
+    cells: &'a Cells<'a, E>,
+    centres: Vec<[f64; 2]>,
+    /// Nodes that no part owns yet, and that are not kept.
+    free: Vec<bool>,
+    /// By node: which half it was last seen in, as a number that grows.
+    seen: Vec<u32>,
+    stamp: u32,
+    keys: Vec<f64>,
+    parts: Vec<Part>,
+    nodes: Vec<u32>,
+}
+
+/// A line across a part, perpendicular to an axis.
+#[derive(Clone, Copy)]
+struct Cut {
+    axis: usize,
+    at: f64,
+}
+
+impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
+    fn new(cells: &'a Cells<'a, E>, kept: &[u32]) -> Self {
+        let centre = |element: &E| {
+            let scale = 1.0 / element.len().max(1) as f64;
+            let nodes = element.iter().map(|node| cells.positions[*node as usize]);
+            let sum = nodes.fold([0.0; 2], |[x, y], node| [x + node[0], y + node[1]]);
+            sum.map(|c| scale * c)
+        };
+        let mut free = cells.unknown.to_vec();
+        kept.iter().for_each(|node| free[*node as usize] = false);
+        Halving {
+            cells,
+            centres: cells.elements.iter().map(centre).collect(),
+            free,
+            seen: vec![0; cells.positions.len()],
+            stamp: 0,
+            keys: Vec::with_capacity(cells.elements.len()),
+            parts: Vec::new(),
+            nodes: Vec::new(),
+        }
+    }
+
+    /// Divides the part with these elements, the first of which is at `first` of all, and returns its number.
+    fn divide(&mut self, elements: &mut [u32], first: usize, depth: u32) -> usize {
+        let mut part = Part {
+            depth,
+            elements: [first, first + elements.len()],
+            ..Part::default()
+        };
+        let mut own = Vec::new();
+        if elements.len() <= LARGEST_LEAF {
+            for &e in elements.iter() {
+                let nodes = self.cells.elements[e as usize].iter();
+                for &node in nodes {
+                    if std::mem::replace(&mut self.free[node as usize], false) {
+                        own.push(node);
+                    }
+                }
+            }
+        } else {
+            let cut = self.best_cut(elements);
+            let middle = self.part_by(elements, cut);
+            let (low, high) = elements.split_at_mut(middle);
+            // before the halves take what is theirs
+            self.shared(low, high, &mut own);
+            own.iter()
+                .for_each(|node| self.free[*node as usize] = false);
+            let along = 1 - cut.map_or(0, |cut| cut.axis);
+            let position = |node: &u32| self.cells.positions[*node as usize];
+            own.sort_unstable_by(|a, b| {
+                let (x, y) = (position(a), position(b));
+                x[along].total_cmp(&y[along]).then(a.cmp(b))
+            });
+            let halves = [
+                self.divide(low, first, depth + 1),
+                self.divide(high, first + middle, depth + 1),
+            ];
+            part.halves = Some(halves);
+        }
+        part.own[0] = self.nodes.len();
+        self.nodes.append(&mut own);
+        part.own[1] = self.nodes.len();
+        self.parts.push(part);
+        self.parts.len() - 1
+    }
+
+    /// The cut through the fewest nodes; none if all centres coincide.
+    fn best_cut(&mut self, elements: &[u32]) -> Option<Cut> {
+        let cuts = [0, 1].map(|axis| self.middle(elements, axis));
+        match cuts {
+            [Some(a), Some(b)] => {
+                let [of_a, of_b] = [a, b].map(|cut| self.count_shared(elements, cut));
+                Some(if of_a <= of_b { a } else { b })
+            }
+            [one, other] => one.or(other),
+        }
+    }
+
+    /// Between two lines of centres, as near to the middle as can be.
+    fn middle(&mut self, elements: &[u32], axis: usize) -> Option<Cut> {
+        let keys = &mut self.keys;
+        keys.clear();
+        keys.extend(elements.iter().map(|e| self.centres[*e as usize][axis]));
+        let count = keys.len();
+        let (below, &mut middle, above) =
+            keys.select_nth_unstable_by(count / 2, |a, b| a.total_cmp(b));
+        let bounds = |(low, high): (f64, f64), key: &f64| (low.min(*key), high.max(*key));
+        let (low, _) = below.iter().fold((middle, middle), bounds);
+        let (_, high) = above.iter().fold((middle, middle), bounds);
+        let same = SAME_LINE * (high - low);
+        // the line of centres through the middle, and the lines beside it
+        let (mut before, mut from) = (f64::NEG_INFINITY, middle);
+        let (mut after, mut to) = (f64::INFINITY, middle);
+        let (mut count_before, mut count_until) = (0usize, 0usize);
+        for &key in keys.iter() {
+            if key < middle - same {
+                before = before.max(key);
+                count_before += 1;
+            } else if key > middle + same {
+                after = after.min(key);
+            } else {
+                from = from.min(key);
+                to = to.max(key);
+                count_until += 1;
+            }
+        }
+        count_until += count_before;
+        let off = |n: usize| (n as f64 / count as f64 - 0.5).abs();
+        let (off_before, off_after) = (off(count_before), off(count_until));
+        if off_before.min(off_after) > 0.5 - SMALLEST_SHARE {
+            return None;
+        }
+        let at = match off_before <= off_after {
+            true => 0.5 * (before + from),
+            false => 0.5 * (to + after),
+        };
+        Some(Cut { axis, at })
+    }
+
+    /// Puts the elements below the cut before the others, and says how many they are.
+    fn part_by(&self, elements: &mut [u32], cut: Option<Cut>) -> usize {
+        let Some(Cut { axis, at }) = cut else {
+            return elements.len() / 2;
+        };
+        let mut low = 0;
+        for i in 0..elements.len() {
+            if self.centres[elements[i] as usize][axis] < at {
+                elements.swap(low, i);
+                low += 1;
+            }
+        }
+        // rounding may put all of them on one side of a cut between two neighbouring numbers
+        match low {
+            0 => elements.len() / 2,
+            low if low == elements.len() => elements.len() / 2,
+            low => low,
+        }
+    }
+
+    /// How many free nodes lie on both sides of a cut.
+    fn count_shared(&mut self, elements: &[u32], cut: Cut) -> usize {
+        let (low, high) = self.stamps();
+        let below = |e: &&u32| self.centres[**e as usize][cut.axis] < cut.at;
+        for &e in elements.iter().filter(below) {
+            for &node in self.cells.elements[e as usize].iter() {
+                self.seen[node as usize] = low;
+            }
+        }
+        let mut count = 0;
+        for &e in elements.iter().filter(|e| !below(e)) {
+            for &node in self.cells.elements[e as usize].iter() {
+                if self.seen[node as usize] == low {
+                    self.seen[node as usize] = high;
+                    count += usize::from(self.free[node as usize]);
+                }
+            }
+        }
+        count
+    }
+
+    /// The free nodes of elements of both halves.
+    fn shared(&mut self, low: &[u32], high: &[u32], into: &mut Vec<u32>) {
+        let (in_low, in_both) = self.stamps();
+        for &e in low {
+            for &node in self.cells.elements[e as usize].iter() {
+                self.seen[node as usize] = in_low;
+            }
+        }
+        for &e in high {
+            for &node in self.cells.elements[e as usize].iter() {
+                if self.seen[node as usize] == in_low {
+                    self.seen[node as usize] = in_both;
+                    if self.free[node as usize] {
+                        into.push(node);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Two numbers that no node has been marked with.
+    fn stamps(&mut self) -> (u32, u32) {
+        self.stamp += 2;
+        (self.stamp - 1, self.stamp)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A grid of four-node cells between lines along x and y, node numbers running along x first.
+    pub(in crate::linear) fn grid(x: &[f64], y: &[f64]) -> (Vec<Vec<u32>>, Vec<[f64; 2]>) {
+        let positions = y.iter().flat_map(|y| x.iter().map(|x| [*x, *y])).collect();
+        let columns = x.len();
+        let cell = |i: usize, j: usize| {
+            let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
+            corners.map(|(i, j)| (j * columns + i) as u32).to_vec()
+        };
+        let cells = (0..y.len() - 1).flat_map(|j| (0..columns - 1).map(move |i| (i, j)));
+        (cells.map(|(i, j)| cell(i, j)).collect(), positions)
+    }
+
+    pub(in crate::linear) fn lines(count: usize) -> Vec<f64> {
+        (0..=count).map(|i| 0.1 * i as f64).collect()
+    }
+
+    fn dissect(x: &[f64], y: &[f64], kept: &[u32]) -> (Dissection, Vec<Vec<u32>>) {
+        let (elements, positions) = grid(x, y);
+        let unknown = vec![true; positions.len()];
+        let cells = Cells {
+            elements: &elements,
+            positions: &positions,
+            unknown: &unknown,
+        };
+        (Dissection::new(&cells, kept), elements)
+    }
+
+    #[test]
+    fn every_part_has_the_nodes_and_the_boundary_that_its_elements_give_it() {
+        let kept = [3, 77, 12, 0];
+        let (found, elements) = dissect(&lines(11), &lines(8), &kept);
+        let count = 12 * 9;
+        let mut all = found.nodes.clone();
+        assert_eq!(all.split_off(count - kept.len()), kept);
+        all.extend(kept);
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..count as u32), "every node once");
+        for (number, part) in found.parts.iter().enumerate() {
+            let range = part.elements[0]..part.elements[1];
+            let (inside, before) = (
+                &found.elements[range.clone()],
+                &found.elements[..range.start],
+            );
+            let outside: Vec<u32> = before
+                .iter()
+                .chain(&found.elements[range.end..])
+                .copied()
+                .collect();
+            let touched =
+                |by: &[u32], node: u32| by.iter().any(|e| elements[*e as usize].contains(&node));
+            let [first, end] = part.own;
+            for &node in &found.nodes[first..end] {
+                assert!(touched(inside, node) && !touched(&outside, node) && !kept.contains(&node));
+            }
+            let boundary: Vec<u32> = (end as u32..count as u32)
+                .filter(|place| {
+                    let node = found.nodes[*place as usize];
+                    touched(inside, node) && (touched(&outside, node) || kept.contains(&node))
+                })
+                .collect();
+            assert_eq!(found.boundary(number), boundary);
+            match part.halves {
+                None => assert!(range.len() <= LARGEST_LEAF),
+                Some([a, b]) => {
+                    let [a, b] = [a, b].map(|half| &found.parts[half]);
+                    assert!(a.elements == [range.start, a.elements[1]]);
+                    assert!(b.elements == [a.elements[1], range.end]);
+                    assert_eq!([a.depth, b.depth], [part.depth + 1; 2]);
+                }
+            }
+        }
+        assert_eq!(
+            found.parts.last().map(|part| part.elements),
+            Some([0, elements.len()])
+        );
+    }
+
+    /// Where lines lie does not matter to a grid, only how many there are: cuts follow them.
+    #[test]
+    fn a_graded_grid_is_dissected_as_an_even_one() {
+        let graded: Vec<f64> = (0..=40).map(|i| 1.3f64.powi(i)).collect();
+        let sizes = |x: &[f64], y: &[f64]| -> Vec<usize> {
+            let (found, _) = dissect(x, y, &[]);
+            (0..found.parts.len())
+                .map(|part| found.boundary(part).len())
+                .collect()
+        };
+        let even = sizes(&lines(40), &lines(40));
+        assert_eq!(sizes(&graded, &lines(40)), even);
+        // that of a 20 × 10 part with three sides inside
+        assert_eq!(even.iter().max(), Some(&51));
+    }
+
+    #[test]
+    fn a_strip_is_cut_across() {
+        for (x, y) in [(1, 500), (500, 1), (3, 200)] {
+            let (found, _) = dissect(&lines(x), &lines(y), &[]);
+            let widest = (0..found.parts.len())
+                .map(|part| found.boundary(part).len())
+                .max();
+            // two cuts across, and some nodes between them in the smallest parts
+            assert!(widest <= Some(2 * (x.min(y) + 1) + 2), "{widest:?}");
+            assert!(found.parts.iter().all(|part| part.depth <= 9));
+        }
+    }
+
+    #[test]
+    fn elements_with_one_centre_are_divided_all_the_same() {
+        let elements: Vec<Vec<u32>> = (0..1000).map(|e| vec![e, 1000]).collect();
+        let positions = vec![[1.0, 2.0]; 1001];
+        let cells = Cells {
+            elements: &elements,
+            positions: &positions,
+            unknown: &[true; 1001],
+        };
+        let found = Dissection::new(&cells, &[]);
+        assert_eq!(found.nodes.len(), 1001);
+        assert_eq!(found.nodes.last(), Some(&1000));
+        assert!(found.parts.iter().all(|part| part.depth <= 8));
+    }
+
+    #[test]
+    fn nodes_without_unknowns_and_without_elements_are_left_out() {
+        let (elements, mut positions) = grid(&lines(4), &lines(4));
+        positions.push([9.0, 9.0]);
+        let mut unknown = vec![true; positions.len()];
+        unknown[6] = false;
+        let cells = Cells {
+            elements: &elements,
+            positions: &positions,
+            unknown: &unknown,
+        };
+        let found = Dissection::new(&cells, &[6, 7]);
+        assert_eq!(found.nodes.len(), 24);
+        assert_eq!(found.nodes.last(), Some(&7));
+        let nothing = Cells::<Vec<u32>> {
+            elements: &[],
+            positions: &[],
+            unknown: &[],
+        };
+        assert_eq!(Dissection::new(&nothing, &[]).parts.len(), 1);
+    }
+}
