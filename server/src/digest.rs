@@ -6,7 +6,8 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::json;
 use sha2::{Digest, Sha256};
-use solver::{problem::Problem, solution::Solution};
+use solver::problem::Problem;
+use solver::solution::{Fields, GaussFields, Solution};
 
 /// Fingerprint of a problem with its defaults filled in. The title is for people and not included. Units are:
 /// problems are stored once per fingerprint, and figures show their units.
@@ -33,10 +34,11 @@ pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<Strin
     if let Some(summary) = summary.as_object_mut() {
         summary.remove("accuracy");
     }
-    // The outermost object is written by hand, its keys in canonical order: the canonical writer
+    // The outermost object and the fields are written by hand, their keys in canonical order: the canonical writer
     // holds every object it is inside of in memory, and fields can be large.
     let mut hash = Hash::default();
-    hash.text_of(r#"{"fields":"#).json(&solution.fields)?;
+    hash.text_of(r#"{"fields":"#);
+    hash.fields(&solution.fields)?;
     hash.text_of(r#","history":"#).json(&solution.history)?;
     hash.text_of(r#","profiles":"#).json(&solution.profiles)?;
     hash.text_of(r#","steps":"#).json(&solution.steps)?;
@@ -69,6 +71,76 @@ impl Hash {
         let mut buffered = io::BufWriter::with_capacity(1 << 16, &mut *self);
         serde_json_canonicalizer::to_writer(value, &mut buffered)?;
         buffered.flush().map_err(serde_json::Error::io)
+    }
+
+    fn fields(&mut self, fields: &Fields) -> serde_json::Result<()> {
+        // all of them by name, so that a new one is not forgotten here
+        let Fields {
+            contact_state,
+            element_error,
+            elements,
+            gauss,
+            stress_xx,
+            stress_xy,
+            stress_yy,
+            stress_zz,
+            ux,
+            uy,
+            x,
+            y,
+        } = fields;
+        self.text_of(r#"{"contact_state":"#).json(contact_state)?;
+        self.column(r#","element_error":"#, element_error)?;
+        self.text_of(r#","elements":"#).json(elements)?;
+        let GaussFields {
+            order,
+            stress_xx: at_points_xx,
+            stress_xy: at_points_xy,
+            stress_yy: at_points_yy,
+            stress_zz: at_points_zz,
+            x: points_x,
+            y: points_y,
+        } = gauss;
+        self.text_of(r#","gauss":{"order":"#).json(order)?;
+        self.column(r#","stress_xx":"#, at_points_xx)?;
+        self.column(r#","stress_xy":"#, at_points_xy)?;
+        self.column(r#","stress_yy":"#, at_points_yy)?;
+        self.column(r#","stress_zz":"#, at_points_zz)?;
+        self.column(r#","x":"#, points_x)?;
+        self.column(r#","y":"#, points_y)?;
+        self.column(r#"},"stress_xx":"#, stress_xx)?;
+        self.column(r#","stress_xy":"#, stress_xy)?;
+        self.column(r#","stress_yy":"#, stress_yy)?;
+        self.column(r#","stress_zz":"#, stress_zz)?;
+        self.column(r#","ux":"#, ux)?;
+        self.column(r#","uy":"#, uy)?;
+        self.column(r#","x":"#, x)?;
+        self.column(r#","y":"#, y)?;
+        self.text_of("}");
+        Ok(())
+    }
+
+    /// A key and the list of its numbers, as the canonical writer has them.
+    fn column(&mut self, key: &str, numbers: &[f64]) -> serde_json::Result<()> {
+        const AT_ONCE: usize = 1024;
+        self.text_of(key).text_of("[");
+        let (mut text, mut number) = (String::new(), ryu_js::Buffer::new());
+        for (part, numbers) in numbers.chunks(AT_ONCE).enumerate() {
+            text.clear();
+            for (k, value) in numbers.iter().enumerate() {
+                if !value.is_finite() {
+                    let message = format!("{value} has no canonical form");
+                    return Err(serde::ser::Error::custom(message));
+                }
+                if part + k > 0 {
+                    text.push(',');
+                }
+                text.push_str(number.format_finite(*value));
+            }
+            self.text_of(&text);
+        }
+        self.text_of("]");
+        Ok(())
     }
 
     fn text(self) -> String {
@@ -131,6 +203,13 @@ mod tests {
     }
 
     #[test]
+    fn a_number_without_a_canonical_form_has_no_digest() {
+        let mut solution = fake::solution();
+        solution.fields.uy[0] = f64::NAN;
+        assert!(digest(&solution, "h").is_err());
+    }
+
+    #[test]
     fn a_digest_is_the_hash_of_one_canonical_document() {
         let mut solution = fake::solution();
         solution.steps.push(StepSolution {
@@ -141,6 +220,21 @@ mod tests {
             node_profiles: solution.node_profiles.clone(),
             friction_profiles: solution.friction_profiles.clone(),
         });
+        // more numbers than are written at once, of every form that a number can have
+        let forms = [
+            0.0,
+            -0.0,
+            1.0,
+            -2.5,
+            1e21,
+            1e-7,
+            123456.789,
+            5e-324,
+            f64::MAX,
+            0.1 + 0.2,
+        ];
+        let numbers = (0..3000).map(|k| forms[k % forms.len()] / (1 + k / 7) as f64);
+        solution.fields.gauss.stress_xy = numbers.collect();
         let mut document = serde_json::to_value(&solution).unwrap();
         document["summary"]["input_hash"] = json!("h");
         document["summary"]
