@@ -101,6 +101,11 @@ impl Front {
     fn height(&self) -> usize {
         self.own + self.boundary()
     }
+
+    /// Numbers in its columns of L, each from the diagonal on.
+    fn len(&self) -> usize {
+        self.own * self.boundary() + self.own * (self.own + 1) / 2
+    }
 }
 
 impl Fronts {
@@ -132,9 +137,8 @@ impl Fronts {
                 values: len,
                 stack: (part.depth % 2) as usize,
             };
-            let size = front.own * front.height();
-            len += size;
-            widest = widest.max(size);
+            len += front.len();
+            widest = widest.max(front.own * front.height());
             fronts.push(front);
         }
         let mut planned = Fronts {
@@ -195,7 +199,7 @@ impl Fronts {
 /// L of the eliminated unknowns.
 pub struct Factor {
     fronts: Fronts,
-    /// The columns of every front, height × own, by columns.
+    /// The columns of every front, each from the diagonal on.
     values: Vec<f64>,
 }
 
@@ -277,7 +281,9 @@ impl Factor {
                     breaks.after((a * a + b * b) as f64)?;
                 }
             }
-            values.extend_from_slice(into.columns);
+            for (j, column) in into.columns.chunks_exact(height.max(1)).enumerate() {
+                values.extend_from_slice(&column[j..]);
+            }
             if number != last {
                 tops[front.stack] += boundary * boundary;
             }
@@ -296,11 +302,14 @@ impl Factor {
         let mut v = Vec::new();
         for front in &self.fronts.fronts {
             self.gather(front, f, &mut v);
-            for (j, column) in self.columns(front).enumerate() {
+            let mut columns = self.columns(front);
+            for j in 0..front.own {
+                let (column, rest) = columns.split_at(v.len() - j);
+                columns = rest;
                 let (above, below) = v.split_at_mut(j + 1);
-                above[j] /= column[j];
+                above[j] /= column[0];
                 let factor = above[j];
-                let entries = below.iter_mut().zip(&column[j + 1..]);
+                let entries = below.iter_mut().zip(&column[1..]);
                 entries.for_each(|(v, l)| *v -= factor * l);
             }
             f[front.first..front.first + front.own].copy_from_slice(&v[..front.own]);
@@ -315,8 +324,7 @@ impl Factor {
         let mut v = Vec::new();
         for front in self.fronts.fronts.iter().rev() {
             self.gather(front, u, &mut v);
-            let height = front.height();
-            let columns = &self.values[front.values..front.values + front.own * height];
+            let columns = self.columns(front);
             pulp::Arch::new().dispatch(|| backward_in_front(columns, front.own, &mut v));
             u[front.first..front.first + front.own].copy_from_slice(&v[..front.own]);
         }
@@ -330,9 +338,8 @@ impl Factor {
         into.extend(rows.map(|row| all[*row as usize]));
     }
 
-    fn columns(&self, front: &Front) -> impl Iterator<Item = &[f64]> {
-        let size = front.own * front.height();
-        self.values[front.values..front.values + size].chunks_exact(front.height().max(1))
+    fn columns(&self, front: &Front) -> &[f64] {
+        &self.values[front.values..front.values + front.len()]
     }
 }
 
@@ -341,17 +348,16 @@ impl Factor {
 fn backward_in_front<const FIELDS: usize>(columns: &[f64], own: usize, v: &mut [[f64; FIELDS]]) {
     /// Sums of one field that do not wait for each other.
     const LANES: usize = 8;
-    let height = v.len();
+    let (height, mut columns) = (v.len(), columns);
     for j in (0..own).rev() {
-        let column = &columns[j * height..(j + 1) * height];
+        let (rest, column) = columns.split_at(columns.len() - (height - j));
+        columns = rest;
+        let (diagonal, column) = (column[0], &column[1..]);
         let (above, below) = v.split_at_mut(j + 1);
         let mut sum = [0.0; FIELDS];
         if FIELDS == 1 {
             let mut sums = [0.0; LANES];
-            let (l, u) = (
-                column[j + 1..].chunks_exact(LANES),
-                below.chunks_exact(LANES),
-            );
+            let (l, u) = (column.chunks_exact(LANES), below.chunks_exact(LANES));
             let rest = l.remainder().iter().zip(u.remainder());
             sum[0] = rest.map(|(l, u)| l * u[0]).sum();
             for (l, u) in l.zip(u) {
@@ -361,14 +367,14 @@ fn backward_in_front<const FIELDS: usize>(columns: &[f64], own: usize, v: &mut [
             }
             sum[0] += sums.iter().sum::<f64>();
         } else {
-            for (l, u) in column[j + 1..].iter().zip(below) {
+            for (l, u) in column.iter().zip(below) {
                 for k in 0..FIELDS {
                     sum[k] += l * u[k];
                 }
             }
         }
         for k in 0..FIELDS {
-            above[j][k] = (above[j][k] - sum[k]) / column[j];
+            above[j][k] = (above[j][k] - sum[k]) / diagonal;
         }
     }
 }
