@@ -159,7 +159,6 @@ impl ElasticBody {
             && a.quadrature == b.quadrature
             && a.fixed == b.fixed
             && a.loads == b.loads
-            && a.held_by_contact == b.held_by_contact
             && on_boundary(a) == on_boundary(b)
     }
 

@@ -23,7 +23,8 @@ const OUT_OF_BALANCE: f64 = 1e-7;
 /// long thin elements do so again. Forces are still known to six digits.
 const OUT_OF_BALANCE_INCOMPRESSIBLE: f64 = 1e-6;
 
-/// Forces count as more than rounding when they exceed this part of modulus × displacement × depth.
+/// Forces count as more than rounding when they exceed this part of modulus × displacement × depth, and of the problem's
+/// own force: what is at rest again may have borne that.
 const FORCE_FLOOR: f64 = 1e-6;
 
 /// q above which the sweeps barely contract.
@@ -201,12 +202,12 @@ pub fn report(
     .all(|x| x.is_finite())
         && displacements.iter().flatten().all(|u| u.is_finite())
         && recovered.stress.iter().flatten().all(|s| s.is_finite());
-    let fields = fields(model, &displacements, recovered, &errors, contact_state);
     if !finite {
         return Err(SolveError::NonFinite {
             phase: Phase::Recover,
         });
     }
+    let fields = fields(model, &displacements, recovered, &errors, contact_state);
     Ok(Reported {
         summary,
         profiles,

@@ -119,7 +119,7 @@ impl Masters {
     }
 
     /// The stations of elements of a shape.
-    pub(super) fn stations(&self, section: &Section, shape: &Shape) -> Stations {
+    fn stations(&self, section: &Section, shape: &Shape) -> Stations {
         let master = self.of(shape.family);
         let at = |places: &[(Tabulated, f64)]| {
             let station = |(place, weight): &(Tabulated, f64)| {
@@ -187,6 +187,33 @@ fn add_stiffness(station: &Station, moduli: &Moduli, k: &mut [[[[f64; 8]; 2]; 2]
                 k[i][1][q][j] += dy[i] * yy[j] + dx[i] * xy[j];
             }
         }
+    }
+}
+
+/// The stations of a mesh's elements.
+pub(super) struct MeshStations<'a> {
+    mesh: &'a Mesh,
+    section: &'a Section,
+    masters: Masters,
+    known: ByShape<Stations>,
+}
+
+impl<'a> MeshStations<'a> {
+    /// `quadrature`: as in `assemble_element`.
+    pub(super) fn new(mesh: &'a Mesh, section: &'a Section, quadrature: u32) -> Self {
+        MeshStations {
+            mesh,
+            section,
+            masters: Masters::new(quadrature),
+            known: ByShape::new(),
+        }
+    }
+
+    /// Those of an element.
+    pub(super) fn of(&mut self, e: usize) -> &Stations {
+        let shape = Shape::of(self.mesh, self.section, e);
+        let stations = |shape: &Shape| self.masters.stations(self.section, shape);
+        self.known.of(shape, stations)
     }
 }
 

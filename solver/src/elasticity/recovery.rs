@@ -1,7 +1,7 @@
 //! From displacements to stresses, nodal forces and energy.
 
 use crate::elasticity::Section;
-use crate::elasticity::geometry::{ByShape, Masters, Shape, Stations};
+use crate::elasticity::geometry::{MeshStations, Stations};
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::elasticity::mixed::{Inside, Mixed, dilatation, position};
 use crate::element::{AtNodes, Element, Family, Mapped};
@@ -72,8 +72,7 @@ pub fn recover(
         work_on_bubbles: 0.0,
     };
     let mut at_nodes = Vec::with_capacity(mesh.elements.len());
-    let mut known = ByShape::new();
-    let masters = Masters::new(quadrature);
+    let mut stations = MeshStations::new(mesh, section, quadrature);
     pulp::Arch::new().dispatch(|| {
         for (e, element) in mesh.elements.iter().enumerate() {
             let u = element.gather(|n| displacements[n as usize]);
@@ -84,8 +83,7 @@ pub fn recover(
                 at_nodes.push(own);
                 continue;
             }
-            let shape = Shape::of(mesh, section, e);
-            let stations = known.of(shape, |shape| masters.stations(section, shape));
+            let stations = stations.of(e);
             let (ux, uy) = (u.map(|u| u[0]), u.map(|u| u[1]));
             let moduli = &section.materials()[material];
             found.add(mesh, (element, stations), moduli, (&ux, &uy));
@@ -213,7 +211,7 @@ fn average(
 /// Elements between two questions whether to stop.
 pub(super) const ELEMENTS_PER_QUESTION: usize = 1 << 14;
 
-/// Displacement fields that are treated together: as many as a vector register of a common machine holds numbers.
+/// Displacement fields that are treated together: their eight numbers fill a line of the cache.
 pub const TOGETHER: usize = 8;
 
 /// The components of a stress in each of several fields.
@@ -225,12 +223,12 @@ pub(super) fn recover_nodal_stresses(
     mesh: &Mesh,
     section: &Section,
     material: usize,
+    stations: &mut MeshStations<'_>,
     fields: &[[[f64; TOGETHER]; 2]],
     stop: &mut dyn FnMut() -> bool,
 ) -> Option<Vec<Stresses>> {
     let mut sums = vec![[[0.0; TOGETHER]; COMPONENTS]; mesh.nodes.len()];
     let mut count = vec![0u32; mesh.nodes.len()];
-    let (mut known, masters) = (ByShape::new(), Masters::new(3));
     let moduli = &section.materials()[material];
     for (k, elements) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
         if stop() {
@@ -246,9 +244,7 @@ pub(super) fn recover_nodal_stresses(
                 let own = if section.split(material).is_some() {
                     mixed_stresses(mesh, (section, material), element, fields)
                 } else {
-                    let shape = Shape::of(mesh, section, e);
-                    let stations = known.of(shape, |shape| masters.stations(section, shape));
-                    stations.stresses_at_nodes(moduli, element, fields)
+                    stations.of(e).stresses_at_nodes(moduli, element, fields)
                 };
                 for (&node, own) in element.iter().zip(&own) {
                     for (sum, own) in sums[node as usize].iter_mut().zip(own) {

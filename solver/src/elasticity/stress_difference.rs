@@ -3,7 +3,7 @@
 //!
 //!   ‖e‖² = ∫ (σ* − σ) : C⁻¹ (σ* − σ),   σ* = Σ h_i σ_i with the recovered nodal stresses σ_i
 
-use crate::elasticity::geometry::{ByShape, Masters, Shape, Stations};
+use crate::elasticity::geometry::{MeshStations, Stations};
 use crate::elasticity::material::{COMPONENTS, Moduli, inverse, stress};
 use crate::elasticity::mixed::dilatation;
 use crate::elasticity::recovery::{
@@ -88,9 +88,10 @@ impl StressDifference {
         stop: &mut dyn FnMut() -> bool,
     ) -> Option<Vec<Vec<f64>>> {
         let mut products = vec![vec![0.0; mesh.elements.len()]; TOGETHER];
-        let (mut known, masters) = (ByShape::new(), Masters::new(quadrature));
+        let mut stations = MeshStations::new(mesh, section, quadrature);
         for (material, weights) in weights(section).iter().enumerate() {
-            let smooth = recover_nodal_stresses(mesh, section, material, fields, stop)?;
+            let smooth =
+                recover_nodal_stresses(mesh, section, material, &mut stations, fields, stop)?;
             let mut first = 0;
             for (k, elements) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
                 if stop() {
@@ -107,9 +108,7 @@ impl StressDifference {
                         }
                         let of_fields = (fields, &smooth[..]);
                         let product = if weights.bulk == 0.0 {
-                            let shape = Shape::of(mesh, section, e);
-                            let stations =
-                                known.of(shape, |shape| masters.stations(section, shape));
+                            let stations = stations.of(e);
                             let compliance = &weights.compliance;
                             product(stations, &self.stress[own], compliance, element, of_fields)
                         } else {
@@ -219,13 +218,11 @@ fn integrate(
     mut pairs: impl Iterator<Item = (Difference, Difference)>,
 ) -> Vec<f64> {
     let weights = weights(section);
-    let (mut known, masters) = (ByShape::new(), Masters::new(quadrature));
+    let mut stations = MeshStations::new(mesh, section, quadrature);
     let product = |e: usize| {
         let weights = &weights[section.material_of(e)];
-        let shape = Shape::of(mesh, section, e);
-        let stations = known.of(shape, |shape| masters.stations(section, shape));
         let mut sum = 0.0;
-        for (station, (own, other)) in stations.rule.iter().zip(&mut pairs) {
+        for (station, (own, other)) in stations.of(e).rule.iter().zip(&mut pairs) {
             sum += station.weight * weights.density(&own, &other);
         }
         sum

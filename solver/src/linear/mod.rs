@@ -4,6 +4,7 @@ mod blocked;
 mod breaks;
 mod dense;
 mod dissection;
+mod front;
 mod multifrontal;
 
 pub use breaks::{Breaks, Stopped};

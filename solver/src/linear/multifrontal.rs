@@ -12,16 +12,13 @@
 //! Unknowns are numbered in the order of their elimination, the kept ones last. These are never eliminated, so what the
 //! whole mesh leaves is their Schur complement: Ŝ = A_cc − A_ci A_ii⁻¹ A_ic.
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::Accum;
 
-use super::blocked::{NoFactor, STRIP, cholesky};
-use super::breaks::{Breaks, PORTION, Stopped, zeros};
+use super::blocked::NoFactor;
+use super::breaks::{Breaks, Stopped, zeros};
 use super::dense::Dense;
 use super::dissection::Dissection;
+use super::front::{Columns, FrontMatrix, Run, find_runs};
 
 /// Unknowns of the largest element.
 const ELEMENT: usize = 16;
@@ -176,16 +173,6 @@ impl Fronts {
         8 * (self.len + self.widest + self.stacks[0] + self.stacks[1]) as u64
     }
 
-    /// What the factor alone takes (bytes).
-    pub fn bytes_of_factor(&self) -> u64 {
-        8 * self.len as u64
-    }
-
-    /// Number of unknowns.
-    pub fn unknowns(&self) -> usize {
-        self.unknowns
-    }
-
     /// Number of those that are kept.
     pub fn kept(&self) -> usize {
         self.kept
@@ -252,11 +239,17 @@ impl Factor {
                 columns,
                 left,
             };
+            let failed = |error: NoFactor| match error {
+                NoFactor::NotPositiveDefinite(pivot) => FactorError::NotPositiveDefinite {
+                    unknown: front.first + pivot,
+                },
+                NoFactor::Stopped => FactorError::Stopped,
+            };
             match front.halves {
                 None => {
                     into.left.fill(0.0);
                     scratch.assemble(&fronts, front, &mut into, &mut element)?;
-                    into.eliminate(front.first, breaks)?;
+                    into.eliminate(breaks).map_err(failed)?;
                     into.reduce(Accum::Add, breaks)?;
                 }
                 Some(halves) => {
@@ -268,12 +261,12 @@ impl Factor {
                     tops[1 - front.stack] = start;
                     for (runs, half) in scratch.runs.iter_mut().zip(halves) {
                         let half = fronts.rows(&fronts.fronts[half]);
-                        find_runs(half, front, fronts.rows(front), runs);
+                        find_runs(half, (front.first, front.own), fronts.rows(front), runs);
                     }
                     for (runs, (size, from)) in scratch.runs.iter().zip(halves_left) {
                         into.add(runs, size, from, Columns::Own);
                     }
-                    into.eliminate(front.first, breaks)?;
+                    into.eliminate(breaks).map_err(failed)?;
                     into.reduce(Accum::Replace, breaks)?;
                     for (runs, (size, from)) in scratch.runs.iter().zip(halves_left) {
                         into.add(runs, size, from, Columns::Left);
@@ -290,11 +283,6 @@ impl Factor {
         }
         schur.mirror(breaks)?;
         Ok((Factor { fronts, values }, schur))
-    }
-
-    /// Number of unknowns.
-    pub fn unknowns(&self) -> usize {
-        self.fronts.unknowns
     }
 
     /// From f of all unknowns: y = L⁻¹ f of the eliminated ones, and f̂ = f_c − A_ci A_ii⁻¹ f_i of the kept ones.
@@ -379,46 +367,6 @@ fn backward_in_front<const FIELDS: usize>(columns: &[f64], own: usize, v: &mut [
     }
 }
 
-/// Which columns of a front are added to.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Columns {
-    /// Those it owns.
-    Own,
-    /// Those of its boundary.
-    Left,
-}
-
-/// Consecutive unknowns of a half that are consecutive in the front of the whole.
-struct Run {
-    /// The first one's place in the boundary of the half.
-    from: usize,
-    /// Its place in the front.
-    to: usize,
-    len: usize,
-}
-
-/// Where the boundary of a half lies in the front of the whole.
-fn find_runs(half: &[u32], front: &Front, rows: &[u32], runs: &mut Vec<Run>) {
-    runs.clear();
-    let end = front.first + front.own;
-    let mut next = 0;
-    for (from, &row) in half.iter().enumerate() {
-        let to = match (row as usize) < end {
-            true => row as usize - front.first,
-            false => {
-                while rows[next] < row {
-                    next += 1;
-                }
-                front.own + next
-            }
-        };
-        match runs.last_mut() {
-            Some(run) if run.to + run.len == to => run.len += 1,
-            _ => runs.push(Run { from, to, len: 1 }),
-        }
-    }
-}
-
 /// What is used again from front to front.
 struct Scratch {
     /// Places of unknowns in a front.
@@ -460,183 +408,6 @@ impl Scratch {
         }
         Ok(())
     }
-}
-
-/// A front while it is worked on, its lower triangle.
-struct FrontMatrix<'a> {
-    own: usize,
-    height: usize,
-    /// The columns it owns, each of `height` rows.
-    columns: &'a mut [f64],
-    /// The columns of its boundary, each of as many rows.
-    left: &'a mut [f64],
-}
-
-impl FrontMatrix<'_> {
-    fn entry(&mut self, row: usize, column: usize) -> &mut f64 {
-        let (own, height) = (self.own, self.height);
-        match column.checked_sub(own) {
-            None => &mut self.columns[column * height + row],
-            Some(column) => &mut self.left[column * (height - own) + row - own],
-        }
-    }
-
-    /// Adds some columns of what a half, with `size` unknowns on its boundary, has left.
-    fn add(&mut self, runs: &[Run], size: usize, from: &[f64], which: Columns) {
-        for (k, run) in runs.iter().enumerate() {
-            for j in 0..run.len {
-                let (source, column) = (run.from + j, run.to + j);
-                let (into, above) = match (which, column.checked_sub(self.own)) {
-                    (Columns::Own, None) => {
-                        let start = column * self.height;
-                        (&mut self.columns[start..start + self.height], 0)
-                    }
-                    (Columns::Left, Some(column)) => {
-                        let boundary = self.height - self.own;
-                        let start = column * boundary;
-                        (&mut self.left[start..start + boundary], self.own)
-                    }
-                    _ => continue,
-                };
-                let from = &from[source * size..(source + 1) * size];
-                // the rest of this run from the diagonal on, then the runs below
-                add(
-                    &mut into[column - above..],
-                    &from[source..run.from + run.len],
-                );
-                for run in &runs[k + 1..] {
-                    add(
-                        &mut into[run.to - above..],
-                        &from[run.from..run.from + run.len],
-                    );
-                }
-            }
-        }
-    }
-
-    /// L_oo and L_bo in place of F_oo and F_bo; `first`: the number of its first unknown.
-    fn eliminate(&mut self, first: usize, breaks: &mut Breaks<'_>) -> Result<(), FactorError> {
-        let (own, height) = (self.own, self.height);
-        let failed = |error: NoFactor| match error {
-            NoFactor::NotPositiveDefinite(pivot) => FactorError::NotPositiveDefinite {
-                unknown: first + pivot,
-            },
-            NoFactor::Stopped => FactorError::Stopped,
-        };
-        if own <= NARROW {
-            eliminate_narrow(self.columns, height, own).map_err(failed)?;
-            breaks.after((own * own * height) as f64)?;
-            return Ok(());
-        }
-        let block = MatMut::from_column_major_slice_mut(self.columns, height, own);
-        let (mut on_diagonal, mut below) = block.split_at_row_mut(own);
-        cholesky(on_diagonal.rb_mut(), breaks).map_err(failed)?;
-        // rows are independent of each other: a large block is solved in parts
-        let part = portion(own * own);
-        for start in (0..height - own).step_by(part) {
-            let rows = part.min(height - own - start);
-            let below = below.rb_mut().subrows_mut(start, rows);
-            solve_lower_triangular_in_place(on_diagonal.rb(), below.transpose_mut(), Par::Seq);
-            breaks.after((rows * own * own) as f64 / 2.0)?;
-        }
-        Ok(())
-    }
-
-    /// F_bb − L_bo L_boᵀ, or its second term alone, in the lower triangle.
-    fn reduce(&mut self, accum: Accum, breaks: &mut Breaks<'_>) -> Result<(), FactorError> {
-        let (own, boundary) = (self.own, self.height - self.own);
-        if own == 0 && accum == Accum::Replace {
-            self.left.fill(0.0);
-            return Ok(());
-        }
-        let columns = MatRef::from_column_major_slice(self.columns, self.height, own);
-        let l = columns.subrows(own, boundary);
-        let mut left = MatMut::from_column_major_slice_mut(self.left, boundary, boundary);
-        for start in (0..boundary).step_by(STRIP) {
-            let (width, rows) = (STRIP.min(boundary - start), boundary - start);
-            let strip = left.rb_mut().submatrix_mut(start, start, rows, width);
-            let (on_diagonal, under) = strip.split_at_row_mut(width);
-            let (l, l_under) = l.subrows(start, rows).split_at_row(width);
-            if width <= FULL {
-                matmul(on_diagonal, accum, l, l.transpose(), -1.0, Par::Seq);
-            } else {
-                triangular::matmul(
-                    on_diagonal,
-                    BlockStructure::TriangularLower,
-                    accum,
-                    l,
-                    BlockStructure::Rectangular,
-                    l.transpose(),
-                    BlockStructure::Rectangular,
-                    -1.0,
-                    Par::Seq,
-                );
-            }
-            matmul(under, accum, l_under, l.transpose(), -1.0, Par::Seq);
-            breaks.after((rows * width * own) as f64)?;
-        }
-        Ok(())
-    }
-}
-
-/// Columns that are eliminated one by one; more of them in blocks.
-const NARROW: usize = 24;
-
-/// Rows of a square that is computed whole, where half of it would do.
-const FULL: usize = 64;
-
-/// Lines of a product that make one portion of work, where each takes this many multiplications.
-fn portion(of_one: usize) -> usize {
-    /// Fewer lines at once would take far more time than their part.
-    const FEWEST: usize = 16;
-    let lines = (PORTION / of_one.max(1) as f64) as usize;
-    lines.clamp(FEWEST, STRIP)
-}
-
-/// `own` columns of L in place of those of the front, some at a time: each of the columns to their right is then read and
-/// written once for all of them.
-fn eliminate_narrow(columns: &mut [f64], height: usize, own: usize) -> Result<(), NoFactor> {
-    const AT_ONCE: usize = 4;
-    pulp::Arch::new().dispatch(|| {
-        for start in (0..own).step_by(AT_ONCE) {
-            let end = own.min(start + AT_ONCE);
-            for k in start..end {
-                let (done, rest) = columns.split_at_mut((k + 1) * height);
-                let column = &mut done[k * height + k..];
-                let pivot = column[0];
-                if pivot.is_nan() || pivot <= 0.0 {
-                    return Err(NoFactor::NotPositiveDefinite(k));
-                }
-                let scale = 1.0 / pivot.sqrt();
-                column.iter_mut().for_each(|l| *l *= scale);
-                let others = rest.chunks_exact_mut(height).take(end - k - 1);
-                for (j, other) in others.enumerate() {
-                    let factor = column[j + 1];
-                    let entries = other[k + 1 + j..].iter_mut().zip(&column[j + 1..]);
-                    entries.for_each(|(a, l)| *a -= factor * l);
-                }
-            }
-            if end - start < AT_ONCE {
-                break;
-            }
-            let (done, rest) = columns.split_at_mut(end * height);
-            let block: [&[f64]; AT_ONCE] =
-                std::array::from_fn(|i| &done[(start + i) * height..(start + i + 1) * height]);
-            for (column, j) in rest.chunks_exact_mut(height).zip(end..own) {
-                let [p, q, r, s] = block.map(|column| &column[j..]);
-                let factors = [p[0], q[0], r[0], s[0]];
-                let l = p.iter().zip(q).zip(r.iter().zip(s));
-                for (a, ((p, q), (r, s))) in column[j..].iter_mut().zip(l) {
-                    *a -= (factors[0] * p + factors[1] * q) + (factors[2] * r + factors[3] * s);
-                }
-            }
-        }
-        Ok(())
-    })
-}
-
-fn add(into: &mut [f64], from: &[f64]) {
-    into.iter_mut().zip(from).for_each(|(a, b)| *a += b);
 }
 
 #[cfg(test)]
@@ -764,7 +535,6 @@ mod tests {
             let n = dense.len();
             let (factor, schur) = body.factor().unwrap();
             let m = schur.size();
-            assert_eq!(factor.unknowns(), n);
             let force: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
             // f̂ is what Ŝ makes of the solution's kept unknowns
             let solution = solve_dense(&dense, &force);
@@ -790,55 +560,6 @@ mod tests {
                 unit[n - m + k] = 1.0;
                 let column = solve_dense(&dense, &unit).split_off(n - m);
                 assert!(largest_difference(&schur.times(&column), &unit[n - m..]) < 1e-12);
-            }
-        }
-    }
-
-    /// A front that is wide enough for blocks, and one whose reduction takes several strips.
-    #[test]
-    fn large_fronts_are_computed_in_blocks() {
-        let (own, height) = (150, 150 + STRIP + 100);
-        let entry = |i: usize, j: usize| {
-            let off = ((i * 7 + j * 7) % 11) as f64 / 100.0;
-            if i == j { height as f64 } else { off }
-        };
-        let mut columns: Vec<f64> = (0..own)
-            .flat_map(|j| (0..height).map(move |i| entry(i, j)))
-            .collect();
-        let boundary = height - own;
-        let mut left: Vec<f64> = (own..height)
-            .flat_map(|j| (own..height).map(move |i| entry(i, j)))
-            .collect();
-        let mut front = FrontMatrix {
-            own,
-            height,
-            columns: &mut columns,
-            left: &mut left,
-        };
-        let go_on = &mut || ControlFlow::Continue(());
-        let breaks = &mut Breaks::new(go_on);
-        front.eliminate(0, breaks).unwrap();
-        front.reduce(Accum::Add, breaks).unwrap();
-        let mut narrow: Vec<f64> = (0..own)
-            .flat_map(|j| (0..height).map(move |i| entry(i, j)))
-            .collect();
-        eliminate_narrow(&mut narrow, height, own).unwrap();
-        for j in 0..own {
-            for i in j..height {
-                let at = j * height + i;
-                assert!((columns[at] - narrow[at]).abs() < 1e-12, "{i}, {j}");
-            }
-        }
-        for j in 0..boundary {
-            for i in j..boundary {
-                let sum: f64 = (0..own)
-                    .map(|k| narrow[k * height + own + i] * narrow[k * height + own + j])
-                    .sum();
-                let expected = entry(own + i, own + j) - sum;
-                assert!(
-                    (left[j * boundary + i] - expected).abs() < 1e-11,
-                    "{i}, {j}"
-                );
             }
         }
     }

@@ -1,0 +1,286 @@
+//! One dense front: what its halves have left is added, the unknowns that it owns are eliminated, and its boundary is
+//! reduced (the module `multifrontal` says how fronts make a factor).
+
+use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Accum, MatMut, MatRef, Par};
+
+use super::blocked::{NoFactor, STRIP, cholesky};
+use super::breaks::{Breaks, PORTION, Stopped};
+
+/// A front while it is worked on, its lower triangle.
+pub(super) struct FrontMatrix<'a> {
+    /// Columns that it owns.
+    pub(super) own: usize,
+    /// Rows: as many as it owns, and those of its boundary.
+    pub(super) height: usize,
+    /// The columns it owns, each of `height` rows.
+    pub(super) columns: &'a mut [f64],
+    /// The columns of its boundary, each of as many rows.
+    pub(super) left: &'a mut [f64],
+}
+
+impl FrontMatrix<'_> {
+    /// An entry of the lower triangle.
+    pub(super) fn entry(&mut self, row: usize, column: usize) -> &mut f64 {
+        let (own, height) = (self.own, self.height);
+        match column.checked_sub(own) {
+            None => &mut self.columns[column * height + row],
+            Some(column) => &mut self.left[column * (height - own) + row - own],
+        }
+    }
+
+    /// Adds some columns of what a half, with `size` unknowns on its boundary, has left.
+    pub(super) fn add(&mut self, runs: &[Run], size: usize, from: &[f64], which: Columns) {
+        for (k, run) in runs.iter().enumerate() {
+            for j in 0..run.len {
+                let (source, column) = (run.from + j, run.to + j);
+                let (into, above) = match (which, column.checked_sub(self.own)) {
+                    (Columns::Own, None) => {
+                        let start = column * self.height;
+                        (&mut self.columns[start..start + self.height], 0)
+                    }
+                    (Columns::Left, Some(column)) => {
+                        let boundary = self.height - self.own;
+                        let start = column * boundary;
+                        (&mut self.left[start..start + boundary], self.own)
+                    }
+                    _ => continue,
+                };
+                let from = &from[source * size..(source + 1) * size];
+                // the rest of this run from the diagonal on, then the runs below
+                add(
+                    &mut into[column - above..],
+                    &from[source..run.from + run.len],
+                );
+                for run in &runs[k + 1..] {
+                    add(
+                        &mut into[run.to - above..],
+                        &from[run.from..run.from + run.len],
+                    );
+                }
+            }
+        }
+    }
+
+    /// L_oo and L_bo in place of F_oo and F_bo.
+    pub(super) fn eliminate(&mut self, breaks: &mut Breaks<'_>) -> Result<(), NoFactor> {
+        let (own, height) = (self.own, self.height);
+        if own <= NARROW {
+            eliminate_narrow(self.columns, height, own)?;
+            breaks.after((own * own * height) as f64)?;
+            return Ok(());
+        }
+        let block = MatMut::from_column_major_slice_mut(self.columns, height, own);
+        let (mut on_diagonal, mut below) = block.split_at_row_mut(own);
+        cholesky(on_diagonal.rb_mut(), breaks)?;
+        // rows are independent of each other: a large block is solved in parts
+        let part = portion(own * own);
+        for start in (0..height - own).step_by(part) {
+            let rows = part.min(height - own - start);
+            let below = below.rb_mut().subrows_mut(start, rows);
+            solve_lower_triangular_in_place(on_diagonal.rb(), below.transpose_mut(), Par::Seq);
+            breaks.after((rows * own * own) as f64 / 2.0)?;
+        }
+        Ok(())
+    }
+
+    /// F_bb − L_bo L_boᵀ, or its second term alone, in the lower triangle.
+    pub(super) fn reduce(&mut self, accum: Accum, breaks: &mut Breaks<'_>) -> Result<(), Stopped> {
+        let (own, boundary) = (self.own, self.height - self.own);
+        if own == 0 && accum == Accum::Replace {
+            self.left.fill(0.0);
+            return Ok(());
+        }
+        let columns = MatRef::from_column_major_slice(self.columns, self.height, own);
+        let l = columns.subrows(own, boundary);
+        let mut left = MatMut::from_column_major_slice_mut(self.left, boundary, boundary);
+        for start in (0..boundary).step_by(STRIP) {
+            let (width, rows) = (STRIP.min(boundary - start), boundary - start);
+            let strip = left.rb_mut().submatrix_mut(start, start, rows, width);
+            let (on_diagonal, under) = strip.split_at_row_mut(width);
+            let (l, l_under) = l.subrows(start, rows).split_at_row(width);
+            if width <= FULL {
+                matmul(on_diagonal, accum, l, l.transpose(), -1.0, Par::Seq);
+            } else {
+                triangular::matmul(
+                    on_diagonal,
+                    BlockStructure::TriangularLower,
+                    accum,
+                    l,
+                    BlockStructure::Rectangular,
+                    l.transpose(),
+                    BlockStructure::Rectangular,
+                    -1.0,
+                    Par::Seq,
+                );
+            }
+            matmul(under, accum, l_under, l.transpose(), -1.0, Par::Seq);
+            breaks.after((rows * width * own) as f64)?;
+        }
+        Ok(())
+    }
+}
+
+/// Fronts that own no more columns are eliminated by a loop of our own, which costs less than the call of a kernel.
+const NARROW: usize = 24;
+
+/// Rows of a square that is computed whole, where half of it would do.
+const FULL: usize = 64;
+
+/// Lines of a product that make one portion of work, where each takes this many multiplications.
+fn portion(of_one: usize) -> usize {
+    /// Fewer lines at once would take far more time than their part.
+    const FEWEST: usize = 16;
+    let lines = (PORTION / of_one.max(1) as f64) as usize;
+    lines.clamp(FEWEST, STRIP)
+}
+
+/// `own` columns of L in place of those of the front, some at a time: each of the columns to their right is then read and
+/// written once for all of them.
+fn eliminate_narrow(columns: &mut [f64], height: usize, own: usize) -> Result<(), NoFactor> {
+    const AT_ONCE: usize = 4;
+    pulp::Arch::new().dispatch(|| {
+        for start in (0..own).step_by(AT_ONCE) {
+            let end = own.min(start + AT_ONCE);
+            for k in start..end {
+                let (done, rest) = columns.split_at_mut((k + 1) * height);
+                let column = &mut done[k * height + k..];
+                let pivot = column[0];
+                if pivot.is_nan() || pivot <= 0.0 {
+                    return Err(NoFactor::NotPositiveDefinite(k));
+                }
+                let scale = 1.0 / pivot.sqrt();
+                column.iter_mut().for_each(|l| *l *= scale);
+                let others = rest.chunks_exact_mut(height).take(end - k - 1);
+                for (j, other) in others.enumerate() {
+                    let factor = column[j + 1];
+                    let entries = other[k + 1 + j..].iter_mut().zip(&column[j + 1..]);
+                    entries.for_each(|(a, l)| *a -= factor * l);
+                }
+            }
+            if end - start < AT_ONCE {
+                break;
+            }
+            let (done, rest) = columns.split_at_mut(end * height);
+            let block: [&[f64]; AT_ONCE] =
+                std::array::from_fn(|i| &done[(start + i) * height..(start + i + 1) * height]);
+            for (column, j) in rest.chunks_exact_mut(height).zip(end..own) {
+                let [p, q, r, s] = block.map(|column| &column[j..]);
+                let factors = [p[0], q[0], r[0], s[0]];
+                let l = p.iter().zip(q).zip(r.iter().zip(s));
+                for (a, ((p, q), (r, s))) in column[j..].iter_mut().zip(l) {
+                    *a -= (factors[0] * p + factors[1] * q) + (factors[2] * r + factors[3] * s);
+                }
+            }
+        }
+        Ok(())
+    })
+}
+
+fn add(into: &mut [f64], from: &[f64]) {
+    into.iter_mut().zip(from).for_each(|(a, b)| *a += b);
+}
+
+/// Which columns of a front are added to.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Columns {
+    /// Those it owns.
+    Own,
+    /// Those of its boundary.
+    Left,
+}
+
+/// Consecutive unknowns of a half that are consecutive in the front of the whole.
+pub(super) struct Run {
+    /// The first one's place in the boundary of the half.
+    from: usize,
+    /// Its place in the front.
+    to: usize,
+    len: usize,
+}
+
+/// Where the boundary of a half lies in the front of the whole, which owns unknowns from `first` on.
+pub(super) fn find_runs(
+    half: &[u32],
+    (first, own): (usize, usize),
+    rows: &[u32],
+    runs: &mut Vec<Run>,
+) {
+    runs.clear();
+    let mut next = 0;
+    for (from, &row) in half.iter().enumerate() {
+        let to = match (row as usize) < first + own {
+            true => row as usize - first,
+            false => {
+                while rows[next] < row {
+                    next += 1;
+                }
+                own + next
+            }
+        };
+        match runs.last_mut() {
+            Some(run) if run.to + run.len == to => run.len += 1,
+            _ => runs.push(Run { from, to, len: 1 }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::ops::ControlFlow;
+
+    use super::*;
+
+    /// A front that is wide enough for blocks, and one whose reduction takes several strips.
+    #[test]
+    fn large_fronts_are_computed_in_blocks() {
+        let (own, height) = (150, 150 + STRIP + 100);
+        let entry = |i: usize, j: usize| {
+            let off = ((i * 7 + j * 7) % 11) as f64 / 100.0;
+            if i == j { height as f64 } else { off }
+        };
+        let mut columns: Vec<f64> = (0..own)
+            .flat_map(|j| (0..height).map(move |i| entry(i, j)))
+            .collect();
+        let boundary = height - own;
+        let mut left: Vec<f64> = (own..height)
+            .flat_map(|j| (own..height).map(move |i| entry(i, j)))
+            .collect();
+        let mut front = FrontMatrix {
+            own,
+            height,
+            columns: &mut columns,
+            left: &mut left,
+        };
+        let go_on = &mut || ControlFlow::Continue(());
+        let breaks = &mut Breaks::new(go_on);
+        front.eliminate(breaks).unwrap();
+        front.reduce(Accum::Add, breaks).unwrap();
+        let mut narrow: Vec<f64> = (0..own)
+            .flat_map(|j| (0..height).map(move |i| entry(i, j)))
+            .collect();
+        eliminate_narrow(&mut narrow, height, own).unwrap();
+        for j in 0..own {
+            for i in j..height {
+                let at = j * height + i;
+                assert!((columns[at] - narrow[at]).abs() < 1e-12, "{i}, {j}");
+            }
+        }
+        for j in 0..boundary {
+            for i in j..boundary {
+                let sum: f64 = (0..own)
+                    .map(|k| narrow[k * height + own + i] * narrow[k * height + own + j])
+                    .sum();
+                let expected = entry(own + i, own + j) - sum;
+                assert!(
+                    (left[j * boundary + i] - expected).abs() < 1e-11,
+                    "{i}, {j}"
+                );
+            }
+        }
+    }
+}
