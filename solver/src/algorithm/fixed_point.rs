@@ -4,7 +4,7 @@
 
 use std::ops::ControlFlow;
 
-use crate::algorithm::convex::{Minimum, minimise};
+use crate::algorithm::convex::{Minimum, minimise_with};
 use crate::algorithm::finished::End;
 use crate::algorithm::rounding;
 use crate::algorithm::system::{State, System};
@@ -38,11 +38,19 @@ pub(super) fn sweep(
     let tolerance = track.controls.tolerance;
     let Minimum {
         state,
+        elastic_force,
         steps,
         residual,
         ..
-    } = minimise(track.system, &bound, start, tolerance, observe);
-    let measured = Measured::new(track.system, state, bound);
+    } = minimise_with(
+        track.system,
+        &bound,
+        start,
+        tolerance,
+        &mut track.factors,
+        observe,
+    );
+    let measured = Measured::with_force(track.system, state, elastic_force, bound);
     let row = Row {
         stage,
         residual,

@@ -107,21 +107,24 @@ fn next(
             v: moved.collect(),
             active: state.active.clone(),
         };
-        let changed = update_active(system, &mut reached);
-        let bound = implied_bound(system, &reached);
-        (Measured::new(system, reached, bound), changed)
+        let force = system.elastic_force(&reached.v);
+        let changed = update_active(system, &force, &mut reached);
+        let bound = implied_bound(system, &reached, &force);
+        let measured = Measured::with_force(system, reached, force, bound);
+        (measured, changed)
     };
     let whole = reach(1.0);
     if whole.0.residuals.monolithic < residual {
         return Some(whole);
     }
     let direction: Vec<f64> = target.iter().zip(&state.v).map(|(a, b)| a - b).collect();
-    let part = least_along(system, &implied_bound(system, state), &state.v, &direction);
+    let bound = implied_bound(system, state, &system.elastic_force(&state.v));
+    let part = least_along(system, &bound, &state.v, &direction);
     Some(if part < 1.0 { reach(part) } else { whole })
 }
 
-fn implied_bound(system: &System<'_>, state: &State) -> Vec<f64> {
-    system.friction_bound(&system.pressures(&system.reactions(state)))
+fn implied_bound(system: &System<'_>, state: &State, force: &[f64]) -> Vec<f64> {
+    system.friction_bound(&system.pressures(&system.reactions_of(state, force)))
 }
 
 /// v after one Newton step; active nodes stay on the obstacle.
@@ -129,10 +132,9 @@ fn step(system: &System<'_>, state: &State, observe: &mut Observer<'_>) -> Optio
     let free = free_dofs(system, |i| state.active[i]);
     let mut place = vec![usize::MAX; system.load.len()];
     free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
-    let pressures = system.pressures(&system.reactions(state));
-    let bound = system.friction_bound(&pressures);
-
     let mut force = system.elastic_force(&state.v);
+    let pressures = system.pressures(&system.reactions_of(state, &force));
+    let bound = system.friction_bound(&pressures);
     system.add_traction_force(&system.tractions(&state.v, &bound), &mut force);
     let shift = if system.semidefinite {
         semidefinite_shift(system)

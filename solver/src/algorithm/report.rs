@@ -61,10 +61,11 @@ pub fn report(
     if system.semidefinite && finished.outcome != Outcome::Canceled {
         held(model, system, finished)?;
     }
-    let reactions = system.reactions(&finished.state);
+    let elastic_force = system.elastic_force(v);
+    let reactions = system.reactions_of(&finished.state, &elastic_force);
     let forces = Forces {
         pressures: system.pressures(&reactions),
-        tangential_reactions: system.tangential_reactions(&finished.state),
+        tangential_reactions: system.tangential_reactions(&elastic_force),
         reactions,
     };
     let contact_force = contact_force(system, finished, &forces);

@@ -56,7 +56,12 @@ pub(super) fn limit(
     if measured.within(tolerance) {
         return None;
     }
-    let (floors, slip) = floors(system, &measured.state, &measured.bound);
+    let (floors, slip) = floors(
+        system,
+        &measured.state,
+        &measured.reactions,
+        &measured.bound,
+    );
     let r = &measured.residuals;
     let pairs = [
         (r.kkt, floors.kkt),
@@ -74,18 +79,23 @@ pub(super) fn limit(
     Some((rounding, floors.friction))
 }
 
-/// Whether a [`System::kkt_residual`] above the tolerance is rounding.
+/// Whether a [`System::kkt_residual`] above the tolerance is rounding. `reactions`: those of the state.
 pub(super) fn is_rounding(
     system: &System<'_>,
-    (state, bound): (&State, &[f64]),
+    (state, reactions, bound): (&State, &[f64], &[f64]),
     residual: f64,
     tolerance: f64,
 ) -> bool {
-    residual > tolerance && residual <= floors(system, state, bound).0.kkt
+    residual > tolerance && residual <= floors(system, state, reactions, bound).0.kkt
 }
 
 /// What rounding leaves of each residual, and the friction point that it leaves most at, unless it is not friction.
-fn floors(system: &System<'_>, state: &State, bound: &[f64]) -> (Residuals, Option<RoundedSlip>) {
+fn floors(
+    system: &System<'_>,
+    state: &State,
+    reactions: &[f64],
+    bound: &[f64],
+) -> (Residuals, Option<RoundedSlip>) {
     const ETA: f64 = OPERATIONS * f64::EPSILON;
     let v = &state.v;
     let mut elastic: Vec<f64> = system.load.iter().map(|f| f.abs()).collect();
@@ -95,7 +105,7 @@ fn floors(system: &System<'_>, state: &State, bound: &[f64]) -> (Residuals, Opti
     }
     elastic.iter_mut().for_each(|sum| *sum *= ETA);
 
-    let pressures = system.pressures(&system.reactions(state));
+    let pressures = system.pressures(reactions);
     let reaction = |node: usize| match system.nodes[node].normal {
         Dof::Free(dof) => elastic[dof],
         Dof::Fixed(_) => 0.0,
@@ -129,7 +139,7 @@ fn floors(system: &System<'_>, state: &State, bound: &[f64]) -> (Residuals, Opti
             }
         }
     }
-    let scale = system.force_scale(state, bound);
+    let scale = system.force_scale(state, reactions, bound);
     let largest = |sum: &dyn Fn(usize) -> f64| (0..v.len()).map(sum).fold(0.0, f64::max);
     let relative = |force: f64| if force == 0.0 { 0.0 } else { force / scale };
     let most = bound.iter().fold(0.0f64, |most, tau| most.max(*tau));

@@ -510,7 +510,7 @@ impl<'a> System<'a> {
     }
 
     /// The same from Ŝ v − f̂, which takes a product with a dense matrix.
-    fn reactions_of(&self, state: &State, force: &[f64]) -> Vec<f64> {
+    pub(super) fn reactions_of(&self, state: &State, force: &[f64]) -> Vec<f64> {
         let reaction = |(node, active): (&ContactNode, &bool)| match node.normal {
             Dof::Free(dof) if *active => -force[dof],
             _ => 0.0,
@@ -519,9 +519,8 @@ impl<'a> System<'a> {
     }
 
     /// Nodal forces along t of the obstacle on nodes whose tangential displacement is held; exactly 0
-    /// on the others.
-    pub fn tangential_reactions(&self, state: &State) -> Vec<f64> {
-        let force = self.elastic_force(&state.v);
+    /// on the others. `force`: Ŝ v − f̂.
+    pub(super) fn tangential_reactions(&self, force: &[f64]) -> Vec<f64> {
         let reaction = |node: &ContactNode| match (node.tangent, node.held_tangent) {
             (Dof::Free(dof), Some(_)) => force[dof],
             _ => 0.0,
@@ -583,13 +582,12 @@ impl<'a> System<'a> {
 
     /// The largest force or complementarity defect for a given friction bound, divided by the
     /// largest nodal reaction. Where nothing touches: by the largest load, friction force or, since a
-    /// body may be at rest again, by the problem's own force.
-    pub fn kkt_residual(&self, state: &State, bound: &[f64]) -> f64 {
+    /// body may be at rest again, by the problem's own force. `elastic`: Ŝ v − f̂ of the state.
+    pub(super) fn kkt_residual(&self, state: &State, elastic: &[f64], bound: &[f64]) -> f64 {
         let mut friction = vec![0.0; state.v.len()];
         self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
-        let elastic = self.elastic_force(&state.v);
         let force: Vec<f64> = elastic.iter().zip(&friction).map(|(a, b)| a + b).collect();
-        let reactions = self.reactions_of(state, &elastic);
+        let reactions = self.reactions_of(state, elastic);
         let mut defect: f64 = 0.0;
         for (i, node) in self.nodes.iter().enumerate() {
             if let Dof::Free(dof) = node.tangent {
@@ -618,10 +616,10 @@ impl<'a> System<'a> {
     }
 
     /// The force that [`System::kkt_residual`] divides by, > 0.
-    pub fn force_scale(&self, state: &State, bound: &[f64]) -> f64 {
+    pub fn force_scale(&self, state: &State, reactions: &[f64], bound: &[f64]) -> f64 {
         let mut friction = vec![0.0; state.v.len()];
         self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
-        self.scale(&self.reactions(state), &friction)
+        self.scale(reactions, &friction)
     }
 
     fn scale(&self, reactions: &[f64], friction: &[f64]) -> f64 {

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
+use crate::algorithm::convex::Factors;
 use crate::algorithm::system::{State, System};
 use crate::problem::SolverControls;
 use crate::solution::{
@@ -28,6 +29,8 @@ pub(super) struct Measured {
     pub(super) bound: Vec<f64>,
     /// τ that the state's own pressure implies.
     pub(super) implied_bound: Vec<f64>,
+    /// Ŝ v − f̂.
+    pub(super) elastic_force: Vec<f64>,
     pub(super) reactions: Vec<f64>,
     pub(super) pressures: Vec<f64>,
     /// kkt, friction and monolithic; equilibrium is computed from the body.
@@ -38,7 +41,18 @@ pub(super) struct Measured {
 
 impl Measured {
     pub(super) fn new(system: &System<'_>, state: State, bound: Vec<f64>) -> Self {
-        let reactions = system.reactions(&state);
+        let elastic_force = system.elastic_force(&state.v);
+        Measured::with_force(system, state, elastic_force, bound)
+    }
+
+    /// The same where Ŝ v − f̂ is known.
+    pub(super) fn with_force(
+        system: &System<'_>,
+        state: State,
+        elastic_force: Vec<f64>,
+        bound: Vec<f64>,
+    ) -> Self {
+        let reactions = system.reactions_of(&state, &elastic_force);
         let pressures = system.pressures(&reactions);
         let implied_bound = system.friction_bound(&pressures);
         let bound_change = largest_difference(&implied_bound, &bound);
@@ -48,19 +62,20 @@ impl Measured {
             .chain(&bound)
             .fold(0.0f64, |a, &b| a.max(b));
         let residuals = Residuals {
-            kkt: system.kkt_residual(&state, &bound),
+            kkt: system.kkt_residual(&state, &elastic_force, &bound),
             friction: if bound_change == 0.0 {
                 0.0
             } else {
                 bound_change / scale
             },
-            monolithic: system.kkt_residual(&state, &implied_bound),
+            monolithic: system.kkt_residual(&state, &elastic_force, &implied_bound),
             equilibrium: 0.0,
         };
         Measured {
             state,
             bound,
             implied_bound,
+            elastic_force,
             reactions,
             pressures,
             residuals,
@@ -114,6 +129,8 @@ pub(super) struct Track<'s, 'a> {
     /// Previous states, with their number and their residual.
     met: HashMap<Vec<u8>, (usize, f64)>,
     states: Vec<Vec<u8>>,
+    /// What the convex problems of the sweeps share.
+    pub(super) factors: Factors,
 }
 
 impl<'s, 'a> Track<'s, 'a> {
@@ -127,6 +144,7 @@ impl<'s, 'a> Track<'s, 'a> {
             contact_changed: true,
             met: HashMap::new(),
             states: Vec::new(),
+            factors: Factors::default(),
         }
     }
 
@@ -160,7 +178,10 @@ impl<'s, 'a> Track<'s, 'a> {
         let friction: f64 = points
             .map(|(point, traction)| point.weight * traction)
             .sum();
-        let held: f64 = system.tangential_reactions(&measured.state).iter().sum();
+        let held: f64 = system
+            .tangential_reactions(&measured.elastic_force)
+            .iter()
+            .sum();
         let iteration = Iteration {
             k: self.place.rows + self.history.len() as u32 + 1,
             stage: row.stage,

@@ -161,7 +161,7 @@ pub fn other_solution(
 /// ∫p, ∫σ_t and ∫|σ_t| over all contacts.
 fn forces(system: &System<'_>, measured: &Measured) -> [f64; 3] {
     let tractions = system.tractions(&measured.state.v, &measured.bound);
-    let held = system.tangential_reactions(&measured.state);
+    let held = system.tangential_reactions(&measured.elastic_force);
     let points = system.points.iter().zip(&tractions);
     let [tangential, friction] = system.tangential_forces(points, &held);
     let normal = system.normal_force(0..system.nodes.len(), &measured.reactions);

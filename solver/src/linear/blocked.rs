@@ -47,13 +47,24 @@ impl From<Stopped> for NoFactor {
 
 /// A = L Lᵀ in place, in the lower triangle; the upper one is neither read nor written, except within the blocks on
 /// the diagonal.
-pub(super) fn cholesky(mut a: MatMut<'_, f64>, breaks: &mut Breaks<'_>) -> Result<(), NoFactor> {
+pub(super) fn cholesky(a: MatMut<'_, f64>, breaks: &mut Breaks<'_>) -> Result<(), NoFactor> {
+    let n = a.nrows();
+    eliminate(a, n, breaks)
+}
+
+/// The first `count` columns of the same; what they leave of the other rows and columns, the Schur complement, takes
+/// their place.
+pub(super) fn eliminate(
+    mut a: MatMut<'_, f64>,
+    count: usize,
+    breaks: &mut Breaks<'_>,
+) -> Result<(), NoFactor> {
     let n = a.nrows();
     let block = if n <= WHOLE { n } else { BLOCK };
     let request = llt::cholesky_in_place_scratch::<f64>(block, PAR, Default::default());
     let mut memory = MemBuffer::new(request);
-    for start in (0..n).step_by(block.max(1)) {
-        let size = block.min(n - start);
+    for start in (0..count).step_by(block.max(1)) {
+        let size = block.min(count - start);
         let rest = n - start - size;
         let (mut diagonal, _, mut below, mut trailing) = a
             .rb_mut()

@@ -1,7 +1,6 @@
 //! Dense symmetric matrices.
 
-use faer::MatMut;
-use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{MatMut, MatRef};
 
 use super::blocked::{self, NoFactor};
 use super::breaks::{Breaks, Stopped, zeros};
@@ -70,33 +69,39 @@ impl Dense {
 
     /// A v.
     pub fn times(&self, v: &[f64]) -> Vec<f64> {
-        /// Rows at once: a sum waits for its last addition, four do not wait for each other.
-        const ROWS: usize = 4;
-        let n = self.size;
-        let mut product = vec![0.0; n];
-        for (k, sums) in product.chunks_mut(ROWS).enumerate() {
-            match sums {
-                [a, b, c, d] => {
-                    let row = |r: usize| self.column(ROWS * k + r)[..n].iter();
-                    let (mut p, mut q, mut r, mut s) = (-0.0, -0.0, -0.0, -0.0);
-                    let rows = row(0).zip(row(1)).zip(row(2).zip(row(3)));
-                    for (((w, x), (y, z)), v) in rows.zip(v) {
-                        p += w * v;
-                        q += x * v;
-                        r += y * v;
-                        s += z * v;
-                    }
-                    (*a, *b, *c, *d) = (p, q, r, s);
+        let mut product = vec![0.0; self.size];
+        pulp::Arch::new().dispatch(|| add_columns(&self.values, v, &mut product));
+        product
+    }
+}
+
+/// Adds Σ v_j a_j of the columns a_j of a matrix, some at once: each pass over the sum is as long as a column. The order of
+/// the additions does not depend on the machine.
+#[inline(always)]
+fn add_columns(columns: &[f64], v: &[f64], sum: &mut [f64]) {
+    /// Columns at once.
+    const TOGETHER: usize = 8;
+    let n = sum.len();
+    for (columns, v) in columns.chunks(TOGETHER * n.max(1)).zip(v.chunks(TOGETHER)) {
+        match <[f64; TOGETHER]>::try_from(v) {
+            Ok(v) => {
+                let column: [&[f64]; TOGETHER] =
+                    std::array::from_fn(|j| &columns[j * n..(j + 1) * n]);
+                for (i, sum) in sum.iter_mut().enumerate() {
+                    let term = |j: usize| column[j][i] * v[j];
+                    let halves = [
+                        (term(0) + term(1)) + (term(2) + term(3)),
+                        (term(4) + term(5)) + (term(6) + term(7)),
+                    ];
+                    *sum += halves[0] + halves[1];
                 }
-                rest => {
-                    for (r, sum) in rest.iter_mut().enumerate() {
-                        let row = self.column(ROWS * k + r).iter();
-                        *sum = row.zip(v).map(|(a, b)| a * b).sum();
-                    }
+            }
+            Err(_) => {
+                for (column, v) in columns.chunks(n).zip(v) {
+                    sum.iter_mut().zip(column).for_each(|(s, a)| *s += a * v);
                 }
             }
         }
-        product
     }
 }
 
@@ -120,34 +125,71 @@ impl From<Stopped> for Unsolved {
     }
 }
 
-/// Solves (A + Σ aᵢⱼ eᵢeⱼᵀ) x = b: A positive definite, given by its entries; `additions` lists
-/// (i, j, aᵢⱼ), symmetric.
+impl From<NoFactor> for Unsolved {
+    fn from(error: NoFactor) -> Self {
+        match error {
+            NoFactor::NotPositiveDefinite(_) => Unsolved::Singular,
+            NoFactor::Stopped => Unsolved::Stopped,
+        }
+    }
+}
+
+/// L of A = L Lᵀ, in the lower triangle.
+pub struct Cholesky {
+    size: usize,
+    values: Vec<f64>,
+}
+
+impl Cholesky {
+    /// Factors A + Σ aᵢⱼ eᵢeⱼᵀ: A positive definite, given by its entries; `additions` lists (i, j, aᵢⱼ), symmetric.
+    /// `room`: the memory of a factor that is no longer needed, since the first touch of memory takes as long as the
+    /// factor of a small matrix.
+    pub fn new(
+        size: usize,
+        entry: impl Fn(usize, usize) -> f64,
+        additions: &[(usize, usize, f64)],
+        room: Option<Cholesky>,
+        breaks: &mut Breaks<'_>,
+    ) -> Result<Self, Unsolved> {
+        let bytes = Dense::bytes(size);
+        let count = size.saturating_mul(size);
+        let mut values = match room {
+            Some(Cholesky { mut values, .. }) if values.capacity() >= count => {
+                values.resize(count, 0.0);
+                values
+            }
+            _ => zeros(count, breaks)?.ok_or(Unsolved::TooLarge { bytes })?,
+        };
+        // the factorisation reads the lower triangle only
+        for (j, column) in values.chunks_exact_mut(size.max(1)).enumerate() {
+            (j..size).for_each(|i| column[i] = entry(i, j));
+            breaks.after((size - j) as f64)?;
+        }
+        let mut a = MatMut::from_column_major_slice_mut(&mut values, size, size);
+        for &(i, j, value) in additions.iter().filter(|(i, j, _)| i >= j) {
+            a[(i, j)] += value;
+        }
+        blocked::cholesky(a, breaks)?;
+        Ok(Cholesky { size, values })
+    }
+
+    /// x of A x = b, in the place of b.
+    pub fn solve(&self, b: &mut [f64]) {
+        let l = MatRef::from_column_major_slice(&self.values, self.size, self.size);
+        let b = MatMut::from_column_major_slice_mut(b, self.size, 1);
+        blocked::solve_cholesky(l, b);
+    }
+}
+
+/// Solves A x = b: A positive definite, given by its entries.
 pub fn solve_positive_definite(
     size: usize,
     entry: impl Fn(usize, usize) -> f64,
-    additions: &[(usize, usize, f64)],
     b: &[f64],
     breaks: &mut Breaks<'_>,
 ) -> Result<Vec<f64>, Unsolved> {
-    let bytes = Dense::bytes(size);
-    let values = zeros(size.saturating_mul(size), breaks)?;
-    let mut values = values.ok_or(Unsolved::TooLarge { bytes })?;
-    // the factorisation reads the lower triangle only
-    for (j, column) in values.chunks_exact_mut(size.max(1)).enumerate() {
-        (j..size).for_each(|i| column[i] = entry(i, j));
-        breaks.after((size - j) as f64)?;
-    }
-    let mut a = MatMut::from_column_major_slice_mut(&mut values, size, size);
-    for &(i, j, value) in additions.iter().filter(|(i, j, _)| i >= j) {
-        a[(i, j)] += value;
-    }
-    blocked::cholesky(a.rb_mut(), breaks).map_err(|error| match error {
-        NoFactor::NotPositiveDefinite(_) => Unsolved::Singular,
-        NoFactor::Stopped => Unsolved::Stopped,
-    })?;
     let mut x = b.to_vec();
-    let into = MatMut::from_column_major_slice_mut(&mut x, size, 1);
-    blocked::solve_cholesky(a.rb(), into);
+    Cholesky::new(size, entry, &[], None, breaks)?.solve(&mut x);
     Ok(x)
 }
 
@@ -297,7 +339,7 @@ mod tests {
             };
             let row = |i: usize| (0..n).map(|j| entry(i, j) * exact[j]).sum();
             let b: Vec<f64> = (0..n).map(row).collect();
-            let x = go_on(|breaks| solve_positive_definite(n, entry, &[], &b, breaks)).unwrap();
+            let x = go_on(|breaks| solve_positive_definite(n, entry, &b, breaks)).unwrap();
             let off = x.iter().zip(&exact).map(|(a, b)| (a - b).abs());
             assert!(off.fold(0.0, f64::max) < 1e-13, "{n}");
         }
@@ -311,7 +353,7 @@ mod tests {
             (false, _) => 0.0,
         };
         let b = vec![1.0; 700];
-        let refused = go_on(|breaks| solve_positive_definite(700, entry, &[], &b, breaks));
+        let refused = go_on(|breaks| solve_positive_definite(700, entry, &b, breaks));
         assert_eq!(refused, Err(Unsolved::Singular));
     }
 
@@ -326,7 +368,7 @@ mod tests {
             ControlFlow::Break(())
         };
         let entry = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
-        let solved = solve_positive_definite(n, entry, &[], &b, &mut Breaks::new(&mut stop));
+        let solved = solve_positive_definite(n, entry, &b, &mut Breaks::new(&mut stop));
         assert_eq!(solved, Err(Unsolved::Stopped));
         let solved = general(n, entry).solve(&b, &mut Breaks::new(&mut stop));
         assert_eq!(solved, Err(Unsolved::Stopped));
@@ -361,7 +403,11 @@ mod tests {
         let a: fn(usize, usize) -> f64 = |i, j| [[3.0, 1.5], [1.5, 3.0]][i][j];
         let additions = [(0, 0, 1.0), (0, 1, -0.5), (1, 0, -0.5)];
         let solve = |a: fn(usize, usize) -> f64, additions: &[_]| {
-            go_on(|breaks| solve_positive_definite(2, a, additions, &[6.0, 7.0], breaks))
+            go_on(|breaks| {
+                let mut x = vec![6.0, 7.0];
+                Cholesky::new(2, a, additions, None, breaks)?.solve(&mut x);
+                Ok(x)
+            })
         };
         let x = solve(a, &additions).unwrap();
         assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] - 2.0).abs() < 1e-15);

@@ -8,6 +8,6 @@ mod front;
 mod multifrontal;
 
 pub use breaks::{Breaks, Stopped};
-pub use dense::{Dense, General, Unsolved, least_squares, solve_positive_definite};
+pub use dense::{Cholesky, Dense, General, Unsolved, least_squares, solve_positive_definite};
 pub use dissection::{Cells, Dissection};
 pub use multifrontal::{ElementMatrix, Factor, FactorError, Fronts};

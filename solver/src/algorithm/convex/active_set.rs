@@ -1,6 +1,6 @@
 //! Primal–dual active set with semi-smooth Newton steps.
 
-use super::step::{AIM, Minimum, close, free_dofs, gradient, newton_direction};
+use super::step::{AIM, Factors, Minimum, close, free_dofs, gradient};
 use crate::algorithm::rounding::{PATIENCE, is_rounding};
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
@@ -15,23 +15,25 @@ pub(super) fn run(
     bound: &[f64],
     start: &State,
     tolerance: f64,
+    factors: &mut Factors,
     observe: &mut Observer<'_>,
 ) -> Minimum {
     let mut state = start.clone();
+    close(system, &mut state);
+    let mut elastic_force = system.elastic_force(&state.v);
+    let mut residual_before = system.kkt_residual(&state, &elastic_force, bound);
     let mut best: Option<Minimum> = None;
     let mut without_gain = 0;
     for step in 1..=ACTIVE_SET_STEPS {
-        close(system, &mut state);
-        let free: Vec<usize> = free_dofs(system, |i| state.active[i]);
-        let force = gradient(system, &state.v, bound);
-        let Some(delta) = newton_direction(system, bound, &state.v, &force, &free, observe) else {
+        if close(system, &mut state) {
+            elastic_force = system.elastic_force(&state.v);
+        }
+        let newton = (system, bound, &mut *factors);
+        let Some(next) = step_from(newton, &state, &elastic_force, residual_before, observe) else {
             break;
         };
-        free.iter()
-            .zip(&delta)
-            .for_each(|(&dof, d)| state.v[dof] += d);
-        let changed = update_active(system, &mut state);
-        let residual = system.kkt_residual(&state, bound);
+        let (changed, residual) = (next.changed, next.residual);
+        (state, elastic_force, residual_before) = (next.state, next.elastic_force, residual);
         // with settled sets a step is exact up to rounding: no further gain is possible
         let gained = best.as_ref().is_none_or(|b| residual <= 0.5 * b.residual);
         let settled = !changed && !gained;
@@ -39,6 +41,7 @@ pub(super) fn run(
         if best.as_ref().is_none_or(|b| residual < b.residual) {
             best = Some(Minimum {
                 state: state.clone(),
+                elastic_force: elastic_force.clone(),
                 steps: step,
                 residual,
                 rounded: false,
@@ -48,10 +51,13 @@ pub(super) fn run(
         let arrived = !changed && residual <= AIM * tolerance || settled && reached <= tolerance;
         if let Some(best) = &mut best
             && without_gain >= PATIENCE
-            && is_rounding(system, (&best.state, bound), best.residual, tolerance)
         {
-            best.rounded = true;
-            break;
+            let reactions = system.reactions_of(&best.state, &best.elastic_force);
+            let known = (&best.state, &reactions[..], bound);
+            if is_rounding(system, known, best.residual, tolerance) {
+                best.rounded = true;
+                break;
+            }
         }
         if arrived || observe(Progress::Pulse).is_break() {
             break;
@@ -60,16 +66,64 @@ pub(super) fn run(
     let steps = best.as_ref().map_or(0, |b| b.steps);
     best.unwrap_or(Minimum {
         state,
+        elastic_force,
         steps,
         residual: f64::INFINITY,
         rounded: false,
     })
 }
 
-/// Keeps nodes that are pressed, adds nodes that have passed the obstacle; true on any change.
-pub(in crate::algorithm) fn update_active(system: &System<'_>, state: &mut State) -> bool {
-    // friction acts along t only: it does not enter the reactions
-    let force = system.elastic_force(&state.v);
+/// A state after a step.
+struct Next {
+    state: State,
+    elastic_force: Vec<f64>,
+    /// The contact set differs from the one before.
+    changed: bool,
+    residual: f64,
+}
+
+/// A step with the last factor if that serves, else with a new one: what the older one has led to is not kept then.
+fn step_from(
+    (system, bound, factors): (&System<'_>, &[f64], &mut Factors),
+    state: &State,
+    elastic_force: &[f64],
+    residual_before: f64,
+    observe: &mut Observer<'_>,
+) -> Option<Next> {
+    /// The part of the residual that a step with an older factor may leave: one with a new factor costs as much as
+    /// several.
+    const SERVES: f64 = 0.1;
+    let free: Vec<usize> = free_dofs(system, |i| state.active[i]);
+    let force = gradient(system, &state.v, elastic_force, bound);
+    loop {
+        let renewed = factors.prepare(system, bound, &state.v, &free, observe)?;
+        let delta = factors.direction(&free, &force)?;
+        let mut next = state.clone();
+        free.iter()
+            .zip(&delta)
+            .for_each(|(&dof, d)| next.v[dof] += d);
+        let elastic_force = system.elastic_force(&next.v);
+        let changed = update_active(system, &elastic_force, &mut next);
+        let residual = system.kkt_residual(&next, &elastic_force, bound);
+        if renewed || residual <= SERVES * residual_before {
+            return Some(Next {
+                state: next,
+                elastic_force,
+                changed,
+                residual,
+            });
+        }
+        factors.renew();
+    }
+}
+
+/// Keeps nodes that are pressed, adds nodes that have passed the obstacle; true on any change. `force`: Ŝ v − f̂;
+/// friction acts along t only, and does not enter the reactions.
+pub(in crate::algorithm) fn update_active(
+    system: &System<'_>,
+    force: &[f64],
+    state: &mut State,
+) -> bool {
     let mut changed = false;
     for (i, node) in system.nodes.iter().enumerate() {
         let Dof::Free(dof) = node.normal else {

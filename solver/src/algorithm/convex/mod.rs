@@ -13,7 +13,7 @@ mod step;
 pub(super) use active_set::update_active;
 pub(super) use projected_newton::least_along;
 pub use step::Minimum;
-pub(super) use step::{close, dense, free_dofs, semidefinite_shift};
+pub(super) use step::{Factors, close, dense, free_dofs, semidefinite_shift};
 
 use crate::algorithm::system::{State, System};
 use crate::solution::{Observer, Progress};
@@ -27,19 +27,45 @@ pub fn minimise(
     tolerance: f64,
     observe: &mut Observer<'_>,
 ) -> Minimum {
-    let mut by_active_set = active_set::run(system, bound, start, tolerance, observe);
+    minimise_with(
+        system,
+        bound,
+        start,
+        tolerance,
+        &mut Factors::default(),
+        observe,
+    )
+}
+
+/// The same with the factors of another such problem on this system, for what they serve.
+pub(super) fn minimise_with(
+    system: &System<'_>,
+    bound: &[f64],
+    start: &State,
+    tolerance: f64,
+    factors: &mut Factors,
+    observe: &mut Observer<'_>,
+) -> Minimum {
+    let mut by_active_set = active_set::run(system, bound, start, tolerance, factors, observe);
     if by_active_set.residual <= tolerance || by_active_set.rounded {
         return by_active_set;
     }
     if observe(Progress::Pulse).is_break() {
         if by_active_set.steps == 0 {
             // stopped within the first step: its residual is infinite, which would be taken for an overflow
-            by_active_set.residual = system.kkt_residual(&by_active_set.state, bound);
+            let (state, force) = (&by_active_set.state, &by_active_set.elastic_force);
+            by_active_set.residual = system.kkt_residual(state, force, bound);
         }
         return by_active_set;
     }
-    let mut fallback =
-        projected_newton::run(system, bound, &by_active_set.state, tolerance, observe);
+    let mut fallback = projected_newton::run(
+        system,
+        bound,
+        &by_active_set.state,
+        tolerance,
+        factors,
+        observe,
+    );
     fallback.steps += by_active_set.steps;
     if fallback.residual <= by_active_set.residual {
         fallback

@@ -1,6 +1,6 @@
 //! Projected Newton (Bertsekas 1982) with a line search: slower, but J decreases at every step.
 
-use super::step::{AIM, Minimum, close, free_dofs, gradient, newton_direction};
+use super::step::{AIM, Factors, Minimum, close, free_dofs, gradient};
 use crate::algorithm::rounding::{PATIENCE, is_rounding};
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::elasticity::Dof;
@@ -17,10 +17,12 @@ pub(super) fn run(
     bound: &[f64],
     start: &State,
     tolerance: f64,
+    factors: &mut Factors,
     observe: &mut Observer<'_>,
 ) -> Minimum {
     let mut best = Minimum {
         state: start.clone(),
+        elastic_force: system.elastic_force(&start.v),
         steps: 0,
         residual: f64::INFINITY,
         rounded: false,
@@ -30,15 +32,17 @@ pub(super) fn run(
     let (mut v, mut steps) = (begin.v, 0);
     project(system, &mut v);
     while steps < PROJECTED_STEPS {
-        let mut force = gradient(system, &v, bound);
+        let mut elastic_force = system.elastic_force(&v);
+        let mut force = gradient(system, &v, &elastic_force, bound);
         let state = State {
             active: pressed(system, &v, &force),
             v: v.clone(),
         };
-        let residual = system.kkt_residual(&state, bound);
+        let residual = system.kkt_residual(&state, &elastic_force, bound);
         if residual < best.residual {
             best = Minimum {
                 state,
+                elastic_force: elastic_force.clone(),
                 steps,
                 residual,
                 rounded: false,
@@ -46,8 +50,11 @@ pub(super) fn run(
         }
         let stale = steps - best.steps.min(steps);
         let patient = stale < PATIENCE;
-        best.rounded =
-            !patient && is_rounding(system, (&best.state, bound), best.residual, tolerance);
+        best.rounded = !patient && {
+            let reactions = system.reactions_of(&best.state, &best.elastic_force);
+            let known = (&best.state, &reactions[..], bound);
+            is_rounding(system, known, best.residual, tolerance)
+        };
         let arrived = best.residual <= AIM * tolerance
             || best.residual <= tolerance && !patient
             || best.rounded;
@@ -63,9 +70,13 @@ pub(super) fn run(
                 v[dof] = node.gap;
             }
         }
-        force = gradient(system, &v, bound);
+        elastic_force = system.elastic_force(&v);
+        force = gradient(system, &v, &elastic_force, bound);
         let free = free_dofs(system, |i| held[i]);
-        let Some(direction) = newton_direction(system, bound, &v, &force, &free, observe) else {
+        // J decreases along the direction of a new factor
+        factors.renew();
+        let prepared = factors.prepare(system, bound, &v, &free, observe);
+        let Some(direction) = prepared.and_then(|_| factors.direction(&free, &force)) else {
             break;
         };
         let mut d = vec![0.0; v.len()];
@@ -173,7 +184,7 @@ pub(in crate::algorithm) fn least_along(
     v: &[f64],
     d: &[f64],
 ) -> f64 {
-    let force = gradient(system, v, bound);
+    let force = gradient(system, v, &system.elastic_force(v), bound);
     let slope: f64 = force.iter().zip(d).map(|(g, d)| g * d).sum();
     if slope < 0.0 {
         Along::new(system, bound, v, d, slope).minimum(1.0)

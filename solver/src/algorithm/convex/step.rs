@@ -2,7 +2,7 @@
 
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
-use crate::linear::{Breaks, Dense, Unsolved, solve_positive_definite};
+use crate::linear::{Breaks, Cholesky, Dense, Unsolved};
 use crate::solution::{Observer, Progress};
 
 /// The best approximation of the minimiser.
@@ -11,6 +11,8 @@ pub struct Minimum {
     pub state: State,
     /// Newton steps taken.
     pub steps: u32,
+    /// Ŝ v − f̂ of it.
+    pub elastic_force: Vec<f64>,
     /// Its KKT residual.
     pub residual: f64,
     /// What is left of it above the tolerance is rounding.
@@ -21,21 +23,33 @@ pub struct Minimum {
 /// Where rounding prevents that, the tolerance itself is enough.
 pub(super) const AIM: f64 = 0.1;
 
-/// Puts the nodes in contact onto the obstacle, and those held along t to their prescribed displacement.
-pub(in crate::algorithm) fn close(system: &System<'_>, state: &mut State) {
+/// Puts the nodes in contact onto the obstacle, and those held along t to their prescribed displacement; true if any of
+/// them moves.
+pub(in crate::algorithm) fn close(system: &System<'_>, state: &mut State) -> bool {
+    let mut moved = false;
+    let mut put = |v: &mut f64, to: f64| {
+        moved |= *v != to;
+        *v = to;
+    };
     for (node, active) in system.nodes.iter().zip(&state.active) {
         if let (true, Dof::Free(dof)) = (active, node.normal) {
-            state.v[dof] = node.gap;
+            put(&mut state.v[dof], node.gap);
         }
         if let (Dof::Free(dof), Some(held)) = (node.tangent, node.held_tangent) {
-            state.v[dof] = held;
+            put(&mut state.v[dof], held);
         }
     }
+    moved
 }
 
-/// ∇J.
-pub(super) fn gradient(system: &System<'_>, v: &[f64], bound: &[f64]) -> Vec<f64> {
-    let mut force = system.elastic_force(v);
+/// ∇J from Ŝ v − f̂.
+pub(super) fn gradient(
+    system: &System<'_>,
+    v: &[f64],
+    elastic_force: &[f64],
+    bound: &[f64],
+) -> Vec<f64> {
+    let mut force = elastic_force.to_vec();
     system.add_traction_force(&system.tractions(v, bound), &mut force);
     force
 }
@@ -68,13 +82,13 @@ pub(in crate::algorithm) fn semidefinite_shift(system: &System<'_>) -> f64 {
     1e-9 * diagonal / size as f64
 }
 
-/// The solution of a dense system of this size, for whose matrix the observer is asked first. None if there is none,
-/// or the observer stops.
-pub(in crate::algorithm) fn dense(
+/// Dense work on a matrix of this size, for which the observer is asked first. None if it has no solution, or the
+/// observer stops.
+pub(in crate::algorithm) fn dense<T>(
     size: usize,
     observe: &mut Observer<'_>,
-    solve: impl FnOnce(&mut Breaks<'_>) -> Result<Vec<f64>, Unsolved>,
-) -> Option<Vec<f64>> {
+    solve: impl FnOnce(&mut Breaks<'_>) -> Result<T, Unsolved>,
+) -> Option<T> {
     let bytes = Dense::bytes(size);
     if observe(Progress::Needs { bytes }).is_break() {
         return None;
@@ -90,15 +104,59 @@ pub(in crate::algorithm) fn dense(
     }
 }
 
-/// −H⁻¹ ∇J on the free unknowns, H = Ŝ + Σ w τ φ′ h hᵀ. None if H has no factor, or the observer stops.
-pub(super) fn newton_direction(
+/// The last factor of H = Ŝ + Σ w τ φ′ h hᵀ on some unknowns. It serves again as long as steps with it are nearly as
+/// good as with a new one: from sweep to sweep friction bounds change little.
+#[derive(Default)]
+pub(in crate::algorithm) struct Factors {
+    last: Option<(Vec<usize>, Cholesky)>,
+    old: bool,
+}
+
+impl Factors {
+    /// Has a factor on the free unknowns: true if it is a new one, for this state. None if H has no factor, or the observer
+    /// stops.
+    pub(super) fn prepare(
+        &mut self,
+        system: &System<'_>,
+        bound: &[f64],
+        v: &[f64],
+        free: &[usize],
+        observe: &mut Observer<'_>,
+    ) -> Option<bool> {
+        let serves = |(unknowns, _): &(Vec<usize>, Cholesky)| unknowns == free && !self.old;
+        if self.last.as_ref().is_some_and(serves) {
+            return Some(false);
+        }
+        let room = self.last.take().map(|(_, factor)| factor);
+        let factor = factor(system, bound, v, free, room, observe)?;
+        self.last = Some((free.to_vec(), factor));
+        self.old = false;
+        Some(true)
+    }
+
+    /// −H⁻¹ ∇J on the unknowns that it was prepared for.
+    pub(super) fn direction(&self, free: &[usize], force: &[f64]) -> Option<Vec<f64>> {
+        let (_, factor) = self.last.as_ref()?;
+        let mut direction: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
+        factor.solve(&mut direction);
+        direction.iter().all(|d| d.is_finite()).then_some(direction)
+    }
+
+    /// Gives the last factor up.
+    pub(super) fn renew(&mut self) {
+        self.old = true;
+    }
+}
+
+/// The factor of H on the free unknowns.
+fn factor(
     system: &System<'_>,
     bound: &[f64],
     v: &[f64],
-    force: &[f64],
     free: &[usize],
+    room: Option<Cholesky>,
     observe: &mut Observer<'_>,
-) -> Option<Vec<f64>> {
+) -> Option<Cholesky> {
     let mut place = vec![usize::MAX; system.load.len()];
     free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
     // friction couples the nodes of one edge only: a few additions to a dense matrix
@@ -127,9 +185,7 @@ pub(super) fn newton_direction(
         let shift = if i == j { shift } else { 0.0 };
         system.stiffness.at(free[i], free[j]) + shift
     };
-    let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
-    let direction = dense(free.len(), observe, |breaks| {
-        solve_positive_definite(free.len(), elastic, &friction, &rhs, breaks)
-    })?;
-    direction.iter().all(|d| d.is_finite()).then_some(direction)
+    dense(free.len(), observe, |breaks| {
+        Cholesky::new(free.len(), elastic, &friction, room, breaks)
+    })
 }

@@ -153,7 +153,7 @@ fn solve(
     let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
     let entry = |i: usize, j: usize| system.stiffness.at(free[i], free[j]);
     let solved = dense(free.len(), observe, |breaks| {
-        solve_positive_definite(free.len(), entry, &[], &rhs, breaks)
+        solve_positive_definite(free.len(), entry, &rhs, breaks)
     })?;
     free.iter()
         .zip(solved)
