@@ -4,7 +4,9 @@
 use std::borrow::Cow;
 
 use crate::accuracy;
-use crate::algorithm::{self, Finished, Place, Reported, Rounding, System, report};
+use crate::algorithm::{
+    self, Finished, Place, Region, Reported, Rounding, System, report, run_near,
+};
 use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::model::{Level, Model};
@@ -185,6 +187,8 @@ fn can_continue(outcome: Outcome) -> bool {
 struct LoadHistory<'a> {
     model: &'a Model,
     system: System<'a>,
+    /// The part of the contacts that may touch.
+    region: Region,
     /// The end of the last increment.
     last: Option<Finished>,
     /// Its level.
@@ -204,6 +208,7 @@ impl<'a> LoadHistory<'a> {
         LoadHistory {
             model,
             system,
+            region: Region::default(),
             last: None,
             level: Level::ZERO,
             anchors_moved: true,
@@ -323,7 +328,15 @@ impl<'a> LoadHistory<'a> {
             rows: self.row_count,
         };
         let controls = &self.model.controls;
-        let finished = algorithm::run(&self.system, controls, place, self.last.as_ref(), observe);
+        let last = self.last.as_ref();
+        let finished = run_near(
+            &self.system,
+            controls,
+            place,
+            last,
+            &mut self.region,
+            observe,
+        );
         self.row_count += finished.history.len() as u32;
         self.rows.extend(finished.history.iter().cloned());
         let residual = |rounding: &Option<Rounding>| rounding.map_or(0.0, |r| r.residual);

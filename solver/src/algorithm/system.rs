@@ -95,7 +95,7 @@ pub struct Oblique {
     /// The displacement along the other direction.
     pub other: Dof,
     /// u_t by u_n and the other.
-    part: [f64; 2],
+    pub(super) part: [f64; 2],
     /// A line of symmetry passes through it.
     pub symmetric: bool,
     /// Another contact begins where this one ends.

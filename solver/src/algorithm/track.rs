@@ -85,8 +85,7 @@ impl Measured {
 
     /// Every residual at or below the tolerance.
     pub(super) fn within(&self, tolerance: f64) -> bool {
-        let r = &self.residuals;
-        r.kkt <= tolerance && r.friction <= tolerance && r.monolithic <= tolerance
+        self.residuals.within(tolerance)
     }
 }
 

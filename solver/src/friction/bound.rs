@@ -1,5 +1,7 @@
 //! The friction bound τ: from the averaged pressure, or prescribed.
 
+use std::sync::Arc;
+
 use crate::friction::{Average, Averaging, Chain, Row};
 use crate::problem::PrescribedBound;
 
@@ -31,7 +33,7 @@ pub enum BoundLaw<A = Averaging> {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     /// The pressures of these nodes.
-    Average(Row),
+    Average(Arc<Row>),
     /// A prescribed bound (stress).
     Given(f64),
 }
@@ -48,7 +50,7 @@ impl Source {
     /// The same with nodes numbered from `first` on.
     pub fn shifted(mut self, first: usize) -> Self {
         if let Source::Average(row) = &mut self {
-            row.first += first;
+            Arc::make_mut(row).first += first;
         }
         self
     }
@@ -123,7 +125,7 @@ impl BoundLaw {
     /// The source of the bound at arc length s.
     pub fn source(&self, s: f64) -> Source {
         match self {
-            BoundLaw::Pressure { average, .. } => Source::Average(average.row(s)),
+            BoundLaw::Pressure { average, .. } => Source::Average(Arc::new(average.row(s))),
             BoundLaw::Prescribed(PrescribedBound::Constant(bound)) => Source::Given(*bound),
             BoundLaw::Prescribed(PrescribedBound::Table(table)) => {
                 Source::Given(interpolate(&table.s, &table.bound, s))

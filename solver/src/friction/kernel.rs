@@ -6,7 +6,7 @@
 //! its own centre, whatever the number of edges under it (without the thesis's limit of
 //! two, 3.4.2).
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use crate::element::{edge3, gauss};
 use crate::problem::{Kernel, Measure, Normalization};
@@ -67,7 +67,7 @@ pub struct Average {
 /// The averaging operator of one chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Averaging {
-    chain: Chain,
+    chain: Arc<Chain>,
     radius: f64,
     kernel: Kernel,
     measure: Measure,
@@ -115,7 +115,7 @@ impl Averaging {
             (_, Kernel::Parabola, Measure::Surface) => 2.0 / (std::f64::consts::PI * disc),
         };
         Averaging {
-            chain,
+            chain: Arc::new(chain),
             radius,
             kernel: average.kernel,
             measure: average.measure,

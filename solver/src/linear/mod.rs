@@ -4,10 +4,12 @@ mod blocked;
 mod breaks;
 mod dense;
 mod dissection;
+mod eliminated;
 mod front;
 mod multifrontal;
 
 pub use breaks::{Breaks, Stopped};
 pub use dense::{Cholesky, Dense, General, Unsolved, least_squares, solve_positive_definite};
 pub use dissection::{Cells, Dissection};
+pub use eliminated::Eliminated;
 pub use multifrontal::{ElementMatrix, Factor, FactorError, Fronts};

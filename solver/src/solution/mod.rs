@@ -243,6 +243,13 @@ pub struct Residuals {
     pub equilibrium: f64,
 }
 
+impl Residuals {
+    /// Those of the iterations are at or below the tolerance.
+    pub fn within(&self, tolerance: f64) -> bool {
+        self.kkt <= tolerance && self.friction <= tolerance && self.monolithic <= tolerance
+    }
+}
+
 /// A point to consider before relying on a result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {

@@ -1,0 +1,380 @@
+//! The iterations on the nodes that may touch.
+//!
+//! Most of a contact boundary is often far from the obstacle: where no node touches and no friction acts, the unknowns follow the
+//! others by a linear system. They are eliminated once, by a part of a Cholesky factorisation of Ŝ; every method then
+//! works on what is left as it would on the whole, and its matrices are as large as the part of the boundary that may
+//! touch. What is found is checked on the whole: where another node would pass the obstacle, or another point rub, that part is
+//! made larger, and the iterations go on.
+
+use crate::algorithm::convex::dense;
+use crate::algorithm::finished::Finished;
+use crate::algorithm::rounding;
+use crate::algorithm::system::{ContactNode, Oblique, State, System};
+use crate::algorithm::track::{Measured, Place};
+use crate::elasticity::Dof;
+use crate::friction::{BoundLaw, FrictionLaw, Source};
+use crate::linear::{Dense, Eliminated};
+use crate::problem::{Algorithm, Condition, SolverControls};
+use crate::solution::{Iteration, Observer, Outcome};
+
+/// Below this number of unknowns the whole system costs next to nothing.
+const LEAST: usize = 64;
+
+/// Elimination is worth its cost if it leaves at most this part of the unknowns.
+const WORTH: f64 = 0.7;
+
+/// Parts of the boundary that may touch are widened on each side by this part of their length, and by a few nodes.
+const MARGIN: f64 = 0.1;
+const MARGIN_NODES: usize = 4;
+
+/// Parts that turned out too small are widened by this part of their length.
+const GROWTH: f64 = 0.5;
+
+/// The part of the boundary that may touch, from one load level to the next.
+#[derive(Default)]
+pub struct Region {
+    near: Option<Near>,
+    /// By contact node: it may touch.
+    touches: Vec<bool>,
+    /// Elimination is not worth its cost for this system.
+    whole: bool,
+}
+
+/// The unknowns of nodes that may touch, or may be rubbed; the others are eliminated.
+struct Near {
+    /// By contact node: kept.
+    kept: Vec<bool>,
+    /// The eliminated unknowns, then the others.
+    order: Vec<usize>,
+    eliminated: Eliminated,
+    stiffness: Dense,
+}
+
+/// As [`run`](super::run), on the part of the boundary that may touch if that is worth it. `region`: that of the last level,
+/// for the same body and the same contact boundaries.
+pub fn run_near(
+    system: &System<'_>,
+    controls: &SolverControls,
+    place: Place,
+    before: Option<&Finished>,
+    region: &mut Region,
+    observe: &mut Observer<'_>,
+) -> Finished {
+    let mut history: Vec<Iteration> = Vec::new();
+    let mut last = before.cloned();
+    loop {
+        let place = Place {
+            rows: place.rows + history.len() as u32,
+            ..place
+        };
+        region.prepare(system, controls, last.as_ref(), observe);
+        let mut finished = match &region.near {
+            None => super::run(system, controls, place, last.as_ref(), observe),
+            Some(near) => near.run(system, controls, place, last.as_ref(), observe),
+        };
+        history.append(&mut finished.history);
+        let outside = match &region.near {
+            Some(near) if finished.outcome != Outcome::Canceled => near.outside(system, &finished),
+            _ => Vec::new(),
+        };
+        let unsettled = finished.outcome == Outcome::Converged
+            && finished.rounding.is_none()
+            && !finished.residuals.within(controls.tolerance);
+        if region.near.is_none() || outside.is_empty() && !unsettled {
+            return Finished {
+                history,
+                ..finished
+            };
+        }
+        match outside.is_empty() {
+            true => *region = Region::whole(),
+            false => region.grow(&outside),
+        }
+        if finished.outcome == Outcome::Converged {
+            last = Some(finished);
+        }
+    }
+}
+
+impl Region {
+    /// The whole of the boundary.
+    fn whole() -> Self {
+        Region {
+            near: None,
+            touches: Vec::new(),
+            whole: true,
+        }
+    }
+
+    /// Eliminates what may not touch, unless that is done or not worth it.
+    fn prepare(
+        &mut self,
+        system: &System<'_>,
+        controls: &SolverControls,
+        last: Option<&Finished>,
+        observe: &mut Observer<'_>,
+    ) {
+        // the thesis's own iteration is kept as printed, and a body that only contact holds has no factor of its own
+        let whole = controls.algorithm == Algorithm::Thesis || system.semidefinite;
+        if self.near.is_some() || self.whole || whole || system.load.len() < LEAST {
+            return;
+        }
+        if self.touches.is_empty() {
+            self.touches = may_touch(system, last);
+        }
+        if !self.touches.contains(&true) {
+            // contact that loads bring about is known after the first level
+            self.touches.clear();
+            return;
+        }
+        let kept = rubbed(system, &self.touches);
+        match Near::new(system, kept, observe) {
+            Some(near) => self.near = Some(near),
+            None => *self = Region::whole(),
+        }
+    }
+
+    /// Takes more of the boundary, to be eliminated anew.
+    fn grow(&mut self, outside: &[usize]) {
+        for &node in outside {
+            self.touches[node] = true;
+        }
+        if let Some(near) = self.near.take() {
+            for (touches, kept) in self.touches.iter_mut().zip(near.kept) {
+                *touches |= kept;
+            }
+        }
+        self.touches = widened(&self.touches, GROWTH);
+    }
+}
+
+/// By contact node, whether it may touch: where the obstacle overlaps the body before it deforms, and where nodes
+/// touched at the last level, with a margin. All nodes of a contact without an obstacle, or with a friction bound that does not
+/// follow from its pressure.
+fn may_touch(system: &System<'_>, last: Option<&Finished>) -> Vec<bool> {
+    let steps = system.model.steps.iter().map(|step| step.indentation);
+    let deepest = steps.fold(system.level.indentation, f64::max);
+    let mut touches = Vec::with_capacity(system.nodes.len());
+    for patch in &system.patches {
+        let by_pressure = |law: &FrictionLaw| matches!(law.bound, BoundLaw::Pressure { .. });
+        let known = patch.contact.condition == Condition::Unilateral
+            && patch.law.as_ref().is_none_or(by_pressure);
+        let of_patch: Vec<bool> = system
+            .range(patch)
+            .enumerate()
+            .map(|(i, node)| {
+                !known
+                    || patch.contact.gap(i, deepest) < 0.0
+                    || last.is_some_and(|last| last.state.active[node])
+            })
+            .collect();
+        touches.extend(widened(&of_patch, MARGIN));
+    }
+    touches
+}
+
+/// Runs of nodes, widened on both sides by a part of their length and some nodes.
+fn widened(nodes: &[bool], part: f64) -> Vec<bool> {
+    let mut wide = nodes.to_vec();
+    let mut end = 0;
+    for run in nodes.chunk_by(|a, b| a == b) {
+        let start = end;
+        end += run.len();
+        if run[0] {
+            let margin = MARGIN_NODES + (part * run.len() as f64) as usize;
+            let last = nodes.len().min(end + margin);
+            wide[start.saturating_sub(margin)..last].fill(true);
+        }
+    }
+    wide
+}
+
+/// The nodes that may touch, those that friction may act on then, and those whose unknowns belong to one of them.
+fn rubbed(system: &System<'_>, touches: &[bool]) -> Vec<bool> {
+    let mut kept = touches.to_vec();
+    for point in &system.points {
+        let rubs = match &point.source {
+            Source::Given(_) => true,
+            Source::Average(row) => {
+                let under = touches[row.first..].iter().zip(&row.weights);
+                under.into_iter().any(|(touches, w)| *touches && *w != 0.0)
+            }
+        };
+        if rubs {
+            point.nodes.iter().for_each(|&node| kept[node] = true);
+        }
+    }
+    for (i, node) in system.nodes.iter().enumerate() {
+        if let Some(end) = node.beside_axis {
+            let any = kept[i] || kept[end];
+            (kept[i], kept[end]) = (any, any);
+        }
+    }
+    kept
+}
+
+impl Near {
+    /// Eliminates the unknowns of other nodes than `kept`. None if that is not worth it, or the observer stops.
+    fn new(system: &System<'_>, kept: Vec<bool>, observe: &mut Observer<'_>) -> Option<Self> {
+        let size = system.load.len();
+        let mut keeps = vec![false; size];
+        for (node, _) in system.nodes.iter().zip(&kept).filter(|(_, kept)| **kept) {
+            for dof in unknowns(node) {
+                keeps[dof] = true;
+            }
+        }
+        let (mut order, rest): (Vec<usize>, Vec<usize>) = (0..size).partition(|&i| !keeps[i]);
+        if rest.len() as f64 > WORTH * size as f64 {
+            return None;
+        }
+        let count = order.len();
+        order.extend(rest);
+        let entry = |i: usize, j: usize| system.stiffness.at(order[i], order[j]);
+        let (eliminated, stiffness) = dense(size, observe, |breaks| {
+            Eliminated::new(size, count, entry, breaks)
+        })?;
+        // a node of two contacts is kept with either of them
+        let has_all = |node| unknowns(node).all(|dof| keeps[dof]);
+        Some(Near {
+            kept: system.nodes.iter().map(has_all).collect(),
+            order,
+            eliminated,
+            stiffness,
+        })
+    }
+
+    /// Number of eliminated unknowns.
+    fn count(&self) -> usize {
+        self.order.len() - self.stiffness.size()
+    }
+
+    /// f̂ in this order, reduced.
+    fn load(&self, system: &System<'_>) -> Vec<f64> {
+        let mut load: Vec<f64> = self.order.iter().map(|&dof| system.load[dof]).collect();
+        self.eliminated.reduce(&mut load);
+        load
+    }
+
+    /// The iterations on this part; what they find, on the whole.
+    fn run(
+        &self,
+        system: &System<'_>,
+        controls: &SolverControls,
+        place: Place,
+        before: Option<&Finished>,
+        observe: &mut Observer<'_>,
+    ) -> Finished {
+        let load = self.load(system);
+        let count = self.count();
+        let mut number = vec![None; self.order.len()];
+        for (i, &dof) in self.order[count..].iter().enumerate() {
+            number[dof] = Some(i);
+        }
+        // other nodes neither touch nor rub: their displacements do not matter
+        let renumbered = |dof: Dof| match dof {
+            Dof::Free(dof) => number[dof].map_or(Dof::Fixed(0.0), Dof::Free),
+            fixed => fixed,
+        };
+        let node = |(node, kept): (&ContactNode, &bool)| ContactNode {
+            normal: renumbered(node.normal),
+            tangent: renumbered(node.tangent),
+            oblique: node.oblique.map(|oblique| Oblique {
+                other: renumbered(oblique.other),
+                ..oblique
+            }),
+            gap: if *kept { node.gap } else { f64::INFINITY },
+            ..*node
+        };
+        let part = System {
+            stiffness: &self.stiffness,
+            load: load[count..].to_vec(),
+            nodes: system.nodes.iter().zip(&self.kept).map(node).collect(),
+            points: system.points.clone(),
+            patches: system.patches.clone(),
+            ..*system
+        };
+        let start = before.map(|before| Finished {
+            state: State {
+                v: self.order[count..]
+                    .iter()
+                    .map(|&dof| before.state.v[dof])
+                    .collect(),
+                active: before.state.active.clone(),
+            },
+            ..before.clone()
+        });
+        let found = super::run(&part, controls, place, start.as_ref(), observe);
+        let mut x = load;
+        x[count..].copy_from_slice(&found.state.v);
+        self.eliminated.expand(&mut x);
+        let mut v = vec![0.0; x.len()];
+        for (&dof, x) in self.order.iter().zip(x) {
+            v[dof] = x;
+        }
+        let state = State {
+            v,
+            active: found.state.active.clone(),
+        };
+        let measured = Measured::new(system, state, found.bound.clone());
+        let limit = match found.outcome {
+            Outcome::Converged | Outcome::NotConverged => {
+                rounding::limit(system, &measured, controls.tolerance)
+            }
+            _ => None,
+        };
+        let (outcome, rounding) = match limit {
+            Some((rounding, _)) if rounding.negligible() => (Outcome::Converged, Some(rounding)),
+            Some((rounding, _)) => (Outcome::NotConverged, Some(rounding)),
+            None => (found.outcome, None),
+        };
+        Finished {
+            state: measured.state,
+            residuals: measured.residuals,
+            outcome,
+            rounding,
+            ..found
+        }
+    }
+
+    /// Eliminated nodes that would pass the obstacle, or that friction would act on.
+    fn outside(&self, system: &System<'_>, finished: &Finished) -> Vec<usize> {
+        let v = &finished.state.v;
+        let passes = |&node: &usize| !self.kept[node] && system.opening(v, node) < 0.0;
+        let mut outside: Vec<usize> = (0..system.nodes.len()).filter(passes).collect();
+        let points = system.points.iter().zip(&finished.bound);
+        for (point, _) in points.filter(|(_, tau)| **tau > 0.0) {
+            outside.extend(point.nodes.iter().filter(|&&node| !self.kept[node]));
+        }
+        outside
+    }
+}
+
+/// The unknowns of a contact node.
+fn unknowns(node: &ContactNode) -> impl Iterator<Item = usize> + use<> {
+    let other = node.oblique.map(|oblique| oblique.other);
+    [Some(node.normal), Some(node.tangent), other]
+        .into_iter()
+        .flatten()
+        .filter_map(|dof| match dof {
+            Dof::Free(dof) => Some(dof),
+            Dof::Fixed(_) => None,
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_widened_on_both_sides() {
+        let mut nodes = vec![false; 60];
+        nodes[20..30].fill(true);
+        let wide = widened(&nodes, 0.5);
+        let first = wide.iter().position(|w| *w);
+        let count = wide.iter().filter(|w| **w).count();
+        assert_eq!((first, count), (Some(20 - 9), 10 + 2 * 9));
+        nodes[0] = true;
+        assert_eq!(widened(&nodes, 0.0).iter().filter(|w| **w).count(), 5 + 18);
+        assert!(!widened(&[false; 3], 0.5).contains(&true));
+    }
+}
