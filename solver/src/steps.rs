@@ -2,10 +2,11 @@
 //! history for both laws.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use crate::accuracy;
 use crate::algorithm::{
-    self, Finished, Place, Region, Reported, Rounding, System, report, run_near,
+    self, Averages, Finished, Place, Region, Reported, Rounding, System, report, run_near,
 };
 use crate::body::ElasticBody;
 use crate::error::SolveError;
@@ -13,8 +14,8 @@ use crate::model::{Level, Model};
 use crate::origins::Origins;
 use crate::problem::{Algorithm, Spacing, Step};
 use crate::solution::{
-    Comparison, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution, StepSolution,
-    Summary, Warning, WarningCode,
+    Comparison, ContactSummary, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution,
+    StepSolution, Summary, Warning, WarningCode,
 };
 
 /// An increment that does not converge is halved this often before the step ends there.
@@ -107,6 +108,82 @@ pub fn run(
     }
     solution.fields = fields;
     Ok(solution)
+}
+
+/// What problems on one body share, from one to the next.
+#[derive(Default)]
+pub struct Neighbour {
+    averages: Averages,
+    region: Region,
+    /// The end of the last problem without load steps.
+    last: Option<Finished>,
+}
+
+/// The numbers of the end of all steps: what is known without the displacements of the whole body.
+pub struct Numbers {
+    /// The end of the last step.
+    pub finished: Finished,
+    /// By the names of the contacts.
+    pub contacts: BTreeMap<String, ContactSummary>,
+    /// Rows of the history.
+    pub iterations: u32,
+    /// What to consider before relying on the numbers.
+    pub warnings: Vec<Warning>,
+}
+
+/// q of sweeps up to which a solution counts as the only one, so that it does not matter where the sweeps begin.
+const UNIQUE: f64 = 0.7;
+
+/// The same path to its end, for its numbers alone. A problem without steps starts from the end of its neighbour; where that
+/// does not converge well, as [`run`] does.
+pub fn run_to_numbers(
+    model: &Model,
+    body: &ElasticBody,
+    neighbour: &mut Neighbour,
+    observe: &mut Observer<'_>,
+) -> Result<Numbers, SolveError> {
+    let system = System::with_averages(model, body, &mut neighbour.averages, observe)?;
+    let mut load_history = LoadHistory::new(model, system);
+    std::mem::swap(&mut load_history.region, &mut neighbour.region);
+    let near = neighbour.last.take().filter(|last| {
+        let system = &load_history.system;
+        let sizes = [last.state.v.len(), last.bound.len()];
+        model.steps.is_empty() && sizes == [system.load.len(), system.points.len()]
+    });
+    let near = near.and_then(|last| {
+        let (place, controls) = (Place::default(), &model.controls);
+        let (system, region) = (&load_history.system, &mut load_history.region);
+        let finished = run_near(system, controls, place, Some(&last), region, observe);
+        let unique = finished.contraction.is_none_or(|q| q <= UNIQUE);
+        (finished.outcome == Outcome::Converged && finished.rounding.is_none() && unique)
+            .then_some(finished)
+    });
+    let (finished, iterations) = match near {
+        Some(finished) => {
+            let rows = finished.history.len() as u32;
+            (finished, rows)
+        }
+        None => {
+            let Some(finished) = load_history.follow(&steps_of(model), 1, observe) else {
+                unreachable!("there is at least one step: a problem without steps is one step")
+            };
+            (finished, load_history.row_count)
+        }
+    };
+    std::mem::swap(&mut load_history.region, &mut neighbour.region);
+    if finished.outcome == Outcome::Canceled {
+        return Err(SolveError::Stopped);
+    }
+    let (contacts, warnings) = algorithm::numbers(model, &load_history.system, &finished);
+    if finished.outcome == Outcome::Converged && model.steps.is_empty() {
+        neighbour.last = Some(finished.clone());
+    }
+    Ok(Numbers {
+        finished,
+        contacts,
+        iterations,
+        warnings,
+    })
 }
 
 /// Adds to the end of the path what was told of an earlier step alone and the end rests on: kinematics that were not small.

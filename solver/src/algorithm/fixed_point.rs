@@ -23,6 +23,9 @@ const DEPTH: usize = 5;
 /// Sweeps without progress after which another method is tried.
 const PATIENCE: usize = 15;
 
+/// A residual that is more than this part of the one before may be rounding.
+const STEADY: f64 = 0.5;
+
 /// Sweeps in a row with nothing but rounding left after which no better one is expected: each has tried several steps.
 const SETTLED: u32 = 3;
 
@@ -89,6 +92,7 @@ pub(super) fn run(
     let mut slow = 0;
     let mut accelerated = false;
     let mut rounded: Option<(Measured, u32)> = None;
+    let mut residual_before = f64::INFINITY;
     let mut next = swept.measured.implied_bound.clone();
     for count in 0..track.controls.max_iterations {
         let before = change_before.filter(|_| !accelerated);
@@ -112,7 +116,13 @@ pub(super) fn run(
             swept.outcome = Outcome::Canceled;
             return swept;
         }
-        rounded = nearer(rounded, &swept.measured, track.system, tolerance);
+        // what still shrinks is not rounding
+        let residual = swept.measured.residuals.monolithic;
+        rounded = match residual > STEADY * residual_before {
+            true => nearer(rounded, &swept.measured, track.system, tolerance),
+            false => None,
+        };
+        residual_before = residual;
         if let Some((nearest, _)) = rounded.take_if(|(_, count)| *count >= SETTLED) {
             swept.measured = nearest;
             swept.outcome = Outcome::Converged;

@@ -25,10 +25,10 @@ pub use convex::{Minimum, minimise};
 pub use finished::Finished;
 pub use near::{Region, run_near};
 pub use profile::{Estimable, Missed, Quantity};
-pub use report::{Reported, report};
+pub use report::{Reported, numbers, report};
 pub use rounding::Rounding;
 pub use slides::Slide;
-pub use system::{ContactNode, Patch, Point, State, System};
+pub use system::{Averages, ContactNode, Patch, Point, State, System};
 pub use track::{Cycle, Place};
 pub use uniqueness::{
     compared, note_doubled_increments, note_uniqueness, other_solution, rounding_of_forces,

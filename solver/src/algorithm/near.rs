@@ -48,6 +48,8 @@ struct Near {
     order: Vec<usize>,
     eliminated: Eliminated,
     stiffness: Dense,
+    /// The friction points all of whose nodes are kept.
+    points: Vec<usize>,
 }
 
 /// As [`run`](super::run), on the part of the boundary that may touch if that is worth it. `region`: that of the last level,
@@ -68,19 +70,20 @@ pub fn run_near(
             ..place
         };
         region.prepare(system, controls, last.as_ref(), observe);
-        let mut finished = match &region.near {
-            None => super::run(system, controls, place, last.as_ref(), observe),
-            Some(near) => near.run(system, controls, place, last.as_ref(), observe),
+        let last_end = last.as_ref();
+        let (mut finished, outside) = match &region.near {
+            None => (
+                super::run(system, controls, place, last_end, observe),
+                Vec::new(),
+            ),
+            Some(near) => near.run(system, controls, place, last_end, observe),
         };
         history.append(&mut finished.history);
-        let outside = match &region.near {
-            Some(near) if finished.outcome != Outcome::Canceled => near.outside(system, &finished),
-            _ => Vec::new(),
-        };
         let unsettled = finished.outcome == Outcome::Converged
             && finished.rounding.is_none()
             && !finished.residuals.within(controls.tolerance);
-        if region.near.is_none() || outside.is_empty() && !unsettled {
+        let settled = outside.is_empty() && !unsettled || finished.outcome == Outcome::Canceled;
+        if region.near.is_none() || settled {
             return Finished {
                 history,
                 ..finished
@@ -235,8 +238,11 @@ impl Near {
         })?;
         // a node of two contacts is kept with either of them
         let has_all = |node| unknowns(node).all(|dof| keeps[dof]);
+        let kept: Vec<bool> = system.nodes.iter().map(has_all).collect();
+        let on_kept = |&g: &usize| system.points[g].nodes.iter().all(|&node| kept[node]);
         Some(Near {
-            kept: system.nodes.iter().map(has_all).collect(),
+            points: (0..system.points.len()).filter(on_kept).collect(),
+            kept,
             order,
             eliminated,
             stiffness,
@@ -255,7 +261,7 @@ impl Near {
         load
     }
 
-    /// The iterations on this part; what they find, on the whole.
+    /// The iterations on this part; what they find, on the whole, and the eliminated nodes that are needed too.
     fn run(
         &self,
         system: &System<'_>,
@@ -263,7 +269,7 @@ impl Near {
         place: Place,
         before: Option<&Finished>,
         observe: &mut Observer<'_>,
-    ) -> Finished {
+    ) -> (Finished, Vec<usize>) {
         let load = self.load(system);
         let count = self.count();
         let mut number = vec![None; self.order.len()];
@@ -289,7 +295,11 @@ impl Near {
             stiffness: &self.stiffness,
             load: load[count..].to_vec(),
             nodes: system.nodes.iter().zip(&self.kept).map(node).collect(),
-            points: system.points.clone(),
+            points: self
+                .points
+                .iter()
+                .map(|&g| system.points[g].clone())
+                .collect(),
             patches: system.patches.clone(),
             ..*system
         };
@@ -301,6 +311,7 @@ impl Near {
                     .collect(),
                 active: before.state.active.clone(),
             },
+            bound: self.points.iter().map(|&g| before.bound[g]).collect(),
             ..before.clone()
         });
         let found = super::run(&part, controls, place, start.as_ref(), observe);
@@ -315,7 +326,13 @@ impl Near {
             v,
             active: found.state.active.clone(),
         };
-        let measured = Measured::new(system, state, found.bound.clone());
+        let on_all = |of_part: &[f64]| {
+            let mut all = vec![0.0; system.points.len()];
+            let values = self.points.iter().zip(of_part);
+            values.for_each(|(&g, value)| all[g] = *value);
+            all
+        };
+        let measured = Measured::new(system, state, on_all(&found.bound));
         let limit = match found.outcome {
             Outcome::Converged | Outcome::NotConverged => {
                 rounding::limit(system, &measured, controls.tolerance)
@@ -327,25 +344,24 @@ impl Near {
             Some((rounding, _)) => (Outcome::NotConverged, Some(rounding)),
             None => (found.outcome, None),
         };
-        Finished {
+        // eliminated nodes that would pass the obstacle, or that friction would act on
+        let passes =
+            |&node: &usize| !self.kept[node] && system.opening(&measured.state.v, node) < 0.0;
+        let mut outside: Vec<usize> = (0..system.nodes.len()).filter(passes).collect();
+        let points = system.points.iter().zip(&measured.implied_bound);
+        for (point, _) in points.filter(|(_, tau)| **tau > 0.0) {
+            outside.extend(point.nodes.iter().filter(|&&node| !self.kept[node]));
+        }
+        let finished = Finished {
+            tractions: on_all(&found.tractions),
             state: measured.state,
+            bound: measured.bound,
             residuals: measured.residuals,
             outcome,
             rounding,
             ..found
-        }
-    }
-
-    /// Eliminated nodes that would pass the obstacle, or that friction would act on.
-    fn outside(&self, system: &System<'_>, finished: &Finished) -> Vec<usize> {
-        let v = &finished.state.v;
-        let passes = |&node: &usize| !self.kept[node] && system.opening(v, node) < 0.0;
-        let mut outside: Vec<usize> = (0..system.nodes.len()).filter(passes).collect();
-        let points = system.points.iter().zip(&finished.bound);
-        for (point, _) in points.filter(|(_, tau)| **tau > 0.0) {
-            outside.extend(point.nodes.iter().filter(|&&node| !self.kept[node]));
-        }
-        outside
+        };
+        (finished, outside)
     }
 }
 

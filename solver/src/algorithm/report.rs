@@ -50,6 +50,30 @@ pub struct Reported {
     pub difference: StressDifference,
 }
 
+/// The numbers of the contacts of a final state, by their names, and what to consider before relying on them: what is known
+/// without the displacements of the whole body.
+pub fn numbers(
+    model: &Model,
+    system: &System<'_>,
+    finished: &Finished,
+) -> (BTreeMap<String, ContactSummary>, Vec<Warning>) {
+    let forces = Forces::new(system, finished);
+    let mut warnings = model.warnings.clone();
+    let mut contacts = BTreeMap::new();
+    for (p, patch) in system.patches.iter().enumerate() {
+        let view = PatchView::new(system, p, finished, &forces);
+        view.warn(&mut warnings);
+        contacts.insert(patch.contact.name.clone(), view.summary());
+    }
+    warn_of_iteration(finished, &mut warnings);
+    warn_of_rounding(model, finished, &mut warnings);
+    if finished.slide.is_none() {
+        let v = &finished.state.v;
+        warn_of_large_slip(system, v, &forces.reactions, &mut warnings);
+    }
+    (contacts, warnings)
+}
+
 /// The results of a final state: forces, extents, profiles, fields and warnings.
 pub fn report(
     model: &Model,
@@ -61,13 +85,7 @@ pub fn report(
     if system.semidefinite && finished.outcome != Outcome::Canceled {
         held(model, system, finished)?;
     }
-    let elastic_force = system.elastic_force(v);
-    let reactions = system.reactions_of(&finished.state, &elastic_force);
-    let forces = Forces {
-        pressures: system.pressures(&reactions),
-        tangential_reactions: system.tangential_reactions(&elastic_force),
-        reactions,
-    };
+    let forces = Forces::new(system, finished);
     let contact_force = contact_force(system, finished, &forces);
     let displacements = body.displacements(v, &system.level);
     let recovered = recover(

@@ -4,7 +4,7 @@
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::elasticity::Dof;
 use crate::error::SolveError;
-use crate::friction::{Average, BoundLaw, Chain, FrictionLaw, Source, largest_pressure};
+use crate::friction::{Average, Averaging, BoundLaw, Chain, FrictionLaw, Source, largest_pressure};
 use crate::linear::Dense;
 use crate::model::{ContactModel, Level, Model};
 use crate::problem::{Condition, FrictionPoints, Measure};
@@ -121,6 +121,33 @@ pub struct Point {
     pub anchor: f64,
 }
 
+/// Averaging operators of contacts, with the rows of them that are known: those of problems that differ in other
+/// numbers than the radius are the same.
+#[derive(Default)]
+pub struct Averages(Vec<(usize, Average, Averaging)>);
+
+impl Averages {
+    /// So many are kept: each may have 8 MiB of rows.
+    const MOST: usize = 16;
+
+    /// The law of a contact along its chain.
+    fn law(&mut self, patch: usize, law: &FrictionLaw<Average>, chain: Chain) -> FrictionLaw {
+        law.along(|average| {
+            // radii in turn come back after all others
+            let known = self.0.iter().find(|(p, a, _)| (*p, a) == (patch, average));
+            if let Some((_, _, averaging)) = known {
+                return averaging.clone();
+            }
+            let averaging = Averaging::new(average, chain);
+            if self.0.len() == Self::MOST {
+                self.0.remove(0);
+            }
+            self.0.push((patch, *average, averaging.clone()));
+            averaging
+        })
+    }
+}
+
 /// One contact of the model in the system.
 #[derive(Clone)]
 pub struct Patch<'a> {
@@ -149,6 +176,16 @@ impl<'a> System<'a> {
         body: &'a ElasticBody,
         observe: &mut Observer<'_>,
     ) -> Result<Self, SolveError> {
+        System::with_averages(model, body, &mut Averages::default(), observe)
+    }
+
+    /// The same with the averages of earlier systems on this body, and this one's added to them.
+    pub fn with_averages(
+        model: &'a Model,
+        body: &'a ElasticBody,
+        averages: &mut Averages,
+        observe: &mut Observer<'_>,
+    ) -> Result<Self, SolveError> {
         let mut system = System {
             stiffness: &body.stiffness,
             load: Vec::new(),
@@ -164,7 +201,7 @@ impl<'a> System<'a> {
             model,
         };
         for contact in &model.contacts {
-            system.add(model, contact, observe)?;
+            system.add(model, contact, averages, observe)?;
         }
         system.set_level(Level::FULL);
         let most =
@@ -184,6 +221,7 @@ impl<'a> System<'a> {
         &mut self,
         model: &Model,
         contact: &'a ContactModel,
+        averages: &mut Averages,
         observe: &mut Observer<'_>,
     ) -> Result<(), SolveError> {
         let (first, boundary) = (self.nodes.len(), &contact.boundary);
@@ -247,7 +285,7 @@ impl<'a> System<'a> {
             mirror_end: symmetric(count - 1),
         };
         let friction = contact.friction.as_ref().filter(|law| law.bound.acts());
-        let law = friction.map(|law| law.along(chain));
+        let law = friction.map(|law| averages.law(self.patches.len(), law, chain));
         if let Some(law) = &law {
             let patch = self.patches.len();
             let point = |s: f64, nodes: [usize; 3], shape: [f64; 3], weight: f64| Point {

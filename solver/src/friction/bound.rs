@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::friction::{Average, Averaging, Chain, Row};
+use crate::friction::{Average, Averaging, Row};
 use crate::problem::PrescribedBound;
 
 /// With cohesion an averaged pressure below this part of the largest nodal pressure is none: rounding must not
@@ -57,8 +57,8 @@ impl Source {
 }
 
 impl BoundLaw<Average> {
-    /// The law on a chain of contact edges.
-    pub fn along(&self, chain: Chain) -> BoundLaw {
+    /// The law with the operator of its average along a chain of contact edges.
+    pub fn along(&self, operator: impl FnOnce(&Average) -> Averaging) -> BoundLaw {
         match self {
             BoundLaw::Prescribed(bound) => BoundLaw::Prescribed(bound.clone()),
             BoundLaw::Pressure {
@@ -70,7 +70,7 @@ impl BoundLaw<Average> {
                 coefficient: *coefficient,
                 cohesion: *cohesion,
                 shear_cap: *shear_cap,
-                average: Averaging::new(average, chain),
+                average: operator(average),
             },
         }
     }
@@ -122,10 +122,18 @@ impl<A> BoundLaw<A> {
 }
 
 impl BoundLaw {
+    /// How far the bound depends on pressures (length); `None` where it is given.
+    pub fn reach(&self) -> Option<f64> {
+        match self {
+            BoundLaw::Pressure { average, .. } => Some(average.radius()),
+            BoundLaw::Prescribed(_) => None,
+        }
+    }
+
     /// The source of the bound at arc length s.
     pub fn source(&self, s: f64) -> Source {
         match self {
-            BoundLaw::Pressure { average, .. } => Source::Average(Arc::new(average.row(s))),
+            BoundLaw::Pressure { average, .. } => Source::Average(average.row(s)),
             BoundLaw::Prescribed(PrescribedBound::Constant(bound)) => Source::Given(*bound),
             BoundLaw::Prescribed(PrescribedBound::Table(table)) => {
                 Source::Given(interpolate(&table.s, &table.bound, s))

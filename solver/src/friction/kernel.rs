@@ -6,7 +6,8 @@
 //! its own centre, whatever the number of edges under it (without the thesis's limit of
 //! two, 3.4.2).
 
-use std::sync::{Arc, LazyLock};
+use std::collections::HashMap;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use crate::element::{edge3, gauss};
 use crate::problem::{Kernel, Measure, Normalization};
@@ -65,9 +66,11 @@ pub struct Average {
 }
 
 /// The averaging operator of one chain.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Averaging {
     chain: Arc<Chain>,
+    /// The rows computed so far: friction points, profiles and the search for peaks ask for the same places again and again.
+    known: Arc<Mutex<KnownRows>>,
     radius: f64,
     kernel: Kernel,
     measure: Measure,
@@ -97,6 +100,27 @@ impl Row {
     }
 }
 
+/// Rows of W by the bits of their arc length.
+#[derive(Debug, Default)]
+struct KnownRows {
+    rows: HashMap<u64, Arc<Row>>,
+    /// Weights in all of them.
+    weights: usize,
+}
+
+impl KnownRows {
+    /// Keeps a row, unless there are many: 8 MiB of weights.
+    fn add(&mut self, s: f64, row: &Arc<Row>) {
+        const MOST_WEIGHTS: usize = 1 << 20;
+        // a row takes some space beside its weights
+        let more = row.weights.len() + 16;
+        if self.weights + more <= MOST_WEIGHTS {
+            self.weights += more;
+            self.rows.insert(s.to_bits(), row.clone());
+        }
+    }
+}
+
 impl Averaging {
     /// The operator of an average.
     pub fn new(average: &Average, chain: Chain) -> Self {
@@ -116,6 +140,7 @@ impl Averaging {
         };
         Averaging {
             chain: Arc::new(chain),
+            known: Arc::default(),
             radius,
             kernel: average.kernel,
             measure: average.measure,
@@ -165,22 +190,22 @@ impl Averaging {
     }
 
     /// The row of W at arc length s. ρ = 0 is interpolation: Coulomb's law.
-    pub fn row(&self, s: f64) -> Row {
-        let nodes = self.chain.s.len();
-        let mut weights = vec![0.0; nodes];
-        let (mut first, mut last) = (nodes, 0);
-        let mut add = |edge: usize, h: &[f64; 3], factor: f64| {
-            for (i, node) in [2 * edge, 2 * edge + 2, 2 * edge + 1]
-                .into_iter()
-                .enumerate()
-            {
-                weights[node] += factor * h[i];
-            }
-            (first, last) = (first.min(2 * edge), last.max(2 * edge + 2));
-        };
+    pub fn row(&self, s: f64) -> Arc<Row> {
+        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(row) = known().rows.get(&s.to_bits()) {
+            return row.clone();
+        }
+        let row = Arc::new(self.integrated_row(s));
+        known().add(s, &row);
+        row
+    }
+
+    fn integrated_row(&self, s: f64) -> Row {
+        let mut parts: Vec<(usize, [f64; 3])> = Vec::new();
+        let mut add = |edge: usize, weights: [f64; 3]| parts.push((edge, weights));
         if self.radius == 0.0 {
             let edge = self.edge_at(s);
-            add(edge, &edge3::shape(edge3::invert(&self.arc(edge), s)), 1.0);
+            add(edge, edge3::shape(edge3::invert(&self.arc(edge), s)));
         } else {
             let ring = match self.measure {
                 Measure::Line => None,
@@ -190,16 +215,24 @@ impl Averaging {
                 self.integrate(centre, ring, &mut add);
             }
         }
-        if first > last {
+        let edges = parts.iter().map(|(edge, _)| *edge);
+        let (Some(first), Some(last)) = (edges.clone().min(), edges.max()) else {
             return Row {
                 first: 0,
                 weights: Vec::new(),
             };
+        };
+        let mut row = Row {
+            first: 2 * first,
+            weights: vec![0.0; 2 * (last - first) + 3],
+        };
+        for (edge, weights) in parts {
+            let start = 2 * (edge - first);
+            for (node, weight) in [start, start + 2, start + 1].into_iter().zip(weights) {
+                row.weights[node] += weight;
+            }
         }
-        Row {
-            first,
-            weights: weights[first..=last].to_vec(),
-        }
+        row
     }
 
     /// Distance from the axis at arc length s.
@@ -236,12 +269,7 @@ impl Averaging {
 
     /// Integrates the kernel centred at `centre` (also outside the chain) edge by edge; over rings
     /// where the centre's distance from the axis is given.
-    fn integrate(
-        &self,
-        centre: f64,
-        ring: Option<f64>,
-        add: &mut impl FnMut(usize, &[f64; 3], f64),
-    ) {
+    fn integrate(&self, centre: f64, ring: Option<f64>, add: &mut impl FnMut(usize, [f64; 3])) {
         let (low, high) = (centre - self.radius, centre + self.radius);
         for edge in self.edge_at(low)..self.chain.s.len() / 2 {
             let arc = self.arc(edge);
@@ -250,6 +278,7 @@ impl Averaging {
             }
             let (a, b) = (arc[0].max(low), arc[1].min(high));
             let middle = centre.clamp(a, b.max(a));
+            let mut weights = [0.0; 3];
             for (a, b) in [(a, middle), (middle, b)] {
                 let length = b - a;
                 if length <= 0.0 {
@@ -271,9 +300,11 @@ impl Averaging {
                         false => 1.0,
                     };
                     let factor = 0.5 * length * w * omega / inside;
-                    add(edge, &edge3::shape(edge3::invert(&arc, y)), factor);
+                    let shape = edge3::shape(edge3::invert(&arc, y));
+                    (0..3).for_each(|i| weights[i] += factor * shape[i]);
                 }
             }
+            add(edge, weights);
         }
     }
 

@@ -31,10 +31,10 @@ pub struct FrictionLaw<A = Averaging> {
 }
 
 impl FrictionLaw<Average> {
-    /// The law on a chain of contact edges.
-    pub fn along(&self, chain: Chain) -> FrictionLaw {
+    /// The law with the operator of its average along a chain of contact edges.
+    pub fn along(&self, operator: impl FnOnce(&Average) -> Averaging) -> FrictionLaw {
         FrictionLaw {
-            bound: self.bound.along(chain),
+            bound: self.bound.along(operator),
             elastic_slip: self.elastic_slip,
             transition: self.transition,
             history: self.history,

@@ -17,6 +17,9 @@ use crate::mesh::{self, Edge, Mesh};
 use crate::problem::{Algorithm, Condition, Contact, NormalOf, Obstacle, Problem, Step};
 use crate::solution::WarningCode;
 
+/// The friction law of a contact; none: frictionless.
+pub(super) type Law = Option<FrictionLaw<Average>>;
+
 /// Cosine of the sharpest turn between two contact edges without a warning: 20°.
 const SHARPEST_TURN: f64 = 0.94;
 
@@ -252,17 +255,28 @@ impl Checks {
                 "Write \"along\": \"arc_length\".",
             ));
         }
-        if let Some(radius) = radius {
-            let most = LARGEST_RADIUS * boundary.length();
-            all.check(self.require(
-                radius <= most,
-                format!("{pointer}/friction/nonlocal_radius"),
-                radius,
-                &format!("at most {most}, ten times the length of the contact boundary"),
-                "The radius is a material length, far below the size of the contact.",
-            ));
-        }
+        all.check(self.radius(boundary, radius, pointer));
         all.finish(())
+    }
+
+    /// Whether the nonlocal radius of a contact is a sensible one for its boundary.
+    pub(super) fn radius(
+        &mut self,
+        boundary: &ContactBoundary,
+        radius: Option<f64>,
+        pointer: &str,
+    ) -> Checked {
+        let most = LARGEST_RADIUS * boundary.length();
+        match radius {
+            Some(radius) if radius > most => Err(self.report(
+                format!("{pointer}/friction/nonlocal_radius"),
+                Reason::OutOfRange,
+                radius,
+                format!("at most {most}, ten times the length of the contact boundary"),
+                "The radius is a material length, far below the size of the contact.",
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// The part of the boundary that faces the obstacle, one chain, and the edges that its ends cut.
@@ -348,7 +362,7 @@ impl Checks {
 
     /// A supported contact node must not be held inside the obstacle, at the end of any step; and a bonded one not
     /// elsewhere than by its obstacle.
-    fn supported_contact_nodes(
+    pub(super) fn supported_contact_nodes(
         &mut self,
         contact: &ContactModel,
         steps: &[Step],

@@ -18,12 +18,14 @@ mod numbers;
 mod sliding;
 mod supports;
 mod unmerged;
+mod variable;
 
 pub use axis::Axis;
 pub use contact_model::ContactModel;
 pub use freedom::RigidMotion;
 pub use level::Level;
 pub use supports::Held;
+pub use variable::VariableModel;
 
 use std::collections::BTreeMap;
 

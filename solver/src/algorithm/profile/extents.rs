@@ -120,22 +120,26 @@ impl PatchView<'_> {
 
     /// The edges, and the places on them, at which |e| = ε: roots of a quadratic on each.
     pub(super) fn turns(&self) -> Vec<(usize, f64)> {
+        let edges = 0..self.patch.contact.boundary.edge_count();
+        let on = |edge: usize| self.turns_on(edge).into_iter().map(move |xi| (edge, xi));
+        edges.flat_map(on).collect()
+    }
+
+    /// Those on one edge.
+    fn turns_on(&self, edge: usize) -> Vec<f64> {
         let Some(law) = &self.patch.law else {
             return Vec::new();
         };
-        let boundary = &self.patch.contact.boundary;
         let mut turns = Vec::new();
-        for edge in 0..boundary.edge_count() {
-            let [start, end, middle] = [-1.0, 1.0, 0.0].map(|xi| self.slip_at(edge, xi));
-            for target in [-law.elastic_slip, law.elastic_slip] {
-                let (a, b, c) = (
-                    0.5 * (start + end) - middle,
-                    0.5 * (end - start),
-                    middle - target,
-                );
-                let roots = quadratic_roots(a, b, c).into_iter();
-                turns.extend(roots.filter(|xi| xi.abs() <= 1.0).map(|xi| (edge, xi)));
-            }
+        let [start, end, middle] = [-1.0, 1.0, 0.0].map(|xi| self.slip_at(edge, xi));
+        for target in [-law.elastic_slip, law.elastic_slip] {
+            let (a, b, c) = (
+                0.5 * (start + end) - middle,
+                0.5 * (end - start),
+                middle - target,
+            );
+            let roots = quadratic_roots(a, b, c).into_iter();
+            turns.extend(roots.filter(|xi| xi.abs() <= 1.0));
         }
         turns
     }
@@ -219,26 +223,42 @@ impl PatchView<'_> {
             }
         }
         let (value, edge, centre) = highest?;
-        let size = |edge: usize, xi: f64| value.signum() * self.tangential_stress_at(edge, xi);
-        // golden section between the neighbouring samples
-        let (mut low, mut high) = ((centre - step).max(-1.0), (centre + step).min(1.0));
-        let ratio = 0.5 * (5f64.sqrt() - 1.0);
-        for _ in 0..40 {
-            let (a, b) = (high - ratio * (high - low), low + ratio * (high - low));
-            if size(edge, a) < size(edge, b) {
-                low = a
-            } else {
-                high = b
-            }
-        }
-        let narrowed = 0.5 * (low + high);
-        let xi = if size(edge, narrowed) > size(edge, centre) {
-            narrowed
-        } else {
-            centre
+        let size = |xi: f64| value.signum() * self.tangential_stress_at(edge, xi);
+        let (low, high) = ((centre - step).max(-1.0), (centre + step).min(1.0));
+        // a peak where stick ends is a kink, whose place is known
+        let turns = self.turns_on(edge).into_iter();
+        let kinks = turns.filter(|xi| (low..=high).contains(xi));
+        let places = kinks.chain([narrowed(&size, low, high)]);
+        let larger = |best: (f64, f64), xi: f64| match size(xi) {
+            size if size > best.0 => (size, xi),
+            _ => best,
         };
+        let (_, xi) = places.fold((size(centre), centre), larger);
         Some((self.tangential_stress_at(edge, xi), edge, xi))
     }
+}
+
+/// The place of the largest value between two places with one peak between them, by golden section: to 10⁻⁵ of their
+/// distance, and the value of a smooth peak to the square of that.
+fn narrowed(value: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    const STEPS: usize = 24;
+    let ratio = 0.5 * (5f64.sqrt() - 1.0);
+    let inner = |low: f64, high: f64| [high - ratio * (high - low), low + ratio * (high - low)];
+    let mut places = inner(low, high);
+    let mut values = places.map(value);
+    for _ in 0..STEPS {
+        // one of the two inner places is an inner place of the next interval
+        if values[0] < values[1] {
+            low = places[0];
+            places = [places[1], inner(low, high)[1]];
+            values = [values[1], value(places[1])];
+        } else {
+            high = places[1];
+            places = [inner(low, high)[0], places[0]];
+            values = [value(places[0]), values[0]];
+        }
+    }
+    0.5 * (low + high)
 }
 
 fn quadratic_roots(a: f64, b: f64, c: f64) -> Vec<f64> {
@@ -257,6 +277,12 @@ fn quadratic_roots(a: f64, b: f64, c: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_peak_is_found_between_two_places() {
+        let found = narrowed(&|x| 1.0 - (x - 0.3) * (x - 0.3), 0.0, 1.0);
+        assert!((found - 0.3).abs() < 1e-5, "{found}");
+    }
 
     #[test]
     fn quadratics_and_lines_give_their_roots() {

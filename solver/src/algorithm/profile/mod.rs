@@ -27,6 +27,8 @@ pub(super) struct PatchView<'a> {
     v: &'a [f64],
     finished: &'a Finished,
     forces: &'a Forces,
+    /// Arc lengths between which the pressure is not zero; empty where nothing touches.
+    pressed: Option<[f64; 2]>,
     /// g at start, end and midside of every edge; 0 in the total law.
     anchors: Vec<[f64; 3]>,
     /// σ_t likewise, if it does not follow from the law: in the thesis's own iteration and in bonded contacts.
@@ -38,6 +40,19 @@ pub(super) struct Forces {
     pub(super) reactions: Vec<f64>,
     pub(super) tangential_reactions: Vec<f64>,
     pub(super) pressures: Vec<f64>,
+}
+
+impl Forces {
+    /// Of a final state.
+    pub(super) fn new(system: &System<'_>, finished: &Finished) -> Self {
+        let elastic_force = system.elastic_force(&finished.state.v);
+        let reactions = system.reactions_of(&finished.state, &elastic_force);
+        Forces {
+            pressures: system.pressures(&reactions),
+            tangential_reactions: system.tangential_reactions(&elastic_force),
+            reactions,
+        }
+    }
 }
 
 impl<'a> PatchView<'a> {
@@ -55,9 +70,11 @@ impl<'a> PatchView<'a> {
             v: &finished.state.v,
             finished,
             forces,
+            pressed: None,
             anchors: Vec::new(),
             tractions: None,
         };
+        view.pressed = view.pressed();
         view.anchors = view.carried_to_nodes(&|g| system.points[g].anchor);
         if patch.contact.condition == Condition::Bonded {
             let shear = |i: usize| {
@@ -75,6 +92,14 @@ impl<'a> PatchView<'a> {
             view.tractions = Some(view.carried_to_nodes(&|g| finished.tractions[g]));
         }
         view
+    }
+
+    /// From the first edge with a pressure to the last.
+    fn pressed(&self) -> Option<[f64; 2]> {
+        let (s, pressures) = (&self.patch.contact.boundary.s, self.own_pressures());
+        let first = pressures.iter().position(|p| *p != 0.0)?;
+        let last = pressures.iter().rposition(|p| *p != 0.0)?;
+        Some([s[first.saturating_sub(2)], s[(last + 2).min(s.len() - 1)]])
     }
 
     /// Values at friction points, carried to start, end and midside of every edge: the parabola
@@ -156,6 +181,14 @@ impl<'a> PatchView<'a> {
         let Some(law) = &self.patch.law else {
             return (0.0, 0.0);
         };
+        // most of a long boundary is further than ρ from any pressure, which the mirrors of lines of symmetry are too
+        if let Some(radius) = law.bound.reach()
+            && self
+                .pressed
+                .is_none_or(|[from, to]| s + radius < from || s - radius > to)
+        {
+            return (0.0, 0.0);
+        }
         let source = law.bound.source(s);
         let pressures = self.own_pressures();
         (

@@ -1,0 +1,152 @@
+//! A model whose numbers change from problem to problem, while its body and its contact boundaries stay.
+
+use super::checks::Checks;
+use super::{Model, contacts};
+use crate::error::{AllChecks, Violation};
+use crate::problem::{Contact, Grid, MeshInput, MeshSource, Problem};
+use crate::solution::Warning;
+
+/// A model that takes over the laws of friction, indentations, drags, load steps and controls of other problems.
+pub struct VariableModel {
+    model: Model,
+    /// Its problem, without the mesh.
+    problem: Problem,
+    /// Warnings that do not depend on these numbers.
+    lasting: Vec<Warning>,
+}
+
+impl VariableModel {
+    /// From a model and its problem.
+    pub fn new(model: Model, problem: &Problem) -> Self {
+        let mut lasting = model.warnings.clone();
+        for warning in warnings(&model) {
+            lasting.retain(|other| *other != warning);
+        }
+        VariableModel {
+            model,
+            problem: without_mesh(problem),
+            lasting,
+        }
+    }
+
+    /// The model of the last problem.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Becomes the model of another problem, or refuses its violations and stays as it is. None if more than those numbers
+    /// differ. The mesh of the problem is not read.
+    pub fn set(&mut self, problem: &Problem) -> Option<Result<(), Vec<Violation>>> {
+        let (own, other) = (&self.problem, problem);
+        let same = own.analysis == other.analysis
+            && own.materials == other.materials
+            && own.supports == other.supports
+            && own.loads == other.loads
+            && own.quadrature == other.quadrature
+            && own.contacts.len() == other.contacts.len()
+            && own.contacts.iter().zip(&other.contacts).all(same_boundary);
+        // which motions friction has to prevent depends on the law
+        if !same || self.model.held_by_contact {
+            return None;
+        }
+        Some(self.take(problem))
+    }
+
+    fn take(&mut self, problem: &Problem) -> Result<(), Vec<Violation>> {
+        let mut checks = Checks::default();
+        let checked = checks.numbers(problem, &self.model);
+        let frictions = checks.found.conclude(checked)?;
+        let model = &mut self.model;
+        for ((model, contact), friction) in model
+            .contacts
+            .iter_mut()
+            .zip(&problem.contacts)
+            .zip(frictions)
+        {
+            model.indentation = contact.indentation;
+            model.tangential_displacement = contact.tangential_displacement;
+            model.friction = friction;
+        }
+        model.steps.clone_from(&problem.steps);
+        model.controls.clone_from(&problem.solver);
+        model.warnings.clone_from(&self.lasting);
+        let of_numbers = warnings(model);
+        model.warnings.extend(of_numbers);
+        self.problem = without_mesh(problem);
+        Ok(())
+    }
+}
+
+/// What is said of contacts and their drag.
+fn warnings(model: &Model) -> Vec<Warning> {
+    let mut checks = Checks::default();
+    checks.warn_about_contacts(&model.contacts);
+    checks.warn_of_dragged_symmetry(&model.contacts, &model.fixed, &model.axis, &model.steps);
+    checks.warnings
+}
+
+/// A problem on a mesh of no meaning: that of the model is not part of it.
+fn without_mesh(problem: &Problem) -> Problem {
+    let nothing = Grid {
+        x: Vec::new(),
+        y: Vec::new(),
+        top: None,
+        bottom: None,
+    };
+    Problem {
+        title: None,
+        units: None,
+        analysis: problem.analysis,
+        mesh: MeshInput::new(MeshSource::Grid(nothing)),
+        materials: problem.materials.clone(),
+        supports: problem.supports.clone(),
+        loads: problem.loads.clone(),
+        contacts: problem.contacts.clone(),
+        steps: problem.steps.clone(),
+        quadrature: problem.quadrature,
+        solver: problem.solver.clone(),
+    }
+}
+
+/// Whether two contacts are the same but for their law, indentation and drag.
+fn same_boundary((a, b): (&Contact, &Contact)) -> bool {
+    a.boundary == b.boundary
+        && a.obstacle == b.obstacle
+        && a.normal == b.normal
+        && a.condition == b.condition
+}
+
+impl Checks {
+    /// The laws of a problem on the contacts of a model, with all checks of what may differ.
+    fn numbers(
+        &mut self,
+        problem: &Problem,
+        model: &Model,
+    ) -> crate::error::Checked<Vec<contacts::Law>> {
+        self.finite(problem)?;
+        self.counts(problem)?;
+        let mut all = AllChecks::default();
+        all.check(self.controls(problem));
+        all.check(self.thesis(problem));
+        all.check(self.steps(&problem.steps));
+        let mut laws = Vec::new();
+        for (i, (contact, model_contact)) in
+            problem.contacts.iter().zip(&model.contacts).enumerate()
+        {
+            let at = |field: &str| format!("/contacts/{i}/{field}");
+            let (law, sound) = self.friction(&problem.analysis, contact, &at("friction"));
+            all.check(sound);
+            let radius = law.as_ref().and_then(|law| law.bound.radius());
+            all.check(self.radius(&model_contact.boundary, radius, &format!("/contacts/{i}")));
+            let moved = super::ContactModel {
+                indentation: contact.indentation,
+                tangential_displacement: contact.tangential_displacement,
+                ..model_contact.clone()
+            };
+            all.check(self.supported_contact_nodes(&moved, &problem.steps, &model.fixed));
+            laws.push(law);
+        }
+        all.check(self.thesis_elements(problem, &model.mesh));
+        all.finish(laws)
+    }
+}
