@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use crate::accuracy;
 use crate::algorithm::{
     self, Averages, Finished, Place, Region, Reported, Rounding, System, report, run_near,
+    settle_near,
 };
 use crate::body::ElasticBody;
 use crate::error::SolveError;
@@ -125,14 +126,11 @@ pub struct Numbers {
     pub finished: Finished,
     /// By the names of the contacts.
     pub contacts: BTreeMap<String, ContactSummary>,
-    /// Rows of the history.
+    /// Rows of the history, or steps from the neighbour.
     pub iterations: u32,
     /// What to consider before relying on the numbers.
     pub warnings: Vec<Warning>,
 }
-
-/// q of sweeps up to which a solution counts as the only one, so that it does not matter where the sweeps begin.
-const UNIQUE: f64 = 0.7;
 
 /// The same path to its end, for its numbers alone. A problem without steps starts from the end of its neighbour; where that
 /// does not converge well, as [`run`] does.
@@ -151,18 +149,11 @@ pub fn run_to_numbers(
         model.steps.is_empty() && sizes == [system.load.len(), system.points.len()]
     });
     let near = near.and_then(|last| {
-        let (place, controls) = (Place::default(), &model.controls);
         let (system, region) = (&load_history.system, &mut load_history.region);
-        let finished = run_near(system, controls, place, Some(&last), region, observe);
-        let unique = finished.contraction.is_none_or(|q| q <= UNIQUE);
-        (finished.outcome == Outcome::Converged && finished.rounding.is_none() && unique)
-            .then_some(finished)
+        settle_near(system, &model.controls, &last, region, observe)
     });
     let (finished, iterations) = match near {
-        Some(finished) => {
-            let rows = finished.history.len() as u32;
-            (finished, rows)
-        }
+        Some(near) => near,
         None => {
             let Some(finished) = load_history.follow(&steps_of(model), 1, observe) else {
                 unreachable!("there is at least one step: a problem without steps is one step")

@@ -6,9 +6,10 @@
 //! touch. What is found is checked on the whole: where another node would pass the obstacle, or another point rub, that part is
 //! made larger, and the iterations go on.
 
-use crate::algorithm::convex::dense;
+use crate::algorithm::convex::{Factors, dense};
 use crate::algorithm::finished::Finished;
 use crate::algorithm::rounding;
+use crate::algorithm::settle::settle;
 use crate::algorithm::system::{ContactNode, Oblique, State, System};
 use crate::algorithm::track::{Measured, Place};
 use crate::elasticity::Dof;
@@ -38,6 +39,8 @@ pub struct Region {
     touches: Vec<bool>,
     /// Elimination is not worth its cost for this system.
     whole: bool,
+    /// What neighbours share.
+    factors: Factors,
 }
 
 /// The unknowns of nodes that may touch, or may be rubbed; the others are eliminated.
@@ -71,12 +74,15 @@ pub fn run_near(
         };
         region.prepare(system, controls, last.as_ref(), observe);
         let last_end = last.as_ref();
-        let (mut finished, outside) = match &region.near {
-            None => (
-                super::run(system, controls, place, last_end, observe),
-                Vec::new(),
-            ),
-            Some(near) => near.run(system, controls, place, last_end, observe),
+        let mut iterate = |system: &System<'_>, before: Option<&Finished>| {
+            Some(super::run(system, controls, place, before, observe))
+        };
+        let found = match &region.near {
+            None => iterate(system, last_end).map(|finished| (finished, Vec::new())),
+            Some(near) => near.run(system, controls, last_end, iterate),
+        };
+        let Some((mut finished, outside)) = found else {
+            unreachable!("these iterations always end")
         };
         history.append(&mut finished.history);
         let unsettled = finished.outcome == Outcome::Converged
@@ -99,6 +105,35 @@ pub fn run_near(
     }
 }
 
+/// The solution near that of a neighbour: with the same body and the same contact boundaries, and numbers that differ a
+/// little; and the number of steps to it. None if it is not near.
+pub fn settle_near(
+    system: &System<'_>,
+    controls: &SolverControls,
+    neighbour: &Finished,
+    region: &mut Region,
+    observe: &mut Observer<'_>,
+) -> Option<(Finished, u32)> {
+    if controls.algorithm != Algorithm::Auto || system.semidefinite {
+        return None;
+    }
+    region.prepare(system, controls, Some(neighbour), observe);
+    let tolerance = controls.tolerance;
+    let (near, factors) = (&region.near, &mut region.factors);
+    let Some(near) = near else {
+        return settle(system, tolerance, &neighbour.state, factors, observe);
+    };
+    let mut steps = 0;
+    let (finished, outside) = near.run(system, controls, Some(neighbour), |part, start| {
+        let (finished, count) = settle(part, tolerance, &start?.state, factors, observe)?;
+        steps = count;
+        Some(finished)
+    })?;
+    let settled =
+        outside.is_empty() && finished.rounding.is_none() && finished.residuals.within(tolerance);
+    settled.then_some((finished, steps))
+}
+
 impl Region {
     /// The whole of the boundary.
     fn whole() -> Self {
@@ -106,6 +141,7 @@ impl Region {
             near: None,
             touches: Vec::new(),
             whole: true,
+            factors: Factors::default(),
         }
     }
 
@@ -131,6 +167,7 @@ impl Region {
             return;
         }
         let kept = rubbed(system, &self.touches);
+        self.factors = Factors::default();
         match Near::new(system, kept, observe) {
             Some(near) => self.near = Some(near),
             None => *self = Region::whole(),
@@ -148,6 +185,7 @@ impl Region {
             }
         }
         self.touches = widened(&self.touches, GROWTH);
+        self.factors = Factors::default();
     }
 }
 
@@ -261,15 +299,14 @@ impl Near {
         load
     }
 
-    /// The iterations on this part; what they find, on the whole, and the eliminated nodes that are needed too.
+    /// Some iterations on this part; what they find, on the whole, and the eliminated nodes that are needed too.
     fn run(
         &self,
         system: &System<'_>,
         controls: &SolverControls,
-        place: Place,
         before: Option<&Finished>,
-        observe: &mut Observer<'_>,
-    ) -> (Finished, Vec<usize>) {
+        iterate: impl FnOnce(&System<'_>, Option<&Finished>) -> Option<Finished>,
+    ) -> Option<(Finished, Vec<usize>)> {
         let load = self.load(system);
         let count = self.count();
         let mut number = vec![None; self.order.len()];
@@ -314,7 +351,7 @@ impl Near {
             bound: self.points.iter().map(|&g| before.bound[g]).collect(),
             ..before.clone()
         });
-        let found = super::run(&part, controls, place, start.as_ref(), observe);
+        let found = iterate(&part, start.as_ref())?;
         let mut x = load;
         x[count..].copy_from_slice(&found.state.v);
         self.eliminated.expand(&mut x);
@@ -361,7 +398,7 @@ impl Near {
             rounding,
             ..found
         };
-        (finished, outside)
+        Some((finished, outside))
     }
 }
 

@@ -1,10 +1,14 @@
 //! Primal–dual active set with semi-smooth Newton steps.
 
+use super::projected_newton::least_along;
 use super::step::{AIM, Factors, Minimum, close, free_dofs, gradient};
 use crate::algorithm::rounding::{PATIENCE, is_rounding};
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 use crate::solution::{Observer, Progress};
+
+/// After a step that leaves more than this part of the residual the next is damped.
+const STALLED: f64 = 0.7;
 
 /// Steps of the active set before falling back.
 const ACTIVE_SET_STEPS: u32 = 30;
@@ -22,6 +26,7 @@ pub(super) fn run(
     close(system, &mut state);
     let mut elastic_force = system.elastic_force(&state.v);
     let mut residual_before = system.kkt_residual(&state, &elastic_force, bound);
+    let mut stalled = false;
     let mut best: Option<Minimum> = None;
     let mut without_gain = 0;
     for step in 1..=ACTIVE_SET_STEPS {
@@ -29,9 +34,11 @@ pub(super) fn run(
             elastic_force = system.elastic_force(&state.v);
         }
         let newton = (system, bound, &mut *factors);
-        let Some(next) = step_from(newton, &state, &elastic_force, residual_before, observe) else {
+        let from = (&state, &elastic_force[..]);
+        let Some(next) = step_from(newton, from, residual_before, stalled, observe) else {
             break;
         };
+        stalled = next.residual > STALLED * residual_before;
         let (changed, residual) = (next.changed, next.residual);
         (state, elastic_force, residual_before) = (next.state, next.elastic_force, residual);
         // with settled sets a step is exact up to rounding: no further gain is possible
@@ -82,12 +89,13 @@ struct Next {
     residual: f64,
 }
 
-/// A step with the last factor if that serves, else with a new one: what the older one has led to is not kept then.
+/// A step with the last factor if that serves, else with a new one: what the older one has led to is not kept then. A
+/// `damped` step ends where J is least along it: whole ones may go to and fro between stick and slip.
 fn step_from(
     (system, bound, factors): (&System<'_>, &[f64], &mut Factors),
-    state: &State,
-    elastic_force: &[f64],
+    (state, elastic_force): (&State, &[f64]),
     residual_before: f64,
+    damped: bool,
     observe: &mut Observer<'_>,
 ) -> Option<Next> {
     /// The part of the residual that a step with an older factor may leave: one with a new factor costs as much as
@@ -98,10 +106,16 @@ fn step_from(
     loop {
         let renewed = factors.prepare(system, bound, &state.v, &free, observe)?;
         let delta = factors.direction(&free, &force)?;
+        let mut direction = vec![0.0; state.v.len()];
+        let moved = free.iter().zip(&delta);
+        moved.for_each(|(&dof, d)| direction[dof] = *d);
+        let part = match damped {
+            true => least_along(system, bound, &state.v, &direction),
+            false => 1.0,
+        };
         let mut next = state.clone();
-        free.iter()
-            .zip(&delta)
-            .for_each(|(&dof, d)| next.v[dof] += d);
+        let moved = next.v.iter_mut().zip(&direction);
+        moved.for_each(|(v, d)| *v += part * d);
         let elastic_force = system.elastic_force(&next.v);
         let changed = update_active(system, &elastic_force, &mut next);
         let residual = system.kkt_residual(&next, &elastic_force, bound);

@@ -115,7 +115,7 @@ pub(in crate::algorithm) struct Factors {
 impl Factors {
     /// Has a factor on the free unknowns: true if it is a new one, for this state. None if H has no factor, or the observer
     /// stops.
-    pub(super) fn prepare(
+    pub(in crate::algorithm) fn prepare(
         &mut self,
         system: &System<'_>,
         bound: &[f64],
@@ -135,7 +135,11 @@ impl Factors {
     }
 
     /// −H⁻¹ ∇J on the unknowns that it was prepared for.
-    pub(super) fn direction(&self, free: &[usize], force: &[f64]) -> Option<Vec<f64>> {
+    pub(in crate::algorithm) fn direction(
+        &self,
+        free: &[usize],
+        force: &[f64],
+    ) -> Option<Vec<f64>> {
         let (_, factor) = self.last.as_ref()?;
         let mut direction: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
         factor.solve(&mut direction);
@@ -143,7 +147,7 @@ impl Factors {
     }
 
     /// Gives the last factor up.
-    pub(super) fn renew(&mut self) {
+    pub(in crate::algorithm) fn renew(&mut self) {
         self.old = true;
     }
 }

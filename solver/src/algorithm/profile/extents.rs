@@ -201,7 +201,14 @@ impl PatchView<'_> {
         }
         let step = 2.0 / SAMPLES as f64;
         let mut highest: Option<(f64, usize, f64)> = None;
-        for edge in 0..self.patch.contact.boundary.edge_count() {
+        let edges = 0..self.patch.contact.boundary.edge_count();
+        let rubbed: Vec<usize> = edges.clone().filter(|&edge| self.may_rub(edge)).collect();
+        // nothing is highest where all is zero
+        let edges = match rubbed.is_empty() {
+            true => edges.rev().take(1).collect(),
+            false => rubbed,
+        };
+        for edge in edges {
             let stress = |xi: f64| self.tangential_stress_at(edge, xi);
             // Between the points of the law u_t, a parabola, may overshoot to the other side of ε: a sign that no point
             // beside it has is not one of the solution.

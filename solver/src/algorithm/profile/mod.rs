@@ -176,6 +176,17 @@ impl<'a> PatchView<'a> {
         &self.forces.pressures[self.system.range(self.patch)]
     }
 
+    /// Whether friction may act somewhere on an edge: a pressure is no further than ρ.
+    fn may_rub(&self, edge: usize) -> bool {
+        let reach = self.patch.law.as_ref().and_then(|law| law.bound.reach());
+        let [start, end, _] = self.patch.contact.boundary.edge_arc(edge);
+        match (reach, self.pressed) {
+            (Some(radius), Some([from, to])) => end + radius >= from && start - radius <= to,
+            (Some(_), None) => self.tractions.is_some(),
+            (None, _) => true,
+        }
+    }
+
     /// S_ρ and τ at arc length s.
     fn averaged_and_bound(&self, s: f64) -> (f64, f64) {
         let Some(law) = &self.patch.law else {

@@ -1,0 +1,97 @@
+//! From the solution of a neighbour, whose numbers differ a little, to that of a system.
+//!
+//! Each step takes the friction bound that the present pressure implies, and one step of the convex problem with the last
+//! factor that serves: sweeps with one inner step each. The residual shrinks by a constant factor, as far as rounding allows; where it
+//! does not, the neighbour is too far, and the usual methods begin anew.
+
+use crate::algorithm::convex::{Factors, close, free_dofs, least_along, update_active};
+use crate::algorithm::finished::Finished;
+use crate::algorithm::system::{State, System};
+use crate::solution::{Observer, Outcome, Progress, Residuals, Stage};
+
+/// Steps; eight to twelve are usual.
+const MOST_STEPS: u32 = 40;
+
+/// A part of the tolerance, so that it hardly matters where the steps began.
+const AIM: f64 = 0.1;
+
+/// A step that leaves more than this part of the residual asks for a new factor.
+const SERVES: f64 = 0.2;
+
+/// So many steps may leave more than [`SLOW`] of the residual: contact sets change at first.
+const PATIENCE: u32 = 6;
+
+/// A solution that steps approach more slowly may not be the only one.
+const SLOW: f64 = 0.7;
+
+/// The solution and the number of steps; None if the steps do not lead to it quickly.
+pub(super) fn settle(
+    system: &System<'_>,
+    tolerance: f64,
+    start: &State,
+    factors: &mut Factors,
+    observe: &mut Observer<'_>,
+) -> Option<(Finished, u32)> {
+    let mut state = start.clone();
+    let (mut residual_before, mut slow, mut changed) = (f64::INFINITY, 0, true);
+    close(system, &mut state);
+    let mut elastic_force = system.elastic_force(&state.v);
+    for steps in 0..MOST_STEPS {
+        let pressures = system.pressures(&system.reactions_of(&state, &elastic_force));
+        let bound = system.friction_bound(&pressures);
+        let tractions = system.tractions(&state.v, &bound);
+        let residual = system.kkt_residual(&state, &elastic_force, &bound);
+        if steps > 0 && !changed && residual <= AIM * tolerance {
+            let finished = Finished {
+                state,
+                bound,
+                tractions,
+                own_tractions: false,
+                outcome: Outcome::Converged,
+                stage: Stage::Outer,
+                residuals: Residuals {
+                    kkt: residual,
+                    monolithic: residual,
+                    ..Residuals::default()
+                },
+                contraction: None,
+                history: Vec::new(),
+                cycle: None,
+                slide: None,
+                rounding: None,
+            };
+            return Some((finished, steps));
+        }
+        let stalls = residual > SLOW * residual_before;
+        slow += u32::from(stalls);
+        if slow > PATIENCE || observe(Progress::Pulse).is_break() {
+            return None;
+        }
+        if residual > SERVES * residual_before {
+            factors.renew();
+        }
+        residual_before = residual;
+        let free = free_dofs(system, |i| state.active[i]);
+        factors.prepare(system, &bound, &state.v, &free, observe)?;
+        let mut force = elastic_force.clone();
+        system.add_traction_force(&tractions, &mut force);
+        let delta = factors.direction(&free, &force)?;
+        let mut direction = vec![0.0; state.v.len()];
+        free.iter()
+            .zip(&delta)
+            .for_each(|(&dof, d)| direction[dof] = *d);
+        // whole steps may go to and fro between stick and slip
+        let part = match stalls {
+            true => least_along(system, &bound, &state.v, &direction),
+            false => 1.0,
+        };
+        let moved = state.v.iter_mut().zip(&direction);
+        moved.for_each(|(v, d)| *v += part * d);
+        elastic_force = system.elastic_force(&state.v);
+        changed = update_active(system, &elastic_force, &mut state);
+        if close(system, &mut state) {
+            elastic_force = system.elastic_force(&state.v);
+        }
+    }
+    None
+}
