@@ -214,6 +214,7 @@ fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::friction::Chain;
     use crate::friction::tests::average;
     use crate::problem::BoundTable;
 
@@ -225,7 +226,7 @@ mod tests {
             shear_cap: 4.0,
             average: average(0.0),
         };
-        let law = law.along(Chain::plain(vec![0.0, 0.5, 1.0]));
+        let law = law.along(|average| Averaging::new(average, Chain::plain(vec![0.0, 0.5, 1.0])));
         let tau = |s: f64| (law.of_average(s, 100.0), law.slope(s));
         assert_eq!(tau(-1.0), (0.0, 0.0));
         assert_eq!(tau(2e-14).0, 0.0);
@@ -242,7 +243,7 @@ mod tests {
             bound: vec![2.0, 4.0, 0.0],
         };
         let law: BoundLaw<Average> = BoundLaw::Prescribed(PrescribedBound::Table(table));
-        let law = law.along(Chain::plain(vec![0.0, 2.0, 4.0]));
+        let law = law.along(|average| Averaging::new(average, Chain::plain(vec![0.0, 2.0, 4.0])));
         for (s, tau) in [
             (-0.1, 0.0),
             (0.0, 2.0),

@@ -61,7 +61,7 @@ pub(super) fn linear(rule: &[(f64, f64)], values: &[f64], zeta: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::friction::{Average, Chain};
+    use crate::friction::{Average, Averaging, Chain};
     use crate::problem::{Kernel, Measure, Normalization};
 
     /// A linear stress over two elements; the kernel within both: the average is the value itself.
@@ -78,7 +78,8 @@ mod tests {
                 measure: Measure::Line,
             },
         };
-        let law = law.along(Chain::plain(vec![0.0, 0.5, 1.0, 1.5, 2.0]));
+        let law = law
+            .along(|average| Averaging::new(average, Chain::plain(vec![0.0, 0.5, 1.0, 1.5, 2.0])));
         let rule = gauss::of_order(3);
         let stress = |from: f64, to: f64| -> Vec<f64> {
             let at = |(zeta, _): &(f64, f64)| 5.0 - (from + 0.5 * (to - from) * (1.0 + zeta));
