@@ -53,6 +53,9 @@ pub mod verify;
 // Finer meshes until the errors are small enough.
 pub mod adapt;
 
+// Many problems on one body.
+pub mod family;
+
 use body::ElasticBody;
 use error::{SolveError, Violation};
 use mesh::{External, Mesh};

@@ -109,6 +109,8 @@ pub enum SolveError {
         /// The phase.
         phase: Phase,
     },
+    /// A problem that is to be solved on the body of another has another body.
+    OtherBody,
     /// The observer stopped the solution before there was a state to return.
     Stopped,
 }
@@ -144,6 +146,10 @@ impl fmt::Display for SolveError {
                 f,
                 "the phase `{}` computed a number that is not finite: check the magnitudes of moduli, lengths and loads",
                 phase.as_str()
+            ),
+            SolveError::OtherBody => write!(
+                f,
+                "the problem has another body: its mesh, materials, supports, loads or contact nodes differ"
             ),
             SolveError::Stopped => write!(f, "stopped on request"),
         }
