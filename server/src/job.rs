@@ -9,6 +9,7 @@ use uuid::Uuid;
 
 use crate::{
     catalog::{Code, Kind},
+    sweep::SweepId,
     time::Time,
 };
 
@@ -62,6 +63,9 @@ pub struct Job {
     /// The job that this one retries.
     #[serde(default)]
     pub parent: Option<JobId>,
+    /// The sweep whose members it solves; its own problem and result are those of the first of them.
+    #[serde(default)]
+    pub sweep: Option<SweepId>,
     /// Never deleted because of its age.
     #[serde(default)]
     pub pinned: bool,
@@ -241,6 +245,8 @@ pub enum Reason {
     ResourceExhausted,
     /// The process died during several attempts.
     WorkerLost,
+    /// The first member of a sweep is wrong in a way that shows only on its mesh.
+    InvalidProblem,
     /// An error of the service itself.
     Internal,
     /// A client canceled it.
@@ -255,7 +261,8 @@ impl Reason {
             | Reason::ContactCycling
             | Reason::FalseConvergence
             | Reason::SingularSystem
-            | Reason::NonFinite => true,
+            | Reason::NonFinite
+            | Reason::InvalidProblem => true,
             Reason::TimedOut
             | Reason::QueueExpired
             | Reason::ResourceExhausted
@@ -278,6 +285,7 @@ impl From<Reason> for Code {
             Reason::QueueExpired => Code::QueueExpired,
             Reason::ResourceExhausted => Code::ResourceExhausted,
             Reason::WorkerLost => Code::WorkerLost,
+            Reason::InvalidProblem => Code::InvalidProblem,
             Reason::Internal => Code::Internal,
             Reason::UserCancel => Code::UserCancel,
         }
