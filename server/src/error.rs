@@ -13,9 +13,8 @@ use uuid::Uuid;
 
 use crate::{
     catalog::{Code, Kind},
-    job::{JobId, Status as JobStatus},
+    job::{JobId, Status as JobStatus, SweepId},
     pace::{LEAST_RATE, LONGEST_PAUSE},
-    sweep::SweepId,
 };
 
 /// Why a request failed.

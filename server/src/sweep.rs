@@ -1,19 +1,18 @@
 //! A sweep: many problems that differ in a few values, and the numbers of each. No I/O.
 
-use std::{borrow::Cow, collections::BTreeMap, fmt};
+use std::collections::BTreeMap;
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use solver::{
     error::Violation,
     family::Member,
     solution::{Outcome, Residuals, WarningCode},
 };
-use uuid::Uuid;
 
 use crate::{
-    job::{Limits, Reason, Status},
+    job::{Limits, Reason, Status, SweepId},
     time::Time,
 };
 
@@ -76,7 +75,7 @@ pub struct MemberRow {
     #[serde(default)]
     pub parameters: BTreeMap<String, Value>,
     /// Its status.
-    pub status: MemberStatus,
+    pub status: Status,
     /// Why it failed or was canceled.
     pub reason: Option<Reason>,
     /// What happened, in words, if it failed.
@@ -107,15 +106,6 @@ pub struct MemberRow {
     pub residuals: Option<Residuals>,
     /// What to consider before relying on the numbers.
     pub warnings: Vec<WarningCode>,
-}
-
-/// The status of a member.
-pub type MemberStatus = Status;
-
-impl Default for Status {
-    fn default() -> Self {
-        Status::Queued
-    }
 }
 
 /// Most violations of a member that are kept.
@@ -247,61 +237,5 @@ pub fn limits_for(members: usize) -> Limits {
     Limits {
         timeout_s: (limits.timeout_s + EACH_S * more).min(MOST_S),
         ..limits
-    }
-}
-
-/// The public id of a sweep, `sweep_<uuidv7>`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct SweepId(pub Uuid);
-
-impl SweepId {
-    /// A new id, later than all before it.
-    pub fn new() -> Self {
-        SweepId(Uuid::now_v7())
-    }
-
-    /// Reads the canonical form and no other: a sweep has one spelling.
-    pub fn parse(text: &str) -> Option<Self> {
-        let id = SweepId(Uuid::try_parse(text.strip_prefix("sweep_")?).ok()?);
-        (id.to_string() == text).then_some(id)
-    }
-}
-
-impl Default for SweepId {
-    fn default() -> Self {
-        SweepId::new()
-    }
-}
-
-impl fmt::Display for SweepId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "sweep_{}", self.0)
-    }
-}
-
-impl Serialize for SweepId {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-impl<'de> Deserialize<'de> for SweepId {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        SweepId::parse(&text).ok_or_else(|| serde::de::Error::custom("not a sweep id"))
-    }
-}
-
-impl JsonSchema for SweepId {
-    fn schema_name() -> Cow<'static, str> {
-        "SweepId".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "description": "The public id of a sweep, sweep_<uuidv7>.",
-            "type": "string",
-            "pattern": "^sweep_[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}$",
-        })
     }
 }

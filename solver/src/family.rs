@@ -1,19 +1,19 @@
 //! Many problems on one body: it is factored and condensed once.
 
-use std::ops::ControlFlow;
-
+use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::mesh::{External, ExternalMesh};
 use crate::model::Model;
 use crate::problem::Problem;
 use crate::solution::{
-    Observer, Outcome, Peak, Residuals, Solution, Summary, Warning, WarningCode,
+    Observer, Outcome, Peak, Phase, Progress, Residuals, Solution, Summary, Warning, WarningCode,
 };
-use crate::{Prepared, prepare};
+use crate::steps;
 
 /// Problems on one body, solved one after the other, each from the end of the one before where that helps.
 pub struct Family {
-    prepared: Prepared,
+    first: Model,
+    body: ElasticBody,
     /// What was said of the mesh when it was made; problems on it repeat it.
     mesh_warnings: Vec<Warning>,
 }
@@ -55,12 +55,17 @@ impl Family {
         external: Option<External>,
         observe: &mut Observer<'_>,
     ) -> Result<Family, SolveError> {
-        let prepared = prepare(problem, external, observe)?;
+        notify(observe, Progress::Phase(Phase::Mesh))?;
+        let first = Model::new(problem, external).map_err(SolveError::Invalid)?;
+        for warning in &first.warnings {
+            notify(observe, Progress::Warning(warning))?;
+        }
+        let body = ElasticBody::new(&first, observe)?;
         let of_mesh = |warning: &&Warning| warning.pointer.starts_with("/mesh");
-        let warnings = prepared.model.warnings.iter().filter(of_mesh);
-        let mesh_warnings = warnings.cloned().collect();
+        let mesh_warnings = first.warnings.iter().filter(of_mesh).cloned().collect();
         Ok(Family {
-            prepared,
+            first,
+            body,
             mesh_warnings,
         })
     }
@@ -83,21 +88,15 @@ impl Family {
         observe: &mut Observer<'_>,
     ) -> Result<Solution, SolveError> {
         let model = self.model(problem)?;
-        let mut stopped = false;
-        let solved = self.prepared.solve_other(&model, &mut |progress| {
-            let answer = match stopped {
-                true => ControlFlow::Break(()),
-                false => observe(progress),
-            };
-            stopped |= answer.is_break();
-            answer
-        });
-        solved.unwrap_or(Err(SolveError::OtherBody))
+        match ElasticBody::same(&self.first, &model) {
+            true => steps::run(&model, &self.body, None, observe),
+            false => Err(SolveError::OtherBody),
+        }
     }
 
     fn model(&self, problem: &Problem) -> Result<Model, SolveError> {
         let mesh = ExternalMesh {
-            mesh: self.prepared.model.mesh.clone(),
+            mesh: self.first.mesh.clone(),
             warnings: vec![],
         };
         let mut model = Model::on_mesh(problem, mesh).map_err(SolveError::Invalid)?;
@@ -155,6 +154,13 @@ impl Member {
     }
 }
 
+fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
+    match observe(progress).is_break() {
+        true => Err(SolveError::Stopped),
+        false => Ok(()),
+    }
+}
+
 impl std::fmt::Debug for Family {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Family")
@@ -164,8 +170,9 @@ impl std::fmt::Debug for Family {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::ops::ControlFlow;
+
     use super::*;
-    use crate::solution::Progress;
 
     fn problem(coefficient: f64, indentation: f64) -> Problem {
         serde_json::from_value(serde_json::json!({

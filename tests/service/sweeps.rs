@@ -405,7 +405,7 @@ async fn rows_come_in_pages_and_in_every_format_of_tables() {
         csv.lines()
             .nth(2)
             .unwrap()
-            .contains(r#""{""kind"":""circle"""#),
+            .contains(r#"""kind"":""circle"""#),
         "{csv}"
     );
     let (status, _) = answer(server.get(&format!("{path}?page_token=x"))).await;

@@ -8,10 +8,10 @@ use super::IntoMessage;
 use crate::{
     caller::Caller,
     event::{Event, Payload, TimedIteration},
-    job::{JobId, Reason, Waiting},
+    job::{JobId, Reason, SweepId, Waiting},
     pb,
     run::Summary,
-    sweep::{SweepEvent, SweepId, SweepPayload},
+    sweep::{SweepEvent, SweepPayload},
     time::Time,
 };
 

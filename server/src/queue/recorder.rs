@@ -115,6 +115,13 @@ async fn store_batch(
     progress: &Progress,
 ) -> Result<bool> {
     let (store, key, attempt) = (&queue.store, job.key, running.attempt);
+    // first: to store them again changes nothing, as a retry does after what comes below has failed
+    if !batch.members.is_empty() {
+        match store.record_members(key, attempt, &batch.members).await? {
+            Some(sweep) => queue.announce_sweep(sweep),
+            None => return Ok(false),
+        }
+    }
     if !batch.events.is_empty() {
         if failpoint::fails(Point::EventsReported, job.id) {
             return Err(StoreError::Full);
@@ -126,12 +133,6 @@ async fn store_batch(
                 queue.announce_events(key);
             }
             false => return Ok(false),
-        }
-    }
-    if !batch.members.is_empty() {
-        match store.record_members(key, attempt, &batch.members).await? {
-            Some(sweep) => queue.announce_sweep(sweep),
-            None => return Ok(false),
         }
     }
     if batch.partial.is_some() && failpoint::fails(Point::PartialReported, job.id) {

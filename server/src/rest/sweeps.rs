@@ -19,8 +19,9 @@ use super::{
 use crate::{
     error::ApiError,
     formats::{self, Format},
+    job::SweepId,
     parameters::{Integers, Parameter},
-    sweep::{MemberRow, Sweep, SweepId},
+    sweep::{MemberRow, Sweep},
     verbs::{
         key::Key,
         page::{PAGE_SIZE, PAGE_TOKEN, Paging},

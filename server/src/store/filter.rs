@@ -2,7 +2,11 @@
 
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
-use crate::{caller::Owners, job::Status, sweep::SweepId, time::Time};
+use crate::{
+    caller::Owners,
+    job::{Status, SweepId},
+    time::Time,
+};
 
 /// Conditions on jobs; absent ones match every job.
 #[derive(Clone, Debug, Default, PartialEq)]

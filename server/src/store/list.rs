@@ -15,8 +15,7 @@ use super::{
 };
 use crate::{
     caller::Owners,
-    job::{Job, Status},
-    sweep::SweepId,
+    job::{Job, Status, SweepId},
 };
 
 /// The index by which the rows of a list are found.

@@ -11,8 +11,7 @@ use super::{
 };
 use crate::{
     caller::Owners,
-    job::{Job, JobId, Limits, Status},
-    sweep::SweepId,
+    job::{Job, JobId, Limits, Status, SweepId},
     time::Time,
 };
 

@@ -6,9 +6,8 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::{error::Result, sweeps::NewSweep};
 use crate::{
-    job::{Cache, Job, JobId, Limits},
+    job::{Cache, Job, JobId, Limits, SweepId},
     memory::Reservation,
-    sweep::SweepId,
 };
 
 /// A job that is about to be accepted.

@@ -15,8 +15,8 @@ use super::{
 };
 use crate::{
     caller::Owners,
-    job::{Reason, Status},
-    sweep::{MemberCounts, MemberRow, Sweep, SweepId},
+    job::{Reason, Status, SweepId},
+    sweep::{MemberCounts, MemberRow, Sweep},
     time::Time,
 };
 
@@ -55,8 +55,10 @@ pub struct MemberEvents {
     pub sweep: Sweep,
     /// In order; some at a time.
     pub events: Vec<(i64, Time, MemberRow)>,
-    /// There are more after these.
+    /// There may be more after these.
     pub more: bool,
+    /// The number of the last one that there is.
+    pub last: i64,
 }
 
 impl Store {
@@ -161,7 +163,7 @@ impl Store {
             .fetch_all(&mut *tx)
             .await?;
             let mut events = vec![];
-            for (expected, row) in (after + 1..).zip(&rows) {
+            for (expected, row) in (after.saturating_add(1)..).zip(&rows) {
                 let seq: i64 = row.try_get("seq")?;
                 if seq != expected {
                     return Err(record(key, "events").damaged("some are missing"));
@@ -169,10 +171,13 @@ impl Store {
                 events.push((seq, Time::from_micros(row.try_get("t")?), member(row)?));
             }
             let more = events.len() as i64 >= limit;
+            let last = sqlx::query_scalar("select last_seq from sweep where id = ?");
+            let last = last.bind(key).fetch_one(&mut *tx).await?;
             Ok(Some(MemberEvents {
                 sweep,
                 events,
                 more,
+                last,
             }))
         };
         self.damages.noting(read).await

@@ -4,10 +4,9 @@ use serde_json::json;
 
 use crate::{
     error::ApiError,
-    job::Status,
+    job::{Status, SweepId},
     parameters::{Description, Parameter, Text, Times, Values, Words},
     store::Filter,
-    sweep::SweepId,
 };
 
 /// By status; several may be given.

@@ -26,10 +26,10 @@ use crate::{
     caller::Caller,
     digest,
     error::ApiError,
-    job::{Cache, Job, Limits},
+    job::{Cache, Job, Limits, SweepId},
     parameters::{Integers, Parameter, Seconds, Variable},
     store::{Accepted, Cursor, Filter, MemberEvents, NewJob, NewSweep, RequestKey},
-    sweep::{MemberRow, Sweep, SweepEvent, SweepId, SweepPayload, limits_for},
+    sweep::{MemberRow, Sweep, SweepEvent, SweepPayload, limits_for},
     violations::{PROBLEM, prefixed},
 };
 
@@ -354,7 +354,9 @@ pub async fn rows(
 ) -> Result<Page<MemberRow>, ApiError> {
     let sweep = get(service, caller, id).await?;
     let list = format!("members of {id}");
-    let from = paging.cursor(&list)?.map_or(0, |cursor| cursor.key + 1);
+    let from = paging
+        .cursor(&list)?
+        .map_or(0, |cursor| cursor.key.saturating_add(1));
     let found = members(service, &sweep, from, paging.limit()).await?;
     let at = |row: &MemberRow| Cursor {
         micros: 0,
@@ -439,7 +441,7 @@ fn follow(
                 let _turn = reader.queue.turn().await;
                 Ok(reader.store.member_events(key, cursor, AT_ONCE).await?)
             });
-            let MemberEvents { sweep, events, more } = read.await?.ok_or(ApiError::SweepDeleted(id))?;
+            let MemberEvents { sweep, events, more, last } = read.await?.ok_or(ApiError::SweepDeleted(id))?;
             let idle = events.is_empty();
             for (seq, t, mut row) in events {
                 cursor = seq;
@@ -448,6 +450,9 @@ fn follow(
             }
             if more {
                 continue;
+            }
+            if sweep.status.is_terminal() && cursor > last {
+                return;
             }
             if sweep.status.is_terminal() {
                 let t = sweep.finished_at.unwrap_or(sweep.created_at);
