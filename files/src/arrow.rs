@@ -19,7 +19,7 @@ fn written(table: &Table) -> Result<Vec<u8>, ArrowError> {
         .iter()
         .map(|column| {
             let (kind, values, nullable) = array(&column.values);
-            (Field::new(column.name, kind, nullable), values)
+            (Field::new(column.name.clone(), kind, nullable), values)
         })
         .unzip();
     let schema = Arc::new(Schema::new(fields));

@@ -1,10 +1,12 @@
 //! Problems and meshes from texts and files, results and figures as files: all input and output
 //! of `solver`. Bytes in, bytes out, never a path.
 
-// In: problems as JSON; meshes as Gmsh files and as decks of Abaqus or CalculiX.
+// In: problems as JSON, and sweeps of them; meshes as Gmsh files and as decks of Abaqus or CalculiX.
 pub mod abaqus;
 pub mod gmsh;
 pub mod json;
+
+pub mod sweep;
 
 mod external;
 mod file;

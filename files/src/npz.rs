@@ -61,14 +61,18 @@ impl Npz {
     }
 
     /// Adds a vector of words, each as wide as the longest: NumPy's own `<U`, which needs no pickle.
-    pub fn words(&mut self, name: &str, words: &[&str]) -> Result<(), String> {
-        let width = words.iter().map(|word| word.chars().count()).max();
+    pub fn words<S: AsRef<str>>(&mut self, name: &str, words: &[S]) -> Result<(), String> {
+        let width = words.iter().map(|word| word.as_ref().chars().count()).max();
         let width = width.unwrap_or(0).max(1);
         self.begin(name, &format!("<U{width}"), &format!("({},)", words.len()))
             .map_err(failed)?;
         let mut bytes = Vec::new();
         for word in words {
-            let letters = word.chars().map(u32::from).chain(std::iter::repeat(0));
+            let letters = word
+                .as_ref()
+                .chars()
+                .map(u32::from)
+                .chain(std::iter::repeat(0));
             letters
                 .take(width)
                 .for_each(|letter| letter.put(&mut bytes));

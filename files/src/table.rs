@@ -1,7 +1,7 @@
 //! Columns with names: a profile or a history, written as CSV or JSON Lines (`arrow` and `npz` have
 //! the binary formats). All formats use one table, and so have the same columns.
 
-use std::fmt::Write;
+use std::{borrow::Cow, fmt::Write};
 
 use solver::solution::{ContactProfile, Iteration};
 
@@ -16,7 +16,7 @@ pub struct Table {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// Its name in the API; a nested field has both names, as in `contact_active`.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// One entry per row.
     pub values: Values,
 }
@@ -28,8 +28,8 @@ pub enum Values {
     Real(Vec<f64>),
     /// Numbers and counts.
     Whole(Vec<u32>),
-    /// Words of the API.
-    Text(Vec<&'static str>),
+    /// Words of the API, or any other text.
+    Text(Vec<Cow<'static, str>>),
 }
 
 impl Values {
@@ -70,7 +70,7 @@ impl Table {
             real("nonlocal_pressure",       nonlocal_pressure),
             real("friction_bound",          friction_bound),
             real("friction_ratio",          friction_ratio),
-            column("state", Values::Text(state.iter().map(|state| state.as_str()).collect())),
+            column("state", Values::Text(state.iter().map(|state| state.as_str().into()).collect())),
         ] }
     }
 
@@ -82,7 +82,7 @@ impl Table {
         let whole = |name, value: fn(&Iteration) -> u32| column(name, Values::Whole(rows.clone().map(value).collect()));
         Table { columns: vec![
             whole("k",                 |row| row.k),
-            column("stage", Values::Text(rows.clone().map(|row| row.stage.as_str()).collect())),
+            column("stage", Values::Text(rows.clone().map(|row| row.stage.as_str().into()).collect())),
             whole("step",              |row| row.step),
             whole("increment",         |row| row.increment),
             real("residual",           |row| row.residual),
@@ -126,7 +126,7 @@ impl Table {
                 match &column.values {
                     Values::Real(values) => real(&mut text, values[row], ""),
                     Values::Whole(values) => push(&mut text, values[row]),
-                    Values::Text(values) => text.push_str(values[row]),
+                    Values::Text(values) => text.push_str(&cell(&values[row])),
                 }
             }
             text.push_str("\r\n");
@@ -135,22 +135,26 @@ impl Table {
     }
 
     fn header(&self) -> String {
-        let names: Vec<&str> = self.columns.iter().map(|column| column.name).collect();
+        let names: Vec<Cow<'_, str>> = self
+            .columns
+            .iter()
+            .map(|column| cell(&column.name))
+            .collect();
         format!("{}\r\n", names.join(","))
     }
 
-    /// A JSON object per row; a missing number is null. Names and words are the API's own and need
-    /// no escape.
+    /// A JSON object per row; a missing number is null.
     pub fn jsonl(&self) -> Result<String, String> {
         let mut text = String::new();
+        let names: Vec<String> = self.columns.iter().map(|c| quoted(&c.name)).collect();
         for row in 0..self.rows()? {
             for (place, column) in self.columns.iter().enumerate() {
                 text.push(if place > 0 { ',' } else { '{' });
-                push(&mut text, format_args!("\"{}\":", column.name));
+                push(&mut text, format_args!("{}:", names[place]));
                 match &column.values {
                     Values::Real(values) => real(&mut text, values[row], "null"),
                     Values::Whole(values) => push(&mut text, values[row]),
-                    Values::Text(values) => push(&mut text, format_args!("\"{}\"", values[row])),
+                    Values::Text(values) => text.push_str(&quoted(&values[row])),
                 }
             }
             text.push_str("}\n");
@@ -160,7 +164,21 @@ impl Table {
 }
 
 fn column(name: &'static str, values: Values) -> Column {
+    let name = name.into();
     Column { name, values }
+}
+
+/// A text as a cell of CSV: in quotes if it would be read as something else.
+fn cell(text: &str) -> Cow<'_, str> {
+    match text.contains([',', '"', '\r', '\n']) {
+        true => Cow::Owned(format!("\"{}\"", text.replace('"', "\"\""))),
+        false => Cow::Borrowed(text),
+    }
+}
+
+/// A text as JSON.
+fn quoted(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
 }
 
 fn real(text: &mut String, value: f64, missing: &str) {
@@ -257,7 +275,11 @@ pub(crate) mod tests {
             names
         };
         let names = |table: Table| {
-            let mut names: Vec<String> = table.columns.iter().map(|c| c.name.to_owned()).collect();
+            let mut names: Vec<String> = table
+                .columns
+                .iter()
+                .map(|c| c.name.clone().into_owned())
+                .collect();
             names.sort();
             names
         };

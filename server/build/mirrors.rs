@@ -134,6 +134,11 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("ContactProfile", "solution::ContactProfile").answer(),
     names("NodeState", "solution::NodeState").answer(),
 
+    // sweeps
+    fields("Sweep", "sweep::Sweep").answer().ours(&["key: _", "links: _"]),
+    fields("MemberCounts", "sweep::MemberCounts").answer(),
+    fields("SweepMember", "sweep::MemberRow").answer(),
+
     // the service
     fields("ServerInfo", "info::Info").answer(),
     names("Isolation", "Isolation").answer(),

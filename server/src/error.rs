@@ -13,7 +13,7 @@ use uuid::Uuid;
 
 use crate::{
     catalog::{Code, Kind},
-    job::{JobId, Status as JobStatus},
+    job::{JobId, Status as JobStatus, SweepId},
     pace::{LEAST_RATE, LONGEST_PAUSE},
 };
 
@@ -68,6 +68,12 @@ pub enum ApiError {
     /// The job was deleted.
     #[error("{0} was deleted")]
     Deleted(JobId),
+    /// The sweep was deleted.
+    #[error("{0} was deleted")]
+    SweepDeleted(SweepId),
+    /// The sweep has not ended.
+    #[error("the sweep is {0}; cancel it, or wait for its end")]
+    SweepActive(JobStatus),
     /// The job ended without a result.
     #[error("the job ended without a result (status {0})")]
     NoResult(JobStatus),
@@ -206,12 +212,14 @@ impl ApiError {
             ApiError::HeaderTooLarge => Code::HeaderTooLarge,
             ApiError::Overloaded => Code::Overloaded,
             ApiError::NotFound(_) => Code::NotFound,
-            ApiError::Deleted(_) => Code::Deleted,
+            ApiError::Deleted(_) | ApiError::SweepDeleted(_) => Code::Deleted,
             ApiError::NoResult(_) => Code::NoResult,
             ApiError::MethodNotAllowed => Code::MethodNotAllowed,
             ApiError::NotAcceptable { .. } => Code::NotAcceptable,
             ApiError::UnsupportedMedia(_) => Code::UnsupportedMedia,
-            ApiError::JobActive(_) | ApiError::MeshInUse => Code::JobActive,
+            ApiError::JobActive(_) | ApiError::SweepActive(_) | ApiError::MeshInUse => {
+                Code::JobActive
+            }
             ApiError::IdConflict(_) => Code::IdConflict,
             ApiError::KeyReuse => Code::IdempotencyKeyReuse,
             ApiError::StaleVersion(_) => Code::StaleVersion,

@@ -1,15 +1,18 @@
 //! The formats of a result: one list, and one way to write each format, for the data routes and for
 //! `signorini solve -o`.
 
+use std::borrow::Cow;
+
 use files::{
     npz::Npz,
     table::{Column, Table, Values},
 };
 use serde::Serialize;
-use solver::solution::{ContactProfile, Fields};
+use serde_json::Value;
+use solver::solution::{ContactProfile, Fields, Residuals};
 use strum::{IntoStaticStr, VariantArray};
 
-use crate::{event::TimedIteration, run::Document};
+use crate::{event::TimedIteration, run::Document, sweep::MemberRow};
 
 /// A format of data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, VariantArray)]
@@ -90,7 +93,7 @@ pub fn history(history: &[TimedIteration], format: Format) -> Result<Vec<u8>, St
 fn history_table(history: &[TimedIteration]) -> Table {
     let mut table = Table::of_history(history.iter().map(|timed| &timed.row));
     table.columns.push(Column {
-        name: "wall_s",
+        name: "wall_s".into(),
         values: Values::Real(history.iter().map(|timed| timed.wall_s).collect()),
     });
     table
@@ -108,6 +111,83 @@ fn rows<T: Serialize + ?Sized>(
         Format::Arrow => files::arrow::file(&table(part)),
         Format::Npz => files::npz::file(&table(part)),
         Format::Vtu | Format::Svg => Err(format!("rows are not written as {}", format.name())),
+    }
+}
+
+/// The rows of a sweep in that format; `paths` are what its members differ in. The table has a column for each number
+/// of a row; nested ones have both names, as in `residuals_kkt`, and the parameters their pointers.
+pub fn members(paths: &[String], rows: &[MemberRow], format: Format) -> Result<Vec<u8>, String> {
+    let table = || members_table(paths, rows);
+    match format {
+        Format::Json => serde_json::to_vec(rows).map_err(|error| error.to_string()),
+        Format::Csv => table().csv().map(String::into_bytes),
+        Format::Jsonl => table().jsonl().map(String::into_bytes),
+        Format::Arrow => files::arrow::file(&table()),
+        Format::Npz => files::npz::file(&table()),
+        Format::Vtu | Format::Svg => Err(format!("rows are not written as {}", format.name())),
+    }
+}
+
+#[rustfmt::skip] // a column in a row
+fn members_table(paths: &[String], rows: &[MemberRow]) -> Table {
+    let column = |name: &'static str, values| Column { name: name.into(), values };
+    let real = |name, value: fn(&MemberRow) -> Option<f64>| {
+        column(name, Values::Real(rows.iter().map(|row| value(row).unwrap_or(f64::NAN)).collect()))
+    };
+    let whole = |name, value: fn(&MemberRow) -> u32| column(name, Values::Whole(rows.iter().map(value).collect()));
+    let text = |name, value: fn(&MemberRow) -> Cow<'static, str>| column(name, Values::Text(rows.iter().map(value).collect()));
+    let residual = |name, value: fn(&Residuals) -> f64| {
+        let values = rows.iter().map(|row| row.residuals.as_ref().map_or(f64::NAN, value));
+        column(name, Values::Real(values.collect()))
+    };
+    let mut columns = vec![whole("number", |row| row.number)];
+    columns.extend(paths.iter().map(|path| parameter(path, rows)));
+    columns.extend([
+        text("status",                  |row| <&str>::from(row.status).into()),
+        text("reason",                  |row| row.reason.map_or("", <&str>::from).into()),
+        real("normal_force",            |row| row.normal_force),
+        real("tangential_force",        |row| row.tangential_force),
+        real("friction_force",          |row| row.friction_force),
+        real("contact_width",           |row| row.contact_width),
+        real("stick_width",             |row| row.stick_width),
+        real("slip_width",              |row| row.slip_width),
+        real("peak_normal_stress",      |row| row.peak_normal_stress),
+        real("peak_tangential_stress",  |row| row.peak_tangential_stress),
+        whole("iterations",             |row| row.iterations),
+        residual("residuals_kkt",         |residuals| residuals.kkt),
+        residual("residuals_friction",    |residuals| residuals.friction),
+        residual("residuals_monolithic",  |residuals| residuals.monolithic),
+        residual("residuals_equilibrium", |residuals| residuals.equilibrium),
+        text("warnings", |row| {
+            let codes: Vec<&str> = row.warnings.iter().map(|code| code.as_str()).collect();
+            codes.join(" ").into()
+        }),
+    ]);
+    Table { columns }
+}
+
+/// The values of one parameter: numbers, or texts if one of them is something else.
+fn parameter(path: &str, rows: &[MemberRow]) -> Column {
+    let values = rows.iter().map(|row| row.parameters.get(path));
+    let numbers = values.clone().flatten().all(|value| value.is_number());
+    let values = match numbers {
+        true => Values::Real(
+            values
+                .map(|value| value.and_then(Value::as_f64).unwrap_or(f64::NAN))
+                .collect(),
+        ),
+        false => {
+            let text = |value: Option<&Value>| match value {
+                Some(Value::String(text)) => text.clone(),
+                Some(other) => other.to_string(),
+                None => String::new(),
+            };
+            Values::Text(values.map(|value| text(value).into()).collect())
+        }
+    };
+    Column {
+        name: path.to_owned().into(),
+        values,
     }
 }
 
@@ -180,6 +260,42 @@ mod tests {
             (&json[1]["k"], &json[1]["wall_s"]),
             (&2.into(), &1.0.into())
         );
+    }
+
+    #[test]
+    fn rows_of_a_sweep_have_a_column_for_each_parameter_whatever_its_type() {
+        let (number, other) = ("/contacts/0/indentation", "/contacts/0/obstacle");
+        let mut rows = vec![MemberRow::default(), MemberRow::default()];
+        rows[0].parameters.insert(number.into(), 0.5.into());
+        rows[0]
+            .parameters
+            .insert(other.into(), serde_json::json!({"kind": "flat", "to": 1}));
+        rows[1].number = 1;
+        rows[1].normal_force = Some(7.5);
+        let paths = [number.to_owned(), other.to_owned()];
+        let written = |format| members(&paths, &rows, format).unwrap();
+        let csv = String::from_utf8(written(Format::Csv)).unwrap();
+        let lines: Vec<&str> = csv.lines().collect();
+        assert!(lines[0].starts_with(
+            "number,/contacts/0/indentation,/contacts/0/obstacle,status,reason,normal_force"
+        ));
+        assert!(
+            lines[1].starts_with(r#"0,0.5,"{""kind"":""flat"",""to"":1}",queued,,,"#),
+            "{csv}"
+        );
+        assert!(lines[2].starts_with("1,,,queued,,7.5,"), "{csv}");
+        let jsonl = String::from_utf8(written(Format::Jsonl)).unwrap();
+        let row: Value = serde_json::from_str(jsonl.lines().next().unwrap()).unwrap();
+        assert_eq!(
+            (&row[number], &row["normal_force"]),
+            (&0.5.into(), &Value::Null)
+        );
+        assert!(!written(Format::Arrow).is_empty() && !written(Format::Npz).is_empty());
+        assert_eq!(
+            serde_json::from_slice::<Value>(&written(Format::Json)).unwrap()[1]["number"],
+            1
+        );
+        assert!(members(&paths, &rows, Format::Vtu).is_err());
     }
 
     #[test]

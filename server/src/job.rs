@@ -62,6 +62,9 @@ pub struct Job {
     /// The job that this one retries.
     #[serde(default)]
     pub parent: Option<JobId>,
+    /// The sweep whose members it solves; its own problem and result are those of the first of them.
+    #[serde(default)]
+    pub sweep: Option<SweepId>,
     /// Never deleted because of its age.
     #[serde(default)]
     pub pinned: bool,
@@ -153,11 +156,68 @@ impl JsonSchema for JobId {
     }
 }
 
+/// The public id of a sweep, `sweep_<uuidv7>`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SweepId(pub Uuid);
+
+impl SweepId {
+    /// A new id, later than all before it.
+    pub fn new() -> Self {
+        SweepId(Uuid::now_v7())
+    }
+
+    /// Reads the canonical form and no other: a sweep has one spelling.
+    pub fn parse(text: &str) -> Option<Self> {
+        let id = SweepId(Uuid::try_parse(text.strip_prefix("sweep_")?).ok()?);
+        (id.to_string() == text).then_some(id)
+    }
+}
+
+impl Default for SweepId {
+    fn default() -> Self {
+        SweepId::new()
+    }
+}
+
+impl fmt::Display for SweepId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "sweep_{}", self.0)
+    }
+}
+
+impl Serialize for SweepId {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for SweepId {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        SweepId::parse(&text).ok_or_else(|| serde::de::Error::custom("not a sweep id"))
+    }
+}
+
+impl JsonSchema for SweepId {
+    fn schema_name() -> Cow<'static, str> {
+        "SweepId".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "The public id of a sweep, sweep_<uuidv7>.",
+            "type": "string",
+            "pattern": "^sweep_[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}$",
+        })
+    }
+}
+
 /// The status of a job.
 #[derive(
     Clone,
     Copy,
     Debug,
+    Default,
     PartialEq,
     Eq,
     Serialize,
@@ -172,6 +232,7 @@ impl JsonSchema for JobId {
 #[strum(serialize_all = "snake_case")]
 pub enum Status {
     /// Accepted and waiting.
+    #[default]
     Queued,
     /// Being solved by a worker.
     Running,
@@ -241,6 +302,8 @@ pub enum Reason {
     ResourceExhausted,
     /// The process died during several attempts.
     WorkerLost,
+    /// The first member of a sweep is wrong in a way that shows only on its mesh.
+    InvalidProblem,
     /// An error of the service itself.
     Internal,
     /// A client canceled it.
@@ -255,7 +318,8 @@ impl Reason {
             | Reason::ContactCycling
             | Reason::FalseConvergence
             | Reason::SingularSystem
-            | Reason::NonFinite => true,
+            | Reason::NonFinite
+            | Reason::InvalidProblem => true,
             Reason::TimedOut
             | Reason::QueueExpired
             | Reason::ResourceExhausted
@@ -278,6 +342,7 @@ impl From<Reason> for Code {
             Reason::QueueExpired => Code::QueueExpired,
             Reason::ResourceExhausted => Code::ResourceExhausted,
             Reason::WorkerLost => Code::WorkerLost,
+            Reason::InvalidProblem => Code::InvalidProblem,
             Reason::Internal => Code::Internal,
             Reason::UserCancel => Code::UserCancel,
         }

@@ -1,13 +1,14 @@
 //! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms of its own
 //! group and of the groups above it; ARCHITECTURE.md has the finer order.
 
-// Basic types, for every module: callers, kinds of errors, points in time, jobs and their changes of status, events.
+// Basic types, for every module: callers, kinds of errors, points in time, jobs and their changes of status, sweeps, events.
 pub mod caller;
 pub mod catalog;
 pub mod event;
 pub mod job;
 pub mod memory;
 pub mod mesh;
+pub mod sweep;
 pub mod time;
 
 // The messages of gRPC, read within a limit.

@@ -24,6 +24,7 @@ mod results;
 mod same_errors;
 mod solve_command;
 mod submit;
+mod sweeps;
 mod validate;
 mod verify;
 mod waiting;

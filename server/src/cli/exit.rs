@@ -32,7 +32,9 @@ impl Exit {
     /// What it means, for `--help` and the README.
     fn meaning(self) -> &'static str {
         match self {
-            Exit::Ok => "success; of solve: converged; of serve: stopped by SIGTERM or SIGINT",
+            Exit::Ok => {
+                "success; of solve and sweep: converged; of serve: stopped by SIGTERM or SIGINT"
+            }
             Exit::Failed => {
                 "anything else: a file that cannot be read or written, a body that its contacts do not hold in the end, no memory"
             }
@@ -44,7 +46,9 @@ impl Exit {
             Exit::Locked => "serve, doctor: another server uses the folder",
             Exit::Schema => "serve, doctor: the tables are of another program or version",
             Exit::Damaged => "serve, doctor: stored data is missing or damaged",
-            Exit::NotConverged => "solve: not converged; the result is written all the same",
+            Exit::NotConverged => {
+                "solve: not converged; sweep: some members failed; the result is written all the same"
+            }
         }
     }
 

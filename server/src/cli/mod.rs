@@ -10,6 +10,7 @@ mod output;
 mod report;
 mod serve;
 mod solve;
+mod sweep;
 
 use std::process::ExitCode;
 
@@ -40,6 +41,9 @@ enum Command {
     /// Solve one problem without a service. Exit code: 0 converged, 9 not converged (the result is written), 2 invalid or
     /// too large, 1 anything else, such as a file that cannot be read, or a body that its contacts do not hold
     Solve(solve::Arguments),
+    /// Solve a sweep without a service: one problem with many values. Exit code: 0 all members converged, 9 some did not
+    /// (the table is written), 2 invalid or too large, 1 anything else
+    Sweep(sweep::Arguments),
     /// Print the JSON Schema of a problem: every field with its meaning and default
     Schema,
     /// Explain an error code and what to do about it
@@ -72,6 +76,10 @@ pub fn main() -> ExitCode {
         Command::Solve(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
             solve::run(&arguments)
+        }
+        Command::Sweep(arguments) => {
+            let _lines = log::start(LevelFilter::WARN);
+            sweep::run(&arguments)
         }
         Command::Schema => solve::schema(),
         Command::Explain(arguments) => explain::run(&arguments),

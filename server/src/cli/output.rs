@@ -208,7 +208,7 @@ fn one_of(contacts: &[&str], asked: Option<String>, ending: &str) -> Result<Stri
 
 /// Writes a temporary file beside `path` and renames it, so that there is never an incomplete file of that
 /// name, and an older one is kept until the new one is complete. A pipe or device is written directly.
-fn replace(
+pub(super) fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {

@@ -137,7 +137,7 @@ pub(super) fn schema() -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-fn invalid(file: &Path, violations: &[Violation]) -> Exit {
+pub(super) fn invalid(file: &Path, violations: &[Violation]) -> Exit {
     let many = if violations.len() == 1 {
         "violation"
     } else {

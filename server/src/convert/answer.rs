@@ -8,9 +8,10 @@ use super::IntoMessage;
 use crate::{
     caller::Caller,
     event::{Event, Payload, TimedIteration},
-    job::{JobId, Reason, Waiting},
+    job::{JobId, Reason, SweepId, Waiting},
     pb,
     run::Summary,
+    sweep::{SweepEvent, SweepPayload},
     time::Time,
 };
 
@@ -36,6 +37,12 @@ impl IntoMessage<Timestamp> for Time {
 impl IntoMessage<Option<Timestamp>> for Time {
     fn into_message(self) -> Option<Timestamp> {
         Some(self.into())
+    }
+}
+
+impl IntoMessage<String> for SweepId {
+    fn into_message(self) -> String {
+        self.to_string()
     }
 }
 
@@ -110,6 +117,29 @@ impl From<Event> for pb::Event {
         pb::Event {
             seq,
             attempt,
+            t: t.into_message(),
+            payload: Some(payload),
+        }
+    }
+}
+
+/// Values of any type, as JSON.
+impl IntoMessage<String> for serde_json::Value {
+    fn into_message(self) -> String {
+        self.to_string()
+    }
+}
+
+impl From<SweepEvent> for pb::SweepEvent {
+    fn from(event: SweepEvent) -> Self {
+        use pb::sweep_event::Payload as Out;
+        let SweepEvent { seq, t, payload } = event;
+        let payload = match payload {
+            SweepPayload::Member { member } => Out::Member((*member).into()),
+            SweepPayload::Done { sweep } => Out::Done((*sweep).into()),
+        };
+        pb::SweepEvent {
+            seq,
             t: t.into_message(),
             payload: Some(payload),
         }

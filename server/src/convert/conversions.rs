@@ -11,6 +11,7 @@ use crate::{
     config::Isolation,
     job, mesh, pb,
     run::Summary,
+    sweep,
     verbs::{bulk, info, jobs, lists, problems, queue, results},
 };
 

@@ -14,5 +14,5 @@ mod tests;
 mod write;
 
 pub use read::{FromMessage, Reader, read};
-pub use request::{edit, filter, invalid_field, job_request};
+pub use request::{edit, filter, invalid_field, job_request, sweep_request};
 pub use write::IntoMessage;

@@ -66,6 +66,16 @@ impl Reader {
         self.at(Token::Index(index), |read| T::from_message(message, read))
     }
 
+    /// Reads what belongs to a field.
+    pub fn inside<T>(&mut self, name: &'static str, read: impl FnOnce(&mut Self) -> T) -> T {
+        self.at(Token::Name(name), read)
+    }
+
+    /// Reads what belongs to an entry of a list.
+    pub fn item<T>(&mut self, index: usize, read: impl FnOnce(&mut Self) -> T) -> T {
+        self.at(Token::Index(index), read)
+    }
+
     /// A message that must be set is absent.
     pub fn missing<T>(&mut self, expected: &str) -> Option<T> {
         self.wrong(Reason::Missing, "nothing", expected)

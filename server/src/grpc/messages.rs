@@ -8,7 +8,6 @@ use crate::{
     convert::invalid_field,
     error::ApiError,
     parameters::{Parameter, Values},
-    pb,
     verbs::{
         MAX_MESSAGE_BYTES,
         key::{IDEMPOTENCY_KEY, Key},
@@ -22,15 +21,15 @@ pub(super) const MAX_ROWS: usize = 4000;
 /// Most points of a profile in one answer, some 90 bytes each.
 const MAX_PLACES: usize = 10_000;
 
-/// How many of these jobs fit into one message; at least one.
-pub(super) fn jobs_that_fit(jobs: &[pb::Job]) -> usize {
+/// How many of these fit into one message; at least one.
+pub(super) fn messages_that_fit<M: Message>(messages: &[M]) -> usize {
     const AROUND: usize = 16; // tag and length of each, and the page's token
     let mut bytes = 0;
-    let fits = |job: &&pb::Job| {
-        bytes += job.encoded_len() + AROUND;
+    let fits = |message: &&M| {
+        bytes += message.encoded_len() + AROUND;
         bytes <= MAX_MESSAGE_BYTES
     };
-    jobs.iter().take_while(fits).count().max(1)
+    messages.iter().take_while(fits).count().max(1)
 }
 
 /// The caller and the message of a request.

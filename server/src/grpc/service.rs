@@ -8,12 +8,12 @@ use sha2::{Digest, Sha256};
 use tonic::{Request, Response, Status, Streaming};
 
 use super::messages::{
-    MAX_ROWS, caller_and_message, check_offset, jobs_that_fit, key, noting_replay, paging, points,
-    read_if_set,
+    MAX_ROWS, caller_and_message, check_offset, key, messages_that_fit, noting_replay, paging,
+    points, read_if_set,
 };
 use crate::{
     caller::Caller,
-    convert::{edit, filter, invalid_field, job_request, read},
+    convert::{edit, filter, invalid_field, job_request, read, sweep_request},
     error::ApiError,
     event::Event,
     formats::Format,
@@ -35,6 +35,7 @@ use crate::{
         problems, profiles, queue, results,
         retry::{self, Changes},
         submit::{self, Submitted},
+        sweeps,
         watch::{self, AFTER_SEQ, Until, WAIT},
     },
     violations,
@@ -161,7 +162,7 @@ impl JobService for Grpc {
             Ok::<_, ApiError>((jobs, page.next))
         };
         let (mut jobs, mut next) = list(&paging).await?;
-        let fitting = jobs_that_fit(&jobs);
+        let fitting = messages_that_fit(&jobs);
         if fitting < jobs.len() {
             // a shorter page, whose token continues where it ends
             let size = Some(fitting as i64);
@@ -453,6 +454,120 @@ impl JobService for Grpc {
         let (caller, request) = caller_and_message(request)?;
         meshes::delete(&self.service, &caller, &HASH.read(&request.hash)?).await?;
         Ok(Response::new(pb::DeleteMeshResponse {}))
+    }
+
+    async fn create_sweep(&self, request: Request<pb::CreateSweepRequest>) -> Reply<pb::Sweep> {
+        let (caller, request) = caller_and_message(request)?;
+        let key = key(request.request_id.clone())?;
+        let request = self.service.work(|| sweep_request(request)).await?;
+        let submitted = sweeps::create(&self.service, &caller, request, key).await?;
+        let response = Response::new(submitted.accepted.into());
+        Ok(noting_replay(response, submitted.replayed))
+    }
+
+    async fn get_sweep(&self, request: Request<pb::GetSweepRequest>) -> Reply<pb::Sweep> {
+        let (caller, request) = caller_and_message(request)?;
+        let id = sweeps::ID.read(&request.id)?;
+        let sweep = match request.wait {
+            Some(wait) => {
+                let wait_s = sweeps::WAIT.check(wait)?;
+                sweeps::wait(&self.service, &caller, id, wait_s).await?
+            }
+            None => sweeps::get(&self.service, &caller, id).await?,
+        };
+        Ok(Response::new(sweep.into()))
+    }
+
+    async fn list_sweeps(
+        &self,
+        request: Request<pb::ListSweepsRequest>,
+    ) -> Reply<pb::ListSweepsResponse> {
+        let (caller, request) = caller_and_message(request)?;
+        let paging = paging(request.page_size, request.page_token)?;
+        let list = async |paging: &Paging| {
+            let page = sweeps::list(&self.service, &caller, paging).await?;
+            let items: Vec<pb::Sweep> = page.items.into_iter().map(Into::into).collect();
+            Ok::<_, ApiError>((items, page.next))
+        };
+        let (mut sweeps, mut next) = list(&paging).await?;
+        let fitting = messages_that_fit(&sweeps);
+        if fitting < sweeps.len() {
+            let size = Some(fitting as i64);
+            (sweeps, next) = list(&Paging { size, ..paging }).await?;
+        }
+        Ok(Response::new(pb::ListSweepsResponse {
+            sweeps,
+            next_page_token: next.unwrap_or_default(),
+        }))
+    }
+
+    async fn list_sweep_members(
+        &self,
+        request: Request<pb::ListSweepMembersRequest>,
+    ) -> Reply<pb::ListSweepMembersResponse> {
+        let (caller, request) = caller_and_message(request)?;
+        let id = sweeps::ID.read(&request.id)?;
+        let paging = paging(request.page_size, request.page_token)?;
+        let list = async |paging: &Paging| {
+            let page = sweeps::rows(&self.service, &caller, id, paging).await?;
+            let items: Vec<pb::SweepMember> = page.items.into_iter().map(Into::into).collect();
+            Ok::<_, ApiError>((items, page.next))
+        };
+        let (mut members, mut next) = list(&paging).await?;
+        let fitting = messages_that_fit(&members);
+        if fitting < members.len() {
+            let size = Some(fitting as i64);
+            (members, next) = list(&Paging { size, ..paging }).await?;
+        }
+        Ok(Response::new(pb::ListSweepMembersResponse {
+            members,
+            next_page_token: next.unwrap_or_default(),
+        }))
+    }
+
+    type WatchSweepStream = Pin<Box<dyn Stream<Item = Result<pb::SweepEvent, Status>> + Send>>;
+
+    async fn watch_sweep(
+        &self,
+        request: Request<pb::WatchSweepRequest>,
+    ) -> Reply<Self::WatchSweepStream> {
+        let (caller, request) = caller_and_message(request)?;
+        let (after, id) = (
+            AFTER_SEQ.check(request.after_seq)?,
+            sweeps::ID.read(&request.id)?,
+        );
+        let events = sweeps::watch(&self.service, &caller, id, after).await?;
+        let events = futures_util::stream::iter(events).flatten();
+        let events = events.map(|event| event.map(Into::into).map_err(Into::into));
+        Ok(Response::new(events.boxed()))
+    }
+
+    async fn cancel_sweep(&self, request: Request<pb::CancelSweepRequest>) -> Reply<pb::Sweep> {
+        let (caller, request) = caller_and_message(request)?;
+        let id = sweeps::ID.read(&request.id)?;
+        let sweep = sweeps::cancel(&self.service, &caller, id).await?;
+        Ok(Response::new(sweep.into()))
+    }
+
+    async fn delete_sweep(
+        &self,
+        request: Request<pb::DeleteSweepRequest>,
+    ) -> Reply<pb::DeleteSweepResponse> {
+        let (caller, request) = caller_and_message(request)?;
+        sweeps::delete(&self.service, &caller, sweeps::ID.read(&request.id)?).await?;
+        Ok(Response::new(pb::DeleteSweepResponse {}))
+    }
+
+    async fn create_member_job(
+        &self,
+        request: Request<pb::CreateMemberJobRequest>,
+    ) -> Reply<pb::Job> {
+        let (caller, request) = caller_and_message(request)?;
+        let (id, key) = (sweeps::ID.read(&request.id)?, key(request.request_id)?);
+        let number = i64::from(request.number);
+        let submitted = sweeps::solve_member(&self.service, &caller, id, number, key).await?;
+        let response = Response::new(submitted.accepted.into());
+        Ok(noting_replay(response, submitted.replayed))
     }
 }
 

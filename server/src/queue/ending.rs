@@ -51,7 +51,7 @@ impl From<SolveError> for NoSolution {
                 NoSolution::Failed(Reason::ResourceExhausted, detail)
             }
             // it was checked before it was accepted
-            SolveError::Invalid(_) => NoSolution::Internal(detail),
+            SolveError::Invalid(_) | SolveError::OtherBody => NoSolution::Internal(detail),
         }
     }
 }

@@ -19,11 +19,14 @@ use crate::{
     failpoint::{self, Point},
     job::{Job, Progress},
     store::{FinalBatch, Parts, Result, StoreError},
+    sweep::MemberRow,
     time::Time,
 };
 
 /// Most events in a batch …
 const MOST_EVENTS: usize = 50;
+/// … most members of a sweep …
+const MOST_MEMBERS: usize = 200;
 /// … and the longest time from its first event until it is stored.
 const LATENCY: Duration = Duration::from_millis(50);
 
@@ -31,6 +34,8 @@ const LATENCY: Duration = Duration::from_millis(50);
 #[derive(Debug, Default)]
 struct Batch {
     events: Vec<(Time, Payload)>,
+    /// Members of a sweep.
+    members: Vec<(Time, MemberRow)>,
     /// A partial result, reported after them.
     partial: Option<Box<Parts>>,
     one_level: bool,
@@ -54,6 +59,16 @@ pub(super) async fn record(
         one_level |= batch.one_level;
         payloads.for_each(|payload| update_progress(&mut progress, payload, one_level));
         if batch.last {
+            // rows of members are not stored together with the end: a row that is told is there, whatever becomes of it
+            let rows = Batch {
+                members: batch.members,
+                ..Batch::default()
+            };
+            if !rows.members.is_empty()
+                && !store_with_retries(queue, job, running, &rows, &progress).await
+            {
+                break;
+            }
             return FinalBatch {
                 events: batch.events,
                 progress,
@@ -100,6 +115,13 @@ async fn store_batch(
     progress: &Progress,
 ) -> Result<bool> {
     let (store, key, attempt) = (&queue.store, job.key, running.attempt);
+    // first: to store them again changes nothing, as a retry does after what comes below has failed
+    if !batch.members.is_empty() {
+        match store.record_members(key, attempt, &batch.members).await? {
+            Some(sweep) => queue.announce_sweep(sweep),
+            None => return Ok(false),
+        }
+    }
     if !batch.events.is_empty() {
         if failpoint::fails(Point::EventsReported, job.id) {
             return Err(StoreError::Full);
@@ -148,13 +170,17 @@ impl Batch {
     fn add(&mut self, report: Report) {
         match report {
             Report::Event(time, payload) => self.events.push((time, payload)),
+            Report::Member(time, row) => self.members.push((time, *row)),
             Report::Partial(parts) => self.partial = Some(parts),
             Report::OneLevel => self.one_level = true,
         }
     }
 
     fn is_open(&self) -> bool {
-        self.events.len() < MOST_EVENTS && self.partial.is_none() && !self.last
+        self.events.len() < MOST_EVENTS
+            && self.members.len() < MOST_MEMBERS
+            && self.partial.is_none()
+            && !self.last
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a solver reports while it is at work.
 
-use crate::{event::Payload, memory::Outgrown, store::Parts, time::Time};
+use crate::{event::Payload, memory::Outgrown, store::Parts, sweep::MemberRow, time::Time};
 
 /// What a solver tells; the answer is whether it is to continue.
 pub(super) enum Told {
@@ -17,6 +17,8 @@ pub(super) enum Told {
 pub(super) enum Report {
     /// An event, with the time when it happened.
     Event(Time, Payload),
+    /// A member of a sweep is solved, or cannot be, with the time of that.
+    Member(Time, Box<MemberRow>),
     /// A partial result, ready to be stored.
     Partial(Box<Parts>),
     /// There is one load level on one grid: when its iterations end, the job ends, and the time until then can be

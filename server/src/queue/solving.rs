@@ -2,11 +2,13 @@
 
 use std::{ops::ControlFlow, time::Duration, time::Instant};
 
+use files::sweep::Plan;
 use solver::{
     error::SolveError,
+    family::{Family, Member},
     mesh::Mesh,
     problem::{Problem, Refine, Step},
-    solution::{Observer, Phase},
+    solution::{Observer, Outcome, Phase, Progress},
 };
 
 use super::{
@@ -15,9 +17,14 @@ use super::{
 };
 use crate::{
     event::Payload,
+    job::Reason,
     memory::Meter,
-    run::{self, PartialSolution, Solve, Update},
-    store::{Parts, Store},
+    run::{
+        self, PartialSolution, Solve, Update,
+        members::{Members, Step as MemberStep, is_alone, row_of},
+    },
+    store::{MembersTask, Parts, Store},
+    sweep::MemberRow,
     time::Time,
 };
 
@@ -36,21 +43,47 @@ pub(super) fn read_mesh(body: &[u8]) -> Result<Mesh, NoSolution> {
         .map_err(|error| NoSolution::Internal(format!("a stored mesh cannot be read: {error}")))
 }
 
-/// Reads the problem and solves it, within a share of memory (bytes). On a blocking thread.
-pub(super) fn solve_and_report(
+/// What is left of the members of a sweep that a job solves. On a blocking thread.
+pub(super) fn members_of(store: &Store, key: i64) -> Result<MembersTask, NoSolution> {
+    let failed = |cause: String| NoSolution::Internal(format!("the members of the job: {cause}"));
+    let task = tokio::runtime::Handle::current().block_on(store.members_task(key));
+    let task = task.map_err(|error| failed(error.to_string()))?;
+    task.ok_or_else(|| failed("they are not stored".into()))
+}
+
+/// Solves the problem of a job within a share of memory (bytes), and with it members of its sweep. On a blocking thread.
+pub(super) fn solve_task(
     problem: &str,
     mesh: Option<Mesh>,
+    members: Option<&MembersTask>,
     solve: Solve,
     share: u64,
     tell: impl FnMut(Told) -> ControlFlow<()>,
-) -> Result<Solved, SolveError> {
-    solve_and_store(problem, mesh, solve, share, Partials::paced(), tell)
+) -> Result<Solved, NoSolution> {
+    let solved = solve_and_store(
+        problem,
+        mesh,
+        members,
+        solve,
+        share,
+        Partials::paced(),
+        tell,
+    );
+    solved.map_err(|error| match (error, members) {
+        // members are not checked on their meshes before
+        (SolveError::Invalid(violations), Some(_)) => {
+            let detail = SolveError::Invalid(violations).to_string();
+            NoSolution::Failed(Reason::InvalidProblem, detail)
+        }
+        (error, _) => NoSolution::from(error),
+    })
 }
 
-/// As [`solve_and_report`], with partial results as `partials` decides.
+/// Reads the problem and solves it, within a share of memory (bytes), with partial results as `partials` decides.
 pub(super) fn solve_and_store(
     problem: &str,
     mesh: Option<Mesh>,
+    members: Option<&MembersTask>,
     solve: Solve,
     share: u64,
     mut partials: Partials,
@@ -61,7 +94,8 @@ pub(super) fn solve_and_store(
     let problem: Problem = files::parse(problem).map_err(SolveError::Invalid)?;
     let parse_s = start.elapsed().as_secs_f64();
     let single = |step: &Step| step.increments == 1;
-    if problem.steps.len() <= 1
+    if members.is_none()
+        && problem.steps.len() <= 1
         && problem.steps.iter().all(single)
         && matches!(problem.mesh.refine, Refine::Times(_))
         && !problem.solver.verifies()
@@ -70,8 +104,18 @@ pub(super) fn solve_and_store(
         let _ = tell(Told::Report(Report::OneLevel));
     }
     let event = |payload| Some(Report::Event(Time::now(), payload));
-    let solve =
-        |observe: &mut Observer<'_>| solve(&problem, files::external_mesh(&problem, mesh), observe);
+    let stored = mesh.clone().filter(|_| members.is_some());
+    let mut family = None;
+    let solve = |observe: &mut Observer<'_>| {
+        let external = files::external_mesh(&problem, mesh);
+        match members {
+            Some(_) if !is_alone(&problem) => {
+                let body = family.insert(Family::new(&problem, external, observe)?);
+                body.solution(&problem, observe)
+            }
+            _ => solve(&problem, external, observe),
+        }
+    };
     let mut verifying = false;
     let document = run::run(&problem, parse_s, solve, &mut |update| {
         let (mut needed, mut room) = (0, 0);
@@ -120,7 +164,31 @@ pub(super) fn solve_and_store(
         }
         // no room is an answer, and no reason to stop
         meter.check(room).map_break(|_| ())
-    })?;
+    });
+    if let Some(task) = members {
+        let first = match &document {
+            Ok(document) => {
+                let summary = &document.summary.solution;
+                match summary.outcome {
+                    Outcome::Canceled => None,
+                    _ => Some(MemberRow::solved(task.first, Member::of(summary))),
+                }
+            }
+            Err(SolveError::Stopped | SolveError::ResourceExhausted { .. }) => None,
+            Err(error) => Some(row_of(task.first, error.clone())?),
+        };
+        if let Some(first) = first {
+            solve_others(
+                &problem,
+                stored,
+                (task, first),
+                family,
+                &mut meter,
+                &mut tell,
+            )?;
+        }
+    }
+    let document = document?;
     let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite {
         phase: Phase::Recover,
     })?;
@@ -130,6 +198,55 @@ pub(super) fn solve_and_store(
         unverified: accuracy.and_then(|accuracy| accuracy.verified) == Some(false),
         iterations: document.history.len(),
         parts,
+    })
+}
+
+/// Tells the row of the first member, and solves the others; an error if that was stopped.
+fn solve_others(
+    problem: &Problem,
+    mesh: Option<Mesh>,
+    (task, first): (&MembersTask, MemberRow),
+    family: Option<Family>,
+    meter: &mut Meter,
+    tell: &mut impl FnMut(Told) -> ControlFlow<()>,
+) -> Result<(), SolveError> {
+    let MembersTask {
+        definition,
+        first: number,
+        numbers,
+    } = task;
+    let plan: Plan = serde_json::from_str(definition).map_err(|_| SolveError::OtherBody)?;
+    let mut members = Members {
+        plan: &plan,
+        mesh: &problem.mesh,
+        external: &|problem| files::external_mesh(problem, mesh.clone()),
+        family,
+    };
+    let mut report = |row: Box<MemberRow>| {
+        let report = Report::Member(Time::now(), row);
+        tell(Told::Report(report))
+    };
+    if numbers.contains(number) && report(Box::new(first)).is_break() {
+        return Err(SolveError::Stopped);
+    }
+    let others: Vec<usize> = numbers.iter().copied().filter(|n| n != number).collect();
+    members.solve(&others, &mut |step| {
+        let (needed, room) = match step {
+            MemberStep::Row(row) => {
+                let report = Report::Member(Time::now(), row);
+                return meter.hand_over(|| tell(Told::Report(report)));
+            }
+            MemberStep::Progress(Progress::Needs { bytes } | Progress::OutOfMemory { bytes }) => {
+                (bytes, 0)
+            }
+            MemberStep::Progress(Progress::Room { bytes }) => (0, bytes),
+            MemberStep::Progress(_) => (0, 0),
+        };
+        match meter.check(needed) {
+            ControlFlow::Break(outgrown) => tell(Told::OutOfMemory(outgrown))?,
+            ControlFlow::Continue(()) => tell(Told::Nothing)?,
+        }
+        meter.check(room).map_break(|_| ())
     })
 }
 

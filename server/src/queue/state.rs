@@ -42,6 +42,8 @@ pub struct Queue {
     /// Notified when a job may be ready to be claimed.
     pub(super) wake: Notify,
     pub(super) watchers: Watchers,
+    /// Those of sweeps, by their keys.
+    pub(super) sweeps: Watchers,
     /// How many that wait for jobs may read them at the same time.
     turns: Semaphore,
     /// Jobs that a worker of this process is solving.
@@ -92,6 +94,7 @@ impl Queue {
             workers,
             wake: Notify::new(),
             watchers: Watchers::default(),
+            sweeps: Watchers::default(),
             turns: Semaphore::new(MOST_TURNS),
             running: Mutex::default(),
             claiming: RwLock::default(),
@@ -112,6 +115,16 @@ impl Queue {
     /// Notifies the watchers of this job that it has new events, and is otherwise as before.
     pub(super) fn announce_events(&self, key: i64) {
         self.watchers.announce_events(key);
+    }
+
+    /// Subscribes to the rows of a sweep's members; to be called before they are read.
+    pub fn subscribe_to_sweep(&self, key: i64) -> Subscription<'_> {
+        self.sweeps.subscribe(key)
+    }
+
+    /// Notifies the watchers of a sweep that more of its members have ended.
+    pub(super) fn announce_sweep(&self, key: i64) {
+        self.sweeps.announce(key);
     }
 
     /// The turn of somebody who waits for a job to look at it: some at a time, since one change may wake thousands.

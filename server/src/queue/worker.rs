@@ -13,7 +13,7 @@ use super::{
     recorder,
     report::{Report, Told},
     running::{Running, StopReason},
-    solving::{read_mesh, solve_and_report, stored_mesh},
+    solving::{members_of, read_mesh, solve_task, stored_mesh},
     state::{Queue, Slot, Solver},
 };
 use crate::{
@@ -64,12 +64,17 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
     let stop = running.clone();
     let share = memory.share();
     let queue_of_solver = queue.clone();
+    let (key, in_sweep) = (job.key, job.sweep.is_some());
     let solving = tokio::task::spawn_blocking(move || {
         // given back when the solver has returned, or panicked, in this order: another job may have them then
         let _slot = slot;
         let _memory = memory;
         let Queue { store, solver, .. } = &*queue_of_solver;
         let mesh = mesh.map(|hash| stored_mesh(store, &hash)).transpose()?;
+        let members = match in_sweep {
+            true => Some(members_of(store, key)?),
+            false => None,
+        };
         if failpoint::fails(Point::MeshRead, id) {
             return Err(NoSolution::Internal("a test wants it".into()));
         }
@@ -93,11 +98,12 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
         match solver {
             Solver::Threads(solve) => {
                 let mesh = mesh.as_deref().map(read_mesh).transpose()?;
-                solve_and_report(&problem, mesh, *solve, share, tell).map_err(NoSolution::from)
+                solve_task(&problem, mesh, members.as_ref(), *solve, share, tell)
             }
             Solver::Processes(processes) => {
                 let task = Task {
                     problem,
+                    members,
                     mesh,
                     share,
                 };

@@ -3,8 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use files::sweep::{MOST_MEMBERS, MOST_PATHS};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use serde_json::Value;
 use solver::{
     error::{Reason, Violation},
     problem::Problem,
@@ -20,6 +22,7 @@ use crate::{
         envelope::{Envelope, JobRequest, MAX_LABEL, MAX_LABELS, MAX_NAME, PRIORITIES},
         retry::Changes,
         submit::MAX_BATCH,
+        sweeps::SweepRequest,
     },
     violations::{PROBLEM, prefixed},
 };
@@ -57,6 +60,83 @@ pub(super) struct Submissions {
     /// The jobs; all or none of them are accepted.
     #[schemars(length(min = 1, max = MAX_BATCH))]
     jobs: Vec<Submission>,
+}
+
+/// A body that submits a sweep; for its schema only.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[allow(dead_code)]
+pub(super) struct SweepSubmission {
+    /// The problem that members differ from. It must be valid itself.
+    base: Problem,
+    /// What members differ in, with the modes grid and zip.
+    #[schemars(default, length(min = 1, max = MOST_PATHS))]
+    axes: Option<Vec<Axis>>,
+    /// How the values of several axes are combined; absent: grid.
+    #[schemars(default)]
+    mode: Option<SweepMode>,
+    /// With the mode list: the values of each member by JSON Pointer; what a point leaves out is as in the base.
+    #[schemars(default, length(min = 1, max = MOST_MEMBERS))]
+    points: Option<Vec<BTreeMap<String, Value>>>,
+    /// A name for people, at most 256 characters.
+    #[schemars(default, length(max = MAX_NAME))]
+    name: Option<String>,
+    /// Labels for programs, at most 64.
+    #[schemars(default, extend("maxProperties" = MAX_LABELS))]
+    labels: Option<BTreeMap<Label, Label>>,
+    /// Its jobs run before those of lower priority; absent: 0.
+    #[schemars(default, range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
+    priority: Option<i32>,
+    /// Time limits of each of its jobs; absent: 600 s to solve the first member and 6 s for each further one of the job,
+    /// at most a week.
+    #[schemars(default)]
+    limits: Option<Limits>,
+}
+
+/// How the values of several axes are combined.
+#[derive(JsonSchema)]
+#[schemars(rename_all = "snake_case")]
+#[allow(dead_code)]
+enum SweepMode {
+    /// Every value of each axis with every value of the others; the last axis changes fastest.
+    Grid,
+    /// The first values of all axes, then the second ones, and so on.
+    Zip,
+    /// As listed in `points`.
+    List,
+}
+
+/// A value of the problem that members differ in, and its values in one form.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[allow(dead_code)]
+struct Axis {
+    /// JSON Pointer (RFC 6901) into the problem, such as /contacts/0/friction/coefficient. The object around it must be in
+    /// the base.
+    path: String,
+    /// Any values of the schema of a problem there: numbers, or a whole obstacle or list of steps.
+    #[schemars(default, length(min = 1, max = MOST_MEMBERS))]
+    values: Option<Vec<Value>>,
+    /// Numbers at equal distances.
+    #[schemars(default)]
+    linspace: Option<Spaced>,
+    /// Numbers at equal ratios, both ends above 0.
+    #[schemars(default)]
+    logspace: Option<Spaced>,
+}
+
+/// Numbers from start to stop, both among them.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[allow(dead_code)]
+struct Spaced {
+    /// The first.
+    start: f64,
+    /// The last.
+    stop: f64,
+    /// How many.
+    #[schemars(range(min = 1, max = MOST_MEMBERS))]
+    count: u64,
 }
 
 /// A body that changes a job: absent fields stay unchanged; for its schema only.
@@ -189,6 +269,37 @@ pub(super) fn batch(text: &str) -> Result<Read<Vec<JobRequest>>, ApiError> {
     Ok(read)
 }
 
+/// A body `{base, axes, mode, points, name, labels, priority, limits}`.
+pub(super) fn sweep(text: &str) -> Result<SweepRequest, ApiError> {
+    let mut body = Object::open(text, "an object with the fields base and axes")?;
+    let fields = files::sweep::Fields {
+        base: body.take_raw("base"),
+        axes: body.take_raw("axes"),
+        mode: body.take_raw("mode"),
+        points: body.take_raw("points"),
+    };
+    let limits: Option<Limits> = body.take_object("limits", LIMITS);
+    let envelope = Envelope {
+        name: body.take("name", "a string"),
+        labels: labels(&mut body, LABELS).unwrap_or_default(),
+        priority: body
+            .take("priority", &PRIORITIES.expected())
+            .unwrap_or_default(),
+        limits: limits.unwrap_or_default(),
+        cache: Cache::Off,
+    };
+    let definition = files::sweep::read(&fields);
+    let definition = definition
+        .map_err(|found| body.violations.extend(found))
+        .ok();
+    let known = "base, axes, mode, points, name, labels, priority, limits";
+    Ok(SweepRequest {
+        envelope,
+        limits,
+        definition: body.finish(known, definition),
+    })
+}
+
 /// A body `{name, labels, priority, pinned}`: absent fields stay unchanged; null removes a name or labels.
 pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
     let mut body = Object::open(text, "an object with what to change")?;
@@ -310,6 +421,10 @@ mod tests {
             (
                 batch(OTHER).unwrap().unwrap_err(),
                 described::<Submissions>(),
+            ),
+            (
+                sweep(OTHER).unwrap().definition.unwrap_err(),
+                described::<SweepSubmission>(),
             ),
             (
                 bare_problem(OTHER).unwrap().unwrap_err(),

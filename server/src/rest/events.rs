@@ -11,6 +11,7 @@ use axum::{
     },
 };
 use futures_util::{Stream, StreamExt, TryStreamExt};
+use serde::Serialize;
 
 use super::{
     accept::{accepted, prefers, weight},
@@ -21,6 +22,7 @@ use crate::{
     event::Event,
     job::JobId,
     parameters::{Integers, Parameter},
+    sweep::SweepEvent,
     verbs::watch::{AFTER_SEQ, watch},
     violations,
 };
@@ -47,10 +49,18 @@ pub(super) async fn events(
 ) -> Result<Response, ApiError> {
     let after = seen.or(asked).unwrap_or(0);
     let events = watch(&call.service, &call.caller, id, after).await?;
+    answer(&call.headers, events)
+}
+
+/// A stream of events in the format that the client asks for, or that there is none.
+pub(super) fn answer<E: Numbered>(
+    headers: &HeaderMap,
+    events: Option<impl Stream<Item = Result<E, ApiError>> + Send + 'static>,
+) -> Result<Response, ApiError> {
     let Some(events) = events else {
         return Ok(StatusCode::NO_CONTENT.into_response());
     };
-    let accepted = accepted(&call.headers);
+    let accepted = accepted(headers);
     let some = |media: &str| weight(&accepted, media).0 > 0.0;
     if !accepted.is_empty()
         && ![SSE, LINES[0], LINES[1], "application/json"]
@@ -64,8 +74,36 @@ pub(super) async fn events(
     }
     Ok(write(
         events,
-        preferred(&call.headers).unwrap_or(Encoding::Stream),
+        preferred(headers).unwrap_or(Encoding::Stream),
     ))
+}
+
+/// An event with a number and a type.
+pub(super) trait Numbered: Serialize + Send + 'static {
+    /// Its number.
+    fn seq(&self) -> i64;
+    /// Its type.
+    fn kind(&self) -> &'static str;
+}
+
+impl Numbered for Event {
+    fn seq(&self) -> i64 {
+        self.seq
+    }
+
+    fn kind(&self) -> &'static str {
+        self.payload.kind()
+    }
+}
+
+impl Numbered for SweepEvent {
+    fn seq(&self) -> i64 {
+        self.seq
+    }
+
+    fn kind(&self) -> &'static str {
+        (&self.payload).into()
+    }
 }
 
 /// The format of a stream of events.
@@ -86,8 +124,8 @@ pub(super) fn preferred(headers: &HeaderMap) -> Option<Encoding> {
 }
 
 /// A stream of events. An error ends the stream: without `done` the client knows that it is incomplete.
-pub(super) fn write(
-    events: impl Stream<Item = Result<Event, ApiError>> + Send + 'static,
+pub(super) fn write<E: Numbered>(
+    events: impl Stream<Item = Result<E, ApiError>> + Send + 'static,
     encoding: Encoding,
 ) -> Response {
     let events = events.inspect_err(|error| tracing::debug!(%error, "event stream ended: {error}"));
@@ -110,15 +148,15 @@ pub(super) fn write(
     }
 }
 
-fn message(event: &Event) -> Result<sse::Event, ApiError> {
+fn message(event: &impl Numbered) -> Result<sse::Event, ApiError> {
     let data = serde_json::to_string(event).map_err(ApiError::internal)?;
     Ok(sse::Event::default()
-        .id(event.seq.to_string())
-        .event(event.payload.kind())
+        .id(event.seq().to_string())
+        .event(event.kind())
         .data(data))
 }
 
-fn line(event: &Event) -> Result<Vec<u8>, ApiError> {
+fn line(event: &impl Numbered) -> Result<Vec<u8>, ApiError> {
     let mut line = serde_json::to_vec(event).map_err(ApiError::internal)?;
     line.push(b'\n');
     Ok(line)

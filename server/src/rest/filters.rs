@@ -7,7 +7,7 @@ use crate::{
     store::Filter,
     verbs::filters::{
         self, CREATED_AFTER, CREATED_BEFORE, FINISHED_AFTER, FINISHED_BEFORE, INPUT_HASH, LABEL,
-        NAME, OWNER, STATUS,
+        NAME, OWNER, STATUS, SWEEP,
     },
 };
 
@@ -36,6 +36,7 @@ impl Input for Filters {
             labels: raw.keyed(LABEL.name).collect(),
             name: text(NAME),
             input_hash: text(INPUT_HASH),
+            sweep: SWEEP.extract(raw)?,
             created_after: CREATED_AFTER.extract(raw)?,
             created_before: CREATED_BEFORE.extract(raw)?,
             finished_after: FINISHED_AFTER.extract(raw)?,
@@ -56,13 +57,17 @@ mod tests {
         let headers = HeaderMap::new();
         for filter in filters::describe() {
             let name = filter.name.replace("{key}", "a");
-            let found = ["queued", "2026-01-31T12:00:00Z"]
-                .into_iter()
-                .find_map(|value| {
-                    let query = format!("{name}={value}");
-                    let raw = RawInput::new(vec![], Some(&query), &headers);
-                    FILTERS.extract(&raw).ok()
-                });
+            let found = [
+                "queued",
+                "2026-01-31T12:00:00Z",
+                "sweep_01890a5d-ac96-774b-bcce-b302099a8057",
+            ]
+            .into_iter()
+            .find_map(|value| {
+                let query = format!("{name}={value}");
+                let raw = RawInput::new(vec![], Some(&query), &headers);
+                FILTERS.extract(&raw).ok()
+            });
             assert_ne!(found.unwrap(), Filter::default(), "{name}");
         }
     }

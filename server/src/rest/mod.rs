@@ -26,6 +26,7 @@ mod plots;
 mod results;
 mod service;
 mod submit;
+mod sweeps;
 
 // The list of operations, and what is made from it.
 mod openapi;

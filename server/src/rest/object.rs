@@ -96,6 +96,11 @@ impl<'a> Object<'a> {
         found
     }
 
+    /// A field as it is written.
+    pub(super) fn take_raw(&mut self, name: &str) -> Option<&'a RawValue> {
+        self.fields.remove(name)
+    }
+
     /// An optional field; null means absent.
     pub(super) fn take<T: DeserializeOwned>(&mut self, name: &str, expected: &str) -> Option<T> {
         let raw = self.fields.remove(name).filter(|raw| !is_null(raw))?;

@@ -76,7 +76,7 @@ pub(super) async fn retry(
 }
 
 /// The job: at once, or when it has ended, or as a stream of its events.
-async fn answer(
+pub(super) async fn answer(
     call: Call,
     submitted: Submitted<Job>,
     wait_s: Option<u64>,

@@ -2,6 +2,7 @@
 //! `signorini solve` alike, so that both write the same document.
 
 mod document;
+pub mod members;
 mod stopwatch;
 
 use std::ops::ControlFlow;

@@ -2,7 +2,7 @@
 
 use sqlx::SqliteConnection;
 
-use super::{change::Change, database::Store, error::Result, results, rows::find};
+use super::{change::Change, database::Store, error::Result, results, rows::find, sweeps};
 use crate::{caller::Owners, job::JobId, time::Time};
 
 /// How long the id of a deleted job is answered with *deleted*; then it is unknown.
@@ -48,7 +48,8 @@ impl Store {
     pub async fn forget_deleted(&self, now: Time) -> Result<()> {
         let before = now.after_s(-REMEMBERED_S).micros();
         let forget = async {
-            let some = "select exists (select 1 from deleted_job where deleted_at < ?)";
+            let some = "select exists (select 1 from deleted_job where deleted_at < ?1)
+                        or exists (select 1 from deleted_sweep where deleted_at < ?1)";
             let some = sqlx::query_scalar(some).bind(before);
             if some.fetch_one(&self.reader).await? {
                 let mut tx = self.begin().await?;
@@ -56,6 +57,7 @@ impl Store {
                     .bind(before)
                     .execute(&mut *tx)
                     .await?;
+                sweeps::forget_deleted(&mut tx, before).await?;
                 tx.commit().await?;
             }
             Ok(())

@@ -2,7 +2,11 @@
 
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
-use crate::{caller::Owners, job::Status, time::Time};
+use crate::{
+    caller::Owners,
+    job::{Status, SweepId},
+    time::Time,
+};
 
 /// Conditions on jobs; absent ones match every job.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,6 +21,8 @@ pub struct Filter {
     pub name: Option<String>,
     /// With this input.
     pub input_hash: Option<String>,
+    /// Of this sweep.
+    pub sweep: Option<SweepId>,
     /// Accepted at this time or later.
     pub created_after: Option<Time>,
     /// Accepted before this time.

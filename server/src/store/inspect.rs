@@ -5,7 +5,10 @@
 
 use std::path::Path;
 
-use sqlx::{ConnectOptions, Connection, Row, SqliteConnection, sqlite::SqliteConnectOptions};
+use sqlx::{
+    ConnectOptions, Connection, Row, SqliteConnection,
+    sqlite::{SqliteConnectOptions, SqliteRow},
+};
 
 use super::{
     database::{Store, Writing, compare_with_the_past},
@@ -16,6 +19,7 @@ use super::{
     progress::{self, Known},
     rows::find,
     salvage::{copy_job, copy_the_rest, insert, new_store},
+    sweeps,
 };
 use crate::{
     event::Payload,
@@ -162,6 +166,7 @@ impl Report {
         }
         self.check_meshes(source, target).await?;
         self.check_request_keys(source, target).await?;
+        self.check_sweeps(source, target).await?;
         match target {
             Some(target) => copy_the_rest(source, target, last).await,
             None => Ok(()),
@@ -267,6 +272,57 @@ impl Report {
             Some(tx) => tx.commit().await,
             None => Ok(()),
         }
+    }
+}
+
+impl Report {
+    /// Checks sweeps, their definitions and the rows of their members; they are copied row by row, members by the numbers
+    /// of their jobs.
+    async fn check_sweeps(
+        &mut self,
+        source: &mut SqliteConnection,
+        target: Option<&Store>,
+    ) -> Result<()> {
+        type Check = fn(&SqliteRow) -> Result<()>;
+        let of_sweep: Check = |row| sweeps::intact(row, row.try_get("id")?);
+        let tables: [(&str, &str, Check); 4] = [
+            ("sweep", "select * from sweep order by id", of_sweep),
+            (
+                "sweep_definition",
+                "select * from sweep_definition",
+                sweeps::check_definition,
+            ),
+            (
+                "sweep_member",
+                "select * from sweep_member order by sweep, number",
+                sweeps::check_member,
+            ),
+            ("deleted_sweep", "select * from deleted_sweep", |_| Ok(())),
+        ];
+        for (table, statement, check) in tables {
+            let rows = match sqlx::query(statement).fetch_all(&mut *source).await {
+                Ok(rows) => rows,
+                Err(error) => {
+                    self.finding(table, &error.into());
+                    continue;
+                }
+            };
+            let mut tx = match target {
+                Some(target) => Some(target.begin().await?),
+                None => None,
+            };
+            for row in &rows {
+                match (check(row), &mut tx) {
+                    (Err(error), _) => self.finding(table, &error),
+                    (Ok(()), Some(tx)) => insert(tx, table, row).await?,
+                    (Ok(()), None) => {}
+                }
+            }
+            if let Some(tx) = tx {
+                tx.commit().await?;
+            }
+        }
+        Ok(())
     }
 }
 

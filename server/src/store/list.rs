@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     caller::Owners,
-    job::{Job, Status},
+    job::{Job, Status, SweepId},
 };
 
 /// The index by which the rows of a list are found.
@@ -23,6 +23,7 @@ use crate::{
 pub(super) enum AccessPath<'a> {
     Label(&'a (String, String)),
     InputHash(&'a str),
+    Sweep(SweepId),
     Name(&'a str),
     Status(Status),
     Owner(&'a str),
@@ -163,6 +164,7 @@ async fn selective_path<'a>(
 ) -> Result<Option<AccessPath<'a>>> {
     let mut candidates: Vec<AccessPath<'a>> = filter.labels.iter().map(AccessPath::Label).collect();
     candidates.extend(filter.input_hash.as_deref().map(AccessPath::InputHash));
+    candidates.extend(filter.sweep.map(AccessPath::Sweep));
     candidates.extend(filter.name.as_deref().map(AccessPath::Name));
     candidates.extend(filter.owner.as_deref().map(AccessPath::Owner));
     if let [status] = filter.statuses[..] {
@@ -184,6 +186,10 @@ async fn selective_path<'a>(
             }
             AccessPath::InputHash(hash) => {
                 query.push("job where input_hash = ").push_bind(hash);
+            }
+            AccessPath::Sweep(sweep) => {
+                let uuid = sweep.0.to_string();
+                query.push("job where sweep = ").push_bind(uuid);
             }
             AccessPath::Name(name) => {
                 query.push("job where name = ").push_bind(name);
@@ -234,6 +240,9 @@ pub(super) fn ordered_paths(filter: &Filter, order: Order) -> Vec<AccessPath<'_>
     if let Some(label) = filter.labels.first() {
         return vec![AccessPath::Label(label)];
     }
+    if let Some(sweep) = filter.sweep {
+        return vec![AccessPath::Sweep(sweep)];
+    }
     if let Some(hash) = &filter.input_hash {
         return vec![AccessPath::InputHash(hash)];
     }
@@ -266,6 +275,10 @@ fn page(
         AccessPath::InputHash(hash) => {
             query.push("select * from job indexed by job_by_input where input_hash = ");
             query.push_bind(hash.to_owned());
+        }
+        AccessPath::Sweep(sweep) => {
+            query.push("select * from job indexed by job_by_sweep where sweep = ");
+            query.push_bind(sweep.0.to_string());
         }
         AccessPath::Name(name) => {
             query.push("select * from job indexed by job_by_name where name = ");
@@ -334,8 +347,10 @@ fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, path: Option<Ac
         labels,
         name,
         input_hash,
+        sweep,
         ..
     } = filter;
+    let sweep = sweep.map(|sweep| sweep.0.to_string());
     if !statuses.is_empty() && !matches!(path, Some(AccessPath::Status(_))) {
         query.push(" and job.status in (");
         let mut list = query.separated(", ");
@@ -357,7 +372,12 @@ fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, path: Option<Ac
         query.push_bind(key.clone()).push(" and value = ");
         query.push_bind(value.clone()).push(")");
     }
-    let texts = [("owner", owner), ("name", name), ("input_hash", input_hash)];
+    let texts = [
+        ("owner", owner),
+        ("name", name),
+        ("input_hash", input_hash),
+        ("sweep", &sweep),
+    ];
     for (column, text) in texts {
         if let Some(text) = text {
             query.push(format!(" and job.{column} = "));

@@ -11,7 +11,7 @@ use super::error::{Result, StoreError};
 
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 7] = [
+const STEPS: [(i64, &str, &str); 8] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -42,6 +42,11 @@ const STEPS: [(i64, &str, &str); 7] = [
         7,
         "memory",
         include_str!("../../../migrations/0007_memory.sql"),
+    ),
+    (
+        8,
+        "sweeps",
+        include_str!("../../../migrations/0008_sweeps.sql"),
     ),
 ];
 

@@ -47,6 +47,9 @@ mod end;
 mod lifecycle;
 mod requeue;
 
+// Sweeps, which are solved by jobs.
+mod sweeps;
+
 // Submitted, under request keys; edited; deleted; many at once.
 mod bulk;
 mod delete;
@@ -93,6 +96,7 @@ pub use self::{
     progress::accept,
     snapshot::Snapshot,
     submission::{Accepted, Claim, NewJob, RequestKey, Submission},
+    sweeps::{MemberEvents, MembersTask, NewSweep},
 };
 
 impl Store {

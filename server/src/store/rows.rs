@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     caller::Owners,
-    job::{Job, JobId, Limits, Status},
+    job::{Job, JobId, Limits, Status, SweepId},
     time::Time,
 };
 
@@ -132,6 +132,7 @@ fn parse(row: &SqliteRow) -> Result<Job> {
         input_hash: row.try_get("input_hash")?,
         cached_from: other("cached_from")?,
         parent: other("parent")?,
+        sweep: other("sweep")?.map(|JobId(uuid)| SweepId(uuid)),
         pinned: row.try_get("pinned")?,
         created_at,
         started_at,

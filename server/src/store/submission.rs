@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use tokio::sync::{mpsc, oneshot};
 
-use super::error::Result;
+use super::{error::Result, sweeps::NewSweep};
 use crate::{
-    job::{Cache, Job, JobId, Limits},
+    job::{Cache, Job, JobId, Limits, SweepId},
     memory::Reservation,
 };
 
@@ -27,6 +27,8 @@ pub struct NewJob {
     pub cache: Cache,
     /// The job that it retries.
     pub parent: Option<JobId>,
+    /// The sweep whose members it solves.
+    pub sweep: Option<SweepId>,
     /// The problem's title.
     pub title: Option<String>,
     /// Fingerprint of the problem.
@@ -57,6 +59,8 @@ pub struct Submission {
     pub owner: String,
     /// One or more.
     pub jobs: Vec<NewJob>,
+    /// The sweep that the jobs solve, each a group of its members.
+    pub sweep: Option<NewSweep>,
     /// The client's key.
     pub key: Option<RequestKey>,
     /// Maximum number of waiting jobs.

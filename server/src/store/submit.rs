@@ -16,6 +16,7 @@ use super::{
     events, keys, labels, meshes, problems,
     rows::read,
     submission::{Accepted, MOST_PER_COMMIT, NewJob, Pending, Submission},
+    sweeps,
     waiting::Move,
 };
 use crate::{
@@ -101,6 +102,7 @@ async fn accept(
     let Submission {
         owner,
         jobs,
+        sweep,
         key,
         max_queued,
     } = submission;
@@ -113,8 +115,17 @@ async fn accept(
         });
     }
     let mut inserted = vec![];
+    let sweep_key = match &sweep {
+        Some(new) => Some(sweeps::insert(change, &owner, new).await?),
+        None => None,
+    };
+    let mut groups = sweep.iter().flat_map(|sweep| &sweep.groups);
     for new in &jobs {
-        inserted.push(insert(change, &owner, new, max_queued).await?);
+        let key = insert(change, &owner, new, max_queued).await?;
+        if let (Some(sweep), Some(members)) = (sweep_key, groups.next()) {
+            sweeps::insert_members(change.sql(), sweep, key, members).await?;
+        }
+        inserted.push(key);
     }
     if let Some(key) = &key {
         keys::remember(change, &owner, key, &inserted).await?;
@@ -187,8 +198,8 @@ pub(super) async fn insert(
     let expires_at = now.after_s(new.limits.queue_ttl_s);
     let key: i64 = sqlx::query_scalar(
         "insert into job (uuid, status, name, title, labels, priority, input_hash, created_at, payload, parent,
-                          cache, coalesced_into, timeout_s, queue_ttl_s, expires_at, owner)
-         values (?, 'queued', ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) returning id",
+                          cache, coalesced_into, timeout_s, queue_ttl_s, expires_at, owner, sweep)
+         values (?, 'queued', ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) returning id",
     )
     .bind(new.id.unwrap_or_default().0.to_string())
     .bind(&new.name)
@@ -205,6 +216,7 @@ pub(super) async fn insert(
     .bind(new.limits.queue_ttl_s)
     .bind(expires_at.micros())
     .bind(owner)
+    .bind(new.sweep.map(|id| id.0.to_string()))
     .fetch_one(change.sql())
     .await?;
     change.touched(key);

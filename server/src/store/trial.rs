@@ -26,6 +26,7 @@ impl Store {
             limits: Limits::default(),
             cache: Cache::Off,
             parent: None,
+            sweep: None,
             title: None,
             input_hash: id.to_string(),
             problem: "{}".into(),

@@ -17,7 +17,7 @@ use crate::{
     digest,
     error::ApiError,
     job::{Job, JobId},
-    store::{Accepted, NewJob, RequestKey, StoreError, Submission},
+    store::{Accepted, NewJob, NewSweep, RequestKey, StoreError, Submission},
 };
 
 /// A job that was read, but not yet checked in depth.
@@ -117,6 +117,7 @@ pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJo
                 limits,
                 cache,
                 parent: None,
+                sweep: None,
                 title,
                 input_hash,
                 problem: json,
@@ -139,11 +140,23 @@ pub(super) async fn enqueue(
     jobs: Vec<NewJob>,
     key: Option<RequestKey>,
 ) -> Result<Accepted, ApiError> {
+    enqueue_sweep(service, caller, jobs, None, key).await
+}
+
+/// The same with the sweep that the jobs solve.
+pub(super) async fn enqueue_sweep(
+    service: &Service,
+    caller: &Caller,
+    jobs: Vec<NewJob>,
+    sweep: Option<NewSweep>,
+    key: Option<RequestKey>,
+) -> Result<Accepted, ApiError> {
     let limit = service.max_queued;
     let hash = jobs.iter().find_map(|job| job.mesh.clone());
     let submission = Submission {
         owner: caller.owner().to_owned(),
         jobs,
+        sweep,
         key,
         max_queued: limit,
     };
@@ -159,6 +172,11 @@ pub(super) async fn enqueue(
         }
         other => other.into(),
     })?;
+    if let Some(id) = accepted.jobs.iter().find_map(|job| job.sweep) {
+        let jobs = accepted.jobs.len();
+        info!(sweep.id = %id, jobs, "sweep {id} accepted: {jobs} jobs");
+        return Ok(accepted);
+    }
     for job in &accepted.jobs {
         info!(job.id = %job.id, job.input_hash, "job {} accepted", job.id);
     }

@@ -4,8 +4,8 @@ use serde_json::json;
 
 use crate::{
     error::ApiError,
-    job::Status,
-    parameters::{Description, Parameter, Text, Times, Words},
+    job::{Status, SweepId},
+    parameters::{Description, Parameter, Text, Times, Values, Words},
     store::Filter,
 };
 
@@ -44,6 +44,33 @@ pub const INPUT_HASH: Parameter<Text> = Parameter {
     values: Text,
 };
 
+/// By the sweep.
+pub const SWEEP: Parameter<SweepIds> = Parameter {
+    name: "sweep",
+    meaning: "Only jobs of this sweep",
+    values: SweepIds,
+};
+
+/// The ids of sweeps.
+#[derive(Clone, Copy, Debug)]
+pub struct SweepIds;
+
+impl Values for SweepIds {
+    type Value = SweepId;
+
+    fn schema(&self) -> serde_json::Value {
+        json!({ "$ref": "#/components/schemas/SweepId" })
+    }
+
+    fn expected(&self) -> String {
+        "sweep_ and a UUID in lower case".into()
+    }
+
+    fn read(&self, text: &str) -> Option<SweepId> {
+        SweepId::parse(text)
+    }
+}
+
 /// By the time of acceptance, from.
 pub const CREATED_AFTER: Parameter<Times> = Parameter {
     name: "created_after",
@@ -73,13 +100,14 @@ pub const FINISHED_BEFORE: Parameter<Times> = Parameter {
 };
 
 /// The descriptions of all filters.
-pub fn describe() -> [Description; 9] {
+pub fn describe() -> [Description; 10] {
     [
         STATUS.describe_several(),
         OWNER.describe(),
         labels(),
         NAME.describe(),
         INPUT_HASH.describe(),
+        SWEEP.describe(),
         CREATED_AFTER.describe(),
         CREATED_BEFORE.describe(),
         FINISHED_AFTER.describe(),

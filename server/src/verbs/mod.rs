@@ -25,6 +25,9 @@ pub mod retry;
 pub mod submit;
 pub mod watch;
 
+// Sweeps, which are solved by jobs.
+pub mod sweeps;
+
 // Results.
 pub mod fields;
 pub mod history;

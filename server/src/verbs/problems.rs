@@ -100,12 +100,18 @@ impl Validation {
 
 /// The violation of a problem that exceeds the memory budget.
 fn too_large(problem: &Problem, estimate: &Estimate, budget_bytes: u64) -> Violation {
+    let pointer = match problem.mesh.refine {
+        Refine::Times(0) => format!("{PROBLEM}/mesh"),
+        Refine::Times(_) | Refine::Adaptive(_) => format!("{PROBLEM}/mesh/refine"),
+    };
+    too_large_at(pointer, estimate, budget_bytes)
+}
+
+/// The same, at this place of a request.
+pub(super) fn too_large_at(pointer: String, estimate: &Estimate, budget_bytes: u64) -> Violation {
     let (unknowns, memory) = (count(estimate.dofs), size(estimate.memory_bytes));
     Violation {
-        pointer: match problem.mesh.refine {
-            Refine::Times(0) => format!("{PROBLEM}/mesh"),
-            Refine::Times(_) | Refine::Adaptive(_) => format!("{PROBLEM}/mesh/refine"),
-        },
+        pointer,
         reason: Reason::TooLarge,
         got: format!("{unknowns} unknowns, which need about {memory}"),
         expected: format!("at most {} of memory", size(budget_bytes)),

@@ -4,6 +4,7 @@
 use std::{path::Path, sync::Arc};
 
 use futures_util::StreamExt;
+use serde_json::value::RawValue;
 
 use super::{
     bulk,
@@ -17,6 +18,7 @@ use super::{
     results, retry,
     service::Service,
     submit,
+    sweeps::{self, SweepRequest},
     watch::{self, Until},
 };
 use crate::{
@@ -28,6 +30,7 @@ use crate::{
     job::{Cache, Job, JobId, Status},
     queue::{Queue, Solver},
     store::{Edit, Filter, GroupBy, Store},
+    sweep::Sweep,
 };
 
 /// A service whose queue has not been started.
@@ -187,4 +190,93 @@ async fn keys_and_ids_belong_to_the_owner_who_used_them() {
     assert_eq!(create(service, ada, Some(id)).await.id, id);
     let theirs = submit::create(service, bob, request(), Some(id), None).await;
     assert!(matches!(theirs, Err(ApiError::IdConflict(_))));
+}
+
+async fn create_sweep(service: &Arc<Service>, caller: &Caller, key: Option<&str>) -> Sweep {
+    let raw = |text: String| RawValue::from_string(text).unwrap();
+    let base = raw(serde_json::to_string(&fake::problem()).unwrap());
+    let axes = raw(r#"[{"path": "/contacts/0/indentation", "values": [0.1, 0.2]}]"#.into());
+    let fields = files::sweep::Fields {
+        base: Some(&base),
+        axes: Some(&axes),
+        ..Default::default()
+    };
+    let request = SweepRequest {
+        envelope: Envelope::default(),
+        limits: None,
+        definition: files::sweep::read(&fields),
+    };
+    let key = key.map(|key| IDEMPOTENCY_KEY.read(key).unwrap());
+    let created = sweeps::create(service, caller, request, key).await;
+    created.unwrap().accepted
+}
+
+#[tokio::test]
+async fn a_sweep_of_another_owner_does_not_exist() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = service(folder.path()).await;
+    let (ada, bob) = (caller("ada"), caller("bob"));
+    let sweep = create_sweep(&service, &ada, Some("k")).await;
+    let id = sweep.id;
+    assert_eq!((sweep.status, sweep.members.queued), (Status::Queued, 2));
+    let (service, bob) = (&service, &bob);
+    unknown("get", sweeps::get(service, bob, id).await);
+    unknown("wait", sweeps::wait(service, bob, id, 0.1).await);
+    unknown(
+        "rows",
+        sweeps::rows(service, bob, id, &Paging::default()).await,
+    );
+    unknown("all_rows", sweeps::all_rows(service, bob, id).await);
+    unknown(
+        "watch",
+        sweeps::watch(service, bob, id, 0).await.map(|_| ()),
+    );
+    unknown("cancel", sweeps::cancel(service, bob, id).await);
+    unknown("delete", sweeps::delete(service, bob, id).await);
+    unknown(
+        "solve_member",
+        sweeps::solve_member(service, bob, id, 0, None)
+            .await
+            .map(|_| ()),
+    );
+    let list = sweeps::list(service, bob, &Paging::default())
+        .await
+        .unwrap();
+    assert!(list.items.is_empty());
+    // a key belongs to an owner
+    let theirs = create_sweep(service, bob, Some("k")).await;
+    assert_ne!(theirs.id, id);
+    assert_eq!(create_sweep(service, &ada, Some("k")).await.id, id);
+    // its own owner may cancel and delete it, also while nothing runs
+    let canceled = sweeps::cancel(service, &ada, id).await.unwrap();
+    assert_eq!(
+        (canceled.status, canceled.members.canceled),
+        (Status::Canceled, 2)
+    );
+    sweeps::delete(service, &ada, id).await.unwrap();
+    assert!(matches!(
+        sweeps::get(service, &ada, id).await,
+        Err(ApiError::SweepDeleted(_))
+    ));
+    unknown("get", sweeps::get(service, bob, id).await);
+}
+
+/// Clients name any number.
+#[tokio::test]
+async fn a_sweep_may_be_watched_from_any_event_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = service(folder.path()).await;
+    let ada = caller("ada");
+    let id = create_sweep(&service, &ada, None).await.id;
+    sweeps::cancel(&service, &ada, id).await.unwrap();
+    assert!(
+        sweeps::watch(&service, &ada, id, i64::MAX)
+            .await
+            .unwrap()
+            .is_none()
+    );
+    let events = sweeps::watch(&service, &ada, id, 0).await.unwrap().unwrap();
+    let events: Vec<_> = events.collect().await;
+    let done = events[0].as_ref().unwrap();
+    assert_eq!((events.len(), done.seq), (1, 1));
 }

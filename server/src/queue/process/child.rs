@@ -20,7 +20,7 @@ use super::{
     super::{
         ending::{NoSolution, panicked},
         report::{Report, Told},
-        solving::{read_mesh, solve_and_report},
+        solving::{read_mesh, solve_task as solve_task_of},
     },
     Order, Reply, Task, send, take,
 };
@@ -93,8 +93,8 @@ fn solve_task(
     };
     let solving = || {
         let mesh = task.mesh.as_deref().map(read_mesh).transpose()?;
-        solve_and_report(&task.problem, mesh, solve, task.share, &mut tell)
-            .map_err(NoSolution::from)
+        let members = task.members.as_ref();
+        solve_task_of(&task.problem, mesh, members, solve, task.share, &mut tell)
     };
     // what a panic leaves behind is not used again
     let solved = catch_unwind(AssertUnwindSafe(solving));
@@ -120,6 +120,7 @@ fn pass_on(told: Told, service: &mut UnixStream) -> io::Result<()> {
         Told::OutOfMemory(outgrown) => send(service, &Reply::OutOfMemory(outgrown), &[]),
         Told::Report(Report::OneLevel) => send(service, &Reply::OneLevel, &[]),
         Told::Report(Report::Event(_, payload)) => send(service, &Reply::Event(payload), &[]),
+        Told::Report(Report::Member(_, row)) => send(service, &Reply::Member(row), &[]),
         Told::Report(Report::Partial(parts)) => {
             send_parts(*parts, service)?;
             send(service, &Reply::Partial, &[])

@@ -13,7 +13,12 @@ use std::io::{self, Write};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::ending::NoSolution;
-use crate::{event::Payload, memory::Outgrown, store::Ending};
+use crate::{
+    event::Payload,
+    memory::Outgrown,
+    store::{Ending, MembersTask},
+    sweep::MemberRow,
+};
 
 pub use child::run as run_worker_process;
 pub use parent::Processes;
@@ -31,6 +36,8 @@ enum Order {
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Task {
     pub(super) problem: String,
+    /// The members of a sweep that are solved with it.
+    pub(super) members: Option<MembersTask>,
     /// The stored mesh that the problem refers to; it follows the order.
     #[serde(skip)]
     pub(super) mesh: Option<Vec<u8>>,
@@ -45,6 +52,8 @@ enum Reply {
     Ready,
     /// An event. The service notes the time: clocks of processes may differ.
     Event(Payload),
+    /// A member of a sweep. The service notes the time.
+    Member(Box<MemberRow>),
     /// There is one load level on one grid.
     OneLevel,
     /// It needs more memory than its share, and stops.

@@ -207,6 +207,7 @@ impl Process {
                 Ok(None) => Told::Nothing,
                 Ok(Some((reply, content))) => match reply {
                     Reply::Event(payload) => Told::Report(Report::Event(Time::now(), payload)),
+                    Reply::Member(row) => Told::Report(Report::Member(Time::now(), row)),
                     Reply::OneLevel => Told::Report(Report::OneLevel),
                     Reply::OutOfMemory(outgrown) => Told::OutOfMemory(outgrown),
                     Reply::Part { name, digest } => {

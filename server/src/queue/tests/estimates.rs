@@ -6,8 +6,9 @@ use std::ops::ControlFlow;
 
 use super::*;
 use crate::queue::{
+    ending::NoSolution,
     report::Told,
-    solving::{Partials, solve_and_report, solve_and_store},
+    solving::{Partials, solve_and_store, solve_task},
 };
 
 /// Problems of different shapes, by what is large in them.
@@ -145,7 +146,15 @@ fn taken_and_told(problem: &Value) -> (u64, u64) {
         ControlFlow::Continue(())
     };
     let partials = Partials::every_step();
-    let solved = solve_and_store(&text, None, solver::solve_on, u64::MAX, partials, go_on);
+    let solved = solve_and_store(
+        &text,
+        None,
+        None,
+        solver::solve_on,
+        u64::MAX,
+        partials,
+        go_on,
+    );
     let taken = allocator::highest() - before;
     drop(solved.map(|solved| solved.parts));
     (taken as u64, told.memory_bytes)
@@ -194,14 +203,21 @@ fn estimates_of_long_contacts_do_too() {
 fn a_job_that_needs_more_than_its_share_is_stopped() {
     let text = wall(300, 2.0).to_string();
     let mut stopped_for = None;
-    let solved = solve_and_report(&text, None, solver::solve_on, 16 << 20, |told| match told {
-        Told::OutOfMemory(outgrown) => {
-            stopped_for = Some(outgrown);
-            ControlFlow::Break(())
-        }
-        _ => ControlFlow::Continue(()),
-    });
-    assert!(matches!(solved.err(), Some(SolveError::Stopped)));
+    let solved = solve_task(
+        &text,
+        None,
+        None,
+        solver::solve_on,
+        16 << 20,
+        |told| match told {
+            Told::OutOfMemory(outgrown) => {
+                stopped_for = Some(outgrown);
+                ControlFlow::Break(())
+            }
+            _ => ControlFlow::Continue(()),
+        },
+    );
+    assert!(matches!(solved.err(), Some(NoSolution::Stopped)));
     let outgrown = stopped_for.unwrap();
     assert_eq!(outgrown.share, 16 << 20);
     // the factor alone is larger
@@ -222,8 +238,9 @@ fn a_verification_that_needs_more_than_the_share_leaves_the_solution() {
     let (needed, _) = taken_and_told(&problem);
     assert!(needed > 2 * taken, "{needed} and {taken}");
     let share = taken + taken / 4;
-    let solved = solve_and_report(
+    let solved = solve_task(
         &problem.to_string(),
+        None,
         None,
         solver::solve_on,
         share,

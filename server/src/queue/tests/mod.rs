@@ -72,6 +72,7 @@ fn new(priority: i32) -> NewJob {
         limits: Limits::default(),
         cache: Cache::Off,
         parent: None,
+        sweep: None,
         title: problem.title.clone(),
         input_hash: digest::input_hash(&problem).unwrap(),
         problem: serde_json::to_string(&problem).unwrap(),
@@ -90,6 +91,7 @@ impl Rig {
         let submission = Submission {
             owner: OWNER.into(),
             jobs: vec![new],
+            sweep: None,
             key: None,
             max_queued: 10,
         };
@@ -169,12 +171,14 @@ fn same() -> NewJob {
 
 fn submission(jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
     let key = key.map(|key| RequestKey {
+        sweep: None,
         key: key.into(),
         payload: jobs[0].payload.clone(),
     });
     Submission {
         owner: OWNER.into(),
         jobs,
+        sweep: None,
         key,
         max_queued: 1000,
     }

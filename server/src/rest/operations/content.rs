@@ -55,6 +55,18 @@ pub(super) fn submission() -> Value {
     json!({ "problem": problem })
 }
 
+/// A body that submits a sweep, as an example.
+pub(super) fn sweep() -> Value {
+    let mut example = submission();
+    json!({
+        "base": example["problem"].take(),
+        "axes": [
+            { "path": "/contacts/0/friction/coefficient", "values": [0.1, 0.2, 0.3] },
+            { "path": "/contacts/0/friction/nonlocal_radius", "logspace": { "start": 0.01, "stop": 0.1, "count": 5 } },
+        ],
+    })
+}
+
 /// The schema of content that JSON Schema cannot describe.
 pub(super) fn anything(_: &mut SchemaGenerator) -> Schema {
     Schema::default()

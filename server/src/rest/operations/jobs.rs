@@ -27,7 +27,7 @@ use crate::{
 };
 
 /// Makes a request repeatable.
-const KEY: Header<Keys> = Header(IDEMPOTENCY_KEY);
+pub(super) const KEY: Header<Keys> = Header(IDEMPOTENCY_KEY);
 
 pub(super) fn operations() -> Vec<Operation> {
     vec![
@@ -120,7 +120,7 @@ pub(super) fn operations() -> Vec<Operation> {
 }
 
 /// The reasons for which a submission may be refused.
-const SUBMITTING: &[Code] = &[
+pub(super) const SUBMITTING: &[Code] = &[
     Code::InvalidProblem,
     Code::ProblemTooLarge,
     Code::IdempotencyKeyReuse,
@@ -132,7 +132,7 @@ const SUBMITTING: &[Code] = &[
 
 impl Operation {
     /// Answers with the submitted job: when it has ended, at once, or with its events.
-    fn submits(self) -> Self {
+    pub(super) fn submits(self) -> Self {
         let accepted = [json::<Job>(), stream::<Event>(), lines()].concat();
         self.answers(201, "The terminal job: it ended within the wait", json::<Job>())
             .with([location(), etag(), preference_applied()])

@@ -16,6 +16,7 @@ mod jobs;
 mod meshes;
 mod results;
 mod service;
+mod sweeps;
 
 use axum::Router;
 
@@ -24,9 +25,14 @@ pub(super) use operation::{Answer, Content, Operation};
 use super::call::AppState;
 
 /// The groups in the order in which they are documented: name, subject and operations.
-pub(super) const GROUPS: [Group; 4] = [
+pub(super) const GROUPS: [Group; 5] = [
     ("jobs", "Submit, get, list, watch, cancel", jobs::operations),
     ("results", "What a job has computed", results::operations),
+    (
+        "sweeps",
+        "One problem with many values: solved together, read as one table",
+        sweeps::operations,
+    ),
     ("meshes", "Stored once, for many jobs", meshes::operations),
     (
         "service",

@@ -201,7 +201,7 @@ impl Operation {
             codes.push(Code::RequestTimeout);
         }
         // all that reads jobs, problems or meshes, and all that writes
-        if ["/v1/jobs", "/v1/problems", "/v1/meshes"]
+        if ["/v1/jobs", "/v1/problems", "/v1/meshes", "/v1/sweeps"]
             .iter()
             .any(|path| self.path.starts_with(path))
         {
@@ -220,7 +220,8 @@ impl Operation {
         if self.parameters.iter().any(in_path) {
             codes.push(Code::NotFound);
         }
-        if self.path.starts_with("/v1/jobs/{id}") {
+        let by_id = ["/v1/jobs/{id}", "/v1/sweeps/{id}"];
+        if by_id.iter().any(|path| self.path.starts_with(path)) {
             codes.push(Code::Deleted);
         }
         let accepts = |media| self.body.iter().flatten().any(|(name, _)| *name == media);

@@ -73,7 +73,7 @@ const NO_RESULT: &[Code] = &[Code::NoResult, Code::ResultNotReady];
 
 impl Operation {
     /// Answers with a file, with a part of it, or with 304 if the client has it.
-    fn file(self, meaning: &'static str, content: Content) -> Self {
+    pub(super) fn file(self, meaning: &'static str, content: Content) -> Self {
         let tag = || header("ETag", text(), "The file's SHA-256");
         let name = || header("Content-Disposition", text(), "A name for the file");
         let whole_file = header("Content-Digest", text(), "Its SHA-256 (RFC 9530)");

@@ -52,6 +52,7 @@ fn new(input: &str) -> NewJob {
         limits: Limits::default(),
         cache: Cache::Off,
         parent: None,
+        sweep: None,
         title: None,
         input_hash: format!("sha256:{input}"),
         problem: "{}".into(),
@@ -64,12 +65,14 @@ fn new(input: &str) -> NewJob {
 /// A submission of this owner.
 fn by(owner: &str, jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
     let key = key.map(|key| RequestKey {
+        sweep: None,
         key: key.into(),
         payload: "request".into(),
     });
     Submission {
         owner: owner.into(),
         jobs,
+        sweep: None,
         key,
         max_queued: 1_000_000,
     }

@@ -103,6 +103,7 @@ impl World {
         let halfway = unanswered && self.dice.bool();
         let mut submission = Submission {
             max_queued: 1000,
+            sweep: None,
             key: Some(RequestKey {
                 key,
                 payload: "request".into(),

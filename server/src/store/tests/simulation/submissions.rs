@@ -72,6 +72,7 @@ impl World {
         Submission {
             owner,
             jobs,
+            sweep: None,
             key,
             max_queued,
         }

@@ -1,0 +1,132 @@
+//! Checking all members of a sweep before any is solved, and grouping those that share a body.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::json;
+use solver::error::{Findings, Violation};
+use solver::model::Model;
+use solver::problem::{MeshSource, NormalOf, Problem, Refine};
+
+use super::read::Sweep;
+
+/// Most violations of members that are told.
+pub const MOST_TOLD: usize = 50;
+
+/// Members on one body, by their numbers in order.
+pub type Group = Vec<usize>;
+
+/// The members of a sweep in groups that share a body, or what is wrong with some of them, at most [`MOST_TOLD`] places.
+/// Structure and numbers are checked; what shows only on the mesh does not refuse a member here.
+pub fn groups(sweep: &Sweep) -> Result<Vec<Group>, Vec<Violation>> {
+    let plan = &sweep.plan;
+    let mut found = Findings::default();
+    let mut places = BTreeSet::new();
+    let mut groups: Vec<Group> = vec![];
+    let mut by_body: BTreeMap<String, usize> = BTreeMap::new();
+    for number in 0..plan.count() {
+        let problem = plan.problem(number).and_then(|problem| {
+            let violations = violations(&problem);
+            match violations.is_empty() {
+                true => Ok(problem),
+                false => Err(violations),
+            }
+        });
+        match problem {
+            Ok(problem) if places.is_empty() => {
+                let body = body(&problem, sweep, number);
+                let group = *by_body.entry(body).or_insert_with(|| {
+                    groups.push(vec![]);
+                    groups.len() - 1
+                });
+                groups[group].push(number);
+            }
+            Ok(_) => {}
+            Err(list) => {
+                for violation in list {
+                    let pointer = plan.place(number, &violation);
+                    // the same value is a part of many members
+                    if places.insert((pointer.clone(), violation.reason)) {
+                        let hint = format!("{} (Member {number}.)", violation.hint);
+                        found.add(Violation {
+                            pointer,
+                            hint,
+                            ..violation
+                        });
+                    }
+                }
+                if places.len() >= MOST_TOLD {
+                    let left = plan.count() - number - 1;
+                    return Err(with_rest(found.into_violations(), left));
+                }
+            }
+        }
+    }
+    found.into_result(groups)
+}
+
+fn with_rest(mut violations: Vec<Violation>, left: usize) -> Vec<Violation> {
+    violations.truncate(MOST_TOLD);
+    if let Some(last) = violations.last_mut().filter(|_| left > 0) {
+        last.hint
+            .push_str(&format!(" (The last {left} members were not checked.)"));
+    }
+    violations
+}
+
+/// What is wrong with the numbers of a problem, whatever its mesh is.
+fn violations(problem: &Problem) -> Vec<Violation> {
+    let mut meshless = problem.clone();
+    meshless.mesh.source = MeshSource::Gmsh(String::new());
+    // a mesh that cannot be read, without a reason: all that is checked before it is told
+    Model::new(&meshless, Some(Err(vec![])))
+        .err()
+        .unwrap_or_default()
+}
+
+/// What members on one body have in common, as text. The solver decides in the end whether they share it.
+fn body(problem: &Problem, sweep: &Sweep, number: usize) -> String {
+    let Problem {
+        analysis,
+        mesh,
+        materials,
+        supports,
+        loads,
+        contacts,
+        quadrature,
+        solver,
+        title: _,
+        units: _,
+        steps: _,
+    } = problem;
+    // on meshes of their own
+    let own_mesh = sweep.plan.changes_mesh();
+    let refine = match own_mesh {
+        true => mesh.refine,
+        false => sweep.base.mesh.refine,
+    };
+    let alone = solver.verifies() || matches!(refine, Refine::Adaptive(_));
+    let contacts: Vec<_> = contacts
+        .iter()
+        .map(|contact| {
+            let turned = contact.normal == NormalOf::Obstacle;
+            json!([
+                contact.boundary,
+                contact.normal,
+                contact.obstacle.span(),
+                turned.then_some(&contact.obstacle),
+            ])
+        })
+        .collect();
+    let mesh = own_mesh.then_some(mesh);
+    json!([
+        analysis,
+        mesh,
+        materials,
+        supports,
+        loads,
+        contacts,
+        quadrature,
+        alone.then_some(number),
+    ])
+    .to_string()
+}

@@ -1,0 +1,20 @@
+//! Sweeps: one problem, and many that differ from it in a few values.
+//!
+//! A sweep is kept as text: that of the base problem with gaps where values go, and the values. A member is that text
+//! with its values filled in, which is then read as any other problem. The mesh of the base is left out of the text
+//! unless the sweep changes it, so that a large one is read once and not once for each member.
+
+mod template;
+
+mod plan;
+
+mod read;
+
+mod check;
+
+pub use check::{Group, MOST_TOLD, groups};
+pub use plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, Mode, Plan};
+pub use read::{Fields, Sweep, read};
+
+#[cfg(test)]
+mod tests;

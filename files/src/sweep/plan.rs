@@ -1,0 +1,193 @@
+//! All members of a sweep: what they differ in, and their values.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use solver::error::{Reason, Violation, escape};
+use solver::problem::{MeshInput, Problem};
+
+use super::template::Template;
+
+/// Most members of a sweep.
+pub const MOST_MEMBERS: usize = 10_000;
+/// Most values that a member may differ in.
+pub const MOST_PATHS: usize = 16;
+/// Bytes of the problems of all members together, as text: checking them reads all of it.
+pub const MOST_BYTES: u64 = 64 << 20;
+
+/// How the values of several axes are combined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "snake_case")]
+pub enum Mode {
+    /// Every value of each axis with every value of the others; the last axis changes fastest.
+    #[default]
+    Grid,
+    /// The first values of all axes, then the second ones, and so on.
+    Zip,
+    /// As listed in `points`, without axes.
+    List,
+}
+
+/// All members of a sweep: what is stored, and what a worker receives.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    pub(super) template: Template,
+    /// The mesh is a part of the template, since the sweep changes it.
+    pub(super) with_mesh: bool,
+    pub(super) paths: Vec<String>,
+    pub(super) values: Values,
+}
+
+/// The values of all members as JSON.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Values {
+    Grid(Vec<Vec<String>>),
+    Zip(Vec<Vec<String>>),
+    /// By member and path; none where a point keeps the value of the base.
+    List(Vec<Vec<Option<String>>>),
+}
+
+impl Plan {
+    /// How many members there are; their numbers count from 0.
+    pub fn count(&self) -> usize {
+        match &self.values {
+            Values::Grid(axes) => axes
+                .iter()
+                .fold(1, |count: usize, values| count.saturating_mul(values.len())),
+            Values::Zip(axes) => axes.first().map_or(0, Vec::len),
+            Values::List(points) => points.len(),
+        }
+    }
+
+    /// JSON Pointers into the problem: what members may differ in.
+    pub fn paths(&self) -> &[String] {
+        &self.paths
+    }
+
+    /// Whether members differ in their mesh, so that each has its own.
+    pub fn changes_mesh(&self) -> bool {
+        self.with_mesh
+    }
+
+    /// The values of a member as JSON, in the order of the paths; none where it keeps that of the base.
+    pub fn values(&self, number: usize) -> Vec<Option<&str>> {
+        match &self.values {
+            Values::Grid(axes) => {
+                let mut rest = number;
+                let mut found: Vec<Option<&str>> = axes
+                    .iter()
+                    .rev()
+                    .map(|values| {
+                        let value = values.get(rest % values.len().max(1));
+                        rest /= values.len().max(1);
+                        value.map(String::as_str)
+                    })
+                    .collect();
+                found.reverse();
+                found
+            }
+            Values::Zip(axes) => axes
+                .iter()
+                .map(|values| values.get(number).map(String::as_str))
+                .collect(),
+            Values::List(points) => points
+                .get(number)
+                .map(|point| point.iter().map(Option::as_deref).collect())
+                .unwrap_or_default(),
+        }
+    }
+
+    /// The values of a member by path, without those of the base.
+    pub fn parameters(&self, number: usize) -> BTreeMap<String, Value> {
+        let values = self.paths.iter().zip(self.values(number));
+        let read = |(path, value): (&String, Option<&str>)| {
+            // it was read before
+            Some((
+                path.clone(),
+                serde_json::from_str(value?).unwrap_or(Value::Null),
+            ))
+        };
+        values.filter_map(read).collect()
+    }
+
+    /// The problem of a member, or its violations: pointers are relative to it. Without a mesh of its own it has an
+    /// empty one in place of the base's.
+    pub fn problem(&self, number: usize) -> Result<Problem, Vec<Violation>> {
+        crate::parse(&self.template.filled(&self.values(number)))
+    }
+
+    /// The problem of a member on its mesh, which is the base's unless the sweep changes it.
+    pub fn whole_problem(
+        &self,
+        number: usize,
+        base: &MeshInput,
+    ) -> Result<Problem, Vec<Violation>> {
+        let mut problem = self.problem(number)?;
+        if !self.with_mesh {
+            problem.mesh = base.clone();
+        }
+        Ok(problem)
+    }
+
+    /// Where in the definition of the sweep a violation of a member comes from.
+    pub(super) fn place(&self, number: usize, violation: &Violation) -> String {
+        let pointer = violation.pointer.as_str();
+        let inside = |path: &String| {
+            let rest = pointer.strip_prefix(path.as_str())?;
+            (rest.is_empty() || rest.starts_with('/')).then_some(rest)
+        };
+        let mut found = self.paths.iter().enumerate();
+        let found = found.find_map(|(k, path)| Some((k, path, inside(path)?)));
+        let Some((k, path, rest)) = found else {
+            // such as two values that exclude each other
+            return self.origin(number);
+        };
+        if violation.reason == Reason::UnknownName && rest.is_empty() {
+            return match &self.values {
+                Values::List(_) => format!("/points/{number}"),
+                Values::Grid(_) | Values::Zip(_) => format!("/axes/{k}/path"),
+            };
+        }
+        match &self.values {
+            Values::List(_) => format!("/points/{number}/{}{rest}", escape(path)),
+            Values::Zip(_) => format!("/axes/{k}/values/{number}{rest}"),
+            Values::Grid(axes) => {
+                let faster: usize = axes[k + 1..].iter().map(Vec::len).product();
+                let place = number / faster.max(1) % axes[k].len().max(1);
+                format!("/axes/{k}/values/{place}{rest}")
+            }
+        }
+    }
+
+    /// Where the definition of the sweep tells a member: its point, or the axes.
+    pub fn origin(&self, number: usize) -> String {
+        match &self.values {
+            Values::List(_) => format!("/points/{number}"),
+            Values::Grid(_) | Values::Zip(_) => "/axes".to_owned(),
+        }
+    }
+
+    /// Bytes of the problems of all members, as text.
+    pub(super) fn bytes(&self) -> u64 {
+        let count = self.count() as u64;
+        let length = |values: &[String]| values.iter().map(|value| value.len() as u64).sum();
+        let of_values: u64 = match &self.values {
+            Values::Grid(axes) => axes
+                .iter()
+                .map(|values| {
+                    let length: u64 = length(values);
+                    length.saturating_mul(count / (values.len() as u64).max(1))
+                })
+                .fold(0, u64::saturating_add),
+            Values::Zip(axes) => axes.iter().map(|values| -> u64 { length(values) }).sum(),
+            Values::List(points) => {
+                let values = points.iter().flatten().flatten();
+                values.map(|value| value.len() as u64).sum()
+            }
+        };
+        let text = self.template.bytes() as u64;
+        text.saturating_mul(count).saturating_add(of_values)
+    }
+}

@@ -1,0 +1,237 @@
+//! `signorini sweep FILE`: solves all members of a sweep, by the same code as a worker of the service.
+
+use std::{
+    borrow::Cow,
+    ops::ControlFlow,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use anyhow::Context;
+use clap::Args;
+use files::sweep::{Fields, Sweep, groups};
+use serde::{Deserialize, de::IgnoredAny};
+use serde_json::value::RawValue;
+use solver::error::{Reason, Violation};
+
+use super::{exit::Exit, output, solve::invalid};
+use crate::{
+    config::MemoryBudget,
+    error::ApiError,
+    formats::{self, Format},
+    job::Status,
+    run::members::{Members, Step},
+    sweep::MemberRow,
+};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// The sweep: a JSON file as for POST /v1/sweeps; `base` may also be the path of a problem, from that file's folder
+    file: PathBuf,
+
+    /// Write the table to this file, in the format of its extension: .json, .csv, .jsonl, .arrow or .npz; - writes JSON to
+    /// standard output. Without it the table is printed as CSV
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+
+    #[command(flatten)]
+    memory: MemoryBudget,
+}
+
+/// A file with a sweep. What is for the service only is not used.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Definition<'a> {
+    #[serde(borrow)]
+    base: Option<&'a RawValue>,
+    #[serde(borrow)]
+    axes: Option<&'a RawValue>,
+    #[serde(borrow)]
+    mode: Option<&'a RawValue>,
+    #[serde(borrow)]
+    points: Option<&'a RawValue>,
+    #[serde(rename = "name")]
+    _name: Option<IgnoredAny>,
+    #[serde(rename = "labels")]
+    _labels: Option<IgnoredAny>,
+    #[serde(rename = "priority")]
+    _priority: Option<IgnoredAny>,
+    #[serde(rename = "limits")]
+    _limits: Option<IgnoredAny>,
+}
+
+/// How often progress is told.
+const PAUSE: Duration = Duration::from_millis(500);
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
+    let Arguments {
+        file,
+        output,
+        memory,
+    } = arguments;
+    let text =
+        std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let format = match output.as_deref().map(format_of).transpose() {
+        Ok(format) => format,
+        Err(problem) => {
+            eprintln!("{problem}");
+            return Ok(Exit::Invalid);
+        }
+    };
+    let sweep = match read(file, &text)? {
+        Ok(sweep) => sweep,
+        Err(violations) => return Ok(invalid(file, &violations)),
+    };
+    let groups = match groups(&sweep) {
+        Ok(groups) => groups,
+        Err(violations) => return Ok(invalid(file, &violations)),
+    };
+    let Sweep { base, plan } = &sweep;
+    let budget_bytes = memory.bytes();
+    for group in &groups {
+        let Some(Ok(first)) = group
+            .first()
+            .map(|first| plan.whole_problem(*first, &base.mesh))
+        else {
+            continue; // they were read before
+        };
+        match solver::estimate(&first, None) {
+            Ok(estimate) if estimate.memory_bytes > budget_bytes => {
+                let too_large = ApiError::ProblemTooLarge {
+                    estimate,
+                    budget_bytes,
+                };
+                eprintln!("{}: member {}: {too_large}", file.display(), group[0]);
+                return Ok(Exit::Invalid);
+            }
+            // what else is wrong with a member is told in its row
+            Ok(_) | Err(_) => {}
+        }
+    }
+    let count = plan.count();
+    let (mut rows, mut told) = (Vec::with_capacity(count), Instant::now());
+    for group in &groups {
+        let mut members = Members {
+            plan,
+            mesh: &base.mesh,
+            external: &|problem| files::external_mesh(problem, None),
+            family: None,
+        };
+        let solved = members.solve(group, &mut |step| {
+            if let Step::Row(row) = step {
+                rows.push(*row);
+                if told.elapsed() >= PAUSE || rows.len() == count {
+                    eprintln!("{} of {count} members", rows.len());
+                    told = Instant::now();
+                }
+            }
+            ControlFlow::Continue(())
+        });
+        solved?;
+    }
+    rows.sort_unstable_by_key(|row: &MemberRow| row.number);
+    for row in &mut rows {
+        row.parameters = plan.parameters(row.number as usize);
+    }
+    let written =
+        |format| formats::members(plan.paths(), &rows, format).map_err(anyhow::Error::msg);
+    match (output, format) {
+        (Some(path), Some(format)) if path.as_os_str() != "-" => {
+            let bytes = written(format)?;
+            output::replace(path, |out| Ok(out.write_all(&bytes)?))
+                .with_context(|| format!("cannot write {}", path.display()))?;
+        }
+        (_, format) => {
+            let bytes = written(format.unwrap_or(Format::Csv))?;
+            output::print(&String::from_utf8_lossy(&bytes))?;
+        }
+    }
+    let failed = rows.iter().filter(|row| row.status != Status::Succeeded);
+    let failed: Vec<&MemberRow> = failed.collect();
+    for row in failed.iter().take(10) {
+        let reason = row.reason.map_or("", <&str>::from);
+        let first = row.violations.first().map(|v| format!(": {v}"));
+        eprintln!(
+            "member {}: {reason}{}",
+            row.number,
+            first.unwrap_or_default()
+        );
+    }
+    Ok(match failed.len() {
+        0 => Exit::Ok,
+        count => {
+            eprintln!("{count} of {} members failed", rows.len());
+            Exit::NotConverged
+        }
+    })
+}
+
+/// The format of a table by the name of its file; an error says why there is none.
+fn format_of(path: &Path) -> Result<Format, String> {
+    if path.as_os_str() == "-" {
+        return Ok(Format::Json);
+    }
+    let error = |problem: String| format!("-o {}: {problem}", path.display());
+    let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+    let named = |format: &&Format| {
+        ending
+            .as_deref()
+            .is_some_and(|ending| ending == format.name())
+    };
+    let format = Format::OF_TABLES.iter().find(named).copied();
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    match (format, folder) {
+        (Some(_), Some(folder)) if !folder.is_dir() => {
+            Err(error(format!("there is no folder {}", folder.display())))
+        }
+        (Some(format), _) => Ok(format),
+        (None, _) => Err(error(format!(
+            "the file must have one of the extensions {}, or be - for JSON on standard output",
+            Format::endings(Format::OF_TABLES)
+        ))),
+    }
+}
+
+/// Reads a sweep from a file's text; an error if the file of its base cannot be read.
+fn read(file: &Path, text: &str) -> anyhow::Result<Result<Sweep, Vec<Violation>>> {
+    let malformed = |pointer: &str, found: String| {
+        vec![Violation::new(
+            pointer,
+            Reason::Malformed,
+            found,
+            "an object of base, axes or points, and mode",
+            "Check the text there; examples are in examples/sweeps.",
+        )]
+    };
+    if let Some(place) = files::json::too_deep(text) {
+        return Ok(Err(malformed("", place)));
+    }
+    let definition: Definition<'_> = match serde_json::from_str(text) {
+        Ok(definition) => definition,
+        Err(error) => return Ok(Err(malformed("", error.to_string()))),
+    };
+    let named = definition.base.filter(|base| base.get().starts_with('"'));
+    let from_file = match named {
+        Some(named) => {
+            let Ok(named) = serde_json::from_str::<Cow<'_, str>>(named.get()) else {
+                return Ok(Err(malformed("/base", "a text that cannot be read".into())));
+            };
+            let path = file.parent().unwrap_or(Path::new("")).join(&*named);
+            let text = std::fs::read_to_string(&path)
+                .with_context(|| format!("cannot read the base {}", path.display()))?;
+            match RawValue::from_string(text) {
+                Ok(base) => Some(base),
+                Err(error) => return Ok(Err(malformed("/base", error.to_string()))),
+            }
+        }
+        None => None,
+    };
+    Ok(files::sweep::read(&Fields {
+        base: from_file.as_deref().or(definition.base),
+        axes: definition.axes,
+        mode: definition.mode,
+        points: definition.points,
+    }))
+}

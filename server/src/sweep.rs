@@ -1,0 +1,241 @@
+//! A sweep: many problems that differ in a few values, and the numbers of each. No I/O.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use solver::{
+    error::Violation,
+    family::Member,
+    solution::{Outcome, Residuals, WarningCode},
+};
+
+use crate::{
+    job::{Limits, Reason, Status, SweepId},
+    time::Time,
+};
+
+/// A sweep, as clients see it.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Sweep {
+    /// The store's own number, in order of arrival; never shown.
+    #[serde(skip)]
+    pub key: i64,
+    /// The public id.
+    pub id: SweepId,
+    /// Running once a job has started; when all have ended: canceled if one was, succeeded if at least one member
+    /// succeeded, else failed. `members` has the details.
+    pub status: Status,
+    /// Changes whenever the sweep does.
+    pub version: String,
+    /// A name for people.
+    pub name: Option<String>,
+    /// Labels for programs.
+    pub labels: BTreeMap<String, String>,
+    /// Who submitted it.
+    pub owner: String,
+    /// When it was accepted.
+    pub created_at: Time,
+    /// When its last job ended.
+    pub finished_at: Option<Time>,
+    /// What members differ in: JSON Pointers into the problem.
+    pub paths: Vec<String>,
+    /// How many members there are, by their status.
+    pub members: MemberCounts,
+    /// How many jobs solve them: one for all members on the same body. `GET /v1/jobs?sweep=…` lists them.
+    pub jobs: u32,
+    /// Addresses of what belongs to it.
+    pub links: BTreeMap<String, String>,
+}
+
+/// How many members a sweep has, by their status.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct MemberCounts {
+    /// All of them.
+    pub total: u32,
+    /// Their job waits.
+    pub queued: u32,
+    /// Their job is at work, on these one after the other.
+    pub running: u32,
+    /// Converged.
+    pub succeeded: u32,
+    /// Not converged, invalid, or not reached when their job failed.
+    pub failed: u32,
+    /// Not reached when their job was canceled.
+    pub canceled: u32,
+}
+
+/// A member of a sweep: a row of its results.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MemberRow {
+    /// From 0, in the order of the definition.
+    pub number: u32,
+    /// Its values by JSON Pointer, without those that are the base's.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Value>,
+    /// Its status.
+    pub status: Status,
+    /// Why it failed or was canceled.
+    pub reason: Option<Reason>,
+    /// What happened, in words, if it failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detail: Option<String>,
+    /// The first violations of a member that is invalid; pointers are those of its problem.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub violations: Vec<Violation>,
+    /// ∫p ≥ 0 over all contacts (force); the numbers are absent until the member is solved.
+    pub normal_force: Option<f64>,
+    /// ∫σ_t over all contacts (force).
+    pub tangential_force: Option<f64>,
+    /// ∫|σ_t| over all contacts (force).
+    pub friction_force: Option<f64>,
+    /// Length of all contacts together.
+    pub contact_width: Option<f64>,
+    /// The part of it that sticks.
+    pub stick_width: Option<f64>,
+    /// The part of it that slips.
+    pub slip_width: Option<f64>,
+    /// The largest pressure, as a stress (≤ 0); 0 without contact.
+    pub peak_normal_stress: Option<f64>,
+    /// The largest |σ_t|, with its sign; 0 without friction.
+    pub peak_tangential_stress: Option<f64>,
+    /// Rows of its history; 0 if it was not solved.
+    pub iterations: u32,
+    /// Dimensionless residuals of its final state.
+    pub residuals: Option<Residuals>,
+    /// What to consider before relying on the numbers.
+    pub warnings: Vec<WarningCode>,
+}
+
+/// Most violations of a member that are kept.
+const MOST_VIOLATIONS: usize = 5;
+
+impl MemberRow {
+    /// A member that was solved, converged or not.
+    pub fn solved(number: usize, member: Member) -> MemberRow {
+        let Member {
+            outcome,
+            normal_force,
+            tangential_force,
+            friction_force,
+            contact_width,
+            stick_width,
+            slip_width,
+            peak_normal_stress,
+            peak_tangential_stress,
+            iterations,
+            residuals,
+            warnings,
+        } = member;
+        let (status, reason) = match outcome {
+            Outcome::Converged => (Status::Succeeded, None),
+            Outcome::NotConverged => (Status::Failed, Some(Reason::NotConverged)),
+            Outcome::ContactCycling => (Status::Failed, Some(Reason::ContactCycling)),
+            Outcome::FalseConvergence => (Status::Failed, Some(Reason::FalseConvergence)),
+            Outcome::Canceled => (Status::Canceled, Some(Reason::UserCancel)),
+        };
+        MemberRow {
+            number: number_of(number),
+            status,
+            reason,
+            normal_force: Some(normal_force),
+            tangential_force: Some(tangential_force),
+            friction_force: Some(friction_force),
+            contact_width: Some(contact_width),
+            stick_width: Some(stick_width),
+            slip_width: Some(slip_width),
+            peak_normal_stress: Some(peak_normal_stress),
+            peak_tangential_stress: Some(peak_tangential_stress),
+            iterations,
+            residuals: Some(residuals),
+            warnings,
+            ..MemberRow::default()
+        }
+    }
+
+    /// A member without a solution.
+    pub fn failed(number: usize, reason: Reason, detail: String) -> MemberRow {
+        MemberRow {
+            number: number_of(number),
+            status: Status::Failed,
+            reason: Some(reason),
+            detail: Some(detail),
+            ..MemberRow::default()
+        }
+    }
+
+    /// A member whose problem is wrong.
+    pub fn invalid(number: usize, mut violations: Vec<Violation>) -> MemberRow {
+        let detail = match violations.len() {
+            1 => "the problem has a violation".to_owned(),
+            count => format!("the problem has {count} violations"),
+        };
+        violations.truncate(MOST_VIOLATIONS);
+        MemberRow {
+            violations,
+            ..MemberRow::failed(number, Reason::InvalidProblem, detail)
+        }
+    }
+
+    /// A member that has no row of its own (yet), by its job: that it waits, runs, or has ended without it.
+    pub fn unsolved(number: usize, status: Status, reason: Option<Reason>) -> MemberRow {
+        MemberRow {
+            number: number_of(number),
+            status: match status {
+                // its job has ended without it
+                Status::Succeeded => Status::Canceled,
+                other => other,
+            },
+            reason,
+            ..MemberRow::default()
+        }
+    }
+}
+
+/// The numbers of members are small.
+fn number_of(number: usize) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
+}
+
+/// An event of a sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SweepEvent {
+    /// Number of the event: it counts from 1 without gaps, across restarts.
+    pub seq: i64,
+    /// When it happened.
+    pub t: Time,
+    /// What happened.
+    #[serde(flatten)]
+    pub payload: SweepPayload,
+}
+
+/// What happened to a sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema, strum::IntoStaticStr)]
+#[serde(tag = "type", rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum SweepPayload {
+    /// A member was solved, or could not be.
+    Member {
+        /// Its row.
+        member: Box<MemberRow>,
+    },
+    /// All jobs of the sweep have ended: the last event. Members that no event named were not reached.
+    Done {
+        /// The sweep.
+        sweep: Box<Sweep>,
+    },
+}
+
+/// The time limit of a job that solves so many members, if the client gives none: that of a job, and six seconds for each
+/// further member, at most a week.
+pub fn limits_for(members: usize) -> Limits {
+    const EACH_S: f64 = 6.0;
+    const MOST_S: f64 = 7.0 * 86_400.0;
+    let limits = Limits::default();
+    let more = members.saturating_sub(1) as f64;
+    Limits {
+        timeout_s: (limits.timeout_s + EACH_S * more).min(MOST_S),
+        ..limits
+    }
+}
