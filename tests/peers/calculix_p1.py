@@ -2,9 +2,9 @@
 
 Usage: calculix_p1.py MESH COEFFICIENT
 
-As CalculiX's manual advises for elements with midside nodes: contact from surface to surface, by a penalty. The cylinder
-is a row of elements of which all nodes are prescribed, on the arc that the contact can reach. One increment, so
-that friction counts slip from the unloaded state, as the other programs here do. The CPU time is that of `ccx`
+As CalculiX's manual advises for elements with midside nodes: contact from surface to surface, by a penalty. The
+cylinder is a row of elements of which all nodes are prescribed, on the arc that the contact can reach. One increment,
+so that friction counts slip from the unloaded state, as the other programs here do. The CPU time is that of `ccx`
 alone, without the writing of its deck.
 """
 

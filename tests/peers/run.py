@@ -16,8 +16,8 @@ from programs import cpu, solve
 # differ by 4e-4, the two ways to measure the gap by 1e-4. CalculiX: its penalty lets the cylinder in by 0.4 % of
 # the indentation on the mean, and the force grows a little faster than the indentation.
 VERTICAL = {"GetFEM": 2e-3, "CalculiX": 6e-3}
-# The horizontal force, most of it friction: with elastic slip of 1e-4 the stuck middle carries 1 % less than in GetFEM, which
-# has none; the penalty of CalculiX takes as much.
+# The horizontal force, most of it friction: with elastic slip of 1e-4 the stuck middle carries 1 % less than in GetFEM,
+# which has none; the penalty of CalculiX takes as much.
 HORIZONTAL = {"GetFEM": 0.02, "CalculiX": 0.03}
 # The solution of a uniform pressure is in the space of the elements: only rounding is left.
 UNIAXIAL = 1e-9
