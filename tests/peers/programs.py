@@ -1,7 +1,6 @@
 """The programs that are compared: how each is called, and what it is compared with."""
 
 import json
-import os
 import pathlib
 import sys
 
@@ -14,7 +13,7 @@ from measured import measured
 
 # GetFEM's module is made for Debian's own Python; scikit-sparse is built in an environment of its own.
 DEBIANS_PYTHON = "/usr/bin/python3"
-ENVIRONMENT = pathlib.Path(os.environ.get("SIGNORINI_PEERS_PYTHON", TOP / "target/peers/bin/python"))
+ENVIRONMENT = TOP / "target/peers/bin/python"
 COMMANDS = {
     "Signorini": (sys.executable, "signorini_p1.py"),
     "GetFEM": (DEBIANS_PYTHON, "getfem_p1.py"),
