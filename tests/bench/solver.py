@@ -1,0 +1,382 @@
+"""Measures `signorini solve` as a whole process, against itself, a factorisation and other programs, and prints the
+tables of docs/performance.md, "Against other programs".
+
+    solver.py [--runs N] [--only NAME,...] [--against BINARY] [--dense COMMAND] [--large]
+
+All tables but the last take some three minutes. Runs (5 when absent) of what is compared take turns, so that a machine
+that slows down for a while slows both. Ratios are formed within a turn; each row has the least, the median and the
+most of them. Seconds are processor time, so that other work on the machine does not count, except where it says clock.
+
+--only     of whole, growth, cholmod, pair, iterations, increments, peers
+--against  another binary, such as an older build, in the turns of `whole`
+--dense    a command that, given a number of unknowns as its last argument, prints the CPU seconds of one dense
+           factorisation of a symmetric matrix of that size: what `iterations` is compared with
+--large    also `peers`: GetFEM and CalculiX at 2e5 degrees of freedom, twice each, some ten minutes
+
+`cargo build --release` comes first, or SIGNORINI_BINARY. `cholmod` needs the environment of tests/peers, `--large` its
+programs.
+"""
+
+import argparse
+import json
+import math
+import os
+import pathlib
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+
+TESTS = pathlib.Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(TESTS), str(TESTS / "peers")]
+
+import problem
+import programs
+from measured import ONE_THREAD, measured, peak_bytes
+from outside import BINARY
+
+MIB = 1 << 20
+PEER_RUNS = 2
+# Of the processors: what other programs may take of them while a clock is compared.
+QUIET = 0.05
+GOALS = {  # of issue 14
+    "whole/factorisation": "≤ 1.3", "cholmod": "≤ 0.5", "GetFEM": "≥ 50", "CalculiX": "≥ 140",
+    "growth": "≤ 1.35", "iterations/whole": "≤ 0.25", "pair": "≥ 1.7", "increments": "≤ 1.5",
+    "iterations/dense": "≤ 1", "user 2e5": "≤ 0.6", "user 1e6": "≤ 4", "peak 1e6": "≤ 1,434",
+}
+
+
+def p1(mesh, normal="body"):
+    return problem.problem(*problem.lines(mesh), problem.COEFFICIENT, normal)
+
+
+def long_contact(radius):
+    """A block with 500 elements along the contact: about 2,000 unknowns there."""
+    x, y = problem.lines("500")
+    made = problem.problem(x, [-problem.HEIGHT * (1 - j / 66) for j in range(67)], problem.COEFFICIENT, "body")
+    made["contacts"][0]["obstacle"]["radius"] = radius
+    return made
+
+
+def increments():
+    """A cylinder is pressed on, shifted and lifted in 80 increments, with 150 elements along the contact."""
+    made = p1("41")
+    made["mesh"]["grid"] = {"x": [-4 + 8 * i / 150 for i in range(151)],
+                            "y": [-8, -6, -4.5, -3.4, -2.6, -2, -1.5, -1.1, -0.8, -0.5, -0.3, -0.12, 0]}
+    made["supports"] = [{"boundary": "bottom", "ux": 0, "uy": 0}]
+    contact = made["contacts"][0]
+    contact["tangential_displacement"] = 0.02
+    contact["friction"].update(nonlocal_radius=0.1, history="incremental")
+    made["steps"] = [
+        {"name": "load", "indentation": 1, "tangential_displacement": 0, "increments": 30},
+        {"name": "shift", "indentation": 1, "tangential_displacement": 1, "increments": 20},
+        {"name": "unload", "indentation": 0.1, "tangential_displacement": 1, "increments": 30},
+    ]
+    return made
+
+
+class Folder:
+    """Problems as files, and where results go."""
+
+    def __init__(self, name):
+        self.path = pathlib.Path(name)
+
+    def file(self, name, content):
+        path = self.path / (name + ".json")
+        path.write_text(json.dumps(content))
+        return path
+
+    def result(self):
+        return self.path / "result.json"
+
+
+def solve(folder, file, binary=BINARY):
+    """Solves a problem; returns what the process used, and the CPU seconds of factorisation and iterations."""
+    starts = {}
+    command = [str(binary), "solve", str(file), "-o", str(folder.result())]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        # The clock of the processor time of another process: pthread_getcpuclockid(3) for processes. It is read when
+        # the process tells that a phase begins; Linux brings it up to date every few milliseconds.
+        clock = (~process.pid << 3) | 2
+        lines = []
+        for line in process.stderr:
+            lines.append(line)
+            words = line.split()
+            if len(words) == 2 and words[1] == "…":
+                starts[words[0]] = time.clock_gettime(clock), user_s(process.pid)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        sys.exit("signorini solve ended with %d\n%s" % (process.returncode, "".join(lines[-5:])))
+    cpu = used.ru_utime + used.ru_stime
+
+    def between(phase, after):
+        return [b - a for a, b in zip(starts[phase], starts[after])]
+
+    factorisation = between("order", "iterate")  # the phases order, factor and condense
+    return {
+        "user": used.ru_utime, "system": used.ru_stime, "cpu": cpu, "faults": used.ru_minflt,
+        "peak": peak_bytes(used), "iterate": between("iterate", "recover")[0],
+        "factorisation": factorisation[0], "factorisation_user": factorisation[1],
+        "summary": summary(folder.result()),
+    }
+
+
+def user_s(pid):
+    """Seconds of processor time of a process, without the system's, to 0.01 s."""
+    fields = pathlib.Path("/proc/%d/stat" % pid).read_text().rsplit(")", 1)[1].split()
+    return int(fields[11]) / os.sysconf("SC_CLK_TCK")
+
+
+def summary(result):
+    """The summary, which is the first part of a result. The rest is not read: the memory of this process would be
+    counted as that of the programs that it starts."""
+    with result.open(encoding="utf-8") as file:
+        head = file.read(MIB)
+    opening = '{"summary":'
+    if not head.startswith(opening):
+        sys.exit("a result does not begin with its summary")
+    return json.JSONDecoder().raw_decode(head, len(opening))[0]
+
+
+def table(title, rows):
+    """Rows of a name, the values of all runs and the goal."""
+    print("\n**%s**\n" % title)
+    print("| | least | median | most | goal |")
+    print("|---|---|---|---|---|")
+    for name, values, goal in rows:
+        values = sorted(values)
+        middle = (values[(len(values) - 1) // 2] + values[len(values) // 2]) / 2
+        print("| %s | %s | %s |" % (name, " | ".join(map(shown, (values[0], middle, values[-1]))), goal))
+    sys.stdout.flush()
+
+
+def shown(value):
+    """Three digits, thousands with a comma."""
+    if value == 0:
+        return "0"
+    return "{:,.{}f}".format(value, max(0, 2 - math.floor(math.log10(abs(value)))))
+
+
+def whole(folder, options):
+    """P1 as a whole process against its own factorisation, and against another binary."""
+    files = {size: folder.file(size, p1(size)) for size in problem.SIZES}
+    runs = {(size, binary): [] for size in files for binary in (BINARY, options.against) if binary}
+    for _ in range(options.runs):
+        for (size, binary), done in runs.items():
+            done.append(solve(folder, files[size], binary))
+    for size in files:
+        ours = runs[size, BINARY]
+        rows = [
+            ("user CPU, s", [run["user"] for run in ours], GOALS.get("user " + size, "")),
+            ("system CPU, s", [run["system"] for run in ours], ""),
+            ("page faults", [run["faults"] for run in ours], ""),
+            ("peak memory, MiB", [run["peak"] / MIB for run in ours], GOALS.get("peak " + size, "")),
+            ("factorisation (`order`, `factor`, `condense`), CPU s", [run["factorisation"] for run in ours], ""),
+        ]
+        if size == "2e4":
+            rows.append(("whole/factorisation", [run["cpu"] / run["factorisation"] for run in ours], ""))
+        else:  # phases long enough for clocks of 0.01 s
+            rows += [
+                ("whole/factorisation", [run["cpu"] / run["factorisation"] for run in ours],
+                 GOALS["whole/factorisation"]),
+                ("whole/factorisation, user CPU", [run["user"] / run["factorisation_user"] for run in ours],
+                 GOALS["whole/factorisation"]),
+            ]
+        if options.against:
+            pairs = list(zip(ours, runs[size, options.against]))
+            for name, key in (("user CPU", "user"), ("CPU", "cpu"), ("page faults", "faults"), ("peak memory", "peak")):
+                rows.append(("%s, this/other binary" % name, [a[key] / b[key] for a, b in pairs], ""))
+        table("Whole `signorini solve`, %s degrees of freedom (%d runs)"
+              % ("{:,}".format(ours[0]["summary"]["dofs"]), options.runs), rows)
+    return {size: runs[size, BINARY] for size in files}
+
+
+def growth(folder, options, done):
+    """How user time and memory grow from 2e4 to 1e6 degrees of freedom, from the runs of `whole` if there are."""
+    small, large = "2e4", "1e6"
+    if not done:
+        files = {size: folder.file(size, p1(size)) for size in (small, large)}
+        done = {size: [] for size in files}
+        for _ in range(options.runs):
+            for size, file in files.items():
+                done[size].append(solve(folder, file))
+    pairs = list(zip(done[small], done[large]))
+
+    def exponents(key):
+        return [math.log(b[key] / a[key]) / math.log(b["summary"]["dofs"] / a["summary"]["dofs"]) for a, b in pairs]
+
+    table("Growth with n degrees of freedom from 2e4 to 1e6: the exponent (%d runs)" % len(pairs), [
+        ("user CPU", exponents("user"), GOALS["growth"]), ("user and system CPU", exponents("cpu"), GOALS["growth"]),
+        ("peak memory", exponents("peak"), ""),
+    ])
+
+
+def cholmod(folder, options):
+    """A whole `signorini solve` against analyse, factor and solve of the same matrix."""
+    file = folder.file("2e5", p1("2e5"))
+    pairs = [(solve(folder, file), programs.solve("CHOLMOD", "2e5")) for _ in range(options.runs)]
+    table("Against CHOLMOD's analyse, factor and solve of the stiffness matrix alone, 2e5 degrees of freedom (%d runs)"
+          % options.runs, [
+              ("Signorini as a whole, user CPU, s", [a["user"] for a, _ in pairs], ""),
+              ("CHOLMOD's three calls, user CPU, s", [b["user_s"] for _, b in pairs], ""),
+              ("user CPU, Signorini/CHOLMOD", [a["user"] / b["user_s"] for a, b in pairs], GOALS["cholmod"]),
+              ("user and system CPU, Signorini/CHOLMOD", [a["cpu"] / programs.cpu(b) for a, b in pairs],
+               GOALS["cholmod"]),
+          ])
+
+
+def pair(folder, options):
+    """Two solutions at once against one after the other, where other programs leave the processors alone."""
+    file = folder.file("2e5", p1("2e5"))
+
+    def clock(at_once):
+        began = time.monotonic()
+        running = []
+        for k in range(2):
+            out = folder.path / ("pair%d.json" % k)
+            running.append(subprocess.Popen([BINARY, "solve", file, "-o", out],
+                                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+            if not at_once:
+                running[-1].wait()
+        if any(process.wait() for process in running):
+            sys.exit("signorini solve failed")
+        return time.monotonic() - began
+
+    quiet, busy = [], 0
+    while len(quiet) < options.runs and busy < 4 * options.runs:
+        began, before = time.monotonic(), others_s()
+        turn = clock(False), clock(True)
+        if others_s() - before <= QUIET * os.cpu_count() * (time.monotonic() - began):
+            quiet.append(turn)
+        else:
+            busy += 1
+    if not quiet:
+        print("\nTwo solutions at once: not measured, other programs were busy on these processors.")
+        return
+    title = "Two solutions of 2e5 degrees of freedom at once, by the clock (%d runs, without %d that others disturbed)"
+    table(title % (len(quiet), busy), [
+        ("one after the other, s", [a for a, _ in quiet], ""), ("at once, s", [b for _, b in quiet], ""),
+        ("throughput, at once/one after the other", [a / b for a, b in quiet], GOALS["pair"]),
+    ])
+
+
+def others_s():
+    """Seconds of processor time that all programs of this machine but this one and those that it has ended took, and
+    its host from it."""
+    words = pathlib.Path("/proc/stat").read_text().split("\n", 1)[0].split()
+    user, nice, system, _, _, interrupts, soft, stolen = map(int, words[1:9])
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    own = sum(one.ru_utime + one.ru_stime for one in used)
+    return (user + nice + system + interrupts + soft + stolen) / os.sysconf("SC_CLK_TCK") - own
+
+
+def iterations(folder, options):
+    """The iterations where the contact has about 2,000 unknowns, against the whole and a dense factorisation."""
+    cases = {"a sixth of the length touches": 8.0, "all of it touches": 400.0}
+    rows = []
+    for name, radius in cases.items():
+        file = folder.file("long", long_contact(radius))
+        runs = []
+        for _ in range(options.runs):
+            dense = None
+            run = solve(folder, file)
+            unknowns = run["summary"]["contact_dofs"]
+            if options.dense:
+                dense = float(measured([*options.dense.split(), unknowns]).stdout.split()[-1])
+            runs.append((run, dense))
+        count = "%s: {:,} contact unknowns, %d sweeps".format(unknowns) % (name, runs[0][0]["summary"]["iterations"])
+        rows.append((count + ", `iterate`, CPU s", [run["iterate"] for run, _ in runs], ""))
+        rows.append((name + ": `iterate`/whole", [run["iterate"] / run["cpu"] for run, _ in runs],
+                     GOALS["iterations/whole"]))
+        if options.dense:
+            rows.append((name + ": `iterate`/dense factorisation",
+                         [run["iterate"] / dense for run, dense in runs], GOALS["iterations/dense"]))
+    table("The iterations of a long contact with friction (%d runs)" % options.runs, rows)
+
+
+def eighty_increments(folder, options):
+    """A history of 80 increments."""
+    file = folder.file("increments", increments())
+    runs = [solve(folder, file) for _ in range(options.runs)]
+    summary = runs[0]["summary"]
+    table("%d increments (press, shift, lift) on 150 elements of contact, %d sweeps (%d runs)"
+          % (summary["increments"], summary["iterations"], options.runs), [
+              ("user CPU, s", [run["user"] for run in runs], ""),
+              ("user and system CPU, s", [run["cpu"] for run in runs], GOALS["increments"]),
+          ])
+
+
+def peers(options):
+    """GetFEM and CalculiX on the same problem at 2e5 degrees of freedom."""
+    limits = programs.limits()
+    runs = min(options.runs, PEER_RUNS)
+    found = []
+    for coefficient in (0.0, problem.COEFFICIENT):
+        done = {program: [] for program in ("Signorini", "GetFEM", "CalculiX")}
+        for _ in range(runs):
+            for program, results in done.items():
+                results.append(programs.solve(program, "2e5", coefficient))
+        rows = []
+        for program in ("GetFEM", "CalculiX"):
+            pairs = list(zip(done[program], done["Signorini"]))
+            rows += [
+                ("%s, user and system CPU, s" % program, [programs.cpu(a) for a, _ in pairs], ""),
+                ("%s/Signorini, user CPU" % program, [a["user_s"] / b["user_s"] for a, b in pairs], GOALS[program]),
+                ("%s/Signorini, user and system CPU" % program,
+                 [programs.cpu(a) / programs.cpu(b) for a, b in pairs], GOALS[program]),
+                ("%s/Signorini, peak memory" % program, [a["peak_bytes"] / b["peak_bytes"] for a, b in pairs], ""),
+            ]
+        table("Against GetFEM and CalculiX, 2e5 degrees of freedom, μ = %g (%d runs)" % (coefficient, runs), rows)
+        found += [(coefficient, results[0]) for results in done.values()]
+    print("\n**What they find, of the half model**\n")
+    print("| μ | program | degrees of freedom | iterations | peak MiB | force down | across | peak pressure "
+          "| error of the force | error of the peak | peak/Hertz's of that force |")
+    print("|" + "---|" * 11)
+    for coefficient, result in found:
+        errors = ["", "", ""]
+        if not coefficient:
+            limit = limits[result["program"]]
+            errors = ["%.1e" % programs.error(result, limit, key) for key in ("vertical_force", "peak_pressure")]
+            errors.append("%.4f" % (result["peak_pressure"] / problem.hertz(result["vertical_force"])))
+        print("| %g | %s | {:,} | %d | {:,.0f} | %.4f | %.4f | %.4f | %s |".format(
+            result["dofs"], result["peak_bytes"] / MIB) % (
+                coefficient, result["program"], result["iterations"], result["vertical_force"],
+                result["horizontal_force"], result["peak_pressure"], " | ".join(errors)))
+    print("\nLimits of refinement without friction: force %s, peak pressure %s."
+          % tuple(", ".join("%s %.4f" % (program, limit[key]) for program, limit in limits.items())
+                  for key in ("vertical_force", "peak_pressure")))
+
+
+def main():
+    parser = argparse.ArgumentParser(usage=__doc__)
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--only", type=lambda names: names.split(","))
+    parser.add_argument("--against", type=pathlib.Path)
+    parser.add_argument("--dense")
+    parser.add_argument("--large", action="store_true")
+    options = parser.parse_args()
+    every = ["whole", "growth", "cholmod", "pair", "iterations", "increments"]
+    chosen = options.only or every + ["peers"] * options.large
+    unknown = set(chosen) - {*every, "peers"}
+    if unknown or options.runs < 1:
+        parser.error("unknown: " + ", ".join(sorted(unknown)) if unknown else "--runs is at least 1")
+    for binary in filter(None, (BINARY, options.against)):
+        if not os.access(binary, os.X_OK):
+            parser.error("%s is not a program; `cargo build --release` makes it" % binary)
+    os.environ.update(ONE_THREAD)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Folder(name)
+        done = whole(folder, options) if "whole" in chosen else None
+        if "growth" in chosen:
+            growth(folder, options, done)
+        for name, bench in (("cholmod", cholmod), ("pair", pair), ("iterations", iterations),
+                            ("increments", eighty_increments)):
+            if name in chosen:
+                bench(folder, options)
+        if "peers" in chosen:
+            peers(options)
+
+
+main()
