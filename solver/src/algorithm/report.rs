@@ -460,7 +460,7 @@ fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warni
         Some((slip.displacement, contact, contact.friction.as_ref()?))
     });
     let mut message = format!(
-        "A residual of {:.1e} remains, above the tolerance of {tolerance:.1e}. It is rounding, which may leave up to {floor:.1e} here: ",
+        "A residual of {:.2e} remains, above the tolerance of {tolerance:.2e}. It is rounding, which may leave up to {floor:.1e} here: ",
         rounding.residual
     );
     let pointer = match slip {

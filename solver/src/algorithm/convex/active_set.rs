@@ -7,6 +7,9 @@ use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 use crate::solution::{Observer, Progress};
 
+/// A reaction below this part of the problem's own force is none.
+const NO_FORCE: f64 = 1e-30;
+
 /// After a step that leaves more than this part of the residual the next is damped.
 const STALLED: f64 = 0.7;
 
@@ -138,6 +141,8 @@ pub(in crate::algorithm) fn update_active(
     force: &[f64],
     state: &mut State,
 ) -> bool {
+    // a body that is at rest again is left with what underflows: that is no contact
+    let none = NO_FORCE * system.reference_force;
     let mut changed = false;
     for (i, node) in system.nodes.iter().enumerate() {
         let Dof::Free(dof) = node.normal else {
@@ -147,9 +152,9 @@ pub(in crate::algorithm) fn update_active(
             continue;
         }
         let active = if state.active[i] {
-            -force[dof] >= 0.0
+            -force[dof] >= none
         } else {
-            state.v[dof] > node.gap
+            system.stiffness.at(dof, dof) * (state.v[dof] - node.gap) > none
         };
         changed |= active != state.active[i];
         state.active[i] = active;
