@@ -13,7 +13,7 @@ mod read;
 mod check;
 
 pub use check::{Group, MOST_TOLD, groups};
-pub use plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, Mode, Plan};
+pub use plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, MOST_VALUE_BYTES, Mode, Plan};
 pub use read::{Fields, Sweep, read};
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use solver::error::{Reason, Violation, escape};
 use solver::problem::{MeshInput, Problem};
 
 use super::template::Template;
+use crate::json::parse;
 
 /// Most members of a sweep.
 pub const MOST_MEMBERS: usize = 10_000;
@@ -15,6 +16,9 @@ pub const MOST_MEMBERS: usize = 10_000;
 pub const MOST_PATHS: usize = 16;
 /// Bytes of the problems of all members together, as text: checking them reads all of it.
 pub const MOST_BYTES: u64 = 64 << 20;
+
+/// Bytes of the values of all members together, as text: a table of all members holds all of them.
+pub const MOST_VALUE_BYTES: u64 = 8 << 20;
 
 /// How the values of several axes are combined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::IntoStaticStr, strum::VariantArray)]
@@ -115,7 +119,7 @@ impl Plan {
     /// The problem of a member, or its violations: pointers are relative to it. Without a mesh of its own it has an
     /// empty one in place of the base's.
     pub fn problem(&self, number: usize) -> Result<Problem, Vec<Violation>> {
-        crate::parse(&self.template.filled(&self.values(number)))
+        parse(&self.template.filled(&self.values(number)))
     }
 
     /// The problem of a member on its mesh, which is the base's unless the sweep changes it.
@@ -171,9 +175,16 @@ impl Plan {
 
     /// Bytes of the problems of all members, as text.
     pub(super) fn bytes(&self) -> u64 {
+        let text = self.template.bytes() as u64;
+        text.saturating_mul(self.count() as u64)
+            .saturating_add(self.value_bytes())
+    }
+
+    /// Bytes of the values of all members, as text.
+    pub(super) fn value_bytes(&self) -> u64 {
         let count = self.count() as u64;
         let length = |values: &[String]| values.iter().map(|value| value.len() as u64).sum();
-        let of_values: u64 = match &self.values {
+        match &self.values {
             Values::Grid(axes) => axes
                 .iter()
                 .map(|values| {
@@ -186,8 +197,6 @@ impl Plan {
                 let values = points.iter().flatten().flatten();
                 values.map(|value| value.len() as u64).sum()
             }
-        };
-        let text = self.template.bytes() as u64;
-        text.saturating_mul(count).saturating_add(of_values)
+        }
     }
 }

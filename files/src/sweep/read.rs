@@ -12,9 +12,10 @@ use solver::problem::Problem;
 use strum::VariantArray;
 
 use super::{
-    plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, Mode, Plan, Values},
+    plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, MOST_VALUE_BYTES, Mode, Plan, Values},
     template::{Nowhere, Place, Template, locate},
 };
+use crate::json::parse;
 use crate::schema::{meant, quoted};
 
 /// The fields of a definition as text, as far as they are given.
@@ -102,6 +103,17 @@ pub fn read(fields: &Fields<'_>) -> Result<Sweep, Vec<Violation>> {
                 false => "Give fewer values, or submit several sweeps.",
             },
         ));
+    } else if plan.value_bytes() > MOST_VALUE_BYTES {
+        found.add(Violation::new(
+            at,
+            Reason::TooLarge,
+            format!(
+                "values of {} bytes, each counted for every member that has it",
+                plan.value_bytes()
+            ),
+            format!("at most {MOST_VALUE_BYTES} bytes as JSON, for all members together"),
+            "Give shorter values, or submit several sweeps.",
+        ));
     } else if bytes > MOST_BYTES {
         found.add(Violation::new(
             at,
@@ -128,7 +140,7 @@ fn base(raw: Option<&RawValue>, found: &mut Findings) -> Option<Problem> {
         ));
         return None;
     };
-    let read = crate::parse(raw.get());
+    let read = parse(raw.get());
     let inside = |v: Violation| Violation {
         pointer: format!("/base{}", v.pointer),
         ..v

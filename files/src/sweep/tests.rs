@@ -370,6 +370,10 @@ fn a_sweep_has_limits() {
     wordy["title"] = json!("x".repeat(100_000));
     let wordy = json!({"base": wordy, "axes": [axis(MU, 1000)]});
     assert_eq!(refused(&wordy), at("/axes", Reason::TooLarge));
+    let long: Vec<f64> = (0..2000).map(f64::from).collect();
+    let table = json!({"kind": "table", "x": long, "gap": long});
+    let tables = grid(json!([axis(MU, 1000), {"path": "/contacts/0/obstacle", "values": [table]}]));
+    assert_eq!(tables, at("/axes", Reason::TooLarge));
     let short = json!({"base": base(), "mode": "zip", "axes": [axis(MU, 3), axis(RHO, 2)]});
     assert_eq!(refused(&short), at("/axes/1", Reason::WrongLength));
     // a deep value is refused as a deep problem is

@@ -95,8 +95,8 @@ pub use self::{
     parts::{PIECE_BYTES, PIECES_PER_COMMIT, Parts, ProfilePoints},
     progress::accept,
     snapshot::Snapshot,
-    submission::{Accepted, Claim, NewJob, RequestKey, Submission},
-    sweeps::{MemberEvents, MembersTask, NewSweep},
+    submission::{Accepted, Claim, NewJob, NewSweep, RequestKey, Submission},
+    sweeps::{MemberEvents, MembersTask},
 };
 
 impl Store {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use tokio::sync::{mpsc, oneshot};
 
-use super::{error::Result, sweeps::NewSweep};
+use super::error::Result;
 use crate::{
     job::{Cache, Job, JobId, Limits, SweepId},
     memory::Reservation,
@@ -41,6 +41,23 @@ pub struct NewJob {
     pub memory_bytes: u64,
     /// Fingerprint of everything that the client submitted.
     pub payload: String,
+}
+
+/// A sweep that is about to be accepted with its jobs.
+#[derive(Clone, Debug)]
+pub struct NewSweep {
+    /// Its public id.
+    pub id: SweepId,
+    /// A name for people.
+    pub name: Option<String>,
+    /// Labels for programs.
+    pub labels: BTreeMap<String, String>,
+    /// JSON Pointers: what members differ in.
+    pub paths: Vec<String>,
+    /// What its members are, as JSON.
+    pub definition: String,
+    /// The members of each job, in the order of the jobs.
+    pub groups: Vec<Vec<usize>>,
 }
 
 /// A key that makes a request repeatable.

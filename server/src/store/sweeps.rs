@@ -12,6 +12,7 @@ use super::{
     database::Store,
     error::{Record, Result, StoreError},
     rows::is_current,
+    submission::NewSweep,
 };
 use crate::{
     caller::Owners,
@@ -19,23 +20,6 @@ use crate::{
     sweep::{MemberCounts, MemberRow, Sweep},
     time::Time,
 };
-
-/// A sweep that is about to be accepted with its jobs.
-#[derive(Clone, Debug)]
-pub struct NewSweep {
-    /// Its public id.
-    pub id: SweepId,
-    /// A name for people.
-    pub name: Option<String>,
-    /// Labels for programs.
-    pub labels: BTreeMap<String, String>,
-    /// JSON Pointers: what members differ in.
-    pub paths: Vec<String>,
-    /// What its members are, as JSON.
-    pub definition: String,
-    /// The members of each job, in the order of the jobs.
-    pub groups: Vec<Vec<usize>>,
-}
 
 /// What a job of a sweep has to solve.
 #[derive(Clone, Debug, Serialize, Deserialize)]

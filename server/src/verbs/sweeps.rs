@@ -419,16 +419,12 @@ pub async fn watch(
     if !sweep.status.is_terminal() {
         service.accepting()?;
     }
-    let definition = service.store.sweep_definition(sweep.key).await?;
-    let definition = definition.ok_or(ApiError::SweepDeleted(id))?;
-    let plan = service.work(move || plan_of(&definition)).await??;
-    Ok(Some(follow(service.clone(), (id, sweep.key), plan, after)))
+    Ok(Some(follow(service.clone(), (id, sweep.key), after)))
 }
 
 fn follow(
     service: Arc<Service>,
     (id, key): (SweepId, i64),
-    plan: Plan,
     after: i64,
 ) -> impl Stream<Item = Result<SweepEvent, ApiError>> + Send {
     try_stream! {
@@ -438,14 +434,18 @@ fn follow(
             // in a task of its own: a client that does not read may stop this stream at any point
             let reader = service.clone();
             let read = detached(async move {
-                let _turn = reader.queue.turn().await;
-                Ok(reader.store.member_events(key, cursor, AT_ONCE).await?)
+                let turn = reader.queue.turn().await;
+                let found = reader.store.member_events(key, cursor, AT_ONCE).await?;
+                drop(turn);
+                match found {
+                    Some(found) => with_parameters(&reader, (id, key), found).await.map(Some),
+                    None => Ok(None),
+                }
             });
             let MemberEvents { sweep, events, more, last } = read.await?.ok_or(ApiError::SweepDeleted(id))?;
             let idle = events.is_empty();
-            for (seq, t, mut row) in events {
+            for (seq, t, row) in events {
                 cursor = seq;
-                row.parameters = plan.parameters(row.number as usize);
                 yield SweepEvent { seq, t, payload: SweepPayload::Member { member: Box::new(row) } };
             }
             if more {
@@ -468,6 +468,30 @@ fn follow(
             }
         }
     }
+}
+
+/// Adds the values of the members. The definition is read each time: hundreds of watchers that kept it would keep as many
+/// copies.
+async fn with_parameters(
+    service: &Service,
+    (id, key): (SweepId, i64),
+    mut found: MemberEvents,
+) -> Result<MemberEvents, ApiError> {
+    if found.events.is_empty() {
+        return Ok(found);
+    }
+    let load = async {
+        let definition = service.store.sweep_definition(key).await?;
+        definition.ok_or(ApiError::SweepDeleted(id))
+    };
+    let add = |definition: String| {
+        let plan = plan_of(&definition)?;
+        for (_, _, row) in &mut found.events {
+            row.parameters = plan.parameters(row.number as usize);
+        }
+        Ok(found)
+    };
+    service.work_on(load, add).await?
 }
 
 /// Asks all jobs of a sweep to stop; members that have a row keep it.

@@ -171,7 +171,6 @@ fn same() -> NewJob {
 
 fn submission(jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
     let key = key.map(|key| RequestKey {
-        sweep: None,
         key: key.into(),
         payload: jobs[0].payload.clone(),
     });

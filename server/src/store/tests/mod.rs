@@ -6,6 +6,7 @@ mod owners;
 mod plans;
 mod simulation;
 mod starts;
+mod sweeps;
 mod upgrades;
 
 use super::*;
@@ -65,7 +66,6 @@ fn new(input: &str) -> NewJob {
 /// A submission of this owner.
 fn by(owner: &str, jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
     let key = key.map(|key| RequestKey {
-        sweep: None,
         key: key.into(),
         payload: "request".into(),
     });
