@@ -210,6 +210,7 @@ fn text(message: &str, field: &str, count: usize) -> String {
         ("Job", "id" | "cached_from" | "parent") => {
             format!("job_00000000-0000-7000-8000-{count:012}")
         }
+        ("Job", "sweep") => format!("sweep_00000000-0000-7000-8000-{count:012}"),
         ("Job", "reason") => "timed_out".into(),
         ("QueuePosition", "reason") => "paused".into(),
         ("Violation", "reason") => "missing".into(),
