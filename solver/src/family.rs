@@ -8,10 +8,10 @@ use crate::mesh::{External, ExternalMesh};
 use crate::model::{Model, VariableModel};
 use crate::problem::Problem;
 use crate::solution::{
-    ContactSummary, Observer, Outcome, Peak, Residuals, Solution, Summary, Warning, WarningCode,
+    ContactSummary, Observer, Outcome, Peak, Phase, Progress, Residuals, Solution, Summary,
+    Warning, WarningCode,
 };
 use crate::steps::{self, Neighbour, Numbers};
-use crate::{Prepared, prepare};
 
 /// Problems on one body, solved one after the other, each from the end of the one before where that helps.
 pub struct Family {
@@ -60,7 +60,12 @@ impl Family {
         external: Option<External>,
         observe: &mut Observer<'_>,
     ) -> Result<Family, SolveError> {
-        let Prepared { model, body } = prepare(problem, external, observe)?;
+        notify(observe, Progress::Phase(Phase::Mesh))?;
+        let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
+        for warning in &model.warnings {
+            notify(observe, Progress::Warning(warning))?;
+        }
+        let body = ElasticBody::new(&model, observe)?;
         let of_mesh = |warning: &&Warning| warning.pointer.starts_with("/mesh");
         let mesh_warnings = model.warnings.iter().filter(of_mesh).cloned().collect();
         Ok(Family {
@@ -196,6 +201,13 @@ impl Member {
     }
 }
 
+fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
+    match observe(progress).is_break() {
+        true => Err(SolveError::Stopped),
+        false => Ok(()),
+    }
+}
+
 impl std::fmt::Debug for Family {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Family")
@@ -208,7 +220,6 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::*;
-    use crate::solution::Progress;
 
     fn problem(coefficient: f64, indentation: f64) -> Problem {
         serde_json::from_value(serde_json::json!({

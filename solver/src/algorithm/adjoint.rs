@@ -10,7 +10,7 @@
 //! where B = ∂(friction forces)/∂R. These z are also displacements of the contact nodes: those of the dual solution, by
 //! which the errors of the body's stresses are weighted.
 
-use crate::algorithm::convex::{dense, free_dofs};
+use crate::algorithm::factors::{dense, free_dofs};
 use crate::algorithm::newton::jacobian;
 use crate::algorithm::system::{Point, State, System};
 use crate::elasticity::Dof;

@@ -5,6 +5,7 @@
 
 mod adjoint;
 mod convex;
+mod factors;
 mod finished;
 mod fixed_point;
 mod large_slip;

@@ -6,7 +6,7 @@
 //! touch. What is found is checked on the whole: where another node would pass the obstacle, or another point rub, that part is
 //! made larger, and the iterations go on.
 
-use crate::algorithm::convex::{Factors, dense};
+use crate::algorithm::factors::{Factors, dense};
 use crate::algorithm::finished::Finished;
 use crate::algorithm::rounding;
 use crate::algorithm::settle::settle;
@@ -27,6 +27,9 @@ const WORTH: f64 = 0.7;
 /// Parts of the boundary that may touch are widened on each side by this part of their length, and by a few nodes.
 const MARGIN: f64 = 0.1;
 const MARGIN_NODES: usize = 4;
+
+/// Residuals of the part count as so many times as large: those of the whole have the rounding of what is eliminated besides.
+const MARGIN_OF_RESIDUALS: f64 = 1.01;
 
 /// Parts that turned out too small are widened by this part of their length.
 const GROWTH: f64 = 0.5;
@@ -331,6 +334,7 @@ impl Near {
         let part = System {
             stiffness: &self.stiffness,
             load: load[count..].to_vec(),
+            residual_margin: MARGIN_OF_RESIDUALS,
             nodes: system.nodes.iter().zip(&self.kept).map(node).collect(),
             points: self
                 .points

@@ -11,9 +11,8 @@
 //! the friction bound before it; there is no other safeguard. Where it converges it takes four
 //! to twenty steps.
 
-use crate::algorithm::convex::{
-    close, dense, free_dofs, least_along, semidefinite_shift, update_active,
-};
+use crate::algorithm::convex::{close, least_along, update_active};
+use crate::algorithm::factors::{dense, free_dofs, semidefinite_shift};
 use crate::algorithm::finished::End;
 use crate::algorithm::rounding;
 use crate::algorithm::system::{Point, State, System};

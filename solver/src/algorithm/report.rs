@@ -449,6 +449,15 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
     }
 }
 
+/// Two digits that are not below the number: what exceeds a limit is seen to exceed it.
+fn rounded_up(value: f64) -> String {
+    let nearest = format!("{value:.1e}");
+    match nearest.parse::<f64>() {
+        Ok(shown) if shown < value => format!("{:.1e}", 1.05 * value),
+        _ => nearest,
+    }
+}
+
 /// Says where rounding keeps residuals above the tolerance, and what would lower them.
 fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warning>) {
     let Some(rounding) = finished.rounding else {
@@ -460,8 +469,8 @@ fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warni
         Some((slip.displacement, contact, contact.friction.as_ref()?))
     });
     let mut message = format!(
-        "A residual of {:.2e} remains, above the tolerance of {tolerance:.2e}. It is rounding, which may leave up to {floor:.1e} here: ",
-        rounding.residual
+        "A residual of {} remains, above the tolerance of {tolerance:.1e}. It is rounding, which may leave up to {floor:.1e} here: ",
+        rounded_up(rounding.residual)
     );
     let pointer = match slip {
         Some((displacement, contact, friction)) => {
@@ -489,4 +498,21 @@ fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warni
         pointer,
         message,
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rounded_up;
+
+    #[test]
+    fn a_number_above_a_limit_is_shown_above_it() {
+        for (value, shown) in [
+            (1.002e-10, "1.1e-10"),
+            (1e-10, "1.0e-10"),
+            (9.94e-10, "1.0e-9"),
+            (2.96e-7, "3.0e-7"),
+        ] {
+            assert_eq!(rounded_up(value), shown);
+        }
+    }
 }

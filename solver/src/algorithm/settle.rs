@@ -4,7 +4,8 @@
 //! factor that serves: sweeps with one inner step each. The residual shrinks by a constant factor, as far as rounding allows; where it
 //! does not, the neighbour is too far, and the usual methods begin anew.
 
-use crate::algorithm::convex::{Factors, close, free_dofs, least_along, update_active};
+use crate::algorithm::convex::{close, least_along, update_active};
+use crate::algorithm::factors::{Factors, free_dofs};
 use crate::algorithm::finished::Finished;
 use crate::algorithm::system::{State, System};
 use crate::solution::{Observer, Outcome, Progress, Residuals, Stage};

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
-use crate::algorithm::convex::Factors;
+use crate::algorithm::factors::Factors;
 use crate::algorithm::system::{State, System};
 use crate::problem::SolverControls;
 use crate::solution::{

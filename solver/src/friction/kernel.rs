@@ -109,12 +109,12 @@ struct KnownRows {
 }
 
 impl KnownRows {
-    /// Keeps a row, unless there are many: 8 MiB of weights.
-    fn add(&mut self, s: f64, row: &Arc<Row>) {
-        const MOST_WEIGHTS: usize = 1 << 20;
+    /// Keeps a row, unless there are many: at most so many weights for each node of the chain.
+    fn add(&mut self, s: f64, row: &Arc<Row>, nodes: usize) {
+        const MOST_FOR_A_NODE: usize = 256;
         // a row takes some space beside its weights
         let more = row.weights.len() + 16;
-        if self.weights + more <= MOST_WEIGHTS {
+        if self.weights + more <= MOST_FOR_A_NODE * nodes {
             self.weights += more;
             self.rows.insert(s.to_bits(), row.clone());
         }
@@ -196,7 +196,7 @@ impl Averaging {
             return row.clone();
         }
         let row = Arc::new(self.integrated_row(s));
-        known().add(s, &row);
+        known().add(s, &row, self.chain.s.len());
         row
     }
 

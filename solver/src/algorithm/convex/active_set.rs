@@ -1,7 +1,8 @@
 //! Primal–dual active set with semi-smooth Newton steps.
 
 use super::projected_newton::least_along;
-use super::step::{AIM, Factors, Minimum, close, free_dofs, gradient};
+use super::step::{AIM, Minimum, close, gradient};
+use crate::algorithm::factors::{Factors, free_dofs};
 use crate::algorithm::rounding::{PATIENCE, is_rounding};
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;

@@ -13,8 +13,9 @@ mod step;
 pub(super) use active_set::update_active;
 pub(super) use projected_newton::least_along;
 pub use step::Minimum;
-pub(super) use step::{Factors, close, dense, free_dofs, semidefinite_shift};
+pub(super) use step::close;
 
+use crate::algorithm::factors::Factors;
 use crate::algorithm::system::{State, System};
 use crate::solution::{Observer, Progress};
 

@@ -1,6 +1,7 @@
 //! Projected Newton (Bertsekas 1982) with a line search: slower, but J decreases at every step.
 
-use super::step::{AIM, Factors, Minimum, close, free_dofs, gradient};
+use super::step::{AIM, Minimum, close, gradient};
+use crate::algorithm::factors::{Factors, free_dofs};
 use crate::algorithm::rounding::{PATIENCE, is_rounding};
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::elasticity::Dof;

@@ -16,7 +16,8 @@ mod average;
 mod friction;
 mod rows;
 
-use crate::algorithm::convex::{close, dense, free_dofs};
+use crate::algorithm::convex::close;
+use crate::algorithm::factors::{dense, free_dofs};
 use crate::algorithm::finished::End;
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::algorithm::track::{Measured, Row, Track, relative_change};

@@ -1,0 +1,139 @@
+//! Dense work of the iterations: factors of H on the free unknowns, kept while they serve.
+
+use crate::algorithm::system::System;
+use crate::elasticity::Dof;
+use crate::linear::{Breaks, Cholesky, Dense, Unsolved};
+use crate::solution::{Observer, Progress};
+
+/// Unknowns that are not held: the normal ones of nodes not `held`, and the tangential ones.
+pub(super) fn free_dofs(system: &System<'_>, held: impl Fn(usize) -> bool) -> Vec<usize> {
+    let mut free = Vec::with_capacity(system.load.len());
+    for (i, node) in system.nodes.iter().enumerate() {
+        if let (Dof::Free(dof), false) = (node.normal, held(i)) {
+            free.push(dof);
+        }
+        if let (Dof::Free(dof), None) = (node.tangent, node.held_tangent) {
+            free.push(dof);
+        }
+    }
+    free
+}
+
+/// Added to the diagonal of H where Ŝ leaves rigid motions free: a step along one is then long but
+/// finite, until contact ends it. Where contact holds the body it costs a step or two but no accuracy, since the
+/// gradient does not depend on it.
+pub(super) fn semidefinite_shift(system: &System<'_>) -> f64 {
+    let size = system.stiffness.size().max(1);
+    let diagonal: f64 = (0..system.stiffness.size())
+        .map(|i| system.stiffness.at(i, i))
+        .sum();
+    1e-9 * diagonal / size as f64
+}
+
+/// Dense work on a matrix of this size, for which the observer is asked first. None if it has no solution, or the
+/// observer stops.
+pub(super) fn dense<T>(
+    size: usize,
+    observe: &mut Observer<'_>,
+    solve: impl FnOnce(&mut Breaks<'_>) -> Result<T, Unsolved>,
+) -> Option<T> {
+    let bytes = Dense::bytes(size);
+    if observe(Progress::Needs { bytes }).is_break() {
+        return None;
+    }
+    match solve(&mut Breaks::new(&mut || observe(Progress::Pulse))) {
+        Ok(x) => Some(x),
+        Err(Unsolved::TooLarge { bytes }) => {
+            // the answer is given again at the next question
+            let _ = observe(Progress::OutOfMemory { bytes });
+            None
+        }
+        Err(Unsolved::Singular | Unsolved::Stopped) => None,
+    }
+}
+
+/// The last factor of H = Ŝ + Σ w τ φ′ h hᵀ on some unknowns. It serves again as long as steps with it are nearly as
+/// good as with a new one: from sweep to sweep friction bounds change little.
+#[derive(Default)]
+pub(super) struct Factors {
+    last: Option<(Vec<usize>, Cholesky)>,
+    old: bool,
+}
+
+impl Factors {
+    /// Has a factor on the free unknowns: true if it is a new one, for this state. None if H has no factor, or the observer
+    /// stops.
+    pub(super) fn prepare(
+        &mut self,
+        system: &System<'_>,
+        bound: &[f64],
+        v: &[f64],
+        free: &[usize],
+        observe: &mut Observer<'_>,
+    ) -> Option<bool> {
+        let serves = |(unknowns, _): &(Vec<usize>, Cholesky)| unknowns == free && !self.old;
+        if self.last.as_ref().is_some_and(serves) {
+            return Some(false);
+        }
+        let room = self.last.take().map(|(_, factor)| factor);
+        let factor = factor(system, bound, v, free, room, observe)?;
+        self.last = Some((free.to_vec(), factor));
+        self.old = false;
+        Some(true)
+    }
+
+    /// −H⁻¹ ∇J on the unknowns that it was prepared for.
+    pub(super) fn direction(&self, free: &[usize], force: &[f64]) -> Option<Vec<f64>> {
+        let (_, factor) = self.last.as_ref()?;
+        let mut direction: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
+        factor.solve(&mut direction);
+        direction.iter().all(|d| d.is_finite()).then_some(direction)
+    }
+
+    /// Gives the last factor up.
+    pub(super) fn renew(&mut self) {
+        self.old = true;
+    }
+}
+
+/// The factor of H on the free unknowns.
+fn factor(
+    system: &System<'_>,
+    bound: &[f64],
+    v: &[f64],
+    free: &[usize],
+    room: Option<Cholesky>,
+    observe: &mut Observer<'_>,
+) -> Option<Cholesky> {
+    let mut place = vec![usize::MAX; system.load.len()];
+    free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
+    // friction couples the nodes of one edge only: a few additions to a dense matrix
+    let mut friction = Vec::new();
+    for (point, tau) in system.points.iter().zip(bound) {
+        let slope = point.weight * tau * system.law(point).phi_slope(system.slip(v, point));
+        if slope == 0.0 {
+            continue;
+        }
+        let dofs = point.nodes.map(|n| system.nodes[n].tangent);
+        for a in 0..3 {
+            for b in 0..3 {
+                if let (Dof::Free(row), Dof::Free(column)) = (dofs[a], dofs[b]) {
+                    let value = slope * point.shape[a] * point.shape[b];
+                    friction.push((place[row], place[column], value));
+                }
+            }
+        }
+    }
+    let shift = if system.semidefinite {
+        semidefinite_shift(system)
+    } else {
+        0.0
+    };
+    let elastic = |i: usize, j: usize| {
+        let shift = if i == j { shift } else { 0.0 };
+        system.stiffness.at(free[i], free[j]) + shift
+    };
+    dense(free.len(), observe, |breaks| {
+        Cholesky::new(free.len(), elastic, &friction, room, breaks)
+    })
+}
