@@ -89,7 +89,9 @@ impl Members<'_> {
             SolveError::SingularSystem { .. } | SolveError::NonFinite { .. } => Failed::Body(error),
             error => Failed::Member(error),
         })?;
-        Ok(self.family.insert(family).member(&problem, observe)?)
+        // the first on a body is solved whole, as in the service: its balance of forces tells whether the body is sound
+        let solution = self.family.insert(family).solution(&problem, observe)?;
+        Ok(Member::of(&solution.summary))
     }
 }
 
