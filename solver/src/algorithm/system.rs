@@ -656,7 +656,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The force that [`System::kkt_residual`] divides by, > 0.
+    /// The force that the KKT residual is divided by, > 0.
     pub fn force_scale(&self, state: &State, reactions: &[f64], bound: &[f64]) -> f64 {
         let mut friction = vec![0.0; state.v.len()];
         self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
