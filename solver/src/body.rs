@@ -334,7 +334,7 @@ fn solve_error(error: FactorError, map: &DofMap) -> SolveError {
     }
 }
 
-fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
+pub(crate) fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
     match observe(progress).is_break() {
         true => Err(SolveError::Stopped),
         false => Ok(()),

@@ -6,10 +6,10 @@ use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::mesh::{External, ExternalMesh};
 use crate::model::{Model, VariableModel};
+use crate::prepared::{Prepared, prepare};
 use crate::problem::Problem;
 use crate::solution::{
-    ContactSummary, Observer, Outcome, Peak, Phase, Progress, Residuals, Solution, Summary,
-    Warning, WarningCode,
+    ContactSummary, Observer, Outcome, Peak, Residuals, Solution, Summary, Warning, WarningCode,
 };
 use crate::steps::{self, Neighbour, Numbers};
 
@@ -60,12 +60,7 @@ impl Family {
         external: Option<External>,
         observe: &mut Observer<'_>,
     ) -> Result<Family, SolveError> {
-        notify(observe, Progress::Phase(Phase::Mesh))?;
-        let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
-        for warning in &model.warnings {
-            notify(observe, Progress::Warning(warning))?;
-        }
-        let body = ElasticBody::new(&model, observe)?;
+        let Prepared { model, body } = prepare(problem, external, observe)?;
         let of_mesh = |warning: &&Warning| warning.pointer.starts_with("/mesh");
         let mesh_warnings = model.warnings.iter().filter(of_mesh).cloned().collect();
         Ok(Family {
@@ -201,13 +196,6 @@ impl Member {
     }
 }
 
-fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
-    match observe(progress).is_break() {
-        true => Err(SolveError::Stopped),
-        false => Ok(()),
-    }
-}
-
 impl std::fmt::Debug for Family {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Family")
@@ -220,6 +208,7 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::*;
+    use crate::solution::Progress;
 
     fn problem(coefficient: f64, indentation: f64) -> Problem {
         serde_json::from_value(serde_json::json!({

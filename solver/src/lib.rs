@@ -53,10 +53,10 @@ pub mod verify;
 // Finer meshes until the errors are small enough.
 pub mod adapt;
 
-// Many problems on one body.
+// A problem up to its iterations; many problems on one body.
 pub mod family;
+mod prepared;
 
-use body::ElasticBody;
 use error::{SolveError, Violation};
 use mesh::{External, Mesh};
 use model::Model;
@@ -98,8 +98,8 @@ pub fn solve_with_mesh(
             let first = Model::new(problem, external).map_err(SolveError::Invalid)?;
             verification = verification.map(|verification| verification.limited(&first));
             let solve = |model: Model, origins: &mut Origins, observe: &mut Observer<'_>| {
-                notify(observe, Progress::Phase(Phase::Mesh))?;
-                let Prepared { model, body } = prepared(model, observe)?;
+                body::notify(observe, Progress::Phase(Phase::Mesh))?;
+                let Prepared { model, body } = Prepared::new(model, observe)?;
                 steps::run(&model, &body, Some(origins), observe)
             };
             adapt::run(problem, &goal, first, &solve, observe)?
@@ -109,66 +109,6 @@ pub fn solve_with_mesh(
         verification.verify(problem, &mesh, &mut solution, observe);
     }
     Ok((solution, mesh))
-}
-
-/// A problem up to its iterations: checked, and its body factored and condensed onto its contacts.
-///
-/// This is most of the work, and problems that differ only in friction, indentation, drag, load steps or tolerances
-/// share it. (An obstacle of another shape may face other nodes, or turn their normals.) Errors are estimated here, whatever
-/// `solver.accuracy` is: [`solve`] verifies them.
-pub struct Prepared {
-    /// The checked problem.
-    pub model: Model,
-    /// The body reduced to its contacts.
-    pub body: ElasticBody,
-}
-
-/// Prepares a problem on its own mesh; adaptive refinement prepares it on each of several.
-pub fn prepare(
-    problem: &Problem,
-    external: Option<External>,
-    observe: &mut Observer<'_>,
-) -> Result<Prepared, SolveError> {
-    notify(observe, Progress::Phase(Phase::Mesh))?;
-    prepared(
-        Model::new(problem, external).map_err(SolveError::Invalid)?,
-        observe,
-    )
-}
-
-/// Prepares a problem on another mesh of its body, with all boundaries, groups and node sets of its own.
-pub fn prepare_on_mesh(
-    problem: &Problem,
-    mesh: Mesh,
-    observe: &mut Observer<'_>,
-) -> Result<Prepared, SolveError> {
-    notify(observe, Progress::Phase(Phase::Mesh))?;
-    let model = Model::on_mesh(problem, mesh.into()).map_err(SolveError::Invalid)?;
-    prepared(model, observe)
-}
-
-fn prepared(model: Model, observe: &mut Observer<'_>) -> Result<Prepared, SolveError> {
-    for warning in &model.warnings {
-        notify(observe, Progress::Warning(warning))?;
-    }
-    let body = ElasticBody::new(&model, observe)?;
-    Ok(Prepared { model, body })
-}
-
-impl Prepared {
-    /// Contact and friction, load step by load step.
-    pub fn solve(&self, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
-        steps::run(&self.model, &self.body, None, observe)
-    }
-
-    /// Solves another problem on this body; `None`: its body is not the same.
-    pub fn solve_other(
-        &self,
-        model: &Model,
-        observe: &mut Observer<'_>,
-    ) -> Option<Result<Solution, SolveError>> {
-        ElasticBody::same(&self.model, model).then(|| steps::run(model, &self.body, None, observe))
-    }
 }
 
 /// What is known of a valid problem without solving it.
@@ -189,12 +129,7 @@ pub fn check(problem: &Problem, external: Option<External>) -> Result<Checked, V
     })
 }
 
-fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
-    match observe(progress).is_break() {
-        true => Err(SolveError::Stopped),
-        false => Ok(()),
-    }
-}
+pub use prepared::{Prepared, prepare, prepare_on_mesh};
 
 pub use model::estimate::{Estimate, MeshSize, estimate};
 

@@ -4,17 +4,18 @@
 //! with its values filled in, which is then read as any other problem. The mesh of the base is left out of the text
 //! unless the sweep changes it, so that a large one is read once and not once for each member.
 
-mod template;
-
-mod plan;
-
-mod read;
-
 mod check;
+mod parts;
+mod path;
+mod plan;
+mod read;
+mod template;
+mod values;
 
 pub use check::{Group, MOST_TOLD, groups};
 pub use plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, MOST_VALUE_BYTES, Mode, Plan};
-pub use read::{Fields, Sweep, read};
+pub use read::{Sweep, read};
+pub use values::Fields;
 
 #[cfg(test)]
 mod tests;

@@ -1,12 +1,14 @@
 //! A text of JSON with gaps, into which values are written.
 
-use std::{borrow::Cow, fmt, ops::Range};
+use std::{fmt, ops::Range};
 
 use serde::{
     Deserialize, Deserializer, Serialize,
-    de::{IgnoredAny, MapAccess, SeqAccess, Visitor},
+    de::{IgnoredAny, SeqAccess, Visitor},
 };
 use serde_json::value::RawValue;
+
+use super::parts::members;
 
 /// A text of JSON with gaps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -138,7 +140,7 @@ pub(super) fn locate(text: &str, tokens: &[String]) -> Result<Place, Nowhere> {
         };
         let next = match trimmed.as_bytes().first() {
             Some(b'{') => {
-                let members = members(trimmed);
+                let members = members(trimmed.trim_end(), MOST_NAMES).unwrap_or_default();
                 let found = members.iter().find(|(name, _)| name == token);
                 match found {
                     Some((_, raw)) => raw.get(),
@@ -179,56 +181,14 @@ pub(super) fn locate(text: &str, tokens: &[String]) -> Result<Place, Nowhere> {
 /// names is not read further.
 const MOST_NAMES: usize = 1 << 14;
 
-/// The members of an object; the text is one.
-fn members(text: &str) -> Vec<(Cow<'_, str>, &RawValue)> {
-    let read: serde_json::Result<Members<'_>> = serde_json::from_str(first_value(text));
-    read.map(|Members(members)| members).unwrap_or_default()
-}
-
 /// An item of a list; the text is one.
 fn item(text: &str, place: usize) -> List<'_> {
-    let mut reader = serde_json::Deserializer::from_str(first_value(text));
+    let mut reader = serde_json::Deserializer::from_str(text.trim_end());
     let read = serde::de::DeserializeSeed::deserialize(Item(place), &mut reader);
     read.unwrap_or(List {
         item: None,
         count: 0,
     })
-}
-
-/// The text without what follows its value.
-fn first_value(text: &str) -> &str {
-    text.trim_end()
-}
-
-struct Members<'a>(Vec<(Cow<'a, str>, &'a RawValue)>);
-
-#[derive(Deserialize)]
-struct Name<'a>(#[serde(borrow)] Cow<'a, str>);
-
-impl<'de> Deserialize<'de> for Members<'de> {
-    fn deserialize<D: Deserializer<'de>>(reader: D) -> Result<Self, D::Error> {
-        struct Read;
-        impl<'de> Visitor<'de> for Read {
-            type Value = Members<'de>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("an object")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
-                let mut members = vec![];
-                while let Some(Name(name)) = map.next_key()? {
-                    if members.len() < MOST_NAMES {
-                        members.push((name, map.next_value()?));
-                    } else {
-                        map.next_value::<IgnoredAny>()?;
-                    }
-                }
-                Ok(Members(members))
-            }
-        }
-        reader.deserialize_map(Read)
-    }
 }
 
 struct Item(usize);

@@ -82,11 +82,15 @@ impl Factors {
         Some(true)
     }
 
-    /// −H⁻¹ ∇J on the unknowns that it was prepared for.
-    pub(super) fn direction(&self, free: &[usize], force: &[f64]) -> Option<Vec<f64>> {
-        let (_, factor) = self.last.as_ref()?;
-        let mut direction: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
-        factor.solve(&mut direction);
+    /// −H⁻¹ ∇J on the unknowns that it was prepared for, 0 on the others. `force`: ∇J.
+    pub(super) fn direction(&self, force: &[f64]) -> Option<Vec<f64>> {
+        let (free, factor) = self.last.as_ref()?;
+        let mut moved: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
+        factor.solve(&mut moved);
+        let mut direction = vec![0.0; force.len()];
+        for (&dof, d) in free.iter().zip(moved) {
+            direction[dof] = d;
+        }
         direction.iter().all(|d| d.is_finite()).then_some(direction)
     }
 

@@ -28,9 +28,6 @@ const WORTH: f64 = 0.7;
 const MARGIN: f64 = 0.1;
 const MARGIN_NODES: usize = 4;
 
-/// Residuals of the part count as so many times as large: those of the whole have the rounding of what is eliminated besides.
-const MARGIN_OF_RESIDUALS: f64 = 1.01;
-
 /// Parts that turned out too small are widened by this part of their length.
 const GROWTH: f64 = 0.5;
 
@@ -76,16 +73,18 @@ pub fn run_near(
             ..place
         };
         region.prepare(system, controls, last.as_ref(), observe);
-        let last_end = last.as_ref();
-        let mut iterate = |system: &System<'_>, before: Option<&Finished>| {
-            Some(super::run(system, controls, place, before, observe))
-        };
-        let found = match &region.near {
-            None => iterate(system, last_end).map(|finished| (finished, Vec::new())),
-            Some(near) => near.run(system, controls, last_end, iterate),
-        };
-        let Some((mut finished, outside)) = found else {
-            unreachable!("these iterations always end")
+        let start = last.as_ref();
+        let (mut finished, outside) = match &region.near {
+            None => {
+                let finished = super::run(system, controls, place, start, observe);
+                (finished, Vec::new())
+            }
+            Some(near) => {
+                let (part, load) = near.part(system);
+                let start = start.map(|start| near.on_part(start));
+                let found = super::run(&part, controls, place, start.as_ref(), observe);
+                near.on_whole(system, controls, load, found)
+            }
         };
         history.append(&mut finished.history);
         let unsettled = finished.outcome == Outcome::Converged
@@ -126,12 +125,10 @@ pub fn settle_near(
     let Some(near) = near else {
         return settle(system, tolerance, &neighbour.state, factors, observe);
     };
-    let mut steps = 0;
-    let (finished, outside) = near.run(system, controls, Some(neighbour), |part, start| {
-        let (finished, count) = settle(part, tolerance, &start?.state, factors, observe)?;
-        steps = count;
-        Some(finished)
-    })?;
+    let (part, load) = near.part(system);
+    let start = near.on_part(neighbour).state;
+    let (found, steps) = settle(&part, tolerance, &start, factors, observe)?;
+    let (finished, outside) = near.on_whole(system, controls, load, found);
     let settled =
         outside.is_empty() && finished.rounding.is_none() && finished.residuals.within(tolerance);
     settled.then_some((finished, steps))
@@ -295,22 +292,10 @@ impl Near {
         self.order.len() - self.stiffness.size()
     }
 
-    /// f̂ in this order, reduced.
-    fn load(&self, system: &System<'_>) -> Vec<f64> {
+    /// The system of this part, and f̂ in this order, reduced: [`Near::on_whole`] needs it again.
+    fn part<'a>(&'a self, system: &System<'a>) -> (System<'a>, Vec<f64>) {
         let mut load: Vec<f64> = self.order.iter().map(|&dof| system.load[dof]).collect();
         self.eliminated.reduce(&mut load);
-        load
-    }
-
-    /// Some iterations on this part; what they find, on the whole, and the eliminated nodes that are needed too.
-    fn run(
-        &self,
-        system: &System<'_>,
-        controls: &SolverControls,
-        before: Option<&Finished>,
-        iterate: impl FnOnce(&System<'_>, Option<&Finished>) -> Option<Finished>,
-    ) -> Option<(Finished, Vec<usize>)> {
-        let load = self.load(system);
         let count = self.count();
         let mut number = vec![None; self.order.len()];
         for (i, &dof) in self.order[count..].iter().enumerate() {
@@ -334,7 +319,6 @@ impl Near {
         let part = System {
             stiffness: &self.stiffness,
             load: load[count..].to_vec(),
-            residual_margin: MARGIN_OF_RESIDUALS,
             nodes: system.nodes.iter().zip(&self.kept).map(node).collect(),
             points: self
                 .points
@@ -344,20 +328,32 @@ impl Near {
             patches: system.patches.clone(),
             ..*system
         };
-        let start = before.map(|before| Finished {
+        (part, load)
+    }
+
+    /// An end on the whole as a start on this part.
+    fn on_part(&self, whole: &Finished) -> Finished {
+        let kept = self.order[self.count()..].iter();
+        Finished {
             state: State {
-                v: self.order[count..]
-                    .iter()
-                    .map(|&dof| before.state.v[dof])
-                    .collect(),
-                active: before.state.active.clone(),
+                v: kept.map(|&dof| whole.state.v[dof]).collect(),
+                active: whole.state.active.clone(),
             },
-            bound: self.points.iter().map(|&g| before.bound[g]).collect(),
-            ..before.clone()
-        });
-        let found = iterate(&part, start.as_ref())?;
+            bound: self.points.iter().map(|&g| whole.bound[g]).collect(),
+            ..whole.clone()
+        }
+    }
+
+    /// What was found on this part, measured on the whole; and the eliminated nodes that are needed too.
+    fn on_whole(
+        &self,
+        system: &System<'_>,
+        controls: &SolverControls,
+        load: Vec<f64>,
+        found: Finished,
+    ) -> (Finished, Vec<usize>) {
         let mut x = load;
-        x[count..].copy_from_slice(&found.state.v);
+        x[self.count()..].copy_from_slice(&found.state.v);
         self.eliminated.expand(&mut x);
         let mut v = vec![0.0; x.len()];
         for (&dof, x) in self.order.iter().zip(x) {
@@ -402,7 +398,7 @@ impl Near {
             rounding,
             ..found
         };
-        Some((finished, outside))
+        (finished, outside)
     }
 }
 

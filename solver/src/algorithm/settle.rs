@@ -76,11 +76,7 @@ pub(super) fn settle(
         factors.prepare(system, &bound, &state.v, &free, observe)?;
         let mut force = elastic_force.clone();
         system.add_traction_force(&tractions, &mut force);
-        let delta = factors.direction(&free, &force)?;
-        let mut direction = vec![0.0; state.v.len()];
-        free.iter()
-            .zip(&delta)
-            .for_each(|(&dof, d)| direction[dof] = *d);
+        let direction = factors.direction(&force)?;
         // whole steps may go to and fro between stick and slip
         let part = match stalls {
             true => least_along(system, &bound, &state.v, &direction),

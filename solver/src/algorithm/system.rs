@@ -36,8 +36,6 @@ pub struct System<'a> {
     /// A typical nodal force of this problem, for levels where nothing acts: that of the full loads, or of a
     /// contact node pushed by the indentation or the drag.
     pub reference_force: f64,
-    /// Residuals count as so many times as large; 1 but for parts of a boundary.
-    pub(super) residual_margin: f64,
     pub(super) body: &'a ElasticBody,
     pub(super) model: &'a Model,
 }
@@ -199,7 +197,6 @@ impl<'a> System<'a> {
             semidefinite: model.held_by_contact,
             dissipated: 0.0,
             reference_force: 0.0,
-            residual_margin: 1.0,
             body,
             model,
         };
@@ -652,7 +649,7 @@ impl<'a> System<'a> {
         if defect == 0.0 {
             0.0
         } else {
-            self.residual_margin * defect / self.scale(&reactions, &friction)
+            defect / self.scale(&reactions, &friction)
         }
     }
 

@@ -109,10 +109,7 @@ fn step_from(
     let force = gradient(system, &state.v, elastic_force, bound);
     loop {
         let renewed = factors.prepare(system, bound, &state.v, &free, observe)?;
-        let delta = factors.direction(&free, &force)?;
-        let mut direction = vec![0.0; state.v.len()];
-        let moved = free.iter().zip(&delta);
-        moved.for_each(|(&dof, d)| direction[dof] = *d);
+        let direction = factors.direction(&force)?;
         let part = match damped {
             true => least_along(system, bound, &state.v, &direction),
             false => 1.0,

@@ -77,13 +77,9 @@ pub(super) fn run(
         // J decreases along the direction of a new factor
         factors.renew();
         let prepared = factors.prepare(system, bound, &v, &free, observe);
-        let Some(direction) = prepared.and_then(|_| factors.direction(&free, &force)) else {
+        let Some(d) = prepared.and_then(|_| factors.direction(&force)) else {
             break;
         };
-        let mut d = vec![0.0; v.len()];
-        free.iter()
-            .zip(direction)
-            .for_each(|(&dof, value)| d[dof] = value);
         if !line_search(system, bound, &mut v, &d, &force) {
             break;
         }

@@ -1,0 +1,71 @@
+//! JSON Pointers of a sweep.
+
+use solver::error::{Findings, Reason, Violation};
+
+use crate::schema::quoted;
+
+/// A pointer into the problem, and where it stands in the definition.
+pub(super) struct Path {
+    pub(super) at: String,
+    pub(super) text: String,
+    pub(super) tokens: Vec<String>,
+}
+
+/// A pointer to a part of a problem; `at` is its place in the definition.
+pub(super) fn path(at: String, text: &str, found: &mut Findings) -> Option<Path> {
+    let tokens = || -> Option<Vec<String>> {
+        let tokens = text.strip_prefix('/')?.split('/');
+        let read = |token: &str| {
+            let escaped = token.split('~').skip(1);
+            let sound = escaped.into_iter().all(|rest| rest.starts_with(['0', '1']));
+            sound.then(|| token.replace("~1", "/").replace("~0", "~"))
+        };
+        tokens.map(read).collect()
+    };
+    match tokens() {
+        Some(tokens) => Some(Path {
+            at,
+            text: text.to_owned(),
+            tokens,
+        }),
+        None => {
+            found.add(Violation::new(
+                at,
+                Reason::Malformed,
+                format!("{:?}", quoted(text)),
+                "a JSON Pointer (RFC 6901) to a part of the problem, such as /contacts/0/indentation",
+                "It begins with / and has ~1 for / and ~0 for ~ in names.",
+            ));
+            None
+        }
+    }
+}
+
+/// Whether no path is another one, or inside it.
+pub(super) fn are_apart(paths: &[Path], found: &mut Findings) -> bool {
+    let mut apart = true;
+    for (k, path) in paths.iter().enumerate() {
+        for other in &paths[..k] {
+            let (longer, shorter) = match path.tokens.len() >= other.tokens.len() {
+                true => (path, other),
+                false => (other, path),
+            };
+            if !longer.tokens.starts_with(&shorter.tokens) {
+                continue;
+            }
+            apart = false;
+            let (reason, expected) = match longer.tokens.len() == shorter.tokens.len() {
+                true => (Reason::DuplicateName, "each pointer once"),
+                false => (Reason::Conflict, "pointers of which none is inside another"),
+            };
+            found.add(Violation::new(
+                path.at.clone(),
+                reason,
+                format!("{} beside {}", quoted(&path.text), quoted(&other.text)),
+                expected,
+                "Leave one of them out: one value would replace the other.",
+            ));
+        }
+    }
+    apart
+}
