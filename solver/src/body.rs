@@ -6,7 +6,7 @@
 
 use crate::elasticity::{self, Axes, Dof, DofMap, ElementStiffness, TOGETHER};
 use crate::error::SolveError;
-use crate::linear::{Breaks, Cells, Dense, Dissection, Factor, FactorError, Fronts};
+use crate::linear::{Breaks, Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts};
 use crate::model::{Held, Level, Model};
 use crate::solution::{Observer, Phase, Progress};
 
@@ -51,17 +51,31 @@ impl ElasticBody {
         notify(observe, Progress::Phase(Phase::Order))?;
         let (map, fronts) = number(model)?;
         let mut of_loads = on_unknowns(&map, &condensed);
-        let mut of_supports = vec![0.0; map.unknowns];
 
         notify(observe, Progress::Phase(Phase::Factor))?;
         let contact_unknowns = fronts.kept();
-        let bytes = fronts.bytes() + Dense::bytes(contact_unknowns);
-        notify(observe, Progress::Needs { bytes })?;
+        let bytes = |threads| fronts.bytes(threads) + Dense::bytes(contact_unknowns);
+        let threads = match fronts.is_large()
+            && observe(Progress::SecondThread).is_continue()
+            && observe(Progress::Room { bytes: bytes(2) }).is_continue()
+        {
+            true => 2,
+            false => 1,
+        };
+        let needed = Progress::Needs {
+            bytes: bytes(threads),
+        };
+        notify(observe, needed)?;
         let (mesh, section) = (&model.mesh, &model.section);
-        let mut elements = ElementStiffness::new(mesh, section, model.quadrature, &map);
+        let stiffness = || ElementStiffness::new(mesh, section, model.quadrature, &map);
+        let mut of_supports = stiffness().load_of_supports();
+        let elements = (0..threads).map(|_| {
+            let mut stiffness = stiffness();
+            move |e: u32, matrix: &mut ElementMatrix| stiffness.put(e, matrix)
+        });
         let factored = Factor::new(
             fronts,
-            |e, matrix| elements.put(e, matrix, &mut of_supports),
+            elements.collect(),
             &mut Breaks::new(&mut || observe(Progress::Pulse)),
         );
         let (factor, mut stiffness) = factored.map_err(|error| solve_error(error, &map))?;
@@ -170,22 +184,42 @@ impl ElasticBody {
             .collect()
     }
 
-    /// Displacements along x and y of every node at a load level, from those of the contact unknowns.
-    pub fn displacements(&self, contact_displacement: &[f64], level: &Level) -> Vec<[f64; 2]> {
+    /// Entries of the factor and of the lower triangle of Ŝ: what is kept of the stiffness.
+    pub fn factor_entries(&self) -> usize {
+        let kept = self.stiffness.size();
+        self.factor.entries() + kept * (kept + 1) / 2
+    }
+
+    /// How many threads may work on the fields of this body: a second one is asked for if that is worth it.
+    pub fn threads(&self, observe: &mut Observer<'_>) -> usize {
+        match self.factor.is_large() && observe(Progress::SecondThread).is_continue() {
+            true => 2,
+            false => 1,
+        }
+    }
+
+    /// Displacements along x and y of every node at a load level, from those of the contact unknowns, on so many threads.
+    pub fn displacements(
+        &self,
+        contact_displacement: &[f64],
+        level: &Level,
+        threads: usize,
+    ) -> Vec<[f64; 2]> {
         let [of_loads, of_supports] = &self.reduced;
         let both = of_loads.iter().zip(of_supports);
         let reduced = both.map(|(a, b)| level.loads * a + level.supports * b);
         let contact = self.nodal_displacements(contact_displacement);
         let mut u: Vec<[f64; 1]> = reduced.chain(contact).map(|u| [u]).collect();
-        self.factor.backward(&mut u);
+        self.factor.backward(&mut u, threads);
         self.map.displacements(|i| u[i][0], level.supports)
     }
 
     /// Displacements along x and y of every node under the given displacements of the contact unknowns alone, of
-    /// [`TOGETHER`] such fields at most.
+    /// [`TOGETHER`] such fields at most; on so many threads.
     pub fn displacements_without_loads(
         &self,
         contact_displacements: &[Vec<f64>],
+        threads: usize,
     ) -> Vec<[[f64; TOGETHER]; 2]> {
         let mut u = vec![[0.0; TOGETHER]; self.map.unknowns];
         for (k, contact) in contact_displacements.iter().enumerate() {
@@ -194,7 +228,7 @@ impl ElasticBody {
             let kept = kept.iter_mut().zip(contact);
             kept.for_each(|(u, contact)| u[k] = contact);
         }
-        self.factor.backward(&mut u);
+        self.factor.backward(&mut u, threads);
         self.map.displacements_together(&u)
     }
 }

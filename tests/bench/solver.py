@@ -1,20 +1,19 @@
 """Measures `signorini solve` as a whole process, against itself, a factorisation and other programs, and prints the
 tables of docs/performance.md, "Against other programs".
 
-    solver.py [--runs N] [--only NAME,...] [--against BINARY] [--dense COMMAND] [--large]
+    solver.py [--runs N] [--only NAME,...] [--against BINARY] [--large]
 
 All tables but the last take some three minutes. Runs (5 when absent) of what is compared take turns, so that a machine
 that slows down for a while slows both. Ratios are formed within a turn; each row has the least, the median and the
 most of them. Seconds are processor time, so that other work on the machine does not count, except where it says clock.
 
---only     of whole, growth, cholmod, pair, iterations, increments, peers
+--only     of whole, growth, cholmod, pair, threads, iterations, increments, fill, peers
 --against  another binary, such as an older build, in the turns of `whole`
---dense    a command that, given a number of unknowns as its last argument, prints the CPU seconds of one dense
-           factorisation of a symmetric matrix of that size: what `iterations` is compared with
 --large    also `peers`: GetFEM and CalculiX at 2e5 degrees of freedom, twice each, some ten minutes
 
-`cargo build --release` comes first, or SIGNORINI_BINARY. `cholmod` needs the environment of tests/peers, `--large` its
-programs.
+Solutions take one thread, except where two are measured. `cargo build --release --workspace` comes first, or
+SIGNORINI_BINARY; `reference`, of the same build, says what a factor has and what a dense one takes. `cholmod` and `fill`
+need the environment of tests/peers, `fill` also Gmsh (Debian's package gmsh), `--large` the programs of tests/peers.
 """
 
 import argparse
@@ -33,17 +32,26 @@ sys.path[:0] = [str(TESTS), str(TESTS / "peers")]
 
 import problem
 import programs
-from measured import ONE_THREAD, measured, peak_bytes
+from measured import ONE_THREAD, peak_bytes
 from outside import BINARY
 
 MIB = 1 << 20
 PEER_RUNS = 2
 # Of the processors: what other programs may take of them while a clock is compared.
 QUIET = 0.05
+REFERENCE = BINARY.parent / "reference"
+GMSH = {"fillet": (0, 0.04), "sheet": (8, 0.03), "hertz": (6, 0.25)}  # the family of elements, and the size of all
+CONTACTS = {
+    name: {"supports": [{"boundary": held, "ux": 0, "uy": 0}],
+           "contacts": [{"boundary": contact, "indentation": 0.01,
+                         "obstacle": {"kind": "circle", "radius": 8, "center": 1}}]}
+    for name, held, contact in (("fillet", "bottom", "top"), ("sheet", "right", "bottom"), ("hertz", "base", "contact"))
+}
 GOALS = {  # of issue 14
     "whole/factorisation": "≤ 1.3", "cholmod": "≤ 0.5", "GetFEM": "≥ 50", "CalculiX": "≥ 140",
     "growth": "≤ 1.35", "iterations/whole": "≤ 0.25", "pair": "≥ 1.7", "increments": "≤ 1.5",
-    "iterations/dense": "≤ 1", "user 2e5": "≤ 0.6", "user 1e6": "≤ 4", "peak 1e6": "≤ 1,434",
+    "iterations/dense": "≤ 1", "user 2e5": "≤ 0.6", "user 1e6": "≤ 4", "peak 1e6": "≤ 1,434", "peak": "≤ 1.3",
+    "threads": "≥ 1.5",
 }
 
 
@@ -91,10 +99,31 @@ class Folder:
         return self.path / "result.json"
 
 
+def reference(*arguments):
+    """What the program `reference` prints."""
+    command = [REFERENCE, *map(str, arguments)]
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def factor_bytes(file):
+    """The bytes of a problem's factor and of its condensed stiffness."""
+    command = [REFERENCE, "factor", str(file)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        _, entries = process.stdout.readline().split()
+        process.kill()
+    return 8 * int(entries)
+
+
+def one_thread(binary):
+    """The option for one thread; older builds have none, and no second thread."""
+    usage = subprocess.run([binary, "solve", "--help"], stdout=subprocess.PIPE, text=True).stdout
+    return ["--threads", "1"] if "--threads" in usage else []
+
+
 def solve(folder, file, binary=BINARY):
     """Solves a problem; returns what the process used, and the CPU seconds of factorisation and iterations."""
     starts = {}
-    command = [str(binary), "solve", str(file), "-o", str(folder.result())]
+    command = [str(binary), "solve", str(file), "-o", str(folder.result()), *one_thread(binary)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         # The clock of the processor time of another process: pthread_getcpuclockid(3) for processes. It is read when
         # the process tells that a phase begins; Linux brings it up to date every few milliseconds.
@@ -146,6 +175,9 @@ def table(title, rows):
     print("| | least | median | most | goal |")
     print("|---|---|---|---|---|")
     for name, values, goal in rows:
+        if not values:
+            print("| %s | not measured: other programs were busy | | | %s |" % (name, goal))
+            continue
         values = sorted(values)
         middle = (values[(len(values) - 1) // 2] + values[len(values) // 2]) / 2
         print("| %s | %s | %s |" % (name, " | ".join(map(shown, (values[0], middle, values[-1]))), goal))
@@ -162,6 +194,7 @@ def shown(value):
 def whole(folder, options):
     """P1 as a whole process against its own factorisation, and against another binary."""
     files = {size: folder.file(size, p1(size)) for size in problem.SIZES}
+    held = {size: factor_bytes(file) + file.stat().st_size for size, file in files.items()}
     runs = {(size, binary): [] for size in files for binary in (BINARY, options.against) if binary}
     for _ in range(options.runs):
         for (size, binary), done in runs.items():
@@ -173,6 +206,8 @@ def whole(folder, options):
             ("system CPU, s", [run["system"] for run in ours], ""),
             ("page faults", [run["faults"] for run in ours], ""),
             ("peak memory, MiB", [run["peak"] / MIB for run in ours], GOALS.get("peak " + size, "")),
+            ("peak memory/bytes of the factor and the input", [run["peak"] / held[size] for run in ours],
+             GOALS["peak"]),
             ("factorisation (`order`, `factor`, `condense`), CPU s", [run["factorisation"] for run in ours], ""),
         ]
         if size == "2e4":
@@ -236,7 +271,7 @@ def pair(folder, options):
         running = []
         for k in range(2):
             out = folder.path / ("pair%d.json" % k)
-            running.append(subprocess.Popen([BINARY, "solve", file, "-o", out],
+            running.append(subprocess.Popen([BINARY, "solve", file, "-o", out, "--threads", "1"],
                                             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
             if not at_once:
                 running[-1].wait()
@@ -244,22 +279,70 @@ def pair(folder, options):
             sys.exit("signorini solve failed")
         return time.monotonic() - began
 
-    quiet, busy = [], 0
-    while len(quiet) < options.runs and busy < 4 * options.runs:
-        began, before = time.monotonic(), others_s()
-        turn = clock(False), clock(True)
-        if others_s() - before <= QUIET * os.cpu_count() * (time.monotonic() - began):
-            quiet.append(turn)
-        else:
-            busy += 1
-    if not quiet:
-        print("\nTwo solutions at once: not measured, other programs were busy on these processors.")
-        return
+    quiet, busy = quiet_turns(options.runs, lambda: (clock(False), clock(True)))
     title = "Two solutions of 2e5 degrees of freedom at once, by the clock (%d runs, without %d that others disturbed)"
     table(title % (len(quiet), busy), [
         ("one after the other, s", [a for a, _ in quiet], ""), ("at once, s", [b for _, b in quiet], ""),
         ("throughput, at once/one after the other", [a / b for a, b in quiet], GOALS["pair"]),
     ])
+
+
+def threads(folder, options):
+    """One solution on two threads against one, by the clock; the results have the same digest."""
+    file = folder.file("1e6", p1("1e6"))
+
+    def clock(count):
+        began = time.monotonic()
+        subprocess.run([BINARY, "solve", file, "-o", folder.result(), "--threads", str(count)], check=True,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        took = time.monotonic() - began
+        return took, summary(folder.result())["digest"]
+
+    quiet, busy = quiet_turns(options.runs, lambda: (clock(1), clock(2)))
+    if any(one[1] != two[1] for one, two in quiet):
+        sys.exit("one thread and two find different results")
+    title = "A solution of 1e6 degrees of freedom alone, by the clock (%d runs, without %d that others disturbed)"
+    table(title % (len(quiet), busy), [
+        ("one thread, s", [one[0] for one, _ in quiet], ""), ("two threads, s", [two[0] for _, two in quiet], ""),
+        ("one thread/two threads", [one[0] / two[0] for one, two in quiet], GOALS["threads"]),
+    ])
+
+
+def quiet_turns(runs, turn):
+    """Results of turns in which other programs left the processors alone, and how many were not counted."""
+    quiet, busy = [], 0
+    while len(quiet) < runs and busy < 4 * runs:
+        began, before = time.monotonic(), others_s()
+        result = turn()
+        if others_s() - before <= QUIET * os.cpu_count() * (time.monotonic() - began):
+            quiet.append(result)
+        else:
+            busy += 1
+    return quiet, busy
+
+
+def fill(folder, options):
+    """Entries of the factor on three meshes of Gmsh, against other orderings of the same matrix."""
+    rows = []
+    for name, (family, size) in GMSH.items():
+        mesh = folder.path / (name + ".msh")
+        subprocess.run(["gmsh", str(TESTS / "data/gmsh" / (name + ".geo")), "-2", "-v", "2", "-format", "msh41",
+                        "-setnumber", "family", str(family), "-clscale", str(size), "-o", str(mesh)],
+                       check=True, stdout=subprocess.DEVNULL)
+        made = {
+            "analysis": {"kind": "plane_strain"}, "mesh": {"gmsh": mesh.read_text(encoding="utf-8")},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}], **CONTACTS[name],
+        }
+        pattern = reference("factor", folder.file(name, made))
+        python = str(TESTS.parent / "target/peers/bin/python")
+        counted = subprocess.run([python, str(TESTS / "peers/fill.py")], input=pattern, check=True,
+                                 stdout=subprocess.PIPE, text=True).stdout
+        found = json.loads(counted)
+        rows.append("| %s | {:,} | {:,} | %.2f | %.2f |".format(found["unknowns"], found["signorini"]) % (
+            name, found["signorini"] / found["metis"], found["signorini"] / found["amd"]))
+    print("\n**Entries of the factor, contact included, on meshes of Gmsh**\n")
+    print("| mesh | unknowns | entries | Signorini/METIS | Signorini/AMD |\n|---|---|---|---|---|")
+    print("\n".join(rows))
 
 
 def others_s():
@@ -280,19 +363,15 @@ def iterations(folder, options):
         file = folder.file("long", long_contact(radius))
         runs = []
         for _ in range(options.runs):
-            dense = None
             run = solve(folder, file)
             unknowns = run["summary"]["contact_dofs"]
-            if options.dense:
-                dense = float(measured([*options.dense.split(), unknowns]).stdout.split()[-1])
-            runs.append((run, dense))
+            runs.append((run, float(reference("dense", unknowns))))
         count = "%s: {:,} contact unknowns, %d sweeps".format(unknowns) % (name, runs[0][0]["summary"]["iterations"])
         rows.append((count + ", `iterate`, CPU s", [run["iterate"] for run, _ in runs], ""))
         rows.append((name + ": `iterate`/whole", [run["iterate"] / run["cpu"] for run, _ in runs],
                      GOALS["iterations/whole"]))
-        if options.dense:
-            rows.append((name + ": `iterate`/dense factorisation",
-                         [run["iterate"] / dense for run, dense in runs], GOALS["iterations/dense"]))
+        rows.append((name + ": `iterate`/dense factorisation",
+                     [run["iterate"] / dense for run, dense in runs], GOALS["iterations/dense"]))
     table("The iterations of a long contact with friction (%d runs)" % options.runs, rows)
 
 
@@ -354,15 +433,14 @@ def main():
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--only", type=lambda names: names.split(","))
     parser.add_argument("--against", type=pathlib.Path)
-    parser.add_argument("--dense")
     parser.add_argument("--large", action="store_true")
     options = parser.parse_args()
-    every = ["whole", "growth", "cholmod", "pair", "iterations", "increments"]
+    every = ["whole", "growth", "cholmod", "pair", "threads", "iterations", "increments", "fill"]
     chosen = options.only or every + ["peers"] * options.large
     unknown = set(chosen) - {*every, "peers"}
     if unknown or options.runs < 1:
         parser.error("unknown: " + ", ".join(sorted(unknown)) if unknown else "--runs is at least 1")
-    for binary in filter(None, (BINARY, options.against)):
+    for binary in filter(None, (BINARY, REFERENCE, options.against)):
         if not os.access(binary, os.X_OK):
             parser.error("%s is not a program; `cargo build --release` makes it" % binary)
     os.environ.update(ONE_THREAD)
@@ -371,8 +449,8 @@ def main():
         done = whole(folder, options) if "whole" in chosen else None
         if "growth" in chosen:
             growth(folder, options, done)
-        for name, bench in (("cholmod", cholmod), ("pair", pair), ("iterations", iterations),
-                            ("increments", eighty_increments)):
+        for name, bench in (("cholmod", cholmod), ("pair", pair), ("threads", threads),
+                            ("iterations", iterations), ("increments", eighty_increments), ("fill", fill)):
             if name in chosen:
                 bench(folder, options)
         if "peers" in chosen:

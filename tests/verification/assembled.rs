@@ -23,11 +23,10 @@ impl Assembled {
         map: &DofMap,
     ) -> (Assembled, Vec<f64>) {
         let mut rows = vec![BTreeMap::new(); map.unknowns];
-        let mut load = vec![0.0; map.unknowns];
         let mut elements = ElementStiffness::new(mesh, section, quadrature, map);
         let mut matrix = ElementMatrix::default();
         for e in 0..mesh.elements.len() as u32 {
-            elements.put(e, &mut matrix, &mut load);
+            elements.put(e, &mut matrix);
             for (row, entries) in matrix.unknowns.iter().zip(&matrix.entries) {
                 let Some(row) = *row else { continue };
                 for (column, value) in matrix.unknowns.iter().zip(entries) {
@@ -37,7 +36,7 @@ impl Assembled {
                 }
             }
         }
-        (Assembled { rows }, load)
+        (Assembled { rows }, elements.load_of_supports())
     }
 
     pub(crate) fn size(&self) -> usize {

@@ -39,6 +39,28 @@ pub(super) struct Arguments {
 
     #[command(flatten)]
     memory: MemoryBudget,
+
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// How many processors a large problem may use. The result is the same, bit for bit.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct Threads {
+    /// Threads for a large problem, 1 or 2 [default: as many as there are processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=2))]
+    threads: Option<u8>,
+}
+
+impl Threads {
+    /// Whether a second one may be used.
+    pub(super) fn second(self) -> ControlFlow<()> {
+        let processors = || std::thread::available_parallelism().map_or(1, usize::from);
+        match self.threads.map_or_else(processors, usize::from) {
+            1 => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }
+    }
 }
 
 pub(super) fn run(
@@ -47,6 +69,7 @@ pub(super) fn run(
         output,
         theme,
         memory,
+        threads,
     }: &Arguments,
 ) -> anyhow::Result<Exit> {
     let start = Instant::now();
@@ -93,6 +116,7 @@ pub(super) fn run(
     };
     let solved = run::run(&problem, parse_s, solve, &mut |update| {
         match update {
+            Update::SecondThread => return threads.second(),
             Update::Phase(phase) => eprintln!("{} …", report::phase(phase)),
             Update::Mesh {
                 number,

@@ -12,9 +12,16 @@ use clap::Args;
 use files::sweep::{Fields, Sweep, groups};
 use serde::{Deserialize, de::IgnoredAny};
 use serde_json::value::RawValue;
-use solver::error::{Reason, Violation};
+use solver::{
+    error::{Reason, Violation},
+    solution::Progress,
+};
 
-use super::{exit::Exit, output, solve::invalid};
+use super::{
+    exit::Exit,
+    output,
+    solve::{Threads, invalid},
+};
 use crate::{
     config::MemoryBudget,
     error::ApiError,
@@ -36,6 +43,9 @@ pub(super) struct Arguments {
 
     #[command(flatten)]
     memory: MemoryBudget,
+
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// A file with a sweep. What is for the service only is not used.
@@ -68,6 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
         file,
         output,
         memory,
+        threads,
     } = arguments;
     let text =
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
@@ -118,12 +129,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
             family: None,
         };
         let solved = members.solve(group, &mut |step| {
-            if let Step::Row(row) = step {
-                rows.push(*row);
-                if told.elapsed() >= PAUSE || rows.len() == count {
-                    eprintln!("{} of {count} members", rows.len());
-                    told = Instant::now();
+            match step {
+                Step::Row(row) => {
+                    rows.push(*row);
+                    if told.elapsed() >= PAUSE || rows.len() == count {
+                        eprintln!("{} of {count} members", rows.len());
+                        told = Instant::now();
+                    }
                 }
+                Step::Progress(Progress::SecondThread) => return threads.second(),
+                Step::Progress(_) => {}
             }
             ControlFlow::Continue(())
         });

@@ -1,5 +1,7 @@
 //! What a solver reports while it is at work.
 
+use std::ops::ControlFlow;
+
 use crate::{event::Payload, memory::Outgrown, store::Parts, sweep::MemberRow, time::Time};
 
 /// What a solver tells; the answer is whether it is to continue.
@@ -10,6 +12,16 @@ pub(super) enum Told {
     OutOfMemory(Outgrown),
     /// It only asks.
     Nothing,
+    /// It could share its next work with a second thread: the answer is whether there is a processor for it.
+    SecondThread,
+}
+
+/// The answer of a yes or no.
+pub(super) fn go_on_if(yes: bool) -> ControlFlow<()> {
+    match yes {
+        true => ControlFlow::Continue(()),
+        false => ControlFlow::Break(()),
+    }
 }
 
 /// A report of a solver.

@@ -119,6 +119,9 @@ pub(super) fn solve_and_store(
     let mut verifying = false;
     let document = run::run(&problem, parse_s, solve, &mut |update| {
         let (mut needed, mut room) = (0, 0);
+        if matches!(update, Update::SecondThread) {
+            return tell(Told::SecondThread);
+        }
         verifying |= matches!(update, Update::Phase(Phase::Verify));
         // what is reported belongs to the recorder then, whose thread frees it
         let told = meter.hand_over(|| {
@@ -136,7 +139,7 @@ pub(super) fn solve_and_store(
                 Update::Iteration(row) => event(Payload::Iteration(row)),
                 Update::Warning(warning) => event(Payload::Warning(warning.clone())),
                 Update::Step(partial) => partials.next(&partial),
-                Update::Pulse => None,
+                Update::Pulse | Update::SecondThread => None,
                 Update::Needs { bytes } => {
                     needed = bytes;
                     None
@@ -240,6 +243,7 @@ fn solve_others(
                 (bytes, 0)
             }
             MemberStep::Progress(Progress::Room { bytes }) => (0, bytes),
+            MemberStep::Progress(Progress::SecondThread) => return tell(Told::SecondThread),
             MemberStep::Progress(_) => (0, 0),
         };
         match meter.check(needed) {

@@ -187,6 +187,13 @@ impl Queue {
         }
     }
 
+    /// Whether there is a processor for a second thread of a job. One that starts a moment later gets its time from the
+    /// system.
+    pub(super) fn has_spare_processor(&self) -> bool {
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        self.running().len() < processors
+    }
+
     /// Jobs that a worker of this process is solving, by key.
     pub(super) fn running(&self) -> MutexGuard<'_, HashMap<i64, Running>> {
         // No code panics while it holds this lock; if one did, the map would still be whole.

@@ -11,7 +11,7 @@ use super::{
     ending::{NoSolution, ending_of_attempt, internal, panicked, timed_out},
     process::Task,
     recorder,
-    report::{Report, Told},
+    report::{Report, Told, go_on_if},
     running::{Running, StopReason},
     solving::{members_of, read_mesh, solve_task, stored_mesh},
     state::{Queue, Slot, Solver},
@@ -78,8 +78,12 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
         if failpoint::fails(Point::MeshRead, id) {
             return Err(NoSolution::Internal("a test wants it".into()));
         }
+        let queue = &*queue_of_solver;
         let tell = |told| {
             pass_failpoint(&told, id);
+            if matches!(told, Told::SecondThread) {
+                return go_on_if(queue.has_spare_processor());
+            }
             // an error means that the recorder has ended: the result is not needed
             let recording = match told {
                 Told::Report(report) => sender.blocking_send(report).is_ok(),
@@ -87,7 +91,7 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
                     stop.stop(StopReason::OutOfMemory(outgrown));
                     true
                 }
-                Told::Nothing => true,
+                Told::Nothing | Told::SecondThread => true,
             };
             if recording && stop.stop.get().is_none() {
                 ControlFlow::Continue(())
@@ -106,6 +110,7 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
                     members,
                     mesh,
                     share,
+                    second_thread: queue.has_spare_processor(),
                 };
                 processes.solve(task, tell)
             }

@@ -55,6 +55,8 @@ pub enum Update<'a> {
         /// Bytes.
         bytes: u64,
     },
+    /// The solver could share its next work with a second thread, and asks whether there is a processor for it.
+    SecondThread,
     /// There was not so much memory.
     OutOfMemory {
         /// Bytes that the solver needed.
@@ -131,6 +133,7 @@ pub fn run(
             Progress::Pulse => Update::Pulse,
             Progress::Needs { bytes } => Update::Needs { bytes },
             Progress::Room { bytes } => Update::Room { bytes },
+            Progress::SecondThread => Update::SecondThread,
             Progress::OutOfMemory { bytes } => Update::OutOfMemory { bytes },
         };
         match non_finite {

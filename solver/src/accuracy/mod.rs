@@ -230,13 +230,14 @@ fn weighted_errors(
     influences: &[Vec<f64>],
     observe: &mut Observer<'_>,
 ) -> Option<Vec<Vec<f64>>> {
+    let threads = body.threads(observe);
     let stop = &mut || observe(Progress::Pulse).is_break();
     let mut errors = Vec::with_capacity(influences.len());
     for some in influences.chunks(TOGETHER) {
         if stop() {
             return None;
         }
-        let duals = body.displacements_without_loads(some);
+        let duals = body.displacements_without_loads(some, threads);
         let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
         let difference = &reported.difference;
         let products = difference.products_with_fields(mesh, section, order, &duals, stop)?;

@@ -190,6 +190,7 @@ pub fn quiet(observe: &mut Observer<'_>) -> impl FnMut(Progress<'_>) -> ControlF
         Progress::Iteration(_) | Progress::Pulse => observe(Progress::Pulse),
         Progress::Needs { bytes } => observe(Progress::Needs { bytes }),
         Progress::OutOfMemory { bytes } => observe(Progress::OutOfMemory { bytes }),
+        Progress::SecondThread => observe(Progress::SecondThread),
         _ => ControlFlow::Continue(()),
     }
 }

@@ -162,9 +162,8 @@ impl<'a> ElementStiffness<'a> {
         }
     }
 
-    /// Puts the matrix of an element in place, and adds −K_fp u_p of its prescribed displacements to the load on the
-    /// unknowns.
-    pub fn put(&mut self, e: u32, matrix: &mut ElementMatrix, load: &mut [f64]) {
+    /// Puts the matrix of an element in place.
+    pub fn put(&mut self, e: u32, matrix: &mut ElementMatrix) {
         let (map, section, masters) = (self.map, self.section, &self.masters);
         let element = &self.mesh.elements[e as usize];
         let shape = Shape::of(self.mesh, section, e as usize);
@@ -175,26 +174,44 @@ impl<'a> ElementStiffness<'a> {
         });
         let k = &mut matrix.entries;
         matrix.unknowns = [None; 16];
-        let mut prescribed = [0.0; 16];
         for (i, &node) in element.iter().enumerate() {
             if let Some(axes) = map.axes[node as usize] {
                 rotate(k, i, axes.moves);
             }
             for (a, dof) in map.dofs[node as usize].iter().enumerate() {
-                match *dof {
-                    Dof::Free(unknown) => matrix.unknowns[2 * i + a] = Some(unknown as u32),
-                    Dof::Fixed(value) => prescribed[2 * i + a] = value,
+                if let Dof::Free(unknown) = *dof {
+                    matrix.unknowns[2 * i + a] = Some(unknown as u32);
                 }
             }
         }
-        let prescribed = prescribed.into_iter().enumerate();
-        for (j, value) in prescribed.filter(|(_, value)| *value != 0.0) {
-            for (unknown, row) in matrix.unknowns.iter().zip(&*k) {
+    }
+
+    /// Forces on the unknowns by the prescribed displacements, −K_fp u_p.
+    pub fn load_of_supports(&mut self) -> Vec<f64> {
+        let (mesh, map) = (self.mesh, self.map);
+        let mut load = vec![0.0; map.unknowns];
+        let mut matrix = ElementMatrix::default();
+        for (e, element) in mesh.elements.iter().enumerate() {
+            let mut prescribed = [0.0; 16];
+            for (i, &node) in element.iter().enumerate() {
+                for (a, dof) in map.dofs[node as usize].iter().enumerate() {
+                    if let Dof::Fixed(value) = *dof {
+                        prescribed[2 * i + a] = value;
+                    }
+                }
+            }
+            if prescribed == [0.0; 16] {
+                continue;
+            }
+            self.put(e as u32, &mut matrix);
+            for (unknown, row) in matrix.unknowns.iter().zip(&matrix.entries) {
                 if let Some(unknown) = unknown {
-                    load[*unknown as usize] -= row[j] * value;
+                    let force: f64 = row.iter().zip(prescribed).map(|(k, u)| k * u).sum();
+                    load[*unknown as usize] -= force;
                 }
             }
         }
+        load
     }
 }
 

@@ -27,6 +27,12 @@ pub(super) fn zeros(count: usize, breaks: &mut Breaks<'_>) -> Result<Option<Vec<
     Ok(Some(values))
 }
 
+/// Zeros that take no memory until they are written: the system hands out each page then. `None` if there is not so much
+/// memory.
+pub(super) fn untouched_zeros(count: usize) -> Option<Vec<f64>> {
+    bytemuck::allocation::try_zeroed_vec(count).ok()
+}
+
 /// The work was stopped on request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stopped;
@@ -47,6 +53,11 @@ impl<'a> Breaks<'a> {
             return Ok(());
         }
         self.done = 0.0;
+        self.ask()
+    }
+
+    /// Asks now.
+    pub(super) fn ask(&mut self) -> Result<(), Stopped> {
         match (self.ask)() {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Stopped),

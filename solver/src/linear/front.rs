@@ -1,6 +1,8 @@
 //! One dense front: what its halves have left is added, the unknowns that it owns are eliminated, and its boundary is
 //! reduced (the module `multifrontal` says how fronts make a factor).
 
+use std::iter;
+
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
@@ -9,6 +11,7 @@ use faer::{Accum, MatMut, MatRef, Par};
 
 use super::blocked::{NoFactor, STRIP, cholesky};
 use super::breaks::{Breaks, PORTION, Stopped};
+use super::parallel::for_each;
 
 /// A front while it is worked on, its lower triangle.
 pub(super) struct FrontMatrix<'a> {
@@ -65,8 +68,12 @@ impl FrontMatrix<'_> {
         }
     }
 
-    /// L_oo and L_bo in place of F_oo and F_bo.
-    pub(super) fn eliminate(&mut self, breaks: &mut Breaks<'_>) -> Result<(), NoFactor> {
+    /// L_oo and L_bo in place of F_oo and F_bo, on so many threads.
+    pub(super) fn eliminate(
+        &mut self,
+        threads: usize,
+        breaks: &mut Breaks<'_>,
+    ) -> Result<(), NoFactor> {
         let (own, height) = (self.own, self.height);
         if own <= NARROW {
             eliminate_narrow(self.columns, height, own)?;
@@ -74,21 +81,34 @@ impl FrontMatrix<'_> {
             return Ok(());
         }
         let block = MatMut::from_column_major_slice_mut(self.columns, height, own);
-        let (mut on_diagonal, mut below) = block.split_at_row_mut(own);
+        let (mut on_diagonal, below) = block.split_at_row_mut(own);
         cholesky(on_diagonal.rb_mut(), breaks)?;
         // rows are independent of each other: a large block is solved in parts
         let part = portion(own * own);
-        for start in (0..height - own).step_by(part) {
-            let rows = part.min(height - own - start);
-            let below = below.rb_mut().subrows_mut(start, rows);
-            solve_lower_triangular_in_place(on_diagonal.rb(), below.transpose_mut(), Par::Seq);
-            breaks.after((rows * own * own) as f64 / 2.0)?;
-        }
-        Ok(())
+        let mut rest = Some(below);
+        let parts = iter::from_fn(|| {
+            let below = rest.take().filter(|below| below.nrows() > 0)?;
+            let rows = part.min(below.nrows());
+            let (part, below) = below.split_at_row_mut(rows);
+            rest = Some(below);
+            Some(part)
+        });
+        let on_diagonal = on_diagonal.rb();
+        let solve = |(): &mut (), part: MatMut<'_, f64>, breaks: &mut Breaks<'_>| {
+            let rows = part.nrows();
+            solve_lower_triangular_in_place(on_diagonal, part.transpose_mut(), Par::Seq);
+            breaks.after((rows * own * own) as f64 / 2.0)
+        };
+        Ok(for_each(parts, &mut vec![(); threads], solve, breaks)?)
     }
 
-    /// F_bb − L_bo L_boᵀ, or its second term alone, in the lower triangle.
-    pub(super) fn reduce(&mut self, accum: Accum, breaks: &mut Breaks<'_>) -> Result<(), Stopped> {
+    /// F_bb − L_bo L_boᵀ, or its second term alone, in the lower triangle, on so many threads.
+    pub(super) fn reduce(
+        &mut self,
+        accum: Accum,
+        threads: usize,
+        breaks: &mut Breaks<'_>,
+    ) -> Result<(), Stopped> {
         let (own, boundary) = (self.own, self.height - self.own);
         if own == 0 && accum == Accum::Replace {
             self.left.fill(0.0);
@@ -96,31 +116,41 @@ impl FrontMatrix<'_> {
         }
         let columns = MatRef::from_column_major_slice(self.columns, self.height, own);
         let l = columns.subrows(own, boundary);
-        let mut left = MatMut::from_column_major_slice_mut(self.left, boundary, boundary);
-        for start in (0..boundary).step_by(STRIP) {
-            let (width, rows) = (STRIP.min(boundary - start), boundary - start);
-            let strip = left.rb_mut().submatrix_mut(start, start, rows, width);
-            let (on_diagonal, under) = strip.split_at_row_mut(width);
-            let (l, l_under) = l.subrows(start, rows).split_at_row(width);
-            if width <= FULL {
-                matmul(on_diagonal, accum, l, l.transpose(), -1.0, Par::Seq);
-            } else {
-                triangular::matmul(
-                    on_diagonal,
-                    BlockStructure::TriangularLower,
-                    accum,
-                    l,
-                    BlockStructure::Rectangular,
-                    l.transpose(),
-                    BlockStructure::Rectangular,
-                    -1.0,
-                    Par::Seq,
-                );
-            }
-            matmul(under, accum, l_under, l.transpose(), -1.0, Par::Seq);
-            breaks.after((rows * width * own) as f64)?;
-        }
-        Ok(())
+        let left = MatMut::from_column_major_slice_mut(self.left, boundary, boundary);
+        // from the diagonal on; the first ones are the longest
+        let mut rest = Some(left);
+        let strips = iter::from_fn(|| {
+            let left = rest.take().filter(|left| left.ncols() > 0)?;
+            let width = STRIP.min(left.ncols());
+            let start = boundary - left.ncols();
+            let (strip, left) = left.split_at_col_mut(width);
+            rest = Some(left);
+            Some((start, strip.subrows_mut(start, boundary - start)))
+        });
+        let reduce =
+            |(): &mut (), (start, strip): (usize, MatMut<'_, f64>), breaks: &mut Breaks<'_>| {
+                let (rows, width) = (strip.nrows(), strip.ncols());
+                let (on_diagonal, under) = strip.split_at_row_mut(width);
+                let (l, l_under) = l.subrows(start, rows).split_at_row(width);
+                if width <= FULL {
+                    matmul(on_diagonal, accum, l, l.transpose(), -1.0, Par::Seq);
+                } else {
+                    triangular::matmul(
+                        on_diagonal,
+                        BlockStructure::TriangularLower,
+                        accum,
+                        l,
+                        BlockStructure::Rectangular,
+                        l.transpose(),
+                        BlockStructure::Rectangular,
+                        -1.0,
+                        Par::Seq,
+                    );
+                }
+                matmul(under, accum, l_under, l.transpose(), -1.0, Par::Seq);
+                breaks.after((rows * width * own) as f64)
+            };
+        for_each(strips, &mut vec![(); threads], reduce, breaks)
     }
 }
 
@@ -258,8 +288,8 @@ mod tests {
         };
         let go_on = &mut || ControlFlow::Continue(());
         let breaks = &mut Breaks::new(go_on);
-        front.eliminate(breaks).unwrap();
-        front.reduce(Accum::Add, breaks).unwrap();
+        front.eliminate(1, breaks).unwrap();
+        front.reduce(Accum::Add, 1, breaks).unwrap();
         let mut narrow: Vec<f64> = (0..own)
             .flat_map(|j| (0..height).map(move |i| entry(i, j)))
             .collect();

@@ -6,10 +6,14 @@ mod dense;
 mod dissection;
 mod eliminated;
 mod front;
+mod fronts;
 mod multifrontal;
+mod parallel;
+mod substitution;
 
 pub use breaks::{Breaks, Stopped};
 pub use dense::{Cholesky, Dense, General, Unsolved, least_squares, solve_positive_definite};
 pub use dissection::{Cells, Dissection};
 pub use eliminated::Eliminated;
-pub use multifrontal::{ElementMatrix, Factor, FactorError, Fronts};
+pub use fronts::Fronts;
+pub use multifrontal::{ElementMatrix, Factor, FactorError};

@@ -15,10 +15,11 @@
 use faer::Accum;
 
 use super::blocked::NoFactor;
-use super::breaks::{Breaks, Stopped, zeros};
+use super::breaks::{Breaks, Stopped, untouched_zeros};
 use super::dense::Dense;
-use super::dissection::Dissection;
 use super::front::{Columns, FrontMatrix, Run, find_runs};
+use super::fronts::{Front, Fronts, Piece, Space};
+use super::parallel::for_each;
 
 /// Unknowns of the largest element.
 const ELEMENT: usize = 16;
@@ -57,332 +58,244 @@ impl From<Stopped> for FactorError {
     }
 }
 
-/// The structure of a factor.
-pub struct Fronts {
-    fronts: Vec<Front>,
-    /// Elements in the order of the parts that are not divided.
-    elements: Vec<u32>,
-    /// Unknowns of all boundaries, those of each front ascending.
-    rows: Vec<u32>,
-    unknowns: usize,
-    kept: usize,
-    /// Numbers in the factor.
-    len: usize,
-    /// The largest columns of a front.
-    widest: usize,
-    /// The most that waits on each of the two stacks.
-    stacks: [usize; 2],
-}
-
-/// One front.
-struct Front {
-    halves: Option<[usize; 2]>,
-    elements: [usize; 2],
-    /// The first unknown it owns.
-    first: usize,
-    /// How many it owns.
-    own: usize,
-    /// Its boundary: first and end in `rows`.
-    rows: [usize; 2],
-    /// Where its columns begin in the factor.
-    values: usize,
-    /// The stack on which it waits: halves wait on the other one.
-    stack: usize,
-}
-
-impl Front {
-    fn boundary(&self) -> usize {
-        self.rows[1] - self.rows[0]
-    }
-
-    fn height(&self) -> usize {
-        self.own + self.boundary()
-    }
-
-    /// Numbers in its columns of L, each from the diagonal on.
-    fn len(&self) -> usize {
-        self.own * self.boundary() + self.own * (self.own + 1) / 2
-    }
-}
-
-impl Fronts {
-    /// Plans the factor; `kept`: how many nodes the dissection keeps, `unknowns_of` a node.
-    pub fn new(dissection: Dissection, unknowns_of: impl Fn(u32) -> usize, kept: usize) -> Self {
-        // the first unknown of every place
-        let mut first = Vec::with_capacity(dissection.nodes.len() + 1);
-        first.push(0);
-        let mut unknowns = 0;
-        for &node in &dissection.nodes {
-            unknowns += unknowns_of(node);
-            first.push(unknowns);
-        }
-        let eliminated = first[dissection.nodes.len() - kept];
-        let (mut fronts, mut rows) = (Vec::with_capacity(dissection.parts.len()), Vec::new());
-        let (mut len, mut widest) = (0, 0);
-        for (number, part) in dissection.parts.iter().enumerate() {
-            let start = rows.len();
-            for &place in dissection.boundary(number) {
-                let place = place as usize;
-                rows.extend((first[place]..first[place + 1]).map(|row| row as u32));
-            }
-            let front = Front {
-                halves: part.halves,
-                elements: part.elements,
-                first: first[part.own[0]],
-                own: first[part.own[1]] - first[part.own[0]],
-                rows: [start, rows.len()],
-                values: len,
-                stack: (part.depth % 2) as usize,
-            };
-            len += front.len();
-            widest = widest.max(front.own * front.height());
-            fronts.push(front);
-        }
-        let mut planned = Fronts {
-            fronts,
-            elements: dissection.elements,
-            rows,
-            unknowns,
-            kept: unknowns - eliminated,
-            len,
-            widest,
-            stacks: [0; 2],
-        };
-        planned.stacks = planned.highest_stacks();
-        planned
-    }
-
-    /// What waits at most on each stack.
-    fn highest_stacks(&self) -> [usize; 2] {
-        let (mut tops, mut most) = ([0usize; 2], [0usize; 2]);
-        let Some((_, below)) = self.fronts.split_last() else {
-            return most;
-        };
-        for front in below {
-            tops[front.stack] += front.boundary().pow(2);
-            most[front.stack] = most[front.stack].max(tops[front.stack]);
-            for half in front.halves.into_iter().flatten() {
-                tops[1 - front.stack] -= self.fronts[half].boundary().pow(2);
-            }
-        }
-        most
-    }
-
-    /// What the factor takes, and what waits while it is made (bytes).
-    pub fn bytes(&self) -> u64 {
-        8 * (self.len + self.widest + self.stacks[0] + self.stacks[1]) as u64
-    }
-
-    /// Number of those that are kept.
-    pub fn kept(&self) -> usize {
-        self.kept
-    }
-
-    fn rows(&self, front: &Front) -> &[u32] {
-        &self.rows[front.rows[0]..front.rows[1]]
-    }
-}
-
 /// L of the eliminated unknowns.
 pub struct Factor {
-    fronts: Fronts,
+    pub(super) fronts: Fronts,
     /// The columns of every front, each from the diagonal on.
-    values: Vec<f64>,
+    pub(super) values: Vec<f64>,
 }
 
 impl Factor {
-    /// Factors the sum of the elements' matrices, and returns Ŝ with it. `element` puts the one of a given number in
-    /// place.
-    pub fn new(
+    /// Factors the sum of the elements' matrices, and returns Ŝ with it. Each of `elements` puts the matrix of an element
+    /// with a given number in place; there are as many threads as of these.
+    pub fn new<E: FnMut(u32, &mut ElementMatrix) + Send>(
         fronts: Fronts,
-        mut element: impl FnMut(u32, &mut ElementMatrix),
+        elements: Vec<E>,
         breaks: &mut Breaks<'_>,
     ) -> Result<(Self, Dense), FactorError> {
-        let bytes = fronts.bytes();
+        let threads = elements.len();
+        let bytes = fronts.bytes(threads);
         let too_large = FactorError::TooLarge { bytes };
-        let mut values = Vec::new();
-        values
-            .try_reserve_exact(fronts.len)
-            .map_err(|_| too_large)?;
-        let mut columns = zeros(fronts.widest, breaks)?.ok_or(too_large)?;
-        let mut stacks = [Vec::new(), Vec::new()];
-        for (stack, size) in stacks.iter_mut().zip(fronts.stacks) {
-            *stack = zeros(size, breaks)?.ok_or(too_large)?;
+        let mut values = untouched_zeros(fronts.len).ok_or(too_large)?;
+        // all memory is taken by this thread, which has to answer for it
+        let mut above = Memory::new(fronts.above, threads).ok_or(too_large)?;
+        let mut of_threads = Vec::with_capacity(threads);
+        for element in elements {
+            let memory = Memory::new(fronts.branch, 1).ok_or(too_large)?;
+            of_threads.push((memory, Assembly::new(element, fronts.unknowns)));
         }
         let bytes = Dense::bytes(fronts.kept);
         let schur = Dense::try_zero(fronts.kept, breaks)?;
         let mut schur = schur.ok_or(FactorError::TooLarge { bytes })?;
-        let mut tops = [0; 2];
-        let mut scratch = Scratch {
-            local: vec![0; fronts.unknowns],
-            matrix: ElementMatrix::default(),
-            runs: [Vec::new(), Vec::new()],
-        };
-        let last = fronts.fronts.len().wrapping_sub(1);
-        for (number, front) in fronts.fronts.iter().enumerate() {
-            let (height, boundary) = (front.height(), front.boundary());
-            let [even, odd] = &mut stacks;
-            let (mine, theirs) = match front.stack {
-                0 => (even, &*odd),
-                _ => (odd, &*even),
-            };
-            let top = tops[front.stack];
-            let left = match number == last {
-                true => schur.values_mut(),
-                false => &mut mine[top..top + boundary * boundary],
-            };
-            let columns = &mut columns[..height * front.own];
-            columns.fill(0.0);
-            let mut into = FrontMatrix {
-                own: front.own,
-                height,
-                columns,
-                left,
-            };
-            let failed = |error: NoFactor| match error {
-                NoFactor::NotPositiveDefinite(pivot) => FactorError::NotPositiveDefinite {
-                    unknown: front.first + pivot,
-                },
-                NoFactor::Stopped => FactorError::Stopped,
-            };
-            match front.halves {
-                None => {
-                    into.left.fill(0.0);
-                    scratch.assemble(&fronts, front, &mut into, &mut element)?;
-                    into.eliminate(breaks).map_err(failed)?;
-                    into.reduce(Accum::Add, breaks)?;
-                }
-                Some(halves) => {
-                    let [a, b] = halves.map(|half| fronts.fronts[half].boundary());
-                    let end = tops[1 - front.stack];
-                    let middle = end - b * b;
-                    let start = middle - a * a;
-                    let halves_left = [(a, &theirs[start..middle]), (b, &theirs[middle..end])];
-                    tops[1 - front.stack] = start;
-                    for (runs, half) in scratch.runs.iter_mut().zip(halves) {
-                        let half = fronts.rows(&fronts.fronts[half]);
-                        find_runs(half, (front.first, front.own), fronts.rows(front), runs);
-                    }
-                    for (runs, (size, from)) in scratch.runs.iter().zip(halves_left) {
-                        into.add(runs, size, from, Columns::Own);
-                    }
-                    into.eliminate(breaks).map_err(failed)?;
-                    into.reduce(Accum::Replace, breaks)?;
-                    for (runs, (size, from)) in scratch.runs.iter().zip(halves_left) {
-                        into.add(runs, size, from, Columns::Left);
-                    }
-                    breaks.after((a * a + b * b) as f64)?;
-                }
+        let mut rest = &mut values[..];
+        for group in fronts.pieces.chunk_by(|a, b| a.branch && b.branch) {
+            let mut values = Vec::with_capacity(group.len());
+            for piece in group {
+                let (own, others) = rest.split_at_mut(piece.len);
+                values.push(own);
+                rest = others;
             }
-            for (j, column) in into.columns.chunks_exact(height.max(1)).enumerate() {
-                values.extend_from_slice(&column[j..]);
-            }
-            if number != last {
-                tops[front.stack] += boundary * boundary;
+            match group {
+                [piece] if !piece.branch => {
+                    let front = &fronts.fronts[piece.fronts.start];
+                    let is_whole = piece.fronts.end == fronts.fronts.len();
+                    let left = is_whole.then(|| schur.values_mut());
+                    let assembly = of_threads.first_mut().map(|(_, assembly)| assembly);
+                    above.eliminate(&fronts, front, left, assembly, values[0], breaks)?;
+                }
+                branches => {
+                    let left = above.put(&fronts, branches);
+                    let tasks = branches.iter().zip(left).zip(values);
+                    for_each(
+                        tasks,
+                        &mut of_threads,
+                        |(memory, assembly), ((branch, left), values), breaks| {
+                            memory.eliminate_branch(&fronts, branch, left, assembly, values, breaks)
+                        },
+                        breaks,
+                    )?;
+                }
             }
         }
         schur.mirror(breaks)?;
         Ok((Factor { fronts, values }, schur))
     }
 
-    /// From f of all unknowns: y = L⁻¹ f of the eliminated ones, and f̂ = f_c − A_ci A_ii⁻¹ f_i of the kept ones.
-    pub fn forward(&self, f: &mut [f64]) {
-        let mut v = Vec::new();
-        for front in &self.fronts.fronts {
-            self.gather(front, f, &mut v);
-            let mut columns = self.columns(front);
-            for j in 0..front.own {
-                let (column, rest) = columns.split_at(v.len() - j);
-                columns = rest;
-                let (above, below) = v.split_at_mut(j + 1);
-                above[j] /= column[0];
-                let factor = above[j];
-                let entries = below.iter_mut().zip(&column[1..]);
-                entries.for_each(|(v, l)| *v -= factor * l);
-            }
-            f[front.first..front.first + front.own].copy_from_slice(&v[..front.own]);
-            for (&row, v) in self.fronts.rows(front).iter().zip(&v[front.own..]) {
-                f[row as usize] = *v;
-            }
-        }
+    /// Whether a second thread is worth its start.
+    pub fn is_large(&self) -> bool {
+        self.fronts.is_large()
     }
 
-    /// From y = L⁻¹ f of the eliminated unknowns and u of the kept ones: u of all. Several fields at once.
-    pub fn backward<const FIELDS: usize>(&self, u: &mut [[f64; FIELDS]]) {
-        let mut v = Vec::new();
-        for front in self.fronts.fronts.iter().rev() {
-            self.gather(front, u, &mut v);
-            let columns = self.columns(front);
-            pulp::Arch::new().dispatch(|| backward_in_front(columns, front.own, &mut v));
-            u[front.first..front.first + front.own].copy_from_slice(&v[..front.own]);
-        }
-    }
-
-    /// Values of a front's unknowns.
-    fn gather<T: Copy>(&self, front: &Front, all: &[T], into: &mut Vec<T>) {
-        into.clear();
-        into.extend_from_slice(&all[front.first..front.first + front.own]);
-        let rows = self.fronts.rows(front).iter();
-        into.extend(rows.map(|row| all[*row as usize]));
-    }
-
-    fn columns(&self, front: &Front) -> &[f64] {
-        &self.values[front.values..front.values + front.len()]
+    /// Entries of L.
+    pub fn entries(&self) -> usize {
+        self.values.len()
     }
 }
 
-/// u of the unknowns that a front owns, from the last to the first: u_j = (y_j − Σ_{i > j} L_ij u_i) / L_jj.
-#[inline(always)]
-fn backward_in_front<const FIELDS: usize>(columns: &[f64], own: usize, v: &mut [[f64; FIELDS]]) {
-    /// Sums of one field that do not wait for each other.
-    const LANES: usize = 8;
-    let (height, mut columns) = (v.len(), columns);
-    for j in (0..own).rev() {
-        let (rest, column) = columns.split_at(columns.len() - (height - j));
-        columns = rest;
-        let (diagonal, column) = (column[0], &column[1..]);
-        let (above, below) = v.split_at_mut(j + 1);
-        let mut sum = [0.0; FIELDS];
-        if FIELDS == 1 {
-            let mut sums = [0.0; LANES];
-            let (l, u) = (column.chunks_exact(LANES), below.chunks_exact(LANES));
-            let rest = l.remainder().iter().zip(u.remainder());
-            sum[0] = rest.map(|(l, u)| l * u[0]).sum();
-            for (l, u) in l.zip(u) {
-                for k in 0..LANES {
-                    sums[k] += l[k] * u[k][0];
+/// Memory for fronts that are worked on one after the other, used again and again.
+struct Memory {
+    /// First the columns that a front owns; then two stacks with what fronts have left, until the front of the whole takes
+    /// it: what its halves leave is on one stack, what it leaves itself goes to the other.
+    values: Vec<f64>,
+    space: Space,
+    tops: [usize; 2],
+    runs: [Vec<Run>; 2],
+    /// How many work on one front.
+    threads: usize,
+}
+
+impl Memory {
+    fn new(space: Space, threads: usize) -> Option<Self> {
+        Some(Memory {
+            values: untouched_zeros(space.len())?,
+            space,
+            tops: [0; 2],
+            runs: [Vec::new(), Vec::new()],
+            threads,
+        })
+    }
+
+    /// Puts what branches are about to leave on the stacks.
+    fn put(&mut self, fronts: &Fronts, branches: &[Piece]) -> Vec<&mut [f64]> {
+        let (_, [even, odd]) = self.space.divide(&mut self.values);
+        let mut free = [&mut even[self.tops[0]..], &mut odd[self.tops[1]..]];
+        let mut left = Vec::with_capacity(branches.len());
+        for branch in branches {
+            let front = &fronts.fronts[branch.fronts.end - 1];
+            let size = front.boundary().pow(2);
+            let stack = std::mem::take(&mut free[front.stack]);
+            let (own, rest) = stack.split_at_mut(size);
+            free[front.stack] = rest;
+            self.tops[front.stack] += size;
+            left.push(own);
+        }
+        left
+    }
+
+    /// Eliminates what a branch owns; what the whole branch leaves goes to `left`.
+    fn eliminate_branch<E: FnMut(u32, &mut ElementMatrix)>(
+        &mut self,
+        fronts: &Fronts,
+        branch: &Piece,
+        left: &mut [f64],
+        assembly: &mut Assembly<E>,
+        values: &mut [f64],
+        breaks: &mut Breaks<'_>,
+    ) -> Result<(), FactorError> {
+        let (mut left, mut values) = (Some(left), values);
+        for number in branch.fronts.clone() {
+            let front = &fronts.fronts[number];
+            let left = match number + 1 == branch.fronts.end {
+                true => left.take(),
+                false => None,
+            };
+            let (own, others) = values.split_at_mut(front.len());
+            values = others;
+            self.eliminate(fronts, front, left, Some(assembly), own, breaks)?;
+        }
+        Ok(())
+    }
+
+    /// Puts the columns of a front into the factor; what it leaves goes to `left`, or waits on its stack.
+    fn eliminate<E: FnMut(u32, &mut ElementMatrix)>(
+        &mut self,
+        fronts: &Fronts,
+        front: &Front,
+        left: Option<&mut [f64]>,
+        assembly: Option<&mut Assembly<E>>,
+        values: &mut [f64],
+        breaks: &mut Breaks<'_>,
+    ) -> Result<(), FactorError> {
+        let (height, boundary, threads) = (front.height(), front.boundary(), self.threads);
+        let (columns, [even, odd]) = self.space.divide(&mut self.values);
+        let (own, theirs) = match front.stack {
+            0 => (even, &*odd),
+            _ => (odd, &*even),
+        };
+        let left = left.unwrap_or_else(|| {
+            let top = &mut self.tops[front.stack];
+            let start = *top;
+            *top += boundary * boundary;
+            &mut own[start..*top]
+        });
+        let columns = &mut columns[..height * front.own];
+        columns.fill(0.0);
+        let mut into = FrontMatrix {
+            own: front.own,
+            height,
+            columns,
+            left,
+        };
+        let failed = |error: NoFactor| match error {
+            NoFactor::NotPositiveDefinite(pivot) => FactorError::NotPositiveDefinite {
+                unknown: front.first + pivot,
+            },
+            NoFactor::Stopped => FactorError::Stopped,
+        };
+        match front.halves {
+            None => {
+                into.left.fill(0.0);
+                if let Some(assembly) = assembly {
+                    assembly.add(fronts, front, &mut into)?;
                 }
+                into.eliminate(threads, breaks).map_err(failed)?;
+                into.reduce(Accum::Add, threads, breaks)?;
             }
-            sum[0] += sums.iter().sum::<f64>();
-        } else {
-            for (l, u) in column.iter().zip(below) {
-                for k in 0..FIELDS {
-                    sum[k] += l * u[k];
+            Some(halves) => {
+                let [a, b] = halves.map(|half| fronts.fronts[half].boundary());
+                let end = self.tops[1 - front.stack];
+                let middle = end - b * b;
+                let start = middle - a * a;
+                let halves_left = [(a, &theirs[start..middle]), (b, &theirs[middle..end])];
+                self.tops[1 - front.stack] = start;
+                for (runs, half) in self.runs.iter_mut().zip(halves) {
+                    let half = fronts.rows(&fronts.fronts[half]);
+                    find_runs(half, (front.first, front.own), fronts.rows(front), runs);
                 }
+                for (runs, (size, from)) in self.runs.iter().zip(halves_left) {
+                    into.add(runs, size, from, Columns::Own);
+                }
+                into.eliminate(threads, breaks).map_err(failed)?;
+                into.reduce(Accum::Replace, threads, breaks)?;
+                for (runs, (size, from)) in self.runs.iter().zip(halves_left) {
+                    into.add(runs, size, from, Columns::Left);
+                }
+                breaks.after((a * a + b * b) as f64)?;
             }
         }
-        for k in 0..FIELDS {
-            above[j][k] = (above[j][k] - sum[k]) / diagonal;
+        let mut values = values;
+        for (j, column) in into.columns.chunks_exact(height.max(1)).enumerate() {
+            let (own, others) = values.split_at_mut(height - j);
+            own.copy_from_slice(&column[j..]);
+            values = others;
         }
+        Ok(())
     }
 }
 
-/// What is used again from front to front.
-struct Scratch {
+/// Adds elements to fronts that are not divided.
+struct Assembly<E> {
+    element: E,
+    matrix: ElementMatrix,
     /// Places of unknowns in a front.
     local: Vec<u32>,
-    matrix: ElementMatrix,
-    runs: [Vec<Run>; 2],
 }
 
-impl Scratch {
+impl<E: FnMut(u32, &mut ElementMatrix)> Assembly<E> {
+    fn new(element: E, unknowns: usize) -> Self {
+        Assembly {
+            element,
+            matrix: ElementMatrix::default(),
+            local: vec![0; unknowns],
+        }
+    }
+
     /// Adds the elements of a part that is not divided.
-    fn assemble(
+    fn add(
         &mut self,
         fronts: &Fronts,
         front: &Front,
         into: &mut FrontMatrix<'_>,
-        element: &mut impl FnMut(u32, &mut ElementMatrix),
     ) -> Result<(), FactorError> {
         let own = (front.first..front.first + front.own).map(|row| row as u32);
         let unknowns = own.chain(fronts.rows(front).iter().copied());
@@ -390,7 +303,7 @@ impl Scratch {
             self.local[row as usize] = k as u32;
         }
         for &e in &fronts.elements[front.elements[0]..front.elements[1]] {
-            element(e, &mut self.matrix);
+            (self.element)(e, &mut self.matrix);
             let ElementMatrix { unknowns, entries } = &self.matrix;
             if !entries.iter().flatten().all(|entry| entry.is_finite()) {
                 return Err(FactorError::NonFinite);
@@ -416,8 +329,8 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::*;
-    use crate::linear::dissection::Cells;
     use crate::linear::dissection::tests::{grid, lines};
+    use crate::linear::dissection::{Cells, Dissection};
 
     /// A made-up body: cells with positive definite matrices on nodes with 0, 1 or 2 unknowns.
     struct Body {
@@ -483,14 +396,11 @@ mod tests {
             dense
         }
 
-        fn factor(&mut self) -> Result<(Factor, Dense), FactorError> {
+        fn factor(&mut self, threads: usize) -> Result<(Factor, Dense), FactorError> {
             let fronts = self.fronts.take().unwrap();
             let go_on = &mut || ControlFlow::Continue(());
-            Factor::new(
-                fronts,
-                |e, matrix| self.matrix(e, matrix),
-                &mut Breaks::new(go_on),
-            )
+            let element = |e: u32, matrix: &mut ElementMatrix| self.matrix(e, matrix);
+            Factor::new(fronts, vec![element; threads], &mut Breaks::new(go_on))
         }
     }
 
@@ -533,7 +443,7 @@ mod tests {
             let mut body = Body::new(x, y, kept);
             let dense = body.dense();
             let n = dense.len();
-            let (factor, schur) = body.factor().unwrap();
+            let (factor, schur) = body.factor(1).unwrap();
             let m = schur.size();
             let force: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
             // f̂ is what Ŝ makes of the solution's kept unknowns
@@ -545,10 +455,10 @@ mod tests {
             // and with these unknowns given, the others follow; in several fields at once
             reduced[n - m..].copy_from_slice(&solution[n - m..]);
             let mut u: Vec<[f64; 1]> = reduced.iter().map(|f| [*f]).collect();
-            factor.backward(&mut u);
+            factor.backward(&mut u, 1);
             assert!(largest_difference(&u.concat(), &solution) < 1e-12);
             let mut several: Vec<[f64; 3]> = reduced.iter().map(|f| [0.0, *f, -2.0 * f]).collect();
-            factor.backward(&mut several);
+            factor.backward(&mut several, 2);
             for (k, scale) in [0.0, 1.0, -2.0].into_iter().enumerate() {
                 let found: Vec<f64> = several.iter().map(|u| u[k]).collect();
                 let expected: Vec<f64> = solution.iter().map(|u| scale * u).collect();
@@ -566,7 +476,7 @@ mod tests {
 
     #[test]
     fn a_matrix_that_is_not_positive_definite_is_refused_with_its_unknown() {
-        for bad in [0.0, -1.0, f64::NAN] {
+        for (threads, bad) in [(1, 0.0), (1, -1.0), (1, f64::NAN), (2, 0.0), (2, f64::NAN)] {
             let mut body = Body::new(9, 7, &[5]);
             let fronts = body.fronts.take().unwrap();
             let go_on = &mut || ControlFlow::Continue(());
@@ -580,7 +490,8 @@ mod tests {
                     }
                 }
             };
-            let refused = Factor::new(fronts, element, &mut Breaks::new(go_on)).err();
+            let refused =
+                Factor::new(fronts, vec![element; threads], &mut Breaks::new(go_on)).err();
             let expected = match bad.is_nan() {
                 true => FactorError::NonFinite,
                 false => FactorError::NotPositiveDefinite { unknown: 7 },
@@ -592,15 +503,37 @@ mod tests {
     /// Of a mesh that takes some portions of work.
     #[test]
     fn a_factor_stops_when_it_is_told_to() {
-        let mut body = Body::new(150, 150, &[]);
-        let fronts = body.fronts.take().unwrap();
-        let mut asked = 0;
-        let mut stop = || {
-            asked += 1;
-            ControlFlow::Break(())
-        };
-        let element = |e: u32, matrix: &mut ElementMatrix| body.matrix(e, matrix);
-        let stopped = Factor::new(fronts, element, &mut Breaks::new(&mut stop)).err();
-        assert_eq!((stopped, asked), (Some(FactorError::Stopped), 1));
+        for threads in [1, 2] {
+            let mut body = Body::new(150, 150, &[]);
+            let fronts = body.fronts.take().unwrap();
+            let mut asked = 0;
+            let mut stop = || {
+                asked += 1;
+                ControlFlow::Break(())
+            };
+            let element = |e: u32, matrix: &mut ElementMatrix| body.matrix(e, matrix);
+            let elements = vec![element; threads];
+            let stopped = Factor::new(fronts, elements, &mut Breaks::new(&mut stop)).err();
+            assert_eq!((stopped, asked), (Some(FactorError::Stopped), 1));
+        }
+    }
+
+    /// With fronts above the branches that are wide enough to be worked on in parts, and branches of one part.
+    #[test]
+    fn two_threads_make_the_same_factor_as_one() {
+        let kept: Vec<u32> = (0..400).collect();
+        for (x, y, kept) in [(150, 150, &kept[..]), (700, 2, &kept[..3]), (3, 1, &[])] {
+            let [one, two] = [1, 2].map(|threads| Body::new(x, y, kept).factor(threads).unwrap());
+            assert_eq!(one.1, two.1);
+            assert_eq!(one.0.values, two.0.values);
+            assert_eq!(one.0.fronts.len, one.0.values.len());
+            let u = |i: usize| [(i as f64).sin(), (i as f64).cos()];
+            let [one, two] = [1, 2].map(|threads| {
+                let mut u: Vec<[f64; 2]> = (0..one.0.fronts.unknowns).map(u).collect();
+                one.0.backward(&mut u, threads);
+                u
+            });
+            assert_eq!(one, two);
+        }
     }
 }

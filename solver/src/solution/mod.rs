@@ -641,6 +641,9 @@ pub enum Progress<'a> {
         /// Bytes.
         bytes: u64,
     },
+    /// The solver could share its next work with a second thread, and asks whether there is a processor for it. The answer
+    /// changes no result, and does not stop the solver.
+    SecondThread,
     /// There was not so much memory: the solver goes on without, and cannot get far.
     OutOfMemory {
         /// Bytes that it needed.

@@ -19,7 +19,7 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use super::{
     super::{
         ending::{NoSolution, panicked},
-        report::{Report, Told},
+        report::{Report, Told, go_on_if},
         solving::{read_mesh, solve_task as solve_task_of},
     },
     Order, Reply, Task, send, take,
@@ -84,6 +84,9 @@ fn solve_task(
 ) -> io::Result<()> {
     let mut sent = Ok(());
     let mut tell = |told| {
+        if matches!(told, Told::SecondThread) {
+            return go_on_if(task.second_thread);
+        }
         let must_stop = matches!(told, Told::OutOfMemory(_));
         sent = pass_on(told, service);
         match must_stop || sent.is_err() || stop.load(Relaxed) {
@@ -116,7 +119,7 @@ fn solve_task(
 
 fn pass_on(told: Told, service: &mut UnixStream) -> io::Result<()> {
     match told {
-        Told::Nothing => Ok(()),
+        Told::Nothing | Told::SecondThread => Ok(()),
         Told::OutOfMemory(outgrown) => send(service, &Reply::OutOfMemory(outgrown), &[]),
         Told::Report(Report::OneLevel) => send(service, &Reply::OneLevel, &[]),
         Told::Report(Report::Event(_, payload)) => send(service, &Reply::Event(payload), &[]),

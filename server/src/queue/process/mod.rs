@@ -43,6 +43,8 @@ pub(super) struct Task {
     pub(super) mesh: Option<Vec<u8>>,
     /// Bytes that it may use.
     pub(super) share: u64,
+    /// Whether there was a processor for a second thread when the task began.
+    pub(super) second_thread: bool,
 }
 
 /// From a worker process.

@@ -1,0 +1,191 @@
+//! Independent tasks on one thread or on several, with the same result.
+
+use std::ops::ControlFlow;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use super::breaks::{Breaks, Stopped};
+
+/// Time between two questions of a thread that waits for the others.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Does all tasks, on as many threads as there are workspaces. Each thread takes the next task as soon as it is free, so a
+/// task must not depend on what its workspace was used for before.
+///
+/// The error is the one that a single thread finds first. Only this thread asks whether to go on; the others stop with it.
+pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
+    tasks: impl Iterator<Item = T> + Send,
+    workspaces: &mut [W],
+    work: impl Fn(&mut W, T, &mut Breaks<'_>) -> Result<(), E> + Sync,
+    breaks: &mut Breaks<'_>,
+) -> Result<(), E> {
+    let [own, others @ ..] = workspaces else {
+        return Ok(());
+    };
+    if others.is_empty() {
+        return tasks
+            .into_iter()
+            .try_for_each(|task| work(own, task, breaks));
+    }
+    let (tasks, stopped) = (Mutex::new(tasks.enumerate()), AtomicBool::new(false));
+    let failed = AtomicBool::new(false);
+    // tasks are begun in their order, so all before one that fails are done as well
+    let work_on = |workspace: &mut W, breaks: &mut Breaks<'_>| {
+        while !failed.load(Relaxed) {
+            let next = tasks.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let Some((number, task)) = next else { break };
+            if let Err(error) = work(workspace, task, breaks) {
+                failed.store(true, Relaxed);
+                return Some((number, error));
+            }
+        }
+        None
+    };
+    let mut errors = Vec::new();
+    thread::scope(|scope| {
+        let (sender, ended) = channel::<()>();
+        let start = |workspace| {
+            let (sender, stopped, work_on) = (sender.clone(), &stopped, &work_on);
+            scope.spawn(move || {
+                // dropped when this thread ends, however it does
+                let _sender = sender;
+                let mut go_on = || match stopped.load(Relaxed) {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                };
+                work_on(workspace, &mut Breaks::new(&mut go_on))
+            })
+        };
+        let threads: Vec<_> = others.iter_mut().map(start).collect();
+        drop(sender);
+        let own_error = work_on(own, breaks);
+        if let Some((_, error)) = &own_error
+            && *error == Stopped.into()
+        {
+            stopped.store(true, Relaxed);
+        }
+        errors.extend(own_error);
+        while ended.recv_timeout(PAUSE) == Err(RecvTimeoutError::Timeout) {
+            if !stopped.load(Relaxed) && breaks.ask().is_err() {
+                stopped.store(true, Relaxed);
+                failed.store(true, Relaxed);
+            }
+        }
+        for thread in threads {
+            errors.extend(thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        }
+    });
+    if stopped.into_inner() {
+        return Err(Stopped.into());
+    }
+    match errors.into_iter().min_by_key(|(number, _)| *number) {
+        Some((_, error)) => Err(error),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::sync::Barrier;
+
+    use super::*;
+
+    #[derive(Debug, PartialEq)]
+    enum Error {
+        Stopped,
+        Bad(usize),
+    }
+
+    impl From<Stopped> for Error {
+        fn from(_: Stopped) -> Self {
+            Error::Stopped
+        }
+    }
+
+    fn go_on() -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    #[test]
+    fn every_task_is_done_once_and_all_threads_take_part() {
+        for threads in [1, 2, 3] {
+            let mut results = vec![0; 100];
+            let mut counts = vec![0; threads];
+            // each thread waits in its first task until all have one
+            let all = Barrier::new(threads);
+            let work = |count: &mut i32, (i, result): (usize, &mut usize), _: &mut Breaks<'_>| {
+                if *count == 0 {
+                    all.wait();
+                }
+                *count += 1;
+                *result += i + 1;
+                Ok::<(), Error>(())
+            };
+            let tasks = results.iter_mut().enumerate();
+            for_each(tasks, &mut counts, work, &mut Breaks::new(&mut go_on)).unwrap();
+            assert!(results.into_iter().eq(1..=100));
+            assert!(counts.iter().all(|count| *count > 0) && counts.iter().sum::<i32>() == 100);
+        }
+    }
+
+    #[test]
+    fn the_error_is_that_of_the_first_task_that_fails() {
+        for threads in [1, 2] {
+            // the later task fails first
+            let both = Barrier::new(threads);
+            let work = |(): &mut (), task: usize, _: &mut Breaks<'_>| {
+                if task < threads {
+                    both.wait();
+                }
+                if task == 0 {
+                    thread::sleep(Duration::from_millis(20));
+                }
+                Err(Error::Bad(task))
+            };
+            let mut workspaces = vec![(); threads];
+            let failed = for_each(0..9, &mut workspaces, work, &mut Breaks::new(&mut go_on));
+            assert_eq!(failed, Err(Error::Bad(0)));
+        }
+    }
+
+    #[test]
+    fn all_threads_stop_with_the_first_and_it_asks_while_it_waits() {
+        let both = Barrier::new(2);
+        // one task each: the first one's is short, the other's goes on until it is stopped
+        let work = |first: &mut bool, _: usize, breaks: &mut Breaks<'_>| {
+            both.wait();
+            while !*first {
+                breaks.ask()?;
+            }
+            Ok::<(), Error>(())
+        };
+        let mut asked = 0;
+        let mut stop_at_third = || {
+            asked += 1;
+            match asked {
+                3 => ControlFlow::Break(()),
+                _ => ControlFlow::Continue(()),
+            }
+        };
+        let mut breaks = Breaks::new(&mut stop_at_third);
+        let stopped = for_each(0..2, &mut [true, false], work, &mut breaks);
+        assert_eq!((stopped, asked), (Err(Error::Stopped), 3));
+    }
+
+    #[test]
+    #[should_panic(expected = "of the second thread")]
+    fn a_panic_of_another_thread_is_passed_on() {
+        let both = Barrier::new(2);
+        let work = |first: &mut bool, _: usize, _: &mut Breaks<'_>| {
+            both.wait();
+            assert!(*first, "of the second thread");
+            Ok::<(), Error>(())
+        };
+        let _ = for_each(0..2, &mut [true, false], work, &mut Breaks::new(&mut go_on));
+    }
+}
