@@ -1,6 +1,8 @@
 //! `signorini solve FILE`: runs the same code as a worker of the service.
 
 use std::{
+    fs::File,
+    io::Read,
     ops::ControlFlow,
     path::{Path, PathBuf},
     time::Instant,
@@ -8,9 +10,10 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
-use files::plot::Theme;
+use files::{ReadError, plot::Theme};
 use solver::{
     error::{SolveError, Violation},
+    problem::Problem,
     solution::Observer,
 };
 
@@ -50,19 +53,12 @@ pub(super) fn run(
     }: &Arguments,
 ) -> anyhow::Result<Exit> {
     let start = Instant::now();
-    let text =
-        std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let deck = file
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("inp"));
-    let read = if deck {
-        files::abaqus::problem(&text)
-    } else {
-        files::parse(&text)
-    };
-    let problem = match read {
+    let problem = match read(file) {
         Ok(problem) => problem,
-        Err(violations) => return Ok(invalid(file, &violations)),
+        Err(ReadError::Invalid(violations)) => return Ok(invalid(file, &violations)),
+        Err(ReadError::Io(error)) => {
+            return Err(error).with_context(|| format!("cannot read {}", file.display()));
+        }
     };
     let parse_s = start.elapsed().as_secs_f64();
     let contacts = problem.contacts.iter();
@@ -129,6 +125,21 @@ pub(super) fn run(
     } else {
         Exit::NotConverged
     })
+}
+
+/// Reads a problem by the ending of its file: of a JSON file with a mesh only the mesh is held, not its text.
+fn read(file: &Path) -> Result<Problem, ReadError> {
+    let mut opened = File::open(file).map_err(ReadError::Io)?;
+    let deck = file
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("inp"));
+    if !deck {
+        return files::read(opened);
+    }
+    let mut text = String::new();
+    let read = opened.read_to_string(&mut text);
+    read.map_err(ReadError::Io)?;
+    files::abaqus::problem(&text).map_err(ReadError::Invalid)
 }
 
 /// `signorini schema`.
