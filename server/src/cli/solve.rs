@@ -160,3 +160,54 @@ pub(super) fn invalid(file: &Path, violations: &[Violation]) -> Exit {
     }
     Exit::Invalid
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::fmt::Write;
+
+    use solver::problem::MeshSource;
+
+    use crate::{digest, fake};
+
+    /// Of a large inline mesh only the columns are held, which grow by doubling, and a few pieces of the text; nothing
+    /// for its fingerprint.
+    #[test]
+    fn a_large_inline_mesh_is_read_and_hashed_in_the_memory_of_its_columns() {
+        const PIECES: i64 = 512 << 10;
+        let (nodes, elements) = (90_000, 30_000);
+        let mut text = serde_json::to_string(&fake::problem()).unwrap();
+        let grid = text.find("{\"grid\"").unwrap();
+        let end = grid + text[grid..].find("]}").unwrap() + 2;
+        let mut mesh = "{\"inline\": {\"nodes\": [".to_owned();
+        for node in 0..nodes {
+            let comma = if node > 0 { ",\n" } else { "" };
+            let (x, y) = (0.1 * f64::from(node), -1e-3 * f64::from(node));
+            write!(mesh, "{comma}[{x}, {y}]").unwrap();
+        }
+        mesh += "], \"elements\": [";
+        for element in 0..elements {
+            let comma = if element > 0 { "," } else { "" };
+            let nodes: [u32; 8] = std::array::from_fn(|k| 3 * element + k as u32 % 3);
+            write!(mesh, "{comma}{nodes:?}").unwrap();
+        }
+        mesh += "], \"boundaries\": {}}";
+        text.replace_range(grid..end, &mesh);
+        assert!(text.len() > 3 << 20);
+
+        let columns = i64::from(nodes) * 16 + i64::from(elements) * 36;
+        let before = allocator::held();
+        allocator::forget_highest();
+        let problem = files::read(text.as_bytes()).unwrap();
+        let (held, highest) = (allocator::held() - before, allocator::highest() - before);
+        assert!(held <= columns + PIECES, "{held} of {columns}");
+        assert!(highest <= 2 * columns + PIECES, "{highest} of {columns}");
+        assert!(matches!(&problem.mesh.source, MeshSource::Inline(mesh)
+            if mesh.nodes.len() == nodes as usize && mesh.elements.len() == elements as usize));
+
+        allocator::forget_highest();
+        digest::input_hash(&problem).unwrap();
+        let highest = allocator::highest() - before - held;
+        assert!(highest <= PIECES, "{highest}");
+    }
+}

@@ -5,6 +5,7 @@ mod number;
 
 use std::io::{self, Write};
 
+use number::{ROOM, Recent};
 use serde::Serialize;
 use serde_json::json;
 use sha2::{Digest, Sha256};
@@ -67,6 +68,7 @@ struct Hash {
     /// What is yet to be hashed: the first `length` bytes.
     text: Box<[u8; AT_ONCE]>,
     length: usize,
+    recent: Recent,
 }
 
 impl Hash {
@@ -75,6 +77,7 @@ impl Hash {
             sha256: Sha256::new(),
             text: Box::new([0; AT_ONCE]),
             length: 0,
+            recent: Recent::new(),
         }
     }
 
@@ -94,7 +97,15 @@ impl Hash {
         }
     }
 
+    #[inline]
+    fn byte(&mut self, byte: u8) {
+        self.make_room(1);
+        self.text[self.length] = byte;
+        self.length += 1;
+    }
+
     /// Room for so many more bytes, or nothing left to be hashed before them.
+    #[inline]
     fn make_room(&mut self, bytes: usize) {
         if self.length + bytes > AT_ONCE {
             self.sha256.update(&self.text[..self.length]);
@@ -177,10 +188,8 @@ impl Hash {
         }
         self.text_of(r#","nodes":"#);
         are_finite(nodes.as_flattened())?;
-        self.list(nodes, |hash, [x, y]| {
-            hash.text_of("[").number(*x);
-            hash.text_of(",").number(*y);
-            hash.text_of("]");
+        self.list(nodes, |hash, place| {
+            hash.list(place, Self::coordinate);
         });
         self.text_of(r#"},"refine":"#).json(refine)?;
         self.text_of("}");
@@ -203,7 +212,10 @@ impl Hash {
             x,
             y,
         } = fields;
-        self.text_of(r#"{"contact_state":"#).json(contact_state)?;
+        self.text_of(r#"{"contact_state":"#);
+        self.list(contact_state, |hash, state| {
+            hash.coordinate(&f64::from(*state));
+        });
         self.column(r#","element_error":"#, element_error)?;
         self.text_of(r#","elements":"#);
         self.elements(elements);
@@ -221,16 +233,16 @@ impl Hash {
         self.column(r#","stress_xy":"#, at_points_xy)?;
         self.column(r#","stress_yy":"#, at_points_yy)?;
         self.column(r#","stress_zz":"#, at_points_zz)?;
-        self.column(r#","x":"#, points_x)?;
-        self.column(r#","y":"#, points_y)?;
+        self.coordinates(r#","x":"#, points_x)?;
+        self.coordinates(r#","y":"#, points_y)?;
         self.column(r#"},"stress_xx":"#, stress_xx)?;
         self.column(r#","stress_xy":"#, stress_xy)?;
         self.column(r#","stress_yy":"#, stress_yy)?;
         self.column(r#","stress_zz":"#, stress_zz)?;
         self.column(r#","ux":"#, ux)?;
         self.column(r#","uy":"#, uy)?;
-        self.column(r#","x":"#, x)?;
-        self.column(r#","y":"#, y)?;
+        self.coordinates(r#","x":"#, x)?;
+        self.coordinates(r#","y":"#, y)?;
         self.text_of("}");
         Ok(())
     }
@@ -239,33 +251,52 @@ impl Hash {
     fn column(&mut self, key: &str, numbers: &[f64]) -> serde_json::Result<()> {
         are_finite(numbers)?;
         self.text_of(key);
-        self.list(numbers, |hash, value| hash.number(*value));
+        self.list(numbers, |hash, value| {
+            hash.number(|_, room| number::write(*value, room));
+        });
         Ok(())
+    }
+
+    /// The same of numbers that repeat.
+    fn coordinates(&mut self, key: &str, numbers: &[f64]) -> serde_json::Result<()> {
+        are_finite(numbers)?;
+        self.text_of(key);
+        self.list(numbers, Self::coordinate);
+        Ok(())
+    }
+
+    #[inline]
+    fn coordinate(&mut self, value: &f64) {
+        self.number(|recent, room| recent.write(*value, room));
     }
 
     fn elements(&mut self, elements: &[Element]) {
         self.list(elements, |hash, element| {
-            hash.list(element, |hash, node| hash.number(f64::from(*node)));
+            hash.list(element, |hash, node| {
+                hash.number(|_, room| number::write_whole(*node, room));
+            });
         });
     }
 
+    /// A number that `write` writes.
+    #[inline]
+    fn number(&mut self, write: impl FnOnce(&mut Recent, &mut [u8; ROOM]) -> usize) {
+        self.make_room(ROOM);
+        if let Some(room) = self.text[self.length..].first_chunk_mut() {
+            self.length += write(&mut self.recent, room);
+        }
+    }
+
+    #[inline]
     fn list<T>(&mut self, items: &[T], write: impl Fn(&mut Self, &T)) {
-        self.text_of("[");
+        self.byte(b'[');
         for (k, item) in items.iter().enumerate() {
             if k > 0 {
-                self.text_of(",");
+                self.byte(b',');
             }
             write(self, item);
         }
-        self.text_of("]");
-    }
-
-    /// A finite number.
-    fn number(&mut self, value: f64) {
-        self.make_room(number::ROOM);
-        if let Some(room) = self.text[self.length..].first_chunk_mut() {
-            self.length += number::write(value, room);
-        }
+        self.byte(b']');
     }
 
     fn finish(mut self) -> String {
