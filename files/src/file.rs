@@ -156,4 +156,31 @@ mod tests {
         );
         assert_eq!(reason(&square.replace("\"top\"", "top")), ": malformed");
     }
+
+    /// Also behind the lists that are taken out of the text, and in one that is left in it from its middle.
+    #[test]
+    fn a_fault_is_placed_where_it_is_in_the_whole_file() {
+        let square = "{\"nodes\": [[0,0],[1,0],\n[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]],\n\
+                      \"elements\": [[0,1,2,3,4,5,6,7]], \"boundaries\": {\"top\":\n [[3,2,6]]}}";
+        for (from, to) in [
+            ("[0,1],", "[0,1,2],"),
+            ("[0,1],", "[0,\n-],"),
+            ("[0,0.5]]", "[0,0.5]"),
+            ("6,7]", "6]"),
+            ("6,7]", "6,7.5]"),
+            ("\"boundaries\"", "\"nodes\": [], \"boundaries\""),
+            ("\"boundaries\"", "\"border\""),
+            ("[3,2,6]", "[3,2]"),
+            ("[3,2,6]", "[3,2,x]"),
+            ("]}}", "]}}}"),
+        ] {
+            assert!(square.contains(from), "{from}");
+            let text = square.replacen(from, to, 1);
+            let whole = serde_json::from_reader::<_, InlineMesh>(text.as_bytes()).unwrap_err();
+            let Err(ReadError::Invalid(list)) = read_mesh(text.as_bytes()) else {
+                panic!("it is no mesh: {text}");
+            };
+            assert_eq!(list[0].got, whole.to_string());
+        }
+    }
 }
