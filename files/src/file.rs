@@ -1,11 +1,11 @@
 //! A mesh file of any format, recognised by its first characters.
 
-use std::io::BufRead;
+use std::io::{BufRead, BufReader};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{abaqus, gmsh, source::ReadError};
+use crate::{abaqus, gmsh, inline::Extract, source::ReadError};
 use solver::error::{Reason, Violation, shortened};
 use solver::mesh::{Mesh, check_inverted, inline_mesh};
 use solver::problem::InlineMesh;
@@ -70,12 +70,16 @@ fn recognised(start: &[u8]) -> &'static str {
 const LONGEST: usize = 300;
 
 fn json(reader: impl BufRead) -> Result<Mesh, ReadError> {
-    let inline: InlineMesh = serde_json::from_reader(reader).map_err(|error| {
+    let mut extract = Extract::new(reader, &[]);
+    let read = serde_json::from_reader(BufReader::new(&mut extract));
+    let taken = extract.taken();
+    let mut inline: InlineMesh = read.map_err(|error| {
         if error.is_io() {
             return ReadError::Io(error.into());
         }
         // it quotes a name that may be as long as the file
-        let (text, at) = (error.to_string(), (error.line(), error.column()));
+        let text = taken.places.message(&error);
+        let at = taken.places.original(error.line(), error.column());
         invalid(
             match text.len() {
                 0..=LONGEST => text,
@@ -90,7 +94,8 @@ fn json(reader: impl BufRead) -> Result<Mesh, ReadError> {
             "See `InlineMesh` in /v1/schema/problem.json.",
         )
     })?;
-    let mesh = inline_mesh(&inline, "").map_err(ReadError::Invalid)?;
+    taken.put(&mut inline);
+    let mesh = inline_mesh(inline, "").map_err(ReadError::Invalid)?;
     let upright = check_inverted(&mesh, true, |e| format!("/elements/{e}"), "");
     upright.map_err(ReadError::Invalid)?;
     Ok(mesh)
@@ -150,5 +155,32 @@ mod tests {
             "/elements/0: inverted_element"
         );
         assert_eq!(reason(&square.replace("\"top\"", "top")), ": malformed");
+    }
+
+    /// Also behind the lists that are taken out of the text, and in one that is left in it from its middle.
+    #[test]
+    fn a_fault_is_placed_where_it_is_in_the_whole_file() {
+        let square = "{\"nodes\": [[0,0],[1,0],\n[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]],\n\
+                      \"elements\": [[0,1,2,3,4,5,6,7]], \"boundaries\": {\"top\":\n [[3,2,6]]}}";
+        for (from, to) in [
+            ("[0,1],", "[0,1,2],"),
+            ("[0,1],", "[0,\n-],"),
+            ("[0,0.5]]", "[0,0.5]"),
+            ("6,7]", "6]"),
+            ("6,7]", "6,7.5]"),
+            ("\"boundaries\"", "\"nodes\": [], \"boundaries\""),
+            ("\"boundaries\"", "\"border\""),
+            ("[3,2,6]", "[3,2]"),
+            ("[3,2,6]", "[3,2,x]"),
+            ("]}}", "]}}}"),
+        ] {
+            assert!(square.contains(from), "{from}");
+            let text = square.replacen(from, to, 1);
+            let whole = serde_json::from_reader::<_, InlineMesh>(text.as_bytes()).unwrap_err();
+            let Err(ReadError::Invalid(list)) = read_mesh(text.as_bytes()) else {
+                panic!("it is no mesh: {text}");
+            };
+            assert_eq!(list[0].got, whole.to_string());
+        }
     }
 }

@@ -1,15 +1,22 @@
 //! Problems from JSON: strict, and with all structural faults reported at once.
 //!
-//! A text is first checked against our JSON Schema, which gives all faults with their places, in memory that does
-//! not depend on what the text says; then serde reads it.
+//! The nodes and elements of an inline mesh, nearly all of a large problem, are taken out while the text is read. The
+//! rest is first checked against our JSON Schema, which gives all faults with their places, in memory that does not
+//! depend on what the text says; then serde reads it.
 
 use std::fmt;
+use std::io::Read;
 
 use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
+use crate::inline::{Extract, Places};
 use crate::schema::violations;
+use crate::source::ReadError;
 use solver::error::{Reason, Violation, escape};
-use solver::problem::Problem;
+use solver::problem::{MeshSource, Problem};
+
+/// The names that lead to an inline mesh.
+const INLINE: &[&str] = &["mesh", "inline"];
 
 /// Most brackets that may be open at once. A problem has ten.
 pub const MOST_NESTED: usize = 64;
@@ -17,6 +24,29 @@ pub const MOST_NESTED: usize = 64;
 /// Reads a problem, or returns all faults of its structure. Pointers are relative to
 /// the problem.
 pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
+    match text.contains("\"inline\"") {
+        true => read(text.as_bytes()).map_err(ReadError::into_violations),
+        false => check(text, &Places::default()),
+    }
+}
+
+/// The same, from a reader, in pieces: of an inline mesh only the columns are held, and never its text, unless it is
+/// faulty. A text that is not UTF-8 is an error of reading.
+pub fn read(reader: impl Read) -> Result<Problem, ReadError> {
+    let mut extract = Extract::new(reader, INLINE);
+    let mut text = String::new();
+    let read = extract.read_to_string(&mut text);
+    read.map_err(ReadError::Io)?;
+    let taken = extract.taken();
+    let mut problem = check(&text, &taken.places).map_err(ReadError::Invalid)?;
+    if let MeshSource::Inline(mesh) = &mut problem.mesh.source {
+        taken.put(mesh);
+    }
+    Ok(problem)
+}
+
+/// Reads a text, whose places are those of the original text as `places` tells them.
+pub(crate) fn check(text: &str, places: &Places) -> Result<Problem, Vec<Violation>> {
     if text.trim().is_empty() {
         return Err(vec![Violation::new(
             "",
@@ -26,11 +56,12 @@ pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
             "An example is in the README.",
         )]);
     }
-    if let Some(place) = too_deep(text) {
+    if let Some((line, column)) = deepest(text) {
+        let (line, column) = places.original(line, column);
         return Err(vec![Violation::new(
             "",
             Reason::Malformed,
-            place,
+            nested_too_deeply(line, column),
             format!("at most {MOST_NESTED}"),
             "Check the brackets there; no problem is nested so deeply.",
         )]);
@@ -42,17 +73,27 @@ pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
             return Err(vec![Violation::new(
                 "",
                 Reason::Malformed,
-                syntax_error(text).unwrap_or(error),
+                places.message(&syntax_error(text).unwrap_or(error)),
                 "a JSON document (RFC 8259), numbers within double precision",
                 "Check the text at that line and column.",
             )]);
         }
     }
-    serde_json::from_str(text).map_err(|first| vec![beyond_the_schema(text, &first)])
+    serde_json::from_str(text)
+        .map_err(|first| vec![beyond_the_schema(text, places.message(&first))])
 }
 
 /// The place of the first bracket that nests a text too deeply, in words.
 pub fn too_deep(text: &str) -> Option<String> {
+    deepest(text).map(|(line, column)| nested_too_deeply(line, column))
+}
+
+fn nested_too_deeply(line: usize, column: usize) -> String {
+    format!("more than {MOST_NESTED} open brackets at line {line} column {column}")
+}
+
+/// The line and column of the first bracket that nests a text too deeply.
+fn deepest(text: &str) -> Option<(usize, usize)> {
     let bytes = text.as_bytes();
     let (mut depth, mut at, mut line, mut start) = (0, 0, 1, 0);
     while let Some(byte) = bytes.get(at) {
@@ -64,10 +105,7 @@ pub fn too_deep(text: &str) -> Option<String> {
                 }
             }
             b'[' | b'{' if depth == MOST_NESTED => {
-                let column = at + 1 - start;
-                return Some(format!(
-                    "more than {MOST_NESTED} open brackets at line {line} column {column}"
-                ));
+                return Some((line, at + 1 - start));
             }
             b'[' | b'{' => depth += 1,
             b']' | b'}' => depth = depth.saturating_sub(1),
@@ -142,7 +180,7 @@ impl<'de> serde::de::DeserializeSeed<'de> for Anything {
 }
 
 /// A fault that the schema cannot express, such as a repeated name or a number outside its type.
-fn beyond_the_schema(text: &str, first: &serde_json::Error) -> Violation {
+fn beyond_the_schema(text: &str, first: String) -> Violation {
     let mut reader = serde_json::Deserializer::from_str(text);
     let path = serde_path_to_error::deserialize::<_, Problem>(&mut reader).err();
     Violation::new(

@@ -10,6 +10,7 @@ pub mod sweep;
 
 mod external;
 mod file;
+mod inline;
 mod schema;
 mod source;
 
@@ -26,7 +27,7 @@ mod number; // what these share
 
 pub use external::external_mesh;
 pub use file::{MeshFormat, read_mesh};
-pub use json::parse;
+pub use json::{parse, read};
 pub use schema::{meant, quoted, schema};
 pub use source::ReadError;
 

@@ -1,6 +1,8 @@
 //! `signorini solve FILE`: runs the same code as a worker of the service.
 
 use std::{
+    fs::File,
+    io::Read,
     ops::ControlFlow,
     path::{Path, PathBuf},
     time::Instant,
@@ -8,9 +10,10 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
-use files::plot::Theme;
+use files::{ReadError, plot::Theme};
 use solver::{
     error::{SolveError, Violation},
+    problem::Problem,
     solution::Observer,
 };
 
@@ -73,19 +76,12 @@ pub(super) fn run(
     }: &Arguments,
 ) -> anyhow::Result<Exit> {
     let start = Instant::now();
-    let text =
-        std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let deck = file
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("inp"));
-    let read = if deck {
-        files::abaqus::problem(&text)
-    } else {
-        files::parse(&text)
-    };
-    let problem = match read {
+    let problem = match read(file) {
         Ok(problem) => problem,
-        Err(violations) => return Ok(invalid(file, &violations)),
+        Err(ReadError::Invalid(violations)) => return Ok(invalid(file, &violations)),
+        Err(ReadError::Io(error)) => {
+            return Err(error).with_context(|| format!("cannot read {}", file.display()));
+        }
     };
     let parse_s = start.elapsed().as_secs_f64();
     let contacts = problem.contacts.iter();
@@ -155,6 +151,21 @@ pub(super) fn run(
     })
 }
 
+/// Reads a problem by the ending of its file: of a JSON file with a mesh only the mesh is held, not its text.
+fn read(file: &Path) -> Result<Problem, ReadError> {
+    let mut opened = File::open(file).map_err(ReadError::Io)?;
+    let deck = file
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("inp"));
+    if !deck {
+        return files::read(opened);
+    }
+    let mut text = String::new();
+    let read = opened.read_to_string(&mut text);
+    read.map_err(ReadError::Io)?;
+    files::abaqus::problem(&text).map_err(ReadError::Invalid)
+}
+
 /// `signorini schema`.
 pub(super) fn schema() -> anyhow::Result<Exit> {
     output::print(&format!("{:#}\n", files::schema()))?;
@@ -172,4 +183,55 @@ pub(super) fn invalid(file: &Path, violations: &[Violation]) -> Exit {
         eprintln!("  {violation}");
     }
     Exit::Invalid
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::fmt::Write;
+
+    use solver::problem::MeshSource;
+
+    use crate::{digest, fake};
+
+    /// Of a large inline mesh only the columns are held, which grow by doubling, and a few pieces of the text; nothing
+    /// for its fingerprint.
+    #[test]
+    fn a_large_inline_mesh_is_read_and_hashed_in_the_memory_of_its_columns() {
+        const PIECES: i64 = 512 << 10;
+        let (nodes, elements) = (90_000, 30_000);
+        let mut text = serde_json::to_string(&fake::problem()).unwrap();
+        let grid = text.find("{\"grid\"").unwrap();
+        let end = grid + text[grid..].find("]}").unwrap() + 2;
+        let mut mesh = "{\"inline\": {\"nodes\": [".to_owned();
+        for node in 0..nodes {
+            let comma = if node > 0 { ",\n" } else { "" };
+            let (x, y) = (0.1 * f64::from(node), -1e-3 * f64::from(node));
+            write!(mesh, "{comma}[{x}, {y}]").unwrap();
+        }
+        mesh += "], \"elements\": [";
+        for element in 0..elements {
+            let comma = if element > 0 { "," } else { "" };
+            let nodes: [u32; 8] = std::array::from_fn(|k| 3 * element + k as u32 % 3);
+            write!(mesh, "{comma}{nodes:?}").unwrap();
+        }
+        mesh += "], \"boundaries\": {}}";
+        text.replace_range(grid..end, &mesh);
+        assert!(text.len() > 3 << 20);
+
+        let columns = i64::from(nodes) * 16 + i64::from(elements) * 36;
+        let before = allocator::held();
+        allocator::forget_highest();
+        let problem = files::read(text.as_bytes()).unwrap();
+        let (held, highest) = (allocator::held() - before, allocator::highest() - before);
+        assert!(held <= columns + PIECES, "{held} of {columns}");
+        assert!(highest <= 2 * columns + PIECES, "{highest} of {columns}");
+        assert!(matches!(&problem.mesh.source, MeshSource::Inline(mesh)
+            if mesh.nodes.len() == nodes as usize && mesh.elements.len() == elements as usize));
+
+        allocator::forget_highest();
+        digest::input_hash(&problem).unwrap();
+        let highest = allocator::highest() - before - held;
+        assert!(highest <= PIECES, "{highest}");
+    }
 }

@@ -148,7 +148,7 @@ impl FromMessage<Vec<u32>> for Element {
     fn from_message(nodes: Vec<u32>, read: &mut Reader) -> Option<Self> {
         let found = nodes.len();
         let wrong = || read.wrong(Reason::WrongLength, numbers(found), "8 or 6 node numbers");
-        Element::try_from(nodes).ok().or_else(wrong)
+        Element::try_from(&nodes[..]).ok().or_else(wrong)
     }
 }
 

@@ -7,15 +7,16 @@ pub mod tri6;
 
 pub use gauss::GaussPoint;
 
+use std::fmt;
 use std::ops::Deref;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+use serde::{Serialize, Serializer};
 
 /// An element by its nodes, from 0: corners counter-clockwise, then the midsides from the side
 /// 1–2 on. In JSON a list of eight or six numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<u32>", into = "Vec<u32>")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
     /// The 8-node quadrilateral.
     Quad([u32; 8]),
@@ -107,26 +108,61 @@ impl Deref for Element {
     }
 }
 
-impl TryFrom<Vec<u32>> for Element {
+impl TryFrom<&[u32]> for Element {
     type Error = String;
 
-    fn try_from(nodes: Vec<u32>) -> Result<Self, String> {
-        if let Ok(quad) = nodes[..].try_into() {
+    fn try_from(nodes: &[u32]) -> Result<Self, String> {
+        if let Ok(quad) = nodes.try_into() {
             return Ok(Element::Quad(quad));
         }
-        if let Ok(triangle) = nodes[..].try_into() {
+        if let Ok(triangle) = nodes.try_into() {
             return Ok(Element::Triangle(triangle));
         }
-        Err(format!(
-            "{} nodes, where an element has 8 (quadrilateral) or 6 (triangle)",
-            nodes.len()
-        ))
+        Err(wrong_count(nodes.len()))
     }
 }
 
-impl From<Element> for Vec<u32> {
-    fn from(element: Element) -> Self {
-        element.to_vec()
+fn wrong_count(count: usize) -> String {
+    format!("{count} nodes, where an element has 8 (quadrilateral) or 6 (triangle)")
+}
+
+/// As a list of its nodes. Written by hand, as its reading: a list made for every element of a large mesh takes longer
+/// than its text.
+impl Serialize for Element {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.iter())
+    }
+}
+
+impl<'de> Deserialize<'de> for Element {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(Nodes)
+    }
+}
+
+/// Reads the nodes of an element.
+struct Nodes;
+
+impl<'de> Visitor<'de> for Nodes {
+    type Value = Element;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // as of any list
+        f.write_str("a sequence")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Element, A::Error> {
+        let (mut nodes, mut count) = ([0; 8], 0);
+        while let Some(node) = list.next_element()? {
+            if let Some(place) = nodes.get_mut(count) {
+                *place = node;
+            }
+            count += 1;
+        }
+        match nodes.get(..count) {
+            Some(nodes) => Element::try_from(nodes).map_err(A::Error::custom),
+            None => Err(A::Error::custom(wrong_count(count))),
+        }
     }
 }
 

@@ -7,15 +7,15 @@ use crate::error::{AllChecks, Checked, Findings, Reason, Violation, escape};
 use crate::problem::InlineMesh;
 
 /// The mesh, or all faults of its numbering; `pointer` is that of the inline mesh.
-pub fn inline_mesh(input: &InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violation>> {
+pub fn inline_mesh(input: InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violation>> {
     let mut found = Findings::of_mesh(pointer);
     let mesh = check(input, &mut found);
     found.conclude(mesh)
 }
 
-fn check(input: &InlineMesh, found: &mut Findings) -> Checked<Mesh> {
+fn check(input: InlineMesh, found: &mut Findings) -> Checked<Mesh> {
     // the following needs valid numbers
-    let used = numbers(input, found)?;
+    let used = numbers(&input, found)?;
     let mut all = AllChecks::default();
     for node in (0..input.nodes.len()).filter(|&n| !used[n]) {
         all.fail(found.report(
@@ -26,18 +26,18 @@ fn check(input: &InlineMesh, found: &mut Findings) -> Checked<Mesh> {
             "Remove the node.",
         ));
     }
-    let sides = surface(input, found, &mut all);
+    let sides = surface(&input, found, &mut all);
     let boundaries = input.boundaries.iter().filter_map(|(name, edges)| {
         let directed = all.check(directed(name, edges, &sides, found))?;
         Some((name.clone(), directed))
     });
     let boundaries = boundaries.collect();
     all.finish(Mesh {
-        nodes: input.nodes.clone(),
-        elements: input.elements.clone(),
+        nodes: input.nodes,
+        elements: input.elements,
         boundaries,
-        groups: input.groups.clone(),
-        node_sets: input.node_sets.clone(),
+        groups: input.groups,
+        node_sets: input.node_sets,
     })
 }
 
@@ -249,7 +249,7 @@ mod tests {
             let mut input = square();
             input.boundaries.insert("top".to_owned(), vec![edge]);
             assert_eq!(
-                inline_mesh(&input, "").unwrap().boundaries["top"],
+                inline_mesh(input.clone(), "").unwrap().boundaries["top"],
                 [[3, 2, 6]]
             );
         }
@@ -259,7 +259,7 @@ mod tests {
     fn unknown_and_repeated_nodes_and_unknown_edges_are_reported() {
         let mut input = square();
         input.elements[0] = Element::Quad([0, 1, 99, 1, 4, 5, 6, 7]);
-        let pointers: Vec<_> = inline_mesh(&input, "/mesh/inline")
+        let pointers: Vec<_> = inline_mesh(input.clone(), "/mesh/inline")
             .unwrap_err()
             .into_iter()
             .map(|v| v.pointer)
@@ -274,7 +274,7 @@ mod tests {
         input
             .boundaries
             .insert("top".to_owned(), vec![[3, 1, 6], [3, 2, 5], [2, 3, 6]]);
-        let reasons: Vec<_> = inline_mesh(&input, "")
+        let reasons: Vec<_> = inline_mesh(input.clone(), "")
             .unwrap_err()
             .into_iter()
             .map(|v| v.reason)
@@ -294,7 +294,7 @@ mod tests {
     fn a_long_list_of_the_same_fault_is_counted() {
         let mut input = square();
         input.nodes.extend((0..100).map(|i| [f64::from(i), 9.0]));
-        let list = inline_mesh(&input, "").unwrap_err();
+        let list = inline_mesh(input.clone(), "").unwrap_err();
         assert_eq!(list.len(), 20);
         assert!(list[19].hint.contains("80 more"));
     }

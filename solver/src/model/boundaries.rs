@@ -177,7 +177,8 @@ impl Checks {
                 Ok(mesh::grid_mesh(grid))
             }
             MeshSource::Inline(inline) => {
-                self.found.merge(mesh::inline_mesh(inline, "/mesh/inline"))
+                let mesh = mesh::inline_mesh(inline.clone(), "/mesh/inline");
+                self.found.merge(mesh)
             }
             MeshSource::Gmsh(_) | MeshSource::Abaqus(_) | MeshSource::Stored(_) => match external {
                 Some(found) => {

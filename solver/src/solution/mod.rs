@@ -46,12 +46,24 @@ pub struct Solution {
 impl Solution {
     /// Whether every number is finite, also those that are not part of the document.
     pub fn is_finite(&self) -> bool {
-        is_finite(self)
-            && is_finite(&[&self.node_profiles, &self.friction_profiles])
-            && self
-                .steps
+        // all of them by name, here and below, so that a new one is not forgotten
+        let Solution {
+            summary,
+            history,
+            profiles,
+            node_profiles,
+            friction_profiles,
+            steps,
+            fields,
+        } = self;
+        is_finite(summary)
+            && is_finite(history)
+            && is_finite(&[profiles, node_profiles, friction_profiles])
+            && is_finite(steps)
+            && steps
                 .iter()
                 .all(|s| is_finite(&[&s.node_profiles, &s.friction_profiles]))
+            && fields.is_finite()
     }
 }
 
@@ -581,6 +593,46 @@ pub struct Fields {
     pub element_error: Vec<f64>,
     /// Stresses at the integration points of every element, not averaged.
     pub gauss: GaussFields,
+}
+
+impl Fields {
+    /// Column by column: they are nearly all numbers of a large solution, and to serialize them takes ten times as long.
+    fn is_finite(&self) -> bool {
+        let Fields {
+            x,
+            y,
+            ux,
+            uy,
+            stress_xx,
+            stress_yy,
+            stress_xy,
+            stress_zz,
+            contact_state: _,
+            elements: _,
+            element_error,
+            gauss,
+        } = self;
+        let GaussFields {
+            order: _,
+            x: points_x,
+            y: points_y,
+            stress_xx: at_points_xx,
+            stress_yy: at_points_yy,
+            stress_xy: at_points_xy,
+            stress_zz: at_points_zz,
+        } = gauss;
+        let at_nodes = [x, y, ux, uy, stress_xx, stress_yy, stress_xy, stress_zz];
+        let at_points = [
+            points_x,
+            points_y,
+            at_points_xx,
+            at_points_yy,
+            at_points_xy,
+            at_points_zz,
+        ];
+        let mut columns = at_nodes.into_iter().chain(at_points).chain([element_error]);
+        columns.all(|column| column.iter().all(|number| number.is_finite()))
+    }
 }
 
 /// Values at the integration points, element by element. A quadrilateral has order × order of them, the
