@@ -11,16 +11,16 @@ use crate::problem::Problem;
 use crate::solution::{
     ContactSummary, Observer, Outcome, Peak, Residuals, Solution, Summary, Warning, WarningCode,
 };
-use crate::steps::{self, Neighbour, Numbers};
+use crate::steps::{self, Numbers, Shared};
+pub use crate::steps::{End, Start};
 
-/// Problems on one body, solved one after the other, each from the end of the one before where that helps.
+/// Problems on one body, solved one after the other, each from the end of another one where that helps.
 pub struct Family {
     model: VariableModel,
     body: ElasticBody,
     /// What was said of the mesh when it was made; problems on it repeat it.
     mesh_warnings: Vec<Warning>,
-    /// What the last member leaves to the next.
-    neighbour: Neighbour,
+    shared: Shared,
 }
 
 /// The numbers of one member.
@@ -67,12 +67,15 @@ impl Family {
             model: VariableModel::new(model, problem),
             body,
             mesh_warnings,
-            neighbour: Neighbour::default(),
+            shared: Shared::default(),
         })
     }
 
-    /// Solves a problem on this body (`problem.mesh` is not read: it is the family's). `Err(Invalid)` with its violations
-    /// if it is wrong; `Err(OtherBody)` if its body differs.
+    /// Solves a problem on this body (`problem.mesh` is not read: it is the family's); also its end, from which others may
+    /// begin. `Err(Invalid)` with its violations if it is wrong; `Err(OtherBody)` if its body differs.
+    ///
+    /// Its numbers are those of its own solution within the tolerance. Their last bits depend on its start, and on nothing
+    /// else that was solved before.
     ///
     /// Its displacements away from the contacts are not computed: the balance of forces (`residuals.equilibrium`) is 0, and
     /// warnings that need it, or strains, are missing. A body that only contact holds, and comparisons of solutions, take
@@ -80,19 +83,20 @@ impl Family {
     pub fn member(
         &mut self,
         problem: &Problem,
+        start: Start<'_>,
         observe: &mut Observer<'_>,
-    ) -> Result<Member, SolveError> {
+    ) -> Result<(Member, Option<End>), SolveError> {
         let controls = &problem.solver;
         let whole = controls.check_uniqueness || controls.check_increments;
         let set = match whole {
             true => None,
             false => self.model.set(problem),
         };
-        let numbers = match set {
+        let (numbers, end) = match set {
             Some(set) => {
                 set.map_err(SolveError::Invalid)?;
-                let (model, neighbour) = (self.model.model(), &mut self.neighbour);
-                steps::run_to_numbers(model, &self.body, neighbour, observe)?
+                let (model, shared) = (self.model.model(), &mut self.shared);
+                steps::run_to_numbers(model, &self.body, shared, start, observe)?
             }
             None => {
                 let model = self.other_model(problem)?;
@@ -100,13 +104,32 @@ impl Family {
                     let solution = steps::run(&model, &self.body, None, observe)?;
                     return match solution.summary.outcome {
                         Outcome::Canceled => Err(SolveError::Stopped),
-                        _ => Ok(Member::of(&solution.summary)),
+                        _ => Ok((Member::of(&solution.summary), None)),
                     };
                 }
-                steps::run_to_numbers(&model, &self.body, &mut Neighbour::default(), observe)?
+                let shared = &mut Shared::default();
+                steps::run_to_numbers(&model, &self.body, shared, Start::Anew, observe)?
             }
         };
-        Ok(Member::of_numbers(&numbers))
+        Ok((Member::of_numbers(&numbers), end))
+    }
+
+    /// Solves a problem on this body with all its displacements, whose balance of forces tells whether the body is sound:
+    /// the first of those that share it. Its numbers are those of its own solution, bit for bit.
+    pub fn whole_member(
+        &self,
+        problem: &Problem,
+        observe: &mut Observer<'_>,
+    ) -> Result<Member, SolveError> {
+        let controls = &problem.solver;
+        if controls.check_uniqueness || !problem.steps.is_empty() {
+            let solution = self.solution(problem, observe)?;
+            return Ok(Member::of(&solution.summary));
+        }
+        // the errors of its numbers are no part of a member
+        let model = self.other_model(problem)?;
+        let reported = steps::run_to_compare(&model, &self.body, observe)?;
+        Ok(Member::of(&reported.summary))
     }
 
     /// The whole solution of a problem on this body, as [`solve`](crate::solve) gives it, bit for bit.
@@ -227,10 +250,14 @@ mod tests {
     fn members_have_the_numbers_of_their_own_solutions() {
         let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
         let mut family = Family::new(&problem(0.3, 0.05), None, go_on).unwrap();
+        let mut end: Option<End> = None;
         for (coefficient, indentation) in [(0.3, 0.05), (0.1, 0.1), (0.6, 0.02)] {
+            let start = end.as_ref().map_or(Start::Anew, Start::Next);
             let problem = problem(coefficient, indentation);
             let alone = crate::solve(&problem, go_on).unwrap();
-            let member = family.member(&problem, go_on).unwrap();
+            let (member, own_end) = family.member(&problem, start, go_on).unwrap();
+            end = own_end;
+            assert!(end.is_some());
             let expected = Member::of(&alone.summary);
             assert_eq!(
                 (member.outcome, &member.warnings),
@@ -265,12 +292,141 @@ mod tests {
     fn what_is_wrong_with_a_member_is_told_and_another_body_is_not_solved() {
         let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
         let mut family = Family::new(&problem(0.3, 0.05), None, go_on).unwrap();
-        let invalid = family.member(&problem(-1.0, 0.05), go_on);
+        let invalid = family.member(&problem(-1.0, 0.05), Start::Anew, go_on);
         assert!(
             matches!(invalid, Err(SolveError::Invalid(list)) if list[0].pointer.ends_with("coefficient"))
         );
         let mut other = problem(0.3, 0.05);
         other.quadrature = 2;
-        assert_eq!(family.member(&other, go_on), Err(SolveError::OtherBody));
+        let refused = family.member(&other, Start::Anew, go_on);
+        assert_eq!(refused.err(), Some(SolveError::OtherBody));
+    }
+
+    /// A quarter of a cylinder's contact, with the numbers of the sweep of 1,000 members that is measured.
+    fn pressed(radius: f64, coefficient: f64, slip: f64, indentation: f64) -> Problem {
+        let x: Vec<f64> = (0..=20)
+            .map(|i| 0.08 * f64::from(i))
+            .chain([2.4, 4.0])
+            .collect();
+        serde_json::from_value(serde_json::json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": x, "y": [-8, -4, -2, -1, -0.5, -0.25, -0.1, 0]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
+            "contacts": [{"boundary": "top", "obstacle": {"kind": "circle", "radius": 8}, "indentation": indentation,
+                "friction": {"coefficient": coefficient, "nonlocal_radius": radius, "elastic_slip": slip}}]
+        }))
+        .unwrap()
+    }
+
+    /// Its own solution is one from a fresh start on the same body, which is that of `solve` bit for bit. Widths are
+    /// compared as parts of the contact's, since a narrow part is known as well as a wide one.
+    #[test]
+    fn every_member_of_a_sweep_has_the_numbers_of_its_own_solution() {
+        let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
+        let even = |from: f64, to: f64, count: u32| {
+            let at = move |k: u32| from + (to - from) * f64::from(k) / f64::from(count - 1);
+            (0..count).map(at).collect::<Vec<f64>>()
+        };
+        let mut family = Family::new(&pressed(0.02, 0.05, 1e-4, 0.06), None, go_on).unwrap();
+        let (mut checked, mut steps, mut sweeps) = (0, 0, 0);
+        let mut first: Option<End> = None;
+        for radius in even(0.02, 0.04, 5) {
+            for coefficient in even(0.05, 0.45, 5) {
+                for slip in even(1e-4, 2e-4, 5) {
+                    let mut last: Option<End> = None;
+                    for indentation in even(0.06, 0.1, 8) {
+                        let problem = pressed(radius, coefficient, slip, indentation);
+                        let start = match (&last, &first) {
+                            (Some(end), _) => Start::Next(end),
+                            (None, Some(end)) => Start::Near(end),
+                            (None, None) => Start::Anew,
+                        };
+                        let (member, end) = family.member(&problem, start, go_on).unwrap();
+                        if last.is_none() {
+                            first.clone_from(&end);
+                        }
+                        last = end;
+                        let alone = family.solution(&problem, go_on).unwrap();
+                        let own = Member::of(&alone.summary);
+                        assert_eq!(
+                            (member.outcome, &member.warnings),
+                            (own.outcome, &own.warnings)
+                        );
+                        for (found, expected, scale) in [
+                            (member.normal_force, own.normal_force, own.normal_force),
+                            (
+                                member.tangential_force,
+                                own.tangential_force,
+                                own.tangential_force,
+                            ),
+                            (
+                                member.friction_force,
+                                own.friction_force,
+                                own.friction_force,
+                            ),
+                            (member.contact_width, own.contact_width, own.contact_width),
+                            (member.stick_width, own.stick_width, own.contact_width),
+                            (member.slip_width, own.slip_width, own.contact_width),
+                            (
+                                member.peak_normal_stress,
+                                own.peak_normal_stress,
+                                own.peak_normal_stress,
+                            ),
+                            (
+                                member.peak_tangential_stress,
+                                own.peak_tangential_stress,
+                                own.peak_tangential_stress,
+                            ),
+                        ] {
+                            let off = (found - expected).abs();
+                            assert!(
+                                off <= 1e-9 * scale.abs(),
+                                "{found} for {expected} at {radius} {coefficient} {slip} {indentation}"
+                            );
+                        }
+                        checked += 1;
+                        steps += member.iterations;
+                        sweeps += own.iterations;
+                    }
+                }
+            }
+        }
+        assert_eq!(checked, 1000);
+        assert!(steps < 12_000 && sweeps > 4_000, "{steps} {sweeps}");
+    }
+
+    /// Whatever was solved before on the body, with other radii, deeper, or without friction.
+    #[test]
+    fn the_bits_of_a_member_depend_on_where_it_begins_and_on_nothing_else() {
+        let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
+        let chain = [0.05, 0.06, 0.07, 0.2].map(|d| pressed(0.03, 0.3, 1e-4, d));
+        let others = [
+            pressed(0.2, 0.5, 1e-3, 0.4),
+            pressed(0.03, 0.0, 1e-4, 0.06),
+            pressed(0.03, 0.3, 1e-4, 0.01),
+        ];
+        let mut found = Vec::new();
+        for with_others in [false, true] {
+            let mut family = Family::new(&chain[0], None, go_on).unwrap();
+            if with_others {
+                let mut end: Option<End> = None;
+                for other in &others {
+                    let start = end.as_ref().map_or(Start::Anew, Start::Next);
+                    let (member, own) = family.member(other, start, go_on).unwrap();
+                    assert_eq!(member.outcome, Outcome::Converged);
+                    end = own;
+                }
+            }
+            let (mut members, mut end) = (Vec::new(), None::<End>);
+            for problem in &chain {
+                let start = end.as_ref().map_or(Start::Anew, Start::Next);
+                let (member, own) = family.member(problem, start, go_on).unwrap();
+                members.push(member);
+                end = own;
+            }
+            found.push(members);
+        }
+        assert_eq!(found[0], found[1]);
     }
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use crate::accuracy;
 use crate::algorithm::{
-    self, Averages, Finished, Place, Region, Reported, Rounding, System, report, run_near,
+    self, Averages, Extent, Finished, Place, Region, Reported, Rounding, System, report, run_near,
     settle_near,
 };
 use crate::body::ElasticBody;
@@ -112,13 +112,32 @@ pub fn run(
     Ok(solution)
 }
 
-/// What problems on one body share, from one to the next.
+/// What problems on one body share.
 #[derive(Default)]
-pub struct Neighbour {
+pub struct Shared {
     averages: Averages,
     region: Region,
-    /// The end of the last problem without load steps.
-    last: Option<Finished>,
+}
+
+/// The end of a problem without load steps, from which those begin whose numbers differ a little.
+#[derive(Clone)]
+pub struct End {
+    finished: Finished,
+    /// v of the end before it, if it came next after that.
+    before: Option<Vec<f64>>,
+    extent: Extent,
+}
+
+/// Where a problem without load steps begins.
+#[derive(Clone, Copy)]
+pub enum Start<'a> {
+    /// As on its own.
+    Anew,
+    /// From the end of a neighbour.
+    Near(&'a End),
+    /// The same, where that neighbour was solved just before: its factors may serve, and if it was the next after another
+    /// one itself, the way goes on from both. Whether it is this or [`Start::Near`] decides about the last bits.
+    Next(&'a End),
 }
 
 /// The numbers of the end of all steps: what is known without the displacements of the whole body.
@@ -133,49 +152,72 @@ pub struct Numbers {
     pub warnings: Vec<Warning>,
 }
 
-/// The same path to its end, for its numbers alone. A problem without steps starts from the end of its neighbour; where that
-/// does not converge well, as [`run`] does.
+/// The same path to its end, for its numbers alone; and its end, if others can begin from it. Where a problem does not
+/// converge well from its start, it is solved as [`run`] does.
 pub fn run_to_numbers(
     model: &Model,
     body: &ElasticBody,
-    neighbour: &mut Neighbour,
+    shared: &mut Shared,
+    start: Start<'_>,
     observe: &mut Observer<'_>,
-) -> Result<Numbers, SolveError> {
-    let system = System::with_averages(model, body, &mut neighbour.averages, observe)?;
+) -> Result<(Numbers, Option<End>), SolveError> {
+    let system = System::with_averages(model, body, &mut shared.averages, observe)?;
     let mut load_history = LoadHistory::new(model, system);
-    std::mem::swap(&mut load_history.region, &mut neighbour.region);
-    let near = neighbour.last.take().filter(|last| {
+    let region = &mut shared.region;
+    let (end, next) = match start {
+        Start::Anew => (None, false),
+        Start::Near(end) => (Some(end), false),
+        Start::Next(end) => (Some(end), true),
+    };
+    match end {
+        Some(end) => region.reach(&end.extent, next),
+        None => region.reach(&Extent::default(), false),
+    }
+    let near = end.and_then(|end| {
         let system = &load_history.system;
+        let last = &end.finished;
         let sizes = [last.state.v.len(), last.bound.len()];
-        model.steps.is_empty() && sizes == [system.load.len(), system.points.len()]
-    });
-    let near = near.and_then(|last| {
-        let (system, region) = (&load_history.system, &mut load_history.region);
-        settle_near(system, &model.controls, &last, region, observe)
+        if !model.steps.is_empty() || sizes != [system.load.len(), system.points.len()] {
+            return None;
+        }
+        let before = end.before.as_deref().filter(|_| next);
+        settle_near(system, &model.controls, (last, before), region, observe)
     });
     let (finished, iterations) = match near {
         Some(near) => near,
         None => {
-            let Some(finished) = load_history.follow(&steps_of(model), 1, observe) else {
+            std::mem::swap(&mut load_history.region, region);
+            let followed = load_history.follow(&steps_of(model), 1, observe);
+            std::mem::swap(&mut load_history.region, region);
+            let Some(finished) = followed else {
                 unreachable!("there is at least one step: a problem without steps is one step")
             };
             (finished, load_history.row_count)
         }
     };
-    std::mem::swap(&mut load_history.region, &mut neighbour.region);
     if finished.outcome == Outcome::Canceled {
         return Err(SolveError::Stopped);
     }
     let (contacts, warnings) = algorithm::numbers(model, &load_history.system, &finished);
-    if finished.outcome == Outcome::Converged && model.steps.is_empty() {
-        neighbour.last = Some(finished.clone());
-    }
-    Ok(Numbers {
+    let others_begin = finished.outcome == Outcome::Converged && model.steps.is_empty();
+    let left = others_begin.then(|| End {
+        finished: Finished {
+            history: Vec::new(),
+            ..finished.clone()
+        },
+        before: match start {
+            Start::Next(before) => Some(before.finished.state.v.clone()),
+            Start::Anew | Start::Near(_) => None,
+        },
+        extent: region.extent(),
+    });
+    let numbers = Numbers {
         finished,
         contacts,
         iterations,
         warnings,
-    })
+    };
+    Ok((numbers, left))
 }
 
 /// Adds to the end of the path what was told of an earlier step alone and the end rests on: kinematics that were not small.

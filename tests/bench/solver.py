@@ -1,14 +1,15 @@
 """Measures `signorini solve` as a whole process, against itself, a factorisation and other programs, and prints the
 tables of docs/performance.md, "Against other programs".
 
-    solver.py [--runs N] [--only NAME,...] [--against BINARY] [--large]
+    solver.py [--runs N] [--only NAME,...] [--against BINARY] [--members] [--large]
 
 All tables but the last take some three minutes. Runs (5 when absent) of what is compared take turns, so that a machine
 that slows down for a while slows both. Ratios are formed within a turn; each row has the least, the median and the
 most of them. Seconds are processor time, so that other work on the machine does not count, except where it says clock.
 
---only     of whole, growth, cholmod, pair, threads, iterations, increments, fill, peers
+--only     of whole, growth, cholmod, pair, threads, iterations, increments, sweeps, fill, peers
 --against  another binary, such as an older build, in the turns of `whole`
+--members  in `sweeps` also each of 1,000 members in a process of its own, some three minutes
 --large    also `peers`: GetFEM and CalculiX at 2e5 degrees of freedom, twice each, some ten minutes
 
 Solutions take one thread, except where two are measured. `cargo build --release --workspace` comes first, or
@@ -51,7 +52,7 @@ GOALS = {  # of issue 14
     "whole/factorisation": "≤ 1.3", "cholmod": "≤ 0.5", "GetFEM": "≥ 50", "CalculiX": "≥ 140",
     "growth": "≤ 1.35", "iterations/whole": "≤ 0.25", "pair": "≥ 1.7", "increments": "≤ 1.5",
     "iterations/dense": "≤ 1", "user 2e5": "≤ 0.6", "user 1e6": "≤ 4", "peak 1e6": "≤ 1,434", "peak": "≤ 1.3",
-    "threads": "≥ 1.5",
+    "threads": "≥ 1.5", "sweep/job": "≤ 2", "10,000 members": "≤ 5", "member": "≤ 1e-9",
 }
 
 
@@ -82,6 +83,31 @@ def increments():
         {"name": "unload", "indentation": 0.1, "tangential_displacement": 1, "increments": 30},
     ]
     return made
+
+
+def even(start, stop, count):
+    return {"linspace": {"start": start, "stop": stop, "count": count}}
+
+
+def axes(values):
+    """The axes of a sweep, by the names of numbers of its contact."""
+    return [{"path": "/contacts/0/" + name, **axis} for name, axis in values.items()]
+
+
+def thousand():
+    """1,000 members on P1 at 2e4 degrees of freedom."""
+    return {"base": p1("2e4"), "axes": axes({
+        "friction/nonlocal_radius": even(0.02, 0.04, 5), "friction/coefficient": even(0.05, 0.45, 5),
+        "friction/elastic_slip": even(1e-4, 2e-4, 5), "indentation": even(0.06, 0.1, 8)})}
+
+
+def ten_thousand():
+    """10,000 members on example 1, of 56 elements."""
+    base = json.loads((TESTS / "data/thesis/rectangular_punch.json").read_text())
+    return {"base": base, "axes": axes({
+        "friction/nonlocal_radius": even(0.008, 0.015, 10), "friction/coefficient": even(0.05, 0.5, 10),
+        "friction/elastic_slip": {"logspace": {"start": 1e-5, "stop": 1e-3, "count": 10}},
+        "indentation": even(0.1, 0.3, 10)})}
 
 
 class Folder:
@@ -387,6 +413,59 @@ def eighty_increments(folder, options):
           ])
 
 
+def sweep(folder, file):
+    """Solves a sweep: the CPU seconds of the process, and the table."""
+    table = folder.path / "table.json"
+    used = measured([str(BINARY), "sweep", str(file), "-o", str(table)])
+    return used.user_s + used.system_s, json.loads(table.read_text())
+
+
+def sweeps(folder, options):
+    """Sweeps against one job, and each member of one against its own solution in a process of its own."""
+    made = thousand()
+    many, large = folder.file("many", made), folder.file("large", ten_thousand())
+    job = folder.file("job", made["base"])
+    runs = []
+    for _ in range(options.runs):
+        cpu, rows = sweep(folder, many)
+        runs.append((cpu, solve(folder, job)["cpu"], sweep(folder, large)[0]))
+    worst = 0
+    if options.members:
+        for row in rows:
+            alone = json.loads(json.dumps(made["base"]))
+            for path, value in row["parameters"].items():
+                *way, last = path.split("/")[1:]
+                place = alone
+                for token in way:
+                    place = place[int(token) if token.isdigit() else token]
+                place[last] = value
+            own = solve(folder, folder.file("member", alone))["summary"]
+            worst = max(worst, *differences(row, own))
+    rows = [
+        ("1,000 members on 2e4 degrees of freedom, CPU s", [a for a, _, _ in runs], ""),
+        ("one job of them, CPU s", [b for _, b, _ in runs], ""),
+        ("sweep/job", [a / b for a, b, _ in runs], GOALS["sweep/job"]),
+        ("10,000 members on 56 elements, CPU s", [c for _, _, c in runs], GOALS["10,000 members"]),
+    ]
+    if options.members:
+        rows.append(("largest relative difference of any of the 1,000 from its own `solve`", [worst], GOALS["member"]))
+    table("Sweeps (%d runs)" % options.runs, rows)
+
+
+def differences(row, own):
+    """Relative differences of a row from a summary; widths as parts of the contact's."""
+    contacts = own["contacts"].values()
+    for name in ("normal_force", "tangential_force", "friction_force"):
+        yield abs(row[name] - own[name]) / abs(own[name])
+    for name in ("peak_normal_stress", "peak_tangential_stress"):
+        peak = max((contact[name]["value"] for contact in contacts), key=abs)
+        yield abs(row[name] - peak) / abs(peak)
+    width = sum(end - start for contact in contacts for start, end in contact["contact"])
+    for name in ("contact", "stick", "slip"):
+        own_width = sum(end - start for contact in contacts for start, end in contact[name])
+        yield abs(row[name + "_width"] - own_width) / width
+
+
 def peers(options):
     """GetFEM and CalculiX on the same problem at 2e5 degrees of freedom."""
     limits = programs.limits()
@@ -433,9 +512,10 @@ def main():
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--only", type=lambda names: names.split(","))
     parser.add_argument("--against", type=pathlib.Path)
+    parser.add_argument("--members", action="store_true")
     parser.add_argument("--large", action="store_true")
     options = parser.parse_args()
-    every = ["whole", "growth", "cholmod", "pair", "threads", "iterations", "increments", "fill"]
+    every = ["whole", "growth", "cholmod", "pair", "threads", "iterations", "increments", "sweeps", "fill"]
     chosen = options.only or every + ["peers"] * options.large
     unknown = set(chosen) - {*every, "peers"}
     if unknown or options.runs < 1:
@@ -450,7 +530,8 @@ def main():
         if "growth" in chosen:
             growth(folder, options, done)
         for name, bench in (("cholmod", cholmod), ("pair", pair), ("threads", threads),
-                            ("iterations", iterations), ("increments", eighty_increments), ("fill", fill)):
+                            ("iterations", iterations), ("increments", eighty_increments), ("sweeps", sweeps),
+                            ("fill", fill)):
             if name in chosen:
                 bench(folder, options)
         if "peers" in chosen:

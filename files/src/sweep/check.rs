@@ -7,6 +7,7 @@ use solver::error::{Findings, Violation};
 use solver::model::Model;
 use solver::problem::{MeshSource, NormalOf, Problem, Refine};
 
+use super::numbers::{Problems, Read};
 use super::read::Sweep;
 
 /// Most violations of members that are told.
@@ -23,22 +24,29 @@ pub fn groups(sweep: &Sweep) -> Result<Vec<Group>, Vec<Violation>> {
     let mut places = BTreeSet::new();
     let mut groups: Vec<Group> = vec![];
     let mut by_body: BTreeMap<String, usize> = BTreeMap::new();
+    let mut problems = Problems::new(plan);
+    // the group of the member before
+    let mut last = None;
     for number in 0..plan.count() {
-        let problem = plan.problem(number).and_then(|problem| {
-            let violations = violations(&problem);
+        let read = problems.read(number).and_then(|read| {
+            let violations = violations(read.problem);
             match violations.is_empty() {
-                true => Ok(problem),
+                true => Ok(read),
                 false => Err(violations),
             }
         });
-        match problem {
-            Ok(problem) if places.is_empty() => {
-                let body = body(&problem, sweep, number);
-                let group = *by_body.entry(body).or_insert_with(|| {
-                    groups.push(vec![]);
-                    groups.len() - 1
+        match read {
+            Ok(Read { problem, same_body }) if places.is_empty() => {
+                let known = last.filter(|_| same_body && !is_alone(problem, sweep));
+                let group = known.unwrap_or_else(|| {
+                    let body = body(problem, sweep, number);
+                    *by_body.entry(body).or_insert_with(|| {
+                        groups.push(vec![]);
+                        groups.len() - 1
+                    })
                 });
                 groups[group].push(number);
+                last = Some(group);
             }
             Ok(_) => {}
             Err(list) => {
@@ -83,6 +91,15 @@ fn violations(problem: &Problem) -> Vec<Violation> {
         .unwrap_or_default()
 }
 
+/// Whether a member is solved on meshes of its own.
+fn is_alone(problem: &Problem, sweep: &Sweep) -> bool {
+    let refine = match sweep.plan.changes_mesh() {
+        true => problem.mesh.refine,
+        false => sweep.base.mesh.refine,
+    };
+    problem.solver.verifies() || matches!(refine, Refine::Adaptive(_))
+}
+
 /// What members on one body have in common, as text. The solver decides in the end whether they share it.
 fn body(problem: &Problem, sweep: &Sweep, number: usize) -> String {
     let Problem {
@@ -93,18 +110,11 @@ fn body(problem: &Problem, sweep: &Sweep, number: usize) -> String {
         loads,
         contacts,
         quadrature,
-        solver,
+        solver: _,
         title: _,
         units: _,
         steps: _,
     } = problem;
-    // on meshes of their own
-    let own_mesh = sweep.plan.changes_mesh();
-    let refine = match own_mesh {
-        true => mesh.refine,
-        false => sweep.base.mesh.refine,
-    };
-    let alone = solver.verifies() || matches!(refine, Refine::Adaptive(_));
     let contacts: Vec<_> = contacts
         .iter()
         .map(|contact| {
@@ -117,7 +127,7 @@ fn body(problem: &Problem, sweep: &Sweep, number: usize) -> String {
             ])
         })
         .collect();
-    let mesh = own_mesh.then_some(mesh);
+    let mesh = sweep.plan.changes_mesh().then_some(mesh);
     json!([
         analysis,
         mesh,
@@ -126,7 +136,7 @@ fn body(problem: &Problem, sweep: &Sweep, number: usize) -> String {
         loads,
         contacts,
         quadrature,
-        alone.then_some(number),
+        is_alone(problem, sweep).then_some(number),
     ])
     .to_string()
 }

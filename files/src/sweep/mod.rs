@@ -5,6 +5,8 @@
 //! unless the sweep changes it, so that a large one is read once and not once for each member.
 
 mod check;
+mod neighbours;
+mod numbers;
 mod parts;
 mod path;
 mod plan;
@@ -13,6 +15,8 @@ mod template;
 mod values;
 
 pub use check::{Group, MOST_TOLD, groups};
+pub use neighbours::Neighbour;
+pub use numbers::{Problems, Read};
 pub use plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, MOST_VALUE_BYTES, Mode, Plan};
 pub use read::{Sweep, read};
 pub use values::Fields;

@@ -391,3 +391,73 @@ fn a_plan_is_stored_as_json() {
     let text = serde_json::to_string(&plan).unwrap();
     assert_eq!(serde_json::from_str::<Plan>(&text).unwrap(), plan);
 }
+
+#[test]
+fn problems_read_one_after_the_other_are_those_of_their_text() {
+    let mut base = base();
+    base["contacts"][0]["tangential_displacement"] = json!(0.01);
+    let two = |path: &str, values: Value| json!({"path": path, "values": values});
+    let names = "/contacts/0/friction/transition";
+    let definitions = [
+        json!({"base": base, "axes": [
+            two(RHO, json!([0.01, 2e-2])), two(MU, json!([1, 0])), two("/contacts/0/indentation", json!([0.1, -0.2])),
+            two("/contacts/0/tangential_displacement", json!([0, 0.5]))]}),
+        // those that the base lacks, and those that are no numbers
+        json!({"base": base, "axes": [
+            two(names, json!(["linear", "tanh"])), two("/contacts/0/friction/shear_cap", json!([5, 7])),
+            two("/materials/0/youngs_modulus", json!([1000, 2000])), two("/contacts/0/friction/cohesion", json!([0, 2]))]}),
+        json!({"base": base, "points": [{MU: 0.1}, {RHO: 0.2}, {MU: 0.2, RHO: 0.3}, {MU: null}, {}]}),
+        json!({"base": base, "mode": "zip", "axes": [
+            two(MU, json!([0.1, 0.2, 0.3])), two("/contacts/0/friction/elastic_slip", json!([1e-4, 2e-4, 3e-4]))]}),
+    ];
+    for definition in definitions {
+        let Sweep { plan, .. } = reading(&definition).unwrap();
+        let mut problems = Problems::new(&plan);
+        for number in (0..plan.count()).chain([0]) {
+            let read = problems.read(number).map(|read| read.problem.clone());
+            assert_eq!(read, plan.problem(number), "{number} of {definition}");
+        }
+    }
+}
+
+#[test]
+fn a_member_of_a_grid_begins_from_one_that_differs_by_one_place_of_one_axis() {
+    let radius = "/contacts/0/obstacle/radius";
+    let definition = json!({"base": base(), "axes": [
+        {"path": MU, "values": [0.1, 0.2, 0.3]},
+        {"path": "/materials/0/poissons_ratio", "values": [0.2, 0.3]},
+        {"path": RHO, "values": [0.01, 0.02, 0.03]},
+    ]});
+    let sweep = reading(&definition).unwrap();
+    let plan = &sweep.plan;
+    let groups = groups(&sweep).unwrap();
+    assert_eq!(groups.len(), 2);
+    for group in &groups {
+        let mut lines: Vec<Option<usize>> = vec![None; plan.lines()];
+        assert_eq!(plan.neighbour(group, 0), None);
+        lines[0] = group.first().copied();
+        for (place, number) in group.iter().enumerate().skip(1) {
+            let found = plan.neighbour(group, place).unwrap();
+            // the last one of a line is all that is needed
+            assert!(lines.contains(&Some(found.number)), "{number}: {found:?}");
+            assert_eq!(found.adjacent, group[place - 1] == found.number);
+            lines[found.line] = Some(*number);
+            let (a, b) = (plan.values(*number), plan.values(found.number));
+            assert_eq!(a.iter().zip(&b).filter(|(a, b)| a != b).count(), 1);
+        }
+    }
+    let list: Vec<Value> = (1..=130)
+        .map(|k| json!({MU: 1e-3 * f64::from(k), radius: 8}))
+        .collect();
+    let sweep = reading(&json!({"base": base(), "points": list})).unwrap();
+    let group: Group = (0..130).collect();
+    let from = |place: usize| sweep.plan.neighbour(&group, place).map(|n| n.number);
+    assert_eq!(
+        [0, 1, 63, 64, 65, 128].map(from),
+        [None, Some(0), Some(62), Some(0), Some(64), Some(0)]
+    );
+    let long = json!([{"path": MU, "linspace": {"start": 0.1, "stop": 0.5, "count": 130}}]);
+    let sweep = reading(&json!({"base": base(), "axes": long})).unwrap();
+    let from = |place: usize| sweep.plan.neighbour(&group, place).map(|n| n.number);
+    assert_eq!([1, 64, 65, 128].map(from), [0, 0, 64, 0].map(Some));
+}

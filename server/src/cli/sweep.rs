@@ -122,12 +122,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     let count = plan.count();
     let (mut rows, mut told) = (Vec::with_capacity(count), Instant::now());
     for group in &groups {
-        let mut members = Members {
-            plan,
-            mesh: &base.mesh,
-            external: &|problem| files::external_mesh(problem, None),
-            family: None,
-        };
+        let external = |problem: &_| files::external_mesh(problem, None);
+        let mut members = Members::new(plan, group, &base.mesh, &external, None);
         let solved = members.solve(group, &mut |step| {
             match step {
                 Step::Row(row) => {

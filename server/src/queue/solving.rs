@@ -216,15 +216,12 @@ fn solve_others(
     let MembersTask {
         definition,
         first: number,
+        group,
         numbers,
     } = task;
     let plan: Plan = serde_json::from_str(definition).map_err(|_| SolveError::OtherBody)?;
-    let mut members = Members {
-        plan: &plan,
-        mesh: &problem.mesh,
-        external: &|problem| files::external_mesh(problem, mesh.clone()),
-        family,
-    };
+    let external = |problem: &Problem| files::external_mesh(problem, mesh.clone());
+    let mut members = Members::new(&plan, group, &problem.mesh, &external, family);
     let mut report = |row: Box<MemberRow>| {
         let report = Report::Member(Time::now(), row);
         tell(Told::Report(report))

@@ -2,10 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use files::sweep::Plan;
+use files::sweep::{Group, Neighbour, Plan, Problems};
 use solver::{
     error::SolveError,
-    family::{Family, Member},
+    family::{End, Family, Member, Start},
     mesh::External,
     problem::{MeshInput, Problem, Refine},
     solution::{Observer, Outcome, Progress},
@@ -21,20 +21,43 @@ pub enum Step<'a> {
     Row(Box<MemberRow>),
 }
 
-/// Members on one body.
+/// The members of a sweep that share a body, or may.
 pub struct Members<'a> {
-    /// All members of the sweep.
-    pub plan: &'a Plan,
+    plan: &'a Plan,
+    problems: Problems<'a>,
+    /// All of them, in order.
+    group: &'a Group,
     /// The mesh of the base, for those without one of their own.
-    pub mesh: &'a MeshInput,
+    mesh: &'a MeshInput,
     /// The mesh that a problem only names or quotes.
-    pub external: &'a dyn Fn(&Problem) -> Option<External>,
+    external: &'a dyn Fn(&Problem) -> Option<External>,
     /// Their body, once a member was found that has one.
-    pub family: Option<Family>,
+    family: Option<Family>,
+    /// By line, the last member that was solved on it and its end; that of its neighbour if it has none.
+    lines: Vec<Option<(usize, Option<End>)>>,
 }
 
-impl Members<'_> {
-    /// Solves members, and tells each row; a failure is a row. An error ends all: the solver was stopped.
+impl<'a> Members<'a> {
+    /// Of a plan, with the mesh of its base and the meshes that problems name; `family`: their body, if it is known.
+    pub fn new(
+        plan: &'a Plan,
+        group: &'a Group,
+        mesh: &'a MeshInput,
+        external: &'a dyn Fn(&Problem) -> Option<External>,
+        family: Option<Family>,
+    ) -> Self {
+        Members {
+            plan,
+            problems: Problems::new(plan),
+            group,
+            mesh,
+            external,
+            family,
+            lines: (0..plan.lines()).map(|_| None).collect(),
+        }
+    }
+
+    /// Solves some of the members, and tells each row; a failure is a row. An error ends all: the solver was stopped.
     pub fn solve(
         &mut self,
         numbers: &[usize],
@@ -66,20 +89,20 @@ impl Members<'_> {
     }
 
     fn member(&mut self, number: usize, observe: &mut Observer<'_>) -> Result<Member, Failed> {
-        let problem = self.plan.problem(number).map_err(SolveError::Invalid)?;
-        if let Some(family) = &mut self.family {
-            match family.member(&problem, observe) {
+        if self.family.is_some() {
+            for ancestor in self.missing(number) {
+                // what is wrong with it is told in its own row
+                if let Err(SolveError::Stopped) = self.on_body(ancestor, observe) {
+                    return Err(Failed::Member(SolveError::Stopped));
+                }
+            }
+            match self.on_body(number, observe) {
                 Err(SolveError::OtherBody) => {}
                 solved => return Ok(solved?),
             }
         }
-        let problem = match self.plan.changes_mesh() {
-            true => problem,
-            false => Problem {
-                mesh: self.mesh.clone(),
-                ..problem
-            },
-        };
+        let problem = self.plan.whole_problem(number, self.mesh);
+        let problem = problem.map_err(SolveError::Invalid)?;
         let external = (self.external)(&problem);
         if self.family.is_some() || is_alone(&problem) {
             let solution = solver::solve_on(&problem, external, observe)?;
@@ -90,8 +113,59 @@ impl Members<'_> {
             error => Failed::Member(error),
         })?;
         // the first on a body is solved whole, as in the service: its balance of forces tells whether the body is sound
-        let solution = self.family.insert(family).solution(&problem, observe)?;
-        Ok(Member::of(&solution.summary))
+        Ok(self.family.insert(family).whole_member(&problem, observe)?)
+    }
+
+    /// The members that one begins from, directly or not, as far as their ends are not known: the first of them first.
+    fn missing(&self, number: usize) -> Vec<usize> {
+        let mut missing = Vec::new();
+        let mut next = self.neighbour(number);
+        while let Some(neighbour) = next {
+            let known = self.lines.iter().flatten();
+            if known.clone().any(|(number, _)| *number == neighbour.number) {
+                break;
+            }
+            missing.push(neighbour.number);
+            next = self.neighbour(neighbour.number);
+        }
+        missing.reverse();
+        missing
+    }
+
+    fn neighbour(&self, number: usize) -> Option<Neighbour> {
+        let place = self.group.binary_search(&number).ok()?;
+        self.plan.neighbour(self.group, place)
+    }
+
+    /// Solves a member on the body of the others, from its neighbour, whose end is known.
+    fn on_body(&mut self, number: usize, observe: &mut Observer<'_>) -> Result<Member, SolveError> {
+        let neighbour = self.neighbour(number);
+        let Some(family) = &mut self.family else {
+            return Err(SolveError::OtherBody);
+        };
+        let from = neighbour.and_then(|neighbour| {
+            let mut known = self.lines.iter().flatten();
+            let (_, end) = known.find(|(known, _)| *known == neighbour.number)?;
+            Some((neighbour, end.as_ref()?))
+        });
+        let start = match from {
+            None => Start::Anew,
+            // members are solved in order: it was the last one
+            Some((neighbour, end)) if neighbour.adjacent => Start::Next(end),
+            Some((_, end)) => Start::Near(end),
+        };
+        let solved = match self.problems.read(number) {
+            Ok(read) => family.member(read.problem, start, observe),
+            Err(violations) => Err(SolveError::Invalid(violations)),
+        };
+        let (member, end) = match solved {
+            Ok((member, end)) => (Ok(member), end),
+            Err(error) => (Err(error), None),
+        };
+        let end = end.or_else(|| from.map(|(_, end)| end.clone()));
+        let line = neighbour.map_or(0, |neighbour| neighbour.line);
+        self.lines[line] = Some((number, end));
+        member
     }
 }
 
@@ -124,4 +198,63 @@ pub fn row_of(number: usize, error: SolveError) -> Result<MemberRow, SolveError>
         SolveError::OtherBody => Reason::Internal,
     };
     Ok(MemberRow::failed(number, reason, error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use files::sweep::{Fields, read};
+    use serde_json::{json, value::RawValue};
+
+    use super::*;
+
+    /// After a restart of the service the members that are left have the bits that they would have had.
+    #[test]
+    fn rows_do_not_depend_on_which_members_were_solved_before() {
+        let base = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1, 2], "y": [-2, -1, -0.5, -0.2, 0]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "ux": 0, "uy": 0}],
+            "contacts": [{"boundary": "top", "obstacle": {"kind": "circle", "radius": 8}, "indentation": 0.02,
+                "friction": {"coefficient": 0.3, "nonlocal_radius": 0.05, "elastic_slip": 1e-4}}]
+        });
+        let axes = json!([
+            {"path": "/contacts/0/friction/coefficient", "values": [0.1, 0.2, -1, 0.4]},
+            {"path": "/contacts/0/friction/nonlocal_radius", "values": [0.05, 0.08]},
+            {"path": "/contacts/0/indentation", "values": [0.01, 0.02, 0.03]},
+        ]);
+        let [base, axes] =
+            [base, axes].map(|text| RawValue::from_string(text.to_string()).unwrap());
+        let sweep = read(&Fields {
+            base: Some(&base),
+            axes: Some(&axes),
+            mode: None,
+            points: None,
+        })
+        .unwrap();
+        // a member that is wrong is among them, which is refused before as a rule
+        let group: Group = (0..24).collect();
+        let solved = |numbers: &[usize]| {
+            let none = |_: &Problem| None;
+            let mut members = Members::new(&sweep.plan, &group, &sweep.base.mesh, &none, None);
+            let mut rows = Vec::new();
+            let tell = &mut |step: Step<'_>| {
+                if let Step::Row(row) = step {
+                    rows.push(*row);
+                }
+                ControlFlow::Continue(())
+            };
+            members.solve(numbers, tell).unwrap();
+            rows
+        };
+        let all = solved(&group);
+        assert_eq!(all.iter().filter(|row| row.reason.is_none()).count(), 18);
+        for left in [&group[5..], &[9, 11, 23], &[20, 21]] {
+            // the first one of a process is solved whole
+            for row in &solved(left)[1..] {
+                assert_eq!(*row, all[row.number as usize]);
+            }
+        }
+    }
 }

@@ -28,6 +28,8 @@ pub struct MembersTask {
     pub definition: String,
     /// The first member of the job: its problem is that of the job.
     pub first: usize,
+    /// All members of the job, in order.
+    pub group: Vec<usize>,
     /// The members without a row.
     pub numbers: Vec<usize>,
 }
@@ -196,6 +198,7 @@ impl Store {
             Ok(Some(MembersTask {
                 definition,
                 first: number(first),
+                group: members.iter().map(|(_, n, _)| number(*n)).collect(),
                 numbers: left.map(|(_, n, _)| number(*n)).collect(),
             }))
         };

@@ -12,6 +12,8 @@ use crate::solution::{Iteration, Outcome, Residuals, Stage};
 pub struct Finished {
     /// The final state.
     pub state: State,
+    /// Ŝ v − f̂ of it.
+    pub elastic_force: Vec<f64>,
     /// The friction bound used for it, at every friction point.
     pub bound: Vec<f64>,
     /// σ_t at every friction point.
@@ -130,6 +132,7 @@ pub(super) fn finish(track: Track<'_, '_>, end: End) -> Finished {
         slide: None,
         rounding: end.rounding,
         state: measured.state,
+        elastic_force: measured.elastic_force,
         bound: measured.bound,
     }
 }

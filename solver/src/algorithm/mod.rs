@@ -25,7 +25,7 @@ mod uniqueness;
 pub use adjoint::{Gradient, influences};
 pub use convex::{Minimum, minimise};
 pub use finished::Finished;
-pub use near::{Region, run_near, settle_near};
+pub use near::{Extent, Region, run_near, settle_near};
 pub use profile::{Estimable, Missed, Quantity};
 pub use report::{Reported, numbers, report};
 pub use rounding::Rounding;
@@ -161,6 +161,7 @@ fn start(
         return (bonded, answer);
     }
     measured.state = stuck(system, &measured.state);
+    measured.elastic_force = system.elastic_force(&measured.state.v);
     (measured, answer)
 }
 

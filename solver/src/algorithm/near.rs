@@ -6,16 +6,18 @@
 //! touch. What is found is checked on the whole: where another node would pass the obstacle, or another point rub, that part is
 //! made larger, and the iterations go on.
 
+use std::sync::Arc;
+
 use crate::algorithm::factors::{Factors, dense};
 use crate::algorithm::finished::Finished;
 use crate::algorithm::rounding;
 use crate::algorithm::settle::settle;
-use crate::algorithm::system::{ContactNode, Oblique, State, System};
+use crate::algorithm::system::{ContactNode, Oblique, Patch, State, System};
 use crate::algorithm::track::{Measured, Place};
 use crate::elasticity::Dof;
 use crate::friction::{BoundLaw, FrictionLaw, Source};
 use crate::linear::{Dense, Eliminated};
-use crate::problem::{Algorithm, Condition, SolverControls};
+use crate::problem::{Algorithm, Condition, FrictionPoints, SolverControls};
 use crate::solution::{Iteration, Observer, Outcome};
 
 /// Below this number of unknowns the whole system costs next to nothing.
@@ -31,20 +33,35 @@ const MARGIN_NODES: usize = 4;
 /// Parts that turned out too small are widened by this part of their length.
 const GROWTH: f64 = 0.5;
 
+/// Parts of the boundary are kept, for problems that come back to them, while they take no more than this.
+const KEPT_BYTES: u64 = 16 << 20;
+
 /// The part of the boundary that may touch, from one load level to the next.
 #[derive(Default)]
 pub struct Region {
-    near: Option<Near>,
-    /// By contact node: it may touch.
-    touches: Vec<bool>,
-    /// Elimination is not worth its cost for this system.
-    whole: bool,
+    near: Option<Arc<Near>>,
+    extent: Extent,
     /// What neighbours share.
     factors: Factors,
+    /// Parts that were made before, small ones.
+    made: Vec<Arc<Near>>,
+}
+
+/// How far a region reaches.
+#[derive(Clone, Default, PartialEq)]
+pub struct Extent {
+    /// By contact node: it may touch. Empty where nothing is known of it.
+    touches: Vec<bool>,
+    /// By contact node: its unknowns are kept, since it may touch or be rubbed. None until that is decided.
+    wanted: Option<Vec<bool>>,
+    /// Elimination is not worth its cost for this system.
+    whole: bool,
 }
 
 /// The unknowns of nodes that may touch, or may be rubbed; the others are eliminated.
 struct Near {
+    /// The nodes that it was made for.
+    wanted: Vec<bool>,
     /// By contact node: kept.
     kept: Vec<bool>,
     /// The eliminated unknowns, then the others.
@@ -53,6 +70,8 @@ struct Near {
     stiffness: Dense,
     /// The friction points all of whose nodes are kept.
     points: Vec<usize>,
+    /// The contacts with friction, which the friction points depend on.
+    acting: Vec<Option<FrictionPoints>>,
 }
 
 /// As [`run`](super::run), on the part of the boundary that may touch if that is worth it. `region`: that of the last level,
@@ -98,7 +117,7 @@ pub fn run_near(
             };
         }
         match outside.is_empty() {
-            true => *region = Region::whole(),
+            true => region.take_whole(),
             false => region.grow(&outside),
         }
         if finished.outcome == Outcome::Converged {
@@ -108,11 +127,12 @@ pub fn run_near(
 }
 
 /// The solution near that of a neighbour: with the same body and the same contact boundaries, and numbers that differ a
-/// little; and the number of steps to it. None if it is not near.
+/// little; and the number of steps to it. None if it is not near. With v of the neighbour before it the steps begin as far
+/// from it on the other side.
 pub fn settle_near(
     system: &System<'_>,
     controls: &SolverControls,
-    neighbour: &Finished,
+    (neighbour, before): (&Finished, Option<&[f64]>),
     region: &mut Region,
     observe: &mut Observer<'_>,
 ) -> Option<(Finished, u32)> {
@@ -122,11 +142,16 @@ pub fn settle_near(
     region.prepare(system, controls, Some(neighbour), observe);
     let tolerance = controls.tolerance;
     let (near, factors) = (&region.near, &mut region.factors);
+    let mut start = neighbour.state.clone();
+    if let Some(before) = before {
+        let pairs = start.v.iter_mut().zip(before);
+        pairs.for_each(|(v, before)| *v += *v - before);
+    }
     let Some(near) = near else {
-        return settle(system, tolerance, &neighbour.state, factors, observe);
+        return settle(system, tolerance, &start, factors, observe);
     };
     let (part, load) = near.part(system);
-    let start = near.on_part(neighbour).state;
+    let start = near.state_on_part(&start);
     let (found, steps) = settle(&part, tolerance, &start, factors, observe)?;
     let (finished, outside) = near.on_whole(system, controls, load, found);
     let settled =
@@ -135,14 +160,31 @@ pub fn settle_near(
 }
 
 impl Region {
-    /// The whole of the boundary.
-    fn whole() -> Self {
-        Region {
-            near: None,
-            touches: Vec::new(),
-            whole: true,
-            factors: Factors::default(),
+    /// How far it reaches now.
+    pub fn extent(&self) -> Extent {
+        self.extent.clone()
+    }
+
+    /// Reaches as far as it did for a neighbour, whose factors serve if they are the last ones.
+    pub fn reach(&mut self, extent: &Extent, with_last_factors: bool) {
+        let same = self.extent == *extent;
+        if !same {
+            self.near = None;
+            self.extent.clone_from(extent);
         }
+        if !(same && with_last_factors) {
+            self.factors.renew();
+        }
+    }
+
+    /// Takes the whole of the boundary.
+    fn take_whole(&mut self) {
+        self.near = None;
+        self.extent = Extent {
+            whole: true,
+            ..Extent::default()
+        };
+        self.factors.renew();
     }
 
     /// Eliminates what may not touch, unless that is done or not worth it.
@@ -155,37 +197,60 @@ impl Region {
     ) {
         // the thesis's own iteration is kept as printed, and a body that only contact holds has no factor of its own
         let whole = controls.algorithm == Algorithm::Thesis || system.semidefinite;
-        if self.near.is_some() || self.whole || whole || system.load.len() < LEAST {
+        if self.extent.whole || whole || system.load.len() < LEAST {
+            self.near = None;
             return;
         }
-        if self.touches.is_empty() {
-            self.touches = may_touch(system, last);
+        let acting = acting(system);
+        if self.near.as_ref().is_some_and(|near| near.acting == acting) {
+            return;
         }
-        if !self.touches.contains(&true) {
+        self.near = None;
+        if self.extent.touches.is_empty() {
+            self.extent.touches = may_touch(system, last);
+        }
+        if !self.extent.touches.contains(&true) {
             // contact that loads bring about is known after the first level
-            self.touches.clear();
+            self.extent.touches.clear();
             return;
         }
-        let kept = rubbed(system, &self.touches);
-        self.factors = Factors::default();
-        match Near::new(system, kept, observe) {
-            Some(near) => self.near = Some(near),
-            None => *self = Region::whole(),
+        let Extent {
+            touches, wanted, ..
+        } = &mut self.extent;
+        let wanted = wanted.get_or_insert_with(|| rubbed(system, touches));
+        self.factors.renew();
+        let serves = |near: &&Arc<Near>| near.wanted == *wanted && near.acting == acting;
+        self.near = self.made.iter().find(serves).cloned();
+        if self.near.is_some() {
+            return;
+        }
+        match Near::new(system, wanted.clone(), observe) {
+            Some(near) => {
+                let near = Arc::new(near);
+                let bytes = near.bytes() + self.made.iter().map(|near| near.bytes()).sum::<u64>();
+                if bytes <= KEPT_BYTES {
+                    self.made.push(near.clone());
+                }
+                self.near = Some(near);
+            }
+            None => self.take_whole(),
         }
     }
 
     /// Takes more of the boundary, to be eliminated anew.
     fn grow(&mut self, outside: &[usize]) {
+        let touches = &mut self.extent.touches;
         for &node in outside {
-            self.touches[node] = true;
+            touches[node] = true;
         }
         if let Some(near) = self.near.take() {
-            for (touches, kept) in self.touches.iter_mut().zip(near.kept) {
+            for (touches, kept) in touches.iter_mut().zip(&near.kept) {
                 *touches |= kept;
             }
         }
-        self.touches = widened(&self.touches, GROWTH);
-        self.factors = Factors::default();
+        *touches = widened(touches, GROWTH);
+        self.extent.wanted = None;
+        self.factors.renew();
     }
 }
 
@@ -264,6 +329,7 @@ impl Near {
                 keeps[dof] = true;
             }
         }
+        let wanted = kept.clone();
         let (mut order, rest): (Vec<usize>, Vec<usize>) = (0..size).partition(|&i| !keeps[i]);
         if rest.len() as f64 > WORTH * size as f64 {
             return None;
@@ -280,11 +346,19 @@ impl Near {
         let on_kept = |&g: &usize| system.points[g].nodes.iter().all(|&node| kept[node]);
         Some(Near {
             points: (0..system.points.len()).filter(on_kept).collect(),
+            acting: acting(system),
+            wanted,
             kept,
             order,
             eliminated,
             stiffness,
         })
+    }
+
+    /// What it takes.
+    fn bytes(&self) -> u64 {
+        let (all, kept) = (self.order.len() as u64, self.stiffness.size() as u64);
+        8 * (all * (all - kept) + kept * kept)
     }
 
     /// Number of eliminated unknowns.
@@ -331,14 +405,21 @@ impl Near {
         (part, load)
     }
 
+    /// A state on the whole as one on this part.
+    fn state_on_part(&self, whole: &State) -> State {
+        let kept = self.order[self.count()..].iter();
+        State {
+            v: kept.map(|&dof| whole.v[dof]).collect(),
+            active: whole.active.clone(),
+        }
+    }
+
     /// An end on the whole as a start on this part.
     fn on_part(&self, whole: &Finished) -> Finished {
-        let kept = self.order[self.count()..].iter();
         Finished {
-            state: State {
-                v: kept.map(|&dof| whole.state.v[dof]).collect(),
-                active: whole.state.active.clone(),
-            },
+            state: self.state_on_part(&whole.state),
+            // nothing begins from forces
+            elastic_force: Vec::new(),
             bound: self.points.iter().map(|&g| whole.bound[g]).collect(),
             ..whole.clone()
         }
@@ -392,6 +473,7 @@ impl Near {
         let finished = Finished {
             tractions: on_all(&found.tractions),
             state: measured.state,
+            elastic_force: measured.elastic_force,
             bound: measured.bound,
             residuals: measured.residuals,
             outcome,
@@ -400,6 +482,12 @@ impl Near {
         };
         (finished, outside)
     }
+}
+
+/// By contact, where friction acts if it does.
+fn acting(system: &System<'_>) -> Vec<Option<FrictionPoints>> {
+    let points = |patch: &Patch<'_>| patch.law.as_ref().map(|law| law.points);
+    system.patches.iter().map(points).collect()
 }
 
 /// The unknowns of a contact node.

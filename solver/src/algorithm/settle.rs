@@ -37,14 +37,18 @@ pub(super) fn settle(
     let (mut residual_before, mut slow, mut changed) = (f64::INFINITY, 0, true);
     close(system, &mut state);
     let mut elastic_force = system.elastic_force(&state.v);
+    let mut before: Option<(Vec<f64>, Vec<f64>)> = None;
     for steps in 0..MOST_STEPS {
         let pressures = system.pressures(&system.reactions_of(&state, &elastic_force));
         let bound = system.friction_bound(&pressures);
         let tractions = system.tractions(&state.v, &bound);
-        let residual = system.kkt_residual(&state, &elastic_force, &bound);
+        let mut force = vec![0.0; state.v.len()];
+        system.add_traction_force(&tractions, &mut force);
+        let residual = system.kkt_residual_of(&state, &elastic_force, &force);
         if steps > 0 && !changed && residual <= AIM * tolerance {
             let finished = Finished {
                 state,
+                elastic_force,
                 bound,
                 tractions,
                 own_tractions: false,
@@ -73,17 +77,25 @@ pub(super) fn settle(
         }
         residual_before = residual;
         let free = free_dofs(system, |i| state.active[i]);
-        factors.prepare(system, &bound, &state.v, &free, observe)?;
-        let mut force = elastic_force.clone();
-        system.add_traction_force(&tractions, &mut force);
+        let renewed = factors.prepare(system, &bound, &state.v, &free, observe)?;
+        let sums = force.iter_mut().zip(&elastic_force);
+        sums.for_each(|(force, elastic)| *force += elastic);
         let direction = factors.direction(&force)?;
         // whole steps may go to and fro between stick and slip
         let part = match stalls {
             true => least_along(system, &bound, &state.v, &direction),
             false => 1.0,
         };
+        let from = state.v.clone();
         let moved = state.v.iter_mut().zip(&direction);
         moved.for_each(|(v, d)| *v += part * d);
+        // steps that each follow from the one before by the same linear map
+        if let Some(before) = before.filter(|_| !(changed || renewed || stalls)) {
+            let further = further(&before, (&from, &direction));
+            let further = state.v.iter_mut().zip(further);
+            further.for_each(|(v, more)| *v += more);
+        }
+        before = (!stalls).then_some((from, direction));
         elastic_force = system.elastic_force(&state.v);
         changed = update_active(system, &elastic_force, &mut state);
         if close(system, &mut state) {
@@ -91,4 +103,31 @@ pub(super) fn settle(
         }
     }
     None
+}
+
+/// How much further than a step to go, by that step and the one before it, each with its place: as far as leaves the
+/// least of the next step, if that follows as this one did.
+fn further(
+    (place_before, step_before): &(Vec<f64>, Vec<f64>),
+    (place, step): (&[f64], &[f64]),
+) -> Vec<f64> {
+    let changes = step
+        .iter()
+        .zip(step_before)
+        .map(|(now, before)| now - before);
+    let [along, size] = step
+        .iter()
+        .zip(changes.clone())
+        .fold([0.0; 2], |[along, size], (step, change)| {
+            [along + step * change, size + change * change]
+        });
+    let part = along / size;
+    // steps that do not shrink have no end
+    if part.is_nan() || part.abs() >= 1.0 {
+        return Vec::new();
+    }
+    let moved = place.iter().zip(place_before).zip(changes);
+    moved
+        .map(|((now, before), change)| -part * (now - before + change))
+        .collect()
 }

@@ -227,6 +227,7 @@ impl<'a> System<'a> {
         let (first, boundary) = (self.nodes.len(), &contact.boundary);
         let count = boundary.nodes.len();
         let on_axis = |i: usize| model.axis.holds(boundary.positions[i]);
+        self.nodes.reserve(count);
         for i in 0..count {
             let [normal, tangent] = self.body.contact_dofs[first + i];
             let oblique = self.body.tangents[first + i].map(|part| {
@@ -288,6 +289,7 @@ impl<'a> System<'a> {
         let law = friction.map(|law| averages.law(self.patches.len(), law, chain));
         if let Some(law) = &law {
             let patch = self.patches.len();
+            self.points.reserve(boundary.friction_points.len());
             let point = |s: f64, nodes: [usize; 3], shape: [f64; 3], weight: f64| Point {
                 patch,
                 s,
@@ -524,11 +526,16 @@ impl<'a> System<'a> {
 
     /// σ_t = −τ φ at every friction point (stress, along t).
     pub fn tractions(&self, v: &[f64], bound: &[f64]) -> Vec<f64> {
-        self.points
-            .iter()
-            .zip(bound)
-            .map(|(point, tau)| -tau * self.law(point).phi(self.slip(v, point)))
-            .collect()
+        // a node belongs to several points
+        let relative = |i: usize| self.tangential_displacement(v, i) - self.nodes[i].drag;
+        let relative: Vec<f64> = (0..self.nodes.len()).map(relative).collect();
+        let traction = |(point, tau): (&Point, &f64)| {
+            let moved: f64 = (0..3)
+                .map(|i| point.shape[i] * relative[point.nodes[i]])
+                .sum();
+            -tau * self.law(point).phi(moved - point.anchor)
+        };
+        self.points.iter().zip(bound).map(traction).collect()
     }
 
     /// Adds the nodal forces −Σ w σ_t h of tangential tractions, on the left-hand side, thesis (2.29).
@@ -624,7 +631,12 @@ impl<'a> System<'a> {
     pub(super) fn kkt_residual(&self, state: &State, elastic: &[f64], bound: &[f64]) -> f64 {
         let mut friction = vec![0.0; state.v.len()];
         self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
-        let force: Vec<f64> = elastic.iter().zip(&friction).map(|(a, b)| a + b).collect();
+        self.kkt_residual_of(state, elastic, &friction)
+    }
+
+    /// The same from the forces of friction, of [`System::add_traction_force`].
+    pub(super) fn kkt_residual_of(&self, state: &State, elastic: &[f64], friction: &[f64]) -> f64 {
+        let force: Vec<f64> = elastic.iter().zip(friction).map(|(a, b)| a + b).collect();
         let reactions = self.reactions_of(state, elastic);
         let mut defect: f64 = 0.0;
         for (i, node) in self.nodes.iter().enumerate() {
@@ -649,7 +661,7 @@ impl<'a> System<'a> {
         if defect == 0.0 {
             0.0
         } else {
-            defect / self.scale(&reactions, &friction)
+            defect / self.scale(&reactions, friction)
         }
     }
 

@@ -49,7 +49,10 @@ impl Source {
 
     /// The same with nodes numbered from `first` on.
     pub fn shifted(mut self, first: usize) -> Self {
-        if let Source::Average(row) = &mut self {
+        // rows are shared with the operator: those of the first contact stay so
+        if let Source::Average(row) = &mut self
+            && first > 0
+        {
             Arc::make_mut(row).first += first;
         }
         self

@@ -9,6 +9,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
+use super::moments::{moments_up_to, shape};
 use crate::element::{edge3, gauss};
 use crate::problem::{Kernel, Measure, Normalization};
 
@@ -22,6 +23,9 @@ const BUMP_DISC: f64 = 2.143_565_775_8;
 static FULL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(40));
 static SHORT_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(12));
 const SHORT: f64 = 0.1;
+
+/// The midside node of an edge is in its middle within this part of its length: rounding of arc length.
+const STRAIGHT: f64 = 1e-12;
 
 /// A radius below this part of the chain's length averages over no point: arc length itself is less accurate,
 /// and the law is Coulomb's.
@@ -176,17 +180,7 @@ impl Averaging {
 
     /// ω_ρ at a distance.
     pub fn omega(&self, distance: f64) -> f64 {
-        let r = distance / self.radius;
-        let rest = 1.0 - r * r;
-        if rest <= 0.0 {
-            return 0.0;
-        }
-        // exp(ρ²/(x² − ρ²)): the exponent's sign as formulation 2.1 reads (1.2)
-        let shape = match self.kernel {
-            Kernel::Bump => (-1.0 / rest).exp(),
-            Kernel::Parabola => rest,
-        };
-        self.scale * shape
+        self.scale * shape(self.kernel, distance / self.radius)
     }
 
     /// The row of W at arc length s. ρ = 0 is interpolation: Coulomb's law.
@@ -277,6 +271,10 @@ impl Averaging {
                 break;
             }
             let (a, b) = (arc[0].max(low), arc[1].min(high));
+            if ring.is_none() && self.by_moments(&arc) && a < b {
+                add(edge, self.weights_by_moments(&arc, centre, [a, b]));
+                continue;
+            }
             let middle = centre.clamp(a, b.max(a));
             let mut weights = [0.0; 3];
             for (a, b) in [(a, middle), (middle, b)] {
@@ -306,6 +304,41 @@ impl Averaging {
             }
             add(edge, weights);
         }
+    }
+
+    /// Whether the weights of an edge follow from moments of the kernel: its midside node lies in the middle, so that its
+    /// shape functions are parabolas of arc length; it is not so short beside ρ that differences of moments lose digits;
+    /// and the kernel is the same all along it.
+    fn by_moments(&self, &[start, end, middle]: &[f64; 3]) -> bool {
+        let length = end - start;
+        (start + end - 2.0 * middle).abs() <= STRAIGHT * length
+            && length >= SHORT * self.radius
+            && !(self.conserving && [start, end].iter().any(|s| self.part_inside(*s) < 1.0))
+    }
+
+    /// ∫ ω h_i between two places of an edge.
+    fn weights_by_moments(
+        &self,
+        &[start, end, _]: &[f64; 3],
+        centre: f64,
+        between: [f64; 2],
+    ) -> [f64; 3] {
+        let moments = between.map(|y| {
+            let t = (y - centre) / self.radius;
+            moments_up_to(self.kernel, t.clamp(-1.0, 1.0))
+        });
+        let scale = self.scale * self.radius;
+        let m: [f64; 3] = std::array::from_fn(|k| scale * (moments[1][k] - moments[0][k]));
+        // ξ = from + by t
+        let half = 0.5 * (end - start);
+        let (from, by) = ((centre - 0.5 * (start + end)) / half, self.radius / half);
+        let first = from * m[0] + by * m[1];
+        let second = from * from * m[0] + 2.0 * from * by * m[1] + by * by * m[2];
+        [
+            0.5 * (second - first),
+            0.5 * (second + first),
+            m[0] - second,
+        ]
     }
 
     /// Kernel centres that stand for s on the chain continued evenly at its mirrors: a kernel over

@@ -2,6 +2,7 @@
 
 mod bound;
 mod kernel;
+mod moments;
 mod transition;
 
 pub use bound::{BoundLaw, Source, largest_pressure};

@@ -47,7 +47,12 @@ pub struct ContactModel {
 impl ContactModel {
     /// Gap at a node (length) when the obstacle is pushed by `factor` times its indentation.
     pub fn gap(&self, node: usize, factor: f64) -> f64 {
-        self.profile[node] - factor * self.indentation * self.push[node][0]
+        self.gap_behind(node, factor * self.indentation)
+    }
+
+    /// Gap at a node (length) when the obstacle is pushed that far.
+    pub fn gap_behind(&self, node: usize, pushed: f64) -> f64 {
+        self.profile[node] - pushed * self.push[node][0]
     }
 
     /// Whether the second of the oblique axes of a node lies along the surface of the body.
@@ -64,7 +69,12 @@ impl ContactModel {
 
     /// d: the obstacle's displacement along the contact's t at a node (length).
     pub fn drag(&self, node: usize, level: &Level) -> f64 {
-        level.tangential_displacement * self.tangential_displacement
-            + level.indentation * self.indentation * self.push[node][1]
+        let along = level.tangential_displacement * self.tangential_displacement;
+        self.drag_behind(node, [level.indentation * self.indentation, along])
+    }
+
+    /// The same when the obstacle is pushed and moved along t that far.
+    pub fn drag_behind(&self, node: usize, [pushed, along]: [f64; 2]) -> f64 {
+        along + pushed * self.push[node][1]
     }
 }

@@ -54,7 +54,8 @@ impl Checks {
                 continue;
             };
             all.check(self.shared_nodes(&model, &models, problem));
-            all.check(self.supported_contact_nodes(&model, &problem.steps, fixed));
+            let moved = [model.indentation, model.tangential_displacement];
+            all.check(self.supported_contact_nodes(&model, moved, &problem.steps, fixed));
             models.push(model);
         }
         all.check(self.oblique_supports(&models, fixed, problem));
@@ -365,6 +366,7 @@ impl Checks {
     pub(super) fn supported_contact_nodes(
         &mut self,
         contact: &ContactModel,
+        [indentation, along]: [f64; 2],
         steps: &[Step],
         fixed: &BTreeMap<u32, Held>,
     ) -> Checked {
@@ -374,6 +376,14 @@ impl Checks {
             _ => steps.iter().map(Level::end_of).collect(),
         };
         let bonded = contact.condition == Condition::Bonded;
+        let gap = |i: usize, level: &Level| contact.gap_behind(i, level.indentation * indentation);
+        let drag = |i: usize, level: &Level| {
+            let moved = [
+                level.indentation * indentation,
+                level.tangential_displacement * along,
+            ];
+            contact.drag_behind(i, moved)
+        };
         for (i, node) in boundary.nodes.iter().enumerate() {
             let Some(held) = fixed.get(node) else {
                 continue;
@@ -385,7 +395,7 @@ impl Checks {
             );
             let (along_n, along_t) = (held.along(n), held.along(t));
             for level in ends.iter().filter(|_| bonded) {
-                let wanted = [contact.gap(i, level.indentation), contact.drag(i, level)];
+                let wanted = [gap(i, level), drag(i, level)];
                 for (prescribed, wanted) in [along_n, along_t].into_iter().zip(wanted) {
                     let Some(u) = prescribed.map(|u| level.supports * u) else {
                         continue;
@@ -403,7 +413,7 @@ impl Checks {
             }
             let Some(u_n) = along_n else { continue };
             for level in &ends {
-                let (u_n, gap) = (level.supports * u_n, contact.gap(i, level.indentation));
+                let (u_n, gap) = (level.supports * u_n, gap(i, level));
                 let free = contact.condition == Condition::None;
                 if !free && u_n > gap + ALIGNED * gap.abs() {
                     return Err(self.report(

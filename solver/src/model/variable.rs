@@ -138,12 +138,9 @@ impl Checks {
             all.check(sound);
             let radius = law.as_ref().and_then(|law| law.bound.radius());
             all.check(self.radius(&model_contact.boundary, radius, &format!("/contacts/{i}")));
-            let moved = super::ContactModel {
-                indentation: contact.indentation,
-                tangential_displacement: contact.tangential_displacement,
-                ..model_contact.clone()
-            };
-            all.check(self.supported_contact_nodes(&moved, &problem.steps, &model.fixed));
+            let moved = [contact.indentation, contact.tangential_displacement];
+            let (steps, fixed) = (&problem.steps, &model.fixed);
+            all.check(self.supported_contact_nodes(model_contact, moved, steps, fixed));
             laws.push(law);
         }
         all.check(self.thesis_elements(problem, &model.mesh));

@@ -71,15 +71,18 @@ impl PatchView<'_> {
         let reactions = &self.forces.reactions[self.system.range(self.patch)];
         let largest = reactions.iter().fold(0.0f64, |most, r| most.max(*r));
         for place in &contact.places {
+            // it counts by the nearer of the two, and one of them is known
+            let stiffness = self.stiffness(place.edge);
+            let slight = |unseen: f64| unseen <= least || stiffness * unseen / largest < SERIOUS;
+            if slight(place.nearer) {
+                continue;
+            }
             let penetration = self.penetration(place);
             let unseen = penetration.min(place.nearer);
-            if unseen <= least {
+            if slight(unseen) {
                 continue;
             }
-            let severity = self.stiffness(place.edge) * unseen / largest;
-            if severity < SERIOUS {
-                continue;
-            }
+            let severity = stiffness * unseen / largest;
             let missed = Missed {
                 patch: self.p,
                 s: self.arc(place),

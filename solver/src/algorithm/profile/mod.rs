@@ -27,6 +27,10 @@ pub(super) struct PatchView<'a> {
     v: &'a [f64],
     finished: &'a Finished,
     forces: &'a Forces,
+    /// u_t − d at the nodes.
+    relative: Vec<f64>,
+    /// The largest pressure at a node (stress).
+    largest: f64,
     /// Arc lengths between which the pressure is not zero; empty where nothing touches.
     pressed: Option<[f64; 2]>,
     /// g at start, end and midside of every edge; 0 in the total law.
@@ -45,11 +49,11 @@ pub(super) struct Forces {
 impl Forces {
     /// Of a final state.
     pub(super) fn new(system: &System<'_>, finished: &Finished) -> Self {
-        let elastic_force = system.elastic_force(&finished.state.v);
-        let reactions = system.reactions_of(&finished.state, &elastic_force);
+        let elastic_force = &finished.elastic_force;
+        let reactions = system.reactions_of(&finished.state, elastic_force);
         Forces {
             pressures: system.pressures(&reactions),
-            tangential_reactions: system.tangential_reactions(&elastic_force),
+            tangential_reactions: system.tangential_reactions(elastic_force),
             reactions,
         }
     }
@@ -70,6 +74,14 @@ impl<'a> PatchView<'a> {
             v: &finished.state.v,
             finished,
             forces,
+            relative: system
+                .range(patch)
+                .map(|i| {
+                    let u_t = system.tangential_displacement(&finished.state.v, i);
+                    u_t - system.nodes[i].drag
+                })
+                .collect(),
+            largest: largest_pressure(&forces.pressures[system.range(patch)]),
             pressed: None,
             anchors: Vec::new(),
             tractions: None,
@@ -163,8 +175,7 @@ impl<'a> PatchView<'a> {
 
     /// e = u_t − d − g along an edge.
     fn slip_at(&self, edge: usize, xi: f64) -> f64 {
-        let drag = |i: usize| self.system.nodes[self.patch.first + i].drag;
-        let relative = edge_nodes(edge).map(|i| self.u_t(i) - drag(i));
+        let relative = edge_nodes(edge).map(|i| self.relative[i]);
         let h = edge3::shape(xi);
         // as at the friction points
         let own = &self.system.nodes[self.system.range(self.patch)];
@@ -204,8 +215,7 @@ impl<'a> PatchView<'a> {
         let pressures = self.own_pressures();
         (
             source.nonlocal_pressure(pressures),
-            law.bound
-                .bound(&source, pressures, largest_pressure(pressures)),
+            law.bound.bound(&source, pressures, self.largest),
         )
     }
 

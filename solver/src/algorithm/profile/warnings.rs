@@ -184,6 +184,9 @@ impl PatchView<'_> {
             let pressure: f64 = (0..3)
                 .map(|i| place.shape[i] * pressures[self.patch.first + place.nodes[i]])
                 .sum();
+            if pressure == 0.0 {
+                continue;
+            }
             whole += place.weight * pressure;
             lost += place.weight * pressure * (1.0 - average.part_inside(place.s));
         }
@@ -328,7 +331,8 @@ impl PatchView<'_> {
             let at = |xi: f64| self.tangential_stress_at(edge, xi).abs();
             at(-0.7).max(at(0.0)).max(at(0.7))
         };
-        let under = edges().max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+        let sizes = edges().map(|edge| (size(edge), edge));
+        let (_, under) = sizes.max_by(|a, b| a.0.total_cmp(&b.0))?;
         // rounding of a grid whose lines are ρ apart
         (length(under) > radius * (1.0 + 1e-9)).then_some((length(under), radius))
     }
