@@ -6,8 +6,12 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::json;
 use sha2::{Digest, Sha256};
+use solver::body::Source;
+use solver::model::Model;
 use solver::problem::Problem;
 use solver::solution::{Fields, GaussFields, Solution};
+
+use crate::bodies::Key;
 
 /// Fingerprint of a problem with its defaults filled in. The title is for people and not included. Units are:
 /// problems are stored once per fingerprint, and figures show their units.
@@ -24,6 +28,15 @@ pub fn of_json(value: &impl Serialize) -> serde_json::Result<String> {
     let mut hash = Hash::default();
     hash.json(value)?;
     Ok(hash.text())
+}
+
+/// Fingerprint of all that a model's body is made from. It is that of a binary form, not of JSON: it never leaves this
+/// process, and the canonical writer would hold a large mesh as text.
+pub fn of_body(model: &Model) -> postcard::Result<Key> {
+    let hash = io::BufWriter::with_capacity(1 << 16, Hash::default());
+    let hash = postcard::to_io(&Source::of(model), hash)?.into_inner();
+    let Hash(hash) = hash.map_err(|_| postcard::Error::SerializeBufferFull)?;
+    Ok(hash.finalize().into())
 }
 
 /// Fingerprint of a result: equal digests mean equal bits. Times, the program's version and what is said about the

@@ -115,6 +115,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
             plan,
             mesh: &base.mesh,
             external: &|problem| files::external_mesh(problem, None),
+            prepare: &solver::prepare,
             family: None,
         };
         let solved = members.solve(group, &mut |step| {

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use files::sweep::Plan;
 use solver::{
+    Prepared,
     error::SolveError,
     family::{Family, Member},
     mesh::External,
@@ -21,6 +22,10 @@ pub enum Step<'a> {
     Row(Box<MemberRow>),
 }
 
+/// Checks a problem, and factors and condenses its body or finds it: [`solver::prepare`].
+pub type Prepare<'a> =
+    dyn Fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Prepared, SolveError> + 'a;
+
 /// Members on one body.
 pub struct Members<'a> {
     /// All members of the sweep.
@@ -29,6 +34,8 @@ pub struct Members<'a> {
     pub mesh: &'a MeshInput,
     /// The mesh that a problem only names or quotes.
     pub external: &'a dyn Fn(&Problem) -> Option<External>,
+    /// Prepares the first of them.
+    pub prepare: &'a Prepare<'a>,
     /// Their body, once a member was found that has one.
     pub family: Option<Family>,
 }
@@ -85,10 +92,12 @@ impl Members<'_> {
             let solution = solver::solve_on(&problem, external, observe)?;
             return Ok(Member::of(&solution.summary));
         }
-        let family = Family::new(&problem, external, observe).map_err(|error| match error {
+        let prepared = (self.prepare)(&problem, external, observe);
+        let prepared = prepared.map_err(|error| match error {
             SolveError::SingularSystem { .. } | SolveError::NonFinite { .. } => Failed::Body(error),
             error => Failed::Member(error),
         })?;
+        let family = Family::of(prepared, &problem);
         // the first on a body is solved whole, as in the service: its balance of forces tells whether the body is sound
         let solution = self.family.insert(family).solution(&problem, observe)?;
         Ok(Member::of(&solution.summary))
