@@ -102,7 +102,7 @@ async fn a_second_job_on_the_same_body_factors_nothing_and_has_the_result_of_its
             .unwrap()
             .into_inner()
             .summary
-            .is_some_and(|summary| summary.body_reused)
+            .is_some_and(|summary| summary.body_reused == Some(true))
     );
 }
 

@@ -167,7 +167,7 @@ impl From<Summary> for pb::Summary {
         } = ours;
         pb::Summary {
             timings,
-            body_reused,
+            body_reused: Some(body_reused),
             solver_version,
             input_hash,
             digest,
