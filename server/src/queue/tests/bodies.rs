@@ -414,10 +414,11 @@ fn a_job_that_keeps_its_body_or_finds_it_needs_no_more_than_on_its_own() {
     let finds = least_share(&problem, || Some(full.clone()));
     println!("alone {alone}, keeps {keeps}, finds {finds}, body {bytes}");
     assert!(finds > bytes, "its body is a part of what it uses");
-    // but for the copy of the model that is kept with the body
-    let copy = 1 << 20;
+    // but for the copy of the model that is kept with the body, and for 4 MiB of scratch space: its first factorisation leaves
+    // them to a thread, and they are counted with the body
+    let (copy, scratch) = (1 << 20, 4 << 20);
     assert!(
-        keeps <= alone + copy && finds <= alone + copy,
+        keeps <= alone + copy && finds <= alone + copy + scratch,
         "alone {alone}, keeps {keeps}, finds {finds}"
     );
 }
