@@ -119,7 +119,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("Result", "results::JobResult").answer(),
     fields("StepResult", "results::StepResult").answer(),
     fields("Summary", "solution::Summary").answer()
-        .theirs(&["timings: BTreeMap::new()", "solver_version: String::new()", "input_hash: String::new()", "digest: String::new()"]),
+        .theirs(&["timings: BTreeMap::new()", "body_reused: None", "solver_version: String::new()", "input_hash: String::new()", "digest: String::new()"]),
     fields("Accuracy", "solution::Accuracy").answer(),
     names("Verdict", "solution::Verdict").answer(),
     fields("EstimatedQuantity", "solution::EstimatedQuantity").answer(),
@@ -143,6 +143,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("ServerInfo", "info::Info").answer(),
     names("Isolation", "Isolation").answer(),
     fields("ServiceLimits", "info::ServiceLimits").answer(),
+    fields("BodyCache", "bodies::BodyCache").answer(),
     fields("QueueState", "queue::QueueState").answer(),
 
     // stored meshes

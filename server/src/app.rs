@@ -17,6 +17,7 @@ use crate::{
     error::{number_of, size},
     grpc,
     listener::{self, Listener},
+    memory::Budget,
     queue::{Processes, Queue, Solver},
     rest,
     store::{self, Store, StoreError},
@@ -83,7 +84,8 @@ impl App {
             ),
             Err(error) => return Err(store::with_advice(error, &config.data).into()),
         }
-        store.set_budget(config.memory.bytes(), config.workers);
+        let (bytes, of_bodies) = (config.memory.bytes(), config.body_cache_bytes());
+        store.set_budget(Budget::new(bytes, config.workers, of_bodies));
         let solver = match config.isolation {
             Isolation::Thread => Solver::Threads(solver::solve_on),
             Isolation::Process => Solver::Processes(Processes::new(worker_process)),

@@ -55,6 +55,12 @@ pub struct Config {
     #[allow(missing_docs)] // a doc comment here would become the help of the command
     pub memory: MemoryBudget,
 
+    /// Memory for condensed bodies that are kept for later jobs on the same body, a part of the memory that running jobs
+    /// share: bodies that no job uses give way to any job. 0 keeps none, and so does isolation `process` [default: a quarter
+    /// of that memory]
+    #[arg(long, env = "SIGNORINI_BODY_CACHE_BYTES", value_name = "BYTES")]
+    pub body_cache_bytes: Option<u64>,
+
     /// Maximum size of a request body over REST
     #[arg(long, env = "SIGNORINI_MAX_BODY_BYTES", default_value_t = 16 << 20, value_name = "BYTES")]
     pub max_body_bytes: usize,
@@ -84,6 +90,20 @@ pub struct Config {
         value_name = "SECONDS"
     )]
     pub grace_s: u64,
+}
+
+impl Config {
+    /// Bytes of bodies that are kept. Worker processes keep none: each would hold bodies that the others cannot use.
+    pub fn body_cache_bytes(&self) -> u64 {
+        match self.isolation {
+            Isolation::Thread => {
+                let budget = self.memory.bytes();
+                let bytes = self.body_cache_bytes.unwrap_or(budget / 4);
+                bytes.min(budget)
+            }
+            Isolation::Process => 0,
+        }
+    }
 }
 
 /// An address and a port, by number or by name; of several addresses, the first.

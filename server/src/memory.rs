@@ -1,7 +1,8 @@
 //! The memory budget: what running jobs are estimated to need is reserved in it, and a job that takes far more than
-//! that is ended.
+//! that is ended. What they leave of it is for bodies that are kept for later jobs: those give way to any job.
 
 use std::{
+    cell::Cell,
     ops::ControlFlow,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
@@ -10,6 +11,9 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
+use solver::{Prepared, body::ElasticBody, model::Model};
+
+use crate::bodies::{Bodies, BodyCache, Key};
 
 /// What all jobs together may use beyond the budget (bytes), since an estimate is one; unless they are so many that each
 /// has the least margin.
@@ -22,19 +26,29 @@ pub struct Budget {
     bytes: u64,
     /// What a job may use beyond its estimate.
     margin: u64,
-    /// Reserved by the jobs whose solvers are at work.
-    reserved: Mutex<u64>,
+    state: Mutex<State>,
     /// The next job of the queue waits for memory.
     short: AtomicBool,
 }
 
+#[derive(Debug)]
+struct State {
+    /// Reserved by the jobs whose solvers are at work. Bodies that they use are a part of it.
+    reserved: u64,
+    /// Those that no job uses fit beside what is reserved.
+    bodies: Bodies,
+}
+
 impl Budget {
-    /// A budget of so many bytes, for so many jobs at the same time.
-    pub fn new(bytes: u64, jobs: u16) -> Arc<Budget> {
+    /// A budget of so many bytes, for so many jobs at the same time; at most `of_bodies` of it are for bodies that are kept.
+    pub fn new(bytes: u64, jobs: u16, of_bodies: u64) -> Arc<Budget> {
         Arc::new(Budget {
             bytes,
             margin: (MARGINS / u64::from(jobs.max(1))).max(LEAST_MARGIN),
-            reserved: Mutex::new(0),
+            state: Mutex::new(State {
+                reserved: 0,
+                bodies: Bodies::new(of_bodies),
+            }),
             short: AtomicBool::new(false),
         })
     }
@@ -45,19 +59,56 @@ impl Budget {
     }
 
     /// Reserves what a job is estimated to need; none if it does not fit beside the running ones. A job of unknown
-    /// need, or of more than the budget (which was larger when it was accepted), takes all of it: it runs alone.
+    /// need, or of more than the budget (which was larger when it was accepted), takes all of it: it runs alone. Kept
+    /// bodies that no job uses are dropped for it, if it fits then.
     pub fn reserve(self: &Arc<Budget>, needed: Option<u64>) -> Option<Reservation> {
         let bytes = needed.unwrap_or(u64::MAX).min(self.bytes);
-        let mut reserved = self.reserved();
-        let fits = self.bytes - *reserved >= bytes;
-        self.short.store(!fits, Ordering::Relaxed);
-        fits.then(|| {
-            *reserved += bytes;
+        let mut state = self.state();
+        let left = (self.bytes - state.reserved).checked_sub(bytes);
+        self.short.store(left.is_none(), Ordering::Relaxed);
+        left.map(|left| {
+            state.reserved += bytes;
             Reservation {
                 budget: self.clone(),
                 bytes,
+                dropped: state.bodies.shrink_idle(left),
             }
         })
+    }
+
+    /// The body of a model, if it is kept, and its bytes.
+    pub fn kept_body(&self, key: &Key, model: &Model) -> Option<(Arc<ElasticBody>, u64)> {
+        let found = self.state().bodies.find(key);
+        // not while the lock is held: meshes are compared. A wrong body gives wrong results that look right
+        let same = found.filter(|(kept, _)| ElasticBody::same(&kept.model, model));
+        let mut state = self.state();
+        match &same {
+            Some(_) => state.bodies.count_hit(key),
+            None => state.bodies.count_miss(),
+        }
+        drop(state);
+        same.map(|(kept, bytes)| (kept.body.clone(), bytes))
+    }
+
+    /// Keeps a body of so many bytes, if there is room; returns those that are dropped for it.
+    pub fn keep(&self, key: Key, prepared: Prepared, bytes: u64) -> Vec<Arc<Prepared>> {
+        self.state().bodies.keep(key, prepared, bytes)
+    }
+
+    /// Drops all kept bodies that no job uses: the machine has less memory than the budget says.
+    pub fn drop_bodies(&self) {
+        let dropped = self.state().bodies.shrink_idle(0);
+        drop(dropped);
+    }
+
+    /// Most bytes of kept bodies.
+    pub fn of_bodies(&self) -> u64 {
+        self.state().bodies.limit()
+    }
+
+    /// The kept bodies, and how often they were used.
+    pub fn body_cache(&self) -> BodyCache {
+        self.state().bodies.figures()
     }
 
     /// Whether the next job of the queue waits for memory and not for a worker.
@@ -65,9 +116,9 @@ impl Budget {
         self.short.load(Ordering::Relaxed)
     }
 
-    fn reserved(&self) -> MutexGuard<'_, u64> {
+    fn state(&self) -> MutexGuard<'_, State> {
         // No code panics while it holds this lock.
-        self.reserved.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -76,9 +127,33 @@ impl Budget {
 pub struct Reservation {
     budget: Arc<Budget>,
     bytes: u64,
+    /// Bodies that had to give way.
+    dropped: Vec<Arc<Prepared>>,
+}
+
+/// What one job may use.
+#[derive(Clone, Copy, Debug)]
+pub struct Allowance<'a> {
+    /// Bytes.
+    pub share: u64,
+    /// Where bodies are kept; none if they are not.
+    pub bodies: Option<&'a Budget>,
 }
 
 impl Reservation {
+    /// Frees what had to give way. To be called before the job begins, on a thread that may take its time.
+    pub fn free_dropped(&mut self) {
+        self.dropped.clear();
+    }
+
+    /// What the job may use.
+    pub fn allowance(&self) -> Allowance<'_> {
+        Allowance {
+            share: self.share(),
+            bodies: Some(&*self.budget).filter(|budget| budget.of_bodies() > 0),
+        }
+    }
+
     /// What the job may use: its estimate, which is meant to be an upper bound, and a margin for what that does not
     /// foresee. All jobs together use no more than the budget and 128 MiB, or 4 MiB for each.
     pub fn share(&self) -> u64 {
@@ -88,8 +163,14 @@ impl Reservation {
 
 impl Drop for Reservation {
     fn drop(&mut self) {
-        *self.budget.reserved() -= self.bytes;
+        let mut state = self.budget.state();
+        state.reserved -= self.bytes;
+        // the job's own body may be idle now, and larger than its estimate
+        let free = self.budget.bytes - state.reserved;
+        let dropped = state.bodies.shrink_idle(free);
         self.budget.short.store(false, Ordering::Relaxed);
+        drop(state);
+        drop(dropped);
     }
 }
 
@@ -107,21 +188,32 @@ pub struct Outgrown {
 /// Watches what the job of this thread uses.
 #[derive(Debug)]
 pub struct Meter {
-    /// The thread's count when the job began.
-    start: i64,
+    /// The thread's count when the job began; what it handed over since is added, what it was lent subtracted.
+    start: Cell<i64>,
     share: u64,
 }
 
 impl Meter {
     /// A job of this share begins on this thread.
     pub fn new(share: u64) -> Meter {
-        let start = allocator::held();
+        let start = Cell::new(allocator::held());
         Meter { start, share }
+    }
+
+    /// Bytes that the job uses.
+    pub fn used(&self) -> u64 {
+        u64::try_from(allocator::held().saturating_sub(self.start.get())).unwrap_or(0)
+    }
+
+    /// The job uses so many bytes that another thread has taken.
+    pub fn lend(&self, bytes: u64) {
+        let bytes = i64::try_from(bytes).unwrap_or(i64::MAX);
+        self.start.set(self.start.get().saturating_sub(bytes));
     }
 
     /// Whether the job may go on, which is about to take `needed` more bytes.
     pub fn check(&self, needed: u64) -> ControlFlow<Outgrown> {
-        let used = u64::try_from(allocator::held() - self.start).unwrap_or(0);
+        let used = self.used();
         match used.saturating_add(needed) > self.share {
             true => ControlFlow::Break(Outgrown {
                 used,
@@ -133,10 +225,11 @@ impl Meter {
     }
 
     /// Does work whose memory is handed over to another thread, and no longer that of the job.
-    pub fn hand_over<T>(&mut self, work: impl FnOnce() -> T) -> T {
+    pub fn hand_over<T>(&self, work: impl FnOnce() -> T) -> T {
         let before = allocator::held();
         let done = work();
-        self.start += allocator::held() - before;
+        let handed_over = allocator::held() - before;
+        self.start.set(self.start.get().saturating_add(handed_over));
         done
     }
 }
@@ -150,7 +243,7 @@ mod tests {
 
     #[test]
     fn jobs_fit_as_long_as_their_sum_does() {
-        let budget = Budget::new(100 * MIB, 2);
+        let budget = Budget::new(100 * MIB, 2, 0);
         let first = budget.reserve(Some(60 * MIB)).unwrap();
         assert!(budget.reserve(Some(41 * MIB)).is_none() && budget.is_short());
         let second = budget.reserve(Some(40 * MIB)).unwrap();
@@ -169,7 +262,7 @@ mod tests {
     #[test]
     fn shares_have_margins_and_a_limit_together() {
         for jobs in [1, 2, 16] {
-            let budget = Budget::new(1000 * MIB, jobs);
+            let budget = Budget::new(1000 * MIB, jobs, 0);
             let estimate = Some(1000 * MIB / u64::from(jobs));
             let reserve = || budget.reserve(estimate);
             let reserved: Vec<Reservation> = std::iter::from_fn(reserve).collect();
@@ -179,9 +272,82 @@ mod tests {
         }
     }
 
+    fn body() -> Prepared {
+        let go_on = &mut |_: solver::solution::Progress<'_>| ControlFlow::Continue(());
+        solver::prepare(&crate::fake::problem(), None, go_on).unwrap()
+    }
+
+    #[test]
+    fn kept_bodies_give_way_to_jobs_and_to_no_more_than_they_need() {
+        let budget = Budget::new(100 * MIB, 2, 50 * MIB);
+        for k in 1..=3 {
+            budget.keep([k; 32], body(), 15 * MIB);
+        }
+        let kept = || budget.body_cache().bodies;
+        // beside 45 MiB of bodies
+        let first = budget.reserve(Some(55 * MIB)).unwrap();
+        assert_eq!((kept(), first.dropped.len()), (3, 0));
+        let mut second = budget.reserve(Some(20 * MIB)).unwrap();
+        assert_eq!((kept(), second.dropped.len()), (1, 2));
+        second.free_dropped();
+        assert!(second.dropped.is_empty());
+        // what does not fit anyway drops nothing
+        assert!(budget.reserve(Some(26 * MIB)).is_none());
+        assert_eq!(kept(), 1);
+        let third = budget.reserve(Some(25 * MIB)).unwrap();
+        assert_eq!((kept(), third.dropped.len()), (0, 1));
+    }
+
+    #[test]
+    fn a_body_in_use_is_a_part_of_what_its_job_has_reserved() {
+        let budget = Budget::new(100 * MIB, 2, 50 * MIB);
+        let body = body();
+        let job = budget.reserve(Some(50 * MIB)).unwrap();
+        budget.keep([1; 32], body.clone(), 50 * MIB);
+        // it is not counted twice
+        let other = budget.reserve(Some(50 * MIB)).unwrap();
+        assert_eq!(budget.body_cache().bodies, 1);
+        drop(body);
+        // the job has ended, and there is no room for its body beside the other and one more
+        drop(job);
+        assert_eq!(budget.body_cache().bodies, 1);
+        let more = budget.reserve(Some(1)).unwrap();
+        assert_eq!(budget.body_cache().bodies, 0);
+        drop((other, more));
+    }
+
+    #[test]
+    fn a_body_larger_than_what_its_job_had_reserved_is_dropped_if_others_need_the_rest() {
+        let budget = Budget::new(100 * MIB, 2, 100 * MIB);
+        let other = budget.reserve(Some(70 * MIB)).unwrap();
+        let job = budget.reserve(Some(30 * MIB)).unwrap();
+        budget.keep([1; 32], body(), 31 * MIB);
+        drop(job);
+        assert_eq!(budget.body_cache().bodies, 0);
+        drop(other);
+    }
+
+    #[test]
+    fn a_kept_body_is_found_only_for_an_equal_model() {
+        let budget = Budget::new(100 * MIB, 2, 50 * MIB);
+        let prepared = body();
+        let model = prepared.model.clone();
+        budget.keep([1; 32], prepared, 7);
+        assert!(matches!(budget.kept_body(&[1; 32], &model), Some((_, 7))));
+        assert!(budget.kept_body(&[2; 32], &model).is_none());
+        // as if two bodies had the same key
+        let other = Model {
+            quadrature: 2,
+            ..model
+        };
+        assert!(budget.kept_body(&[1; 32], &other).is_none());
+        let figures = budget.body_cache();
+        assert_eq!((figures.hits, figures.misses), (1, 2));
+    }
+
     #[test]
     fn a_meter_counts_what_its_thread_holds_and_has_not_handed_over() {
-        let mut meter = Meter::new(10_000);
+        let meter = Meter::new(10_000);
         assert!(meter.check(9_000).is_continue());
         let held = std::hint::black_box(vec![0u8; 6_000]);
         let outgrown = Outgrown {
@@ -197,6 +363,10 @@ mod tests {
         assert!(meter.check(3_500).is_continue());
         drop(held);
         assert!(meter.check(9_000).is_continue());
+        meter.lend(5_000);
+        assert!(meter.used() >= 5_000 && meter.check(6_000).is_break());
+        meter.lend(u64::MAX);
+        assert!(meter.check(0).is_break());
         assert!(meter.check(u64::MAX).is_break());
     }
 }

@@ -4,9 +4,14 @@
 //! contact and friction iteration runs on it; [`ElasticBody::displacements`] computes
 //! the whole field by one back-substitution. The factor is private to this module.
 
-use crate::elasticity::{self, Axes, Dof, DofMap, ElementStiffness, TOGETHER};
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::elasticity::{self, Axes, Dof, DofMap, ElementStiffness, Loads, Section, TOGETHER};
 use crate::error::SolveError;
 use crate::linear::{Breaks, Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts};
+use crate::mesh::Mesh;
 use crate::model::{Held, Level, Model};
 use crate::solution::{Observer, Phase, Progress};
 
@@ -32,6 +37,36 @@ pub struct ElasticBody {
     factor: Factor,
     /// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it.
     axis_ends: Vec<[usize; 2]>,
+}
+
+/// What a body is made from: models that are equal in this have one body. The rest of a model that
+/// [`ElasticBody::new`] reads follows from it.
+#[derive(PartialEq, Serialize)]
+pub struct Source<'a> {
+    mesh: &'a Mesh,
+    section: &'a Section,
+    quadrature: u32,
+    fixed: &'a BTreeMap<u32, Held>,
+    loads: &'a Loads,
+    /// Nodes and normals of each contact.
+    contacts: Vec<(&'a [u32], &'a [[f64; 2]])>,
+}
+
+impl<'a> Source<'a> {
+    /// That of a model.
+    pub fn of(model: &'a Model) -> Self {
+        let boundaries = model.contacts.iter().map(|contact| &contact.boundary);
+        Source {
+            mesh: &model.mesh,
+            section: &model.section,
+            quadrature: model.quadrature,
+            fixed: &model.fixed,
+            loads: &model.loads,
+            contacts: boundaries
+                .map(|boundary| (&boundary.nodes[..], &boundary.normals[..]))
+                .collect(),
+        }
+    }
 }
 
 /// The unknown of the midside node beside a contact's end on the axis is u_n − a u_n⁰, with u_n⁰ of that end, which has
@@ -162,18 +197,7 @@ impl ElasticBody {
 
     /// Whether the body of one model is the body of another: all that [`ElasticBody::new`] reads is equal.
     pub fn same(a: &Model, b: &Model) -> bool {
-        let on_boundary = |model: &Model| -> Vec<(Vec<u32>, Vec<[f64; 2]>)> {
-            let boundaries = model.contacts.iter().map(|contact| &contact.boundary);
-            boundaries
-                .map(|boundary| (boundary.nodes.clone(), boundary.normals.clone()))
-                .collect()
-        };
-        a.mesh == b.mesh
-            && a.section == b.section
-            && a.quadrature == b.quadrature
-            && a.fixed == b.fixed
-            && a.loads == b.loads
-            && on_boundary(a) == on_boundary(b)
+        Source::of(a) == Source::of(b)
     }
 
     /// f̂ at a load level.

@@ -1,6 +1,7 @@
 //! Many problems on one body: it is factored and condensed once.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::body::ElasticBody;
 use crate::error::SolveError;
@@ -17,7 +18,7 @@ pub use crate::steps::{End, Start};
 /// Problems on one body, solved one after the other, each from the end of another one where that helps.
 pub struct Family {
     model: VariableModel,
-    body: ElasticBody,
+    body: Arc<ElasticBody>,
     /// What was said of the mesh when it was made; problems on it repeat it.
     mesh_warnings: Vec<Warning>,
     shared: Shared,
@@ -60,15 +61,20 @@ impl Family {
         external: Option<External>,
         observe: &mut Observer<'_>,
     ) -> Result<Family, SolveError> {
-        let Prepared { model, body } = prepare(problem, external, observe)?;
+        Ok(Family::of(prepare(problem, external, observe)?, problem))
+    }
+
+    /// The problems on the body of one that is prepared.
+    pub fn of(prepared: Prepared, problem: &Problem) -> Family {
+        let Prepared { model, body } = prepared;
         let of_mesh = |warning: &&Warning| warning.pointer.starts_with("/mesh");
         let mesh_warnings = model.warnings.iter().filter(of_mesh).cloned().collect();
-        Ok(Family {
+        Family {
             model: VariableModel::new(model, problem),
             body,
             mesh_warnings,
             shared: Shared::default(),
-        })
+        }
     }
 
     /// Solves a problem on this body (`problem.mesh` is not read: it is the family's); also its end, from which others may

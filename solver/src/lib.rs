@@ -99,6 +99,7 @@ pub fn solve_with_mesh(
             verification = verification.map(|verification| verification.limited(&first));
             let solve = |model: Model, origins: &mut Origins, observe: &mut Observer<'_>| {
                 body::notify(observe, Progress::Phase(Phase::Mesh))?;
+                prepared::tell_warnings(&model, observe)?;
                 let Prepared { model, body } = Prepared::new(model, observe)?;
                 steps::run(&model, &body, Some(origins), observe)
             };
@@ -129,7 +130,7 @@ pub fn check(problem: &Problem, external: Option<External>) -> Result<Checked, V
     })
 }
 
-pub use prepared::{Prepared, prepare, prepare_on_mesh};
+pub use prepared::{Prepared, checked, prepare, prepare_on_mesh};
 
 pub use model::estimate::{Estimate, MeshSize, estimate};
 

@@ -1,5 +1,7 @@
 //! A problem up to its iterations.
 
+use std::sync::Arc;
+
 use crate::body::{ElasticBody, notify};
 use crate::error::SolveError;
 use crate::mesh::{External, Mesh};
@@ -13,11 +15,12 @@ use crate::steps;
 /// This is most of the work, and problems that differ only in friction, indentation, drag, load steps or tolerances
 /// share it. (An obstacle of another shape may face other nodes, or turn their normals.) Errors are estimated here, whatever
 /// `solver.accuracy` is: [`solve`](crate::solve) verifies them.
+#[derive(Clone)]
 pub struct Prepared {
     /// The checked problem.
     pub model: Model,
-    /// The body reduced to its contacts.
-    pub body: ElasticBody,
+    /// The body reduced to its contacts, which other problems may share.
+    pub body: Arc<ElasticBody>,
 }
 
 /// Prepares a problem on its own mesh; adaptive refinement prepares it on each of several.
@@ -26,11 +29,19 @@ pub fn prepare(
     external: Option<External>,
     observe: &mut Observer<'_>,
 ) -> Result<Prepared, SolveError> {
+    Prepared::new(checked(problem, external, observe)?, observe)
+}
+
+/// Checks a problem and tells its warnings: what comes before its body.
+pub fn checked(
+    problem: &Problem,
+    external: Option<External>,
+    observe: &mut Observer<'_>,
+) -> Result<Model, SolveError> {
     notify(observe, Progress::Phase(Phase::Mesh))?;
-    Prepared::new(
-        Model::new(problem, external).map_err(SolveError::Invalid)?,
-        observe,
-    )
+    let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
+    tell_warnings(&model, observe)?;
+    Ok(model)
 }
 
 /// Prepares a problem on another mesh of its body, with all boundaries, groups and node sets of its own.
@@ -41,16 +52,19 @@ pub fn prepare_on_mesh(
 ) -> Result<Prepared, SolveError> {
     notify(observe, Progress::Phase(Phase::Mesh))?;
     let model = Model::on_mesh(problem, mesh.into()).map_err(SolveError::Invalid)?;
+    tell_warnings(&model, observe)?;
     Prepared::new(model, observe)
 }
 
+pub(crate) fn tell_warnings(model: &Model, observe: &mut Observer<'_>) -> Result<(), SolveError> {
+    let mut warnings = model.warnings.iter();
+    warnings.try_for_each(|warning| notify(observe, Progress::Warning(warning)))
+}
+
 impl Prepared {
-    /// Tells the warnings of a model, and factors and condenses its body.
-    pub(crate) fn new(model: Model, observe: &mut Observer<'_>) -> Result<Prepared, SolveError> {
-        for warning in &model.warnings {
-            notify(observe, Progress::Warning(warning))?;
-        }
-        let body = ElasticBody::new(&model, observe)?;
+    /// Factors and condenses the body of a model.
+    pub fn new(model: Model, observe: &mut Observer<'_>) -> Result<Prepared, SolveError> {
+        let body = Arc::new(ElasticBody::new(&model, observe)?);
         Ok(Prepared { model, body })
     }
 
@@ -66,5 +80,11 @@ impl Prepared {
         observe: &mut Observer<'_>,
     ) -> Option<Result<Solution, SolveError>> {
         ElasticBody::same(&self.model, model).then(|| steps::run(model, &self.body, None, observe))
+    }
+}
+
+impl std::fmt::Debug for Prepared {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Prepared")
     }
 }

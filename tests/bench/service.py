@@ -2,10 +2,11 @@
 
     service.py [JOBS]
     service.py --isolation
+    service.py --bodies
 
-With --isolation only the second table. JOBS (1,000,000 when absent) is how many jobs the lists are read from; what they show is compared with plain
-SQL over the same rows. `cargo build --release`
-comes first: requests are sent by `target/release/load`.
+With --isolation only the table of threads and processes, with --bodies only that of bodies that are kept. JOBS (1,000,000
+when absent) is how many jobs the lists are read from; what they show is compared with plain SQL over the same rows.
+`cargo build --release` comes first: requests are sent by `target/release/load`.
 """
 
 import calendar
@@ -21,12 +22,17 @@ import time
 import urllib.parse
 import uuid
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+TESTS = pathlib.Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(TESTS), str(TESTS / "peers")]
 
-from outside import TERMINAL, TOP, Server, check, equal, example, percentile, submission, talkative
+import problem as block
 
-ISOLATION = sys.argv[1:] == ["--isolation"]
-JOBS = int(sys.argv[1]) if len(sys.argv) > 1 and not ISOLATION else 1_000_000
+from outside import TERMINAL, TOP, Server, check, cpu_s, equal, example, percentile, submission, talkative
+
+ONLY = sys.argv[1] if sys.argv[1:] in (["--isolation"], ["--bodies"]) else None
+JOBS = int(sys.argv[1]) if len(sys.argv) > 1 and not ONLY else 1_000_000
+# every job factors its body
+NO_BODIES = ("--body-cache-bytes", "0")
 LOAD = TOP / "target/release/load"
 MANY = ("--max-queued", "1000000")
 
@@ -100,7 +106,7 @@ def isolation():
     kinds = {"56 elements": (example(), 200), "56 elements, 500 load steps, some 5,000 events": (talkative(500), 3),
              "14,336 elements, a result of 5 MB": (example(refine=4), 2)}
     found = {kind: {"thread": [], "process": []} for kind in kinds}
-    with Server() as threads, Server("--isolation", "process") as processes:
+    with Server(*NO_BODIES) as threads, Server("--isolation", "process") as processes:
         for _ in range(5):
             for kind, (problem, count) in kinds.items():
                 sent = request("POST", "/v1/jobs", submission(problem), prefer="wait=60")
@@ -112,6 +118,35 @@ def isolation():
         rows.append((kind, thread, process, process - thread, process / thread))
     table("Request to answer, solved on a thread and in a process of its own, ms (median of 5 medians, in turns)",
           ("the job", "thread", "process", "more", "ratio"), rows)
+
+
+def bodies():
+    """Jobs on one body that differ in friction: with the body kept, and factored anew by each, in turns."""
+    rows = []
+    for size in ("2e4", "2e5"):
+        with Server() as keeping, Server(*NO_BODIES) as without:
+            spans = {keeping: [], without: []}
+            for turn in range(7):
+                problem = block.problem(*block.lines(size), 0.2 + 0.02 * turn)
+                digests = set()
+                for server, taken in spans.items():
+                    before = cpu_s(server.process.pid)
+                    job = server.submit(problem, cache="off")
+                    equal(server.finished(job)["status"], "succeeded", "a job")
+                    taken.append(cpu_s(server.process.pid) - before)
+                    summary = server.json("/v1/jobs/%s/result" % job)["summary"]
+                    equal(summary["body_reused"], server is keeping and turn > 0, "whether the body was reused")
+                    digests.add(summary["digest"])
+                equal(len(digests), 1, "digests of the same problem")
+            kept = keeping.json("/v1/info")["body_cache"]
+        # the first turn makes the body
+        pairs = list(zip(spans[keeping], spans[without]))[1:]
+        ratios = sorted(found / alone for found, alone in pairs)
+        found, alone = (percentile([pair[k] for pair in pairs], 0.5) for k in (0, 1))
+        rows.append((size, alone, found, "%.2f (%.2f–%.2f)" % (percentile(ratios, 0.5), ratios[0], ratios[-1]),
+                     kept["bytes"] / 2**20))
+    table("Processor time of the service for a job on a body that is kept, s (median of 6, in turns; the result stored)",
+          ("unknowns", "factored anew", "kept", "ratio (least–most)", "the body, MiB"), rows)
 
 
 def submits():
@@ -275,14 +310,17 @@ def lists():
 
 
 def main():
+    if ONLY == "--bodies":
+        return bodies()
     check(LOAD.exists(), "%s is missing: cargo build --release" % LOAD)
-    if ISOLATION:
+    if ONLY == "--isolation":
         return isolation()
     with tempfile.TemporaryDirectory() as folder:
         commits(folder)
-    with Server() as server:
+    with Server(*NO_BODIES) as server:
         waited(server)
     isolation()
+    bodies()
     submits()
     lists()
 

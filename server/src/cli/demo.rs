@@ -34,6 +34,7 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         isolation: Isolation::Thread,
         max_queued: 100,
         memory: MemoryBudget::default(),
+        body_cache_bytes: None,
         max_body_bytes: 16 << 20,
         max_mesh_bytes: 16 << 20,
         max_connections: 100,

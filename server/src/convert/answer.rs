@@ -160,12 +160,14 @@ impl From<Summary> for pb::Summary {
         let Summary {
             solution,
             timings,
+            body_reused,
             solver_version,
             input_hash,
             digest,
         } = ours;
         pb::Summary {
             timings,
+            body_reused: Some(body_reused),
             solver_version,
             input_hash,
             digest,

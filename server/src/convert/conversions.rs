@@ -8,6 +8,7 @@ use solver::{element::Element, problem, solution};
 
 use super::{FromMessage, IntoMessage, Reader};
 use crate::{
+    bodies,
     config::Isolation,
     job, mesh, pb,
     run::Summary,

@@ -9,9 +9,13 @@ use number::{ROOM, Recent};
 use serde::Serialize;
 use serde_json::json;
 use sha2::{Digest, Sha256};
+use solver::body::Source;
 use solver::element::Element;
+use solver::model::Model;
 use solver::problem::{InlineMesh, MeshInput, MeshSource, Problem};
 use solver::solution::{Fields, GaussFields, Solution};
+
+use crate::bodies::Key;
 
 /// Fingerprint of a problem with its defaults filled in. The title is for people and not included. Units are:
 /// problems are stored once per fingerprint, and figures show their units.
@@ -26,6 +30,13 @@ pub fn of_json(value: &impl Serialize) -> serde_json::Result<String> {
     let mut hash = Hash::new();
     hash.json(value)?;
     Ok(hash.finish())
+}
+
+/// Fingerprint of all that a model's body is made from. It is that of a binary form, not of JSON: it never leaves this
+/// process, and the canonical writer would hold a large mesh as text.
+pub fn of_body(model: &Model) -> postcard::Result<Key> {
+    let hash = postcard::to_io(&Source::of(model), Hash::new())?;
+    Ok(hash.sha256().finalize().into())
 }
 
 /// Fingerprint of a result: equal digests mean equal bits. Times, the program's version and what is said about the
@@ -299,9 +310,13 @@ impl Hash {
         self.byte(b']');
     }
 
-    fn finish(mut self) -> String {
+    fn finish(self) -> String {
+        sha256_text(self.sha256())
+    }
+
+    fn sha256(mut self) -> Sha256 {
         self.sha256.update(&self.text[..self.length]);
-        sha256_text(self.sha256)
+        self.sha256
     }
 }
 

@@ -4,9 +4,10 @@ use std::{ops::ControlFlow, time::Duration, time::Instant};
 
 use files::sweep::Plan;
 use solver::{
+    Prepared,
     error::SolveError,
     family::{Family, Member},
-    mesh::Mesh,
+    mesh::{External, Mesh},
     problem::{Problem, Refine, Step},
     solution::{Observer, Outcome, Phase, Progress},
 };
@@ -16,9 +17,10 @@ use super::{
     report::{Report, Told},
 };
 use crate::{
+    digest,
     event::Payload,
     job::Reason,
-    memory::Meter,
+    memory::{Allowance, Budget, Meter},
     run::{
         self, PartialSolution, Solve, Update,
         members::{Members, Step as MemberStep, is_alone, row_of},
@@ -51,13 +53,13 @@ pub(super) fn members_of(store: &Store, key: i64) -> Result<MembersTask, NoSolut
     task.ok_or_else(|| failed("they are not stored".into()))
 }
 
-/// Solves the problem of a job within a share of memory (bytes), and with it members of its sweep. On a blocking thread.
+/// Solves the problem of a job within its memory, and with it members of its sweep. On a blocking thread.
 pub(super) fn solve_task(
     problem: &str,
     mesh: Option<Mesh>,
     members: Option<&MembersTask>,
     solve: Solve,
-    share: u64,
+    allowance: Allowance<'_>,
     tell: impl FnMut(Told) -> ControlFlow<()>,
 ) -> Result<Solved, NoSolution> {
     let solved = solve_and_store(
@@ -65,7 +67,7 @@ pub(super) fn solve_task(
         mesh,
         members,
         solve,
-        share,
+        allowance,
         Partials::paced(),
         tell,
     );
@@ -79,17 +81,18 @@ pub(super) fn solve_task(
     })
 }
 
-/// Reads the problem and solves it, within a share of memory (bytes), with partial results as `partials` decides.
+/// Reads the problem and solves it, within its memory, with partial results as `partials` decides.
 pub(super) fn solve_and_store(
     problem: &str,
     mesh: Option<Mesh>,
     members: Option<&MembersTask>,
     solve: Solve,
-    share: u64,
+    allowance: Allowance<'_>,
     mut partials: Partials,
     mut tell: impl FnMut(Told) -> ControlFlow<()>,
 ) -> Result<Solved, SolveError> {
-    let mut meter = Meter::new(share);
+    let Allowance { share, bodies } = allowance;
+    let meter = Meter::new(share);
     let start = Instant::now();
     let problem: Problem = files::parse(problem).map_err(SolveError::Invalid)?;
     let parse_s = start.elapsed().as_secs_f64();
@@ -108,12 +111,16 @@ pub(super) fn solve_and_store(
     let mut family = None;
     let solve = |observe: &mut Observer<'_>| {
         let external = files::external_mesh(&problem, mesh);
+        if is_alone(&problem) || (members.is_none() && bodies.is_none()) {
+            return solve(&problem, external, observe);
+        }
+        let prepared = prepare(&problem, external, bodies, &meter, observe)?;
         match members {
-            Some(_) if !is_alone(&problem) => {
-                let body = family.insert(Family::new(&problem, external, observe)?);
-                body.solution(&problem, observe)
+            Some(_) => {
+                let family = family.insert(Family::of(prepared, &problem));
+                family.solution(&problem, observe)
             }
-            _ => solve(&problem, external, observe),
+            None => prepared.solve(observe),
         }
     };
     let mut verifying = false;
@@ -168,6 +175,9 @@ pub(super) fn solve_and_store(
         // no room is an answer, and no reason to stop
         meter.check(room).map_break(|_| ())
     });
+    if let (Err(SolveError::ResourceExhausted { .. }), Some(bodies)) = (&document, bodies) {
+        meter.hand_over(|| bodies.drop_bodies());
+    }
     if let Some(task) = members {
         let first = match &document {
             Ok(document) => {
@@ -186,7 +196,7 @@ pub(super) fn solve_and_store(
                 stored,
                 (task, first),
                 family,
-                &mut meter,
+                (bodies, &meter),
                 &mut tell,
             )?;
         }
@@ -204,13 +214,44 @@ pub(super) fn solve_and_store(
     })
 }
 
+/// A problem on its body, which is made and kept unless it is kept already. Two jobs that begin at the same time each make
+/// their own: the first does not know yet whether there will be one.
+pub(super) fn prepare(
+    problem: &Problem,
+    external: Option<External>,
+    bodies: Option<&Budget>,
+    meter: &Meter,
+    observe: &mut Observer<'_>,
+) -> Result<Prepared, SolveError> {
+    let model = solver::checked(problem, external, observe)?;
+    let key = bodies.and_then(|bodies| Some((bodies, digest::of_body(&model).ok()?)));
+    let Some((bodies, key)) = key else {
+        return Prepared::new(model, observe);
+    };
+    if let Some((body, bytes)) = bodies.kept_body(&key, &model) {
+        // as if the job had made it
+        meter.lend(bytes);
+        return Ok(Prepared { model, body });
+    }
+    let before = meter.used();
+    let prepared = Prepared::new(model, observe)?;
+    let made = |meter: &Meter| meter.used().saturating_sub(before);
+    if made(meter) <= bodies.of_bodies() {
+        let kept = prepared.clone();
+        let dropped = bodies.keep(key, kept, made(meter));
+        // other threads have taken that memory
+        meter.hand_over(|| drop(dropped));
+    }
+    Ok(prepared)
+}
+
 /// Tells the row of the first member, and solves the others; an error if that was stopped.
 fn solve_others(
     problem: &Problem,
     mesh: Option<Mesh>,
     (task, first): (&MembersTask, MemberRow),
     family: Option<Family>,
-    meter: &mut Meter,
+    (bodies, meter): (Option<&Budget>, &Meter),
     tell: &mut impl FnMut(Told) -> ControlFlow<()>,
 ) -> Result<(), SolveError> {
     let MembersTask {
@@ -221,7 +262,11 @@ fn solve_others(
     } = task;
     let plan: Plan = serde_json::from_str(definition).map_err(|_| SolveError::OtherBody)?;
     let external = |problem: &Problem| files::external_mesh(problem, mesh.clone());
-    let mut members = Members::new(&plan, group, &problem.mesh, &external, family);
+    let prepare = |problem: &Problem, external: Option<External>, observe: &mut Observer<'_>| {
+        prepare(problem, external, bodies, meter, observe)
+    };
+    let mesh = &problem.mesh;
+    let mut members = Members::new(&plan, group, mesh, &external, &prepare, family);
     let mut report = |row: Box<MemberRow>| {
         let report = Report::Member(Time::now(), row);
         tell(Told::Report(report))

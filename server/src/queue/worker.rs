@@ -62,13 +62,13 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
     failpoint::pass(Point::Begun, id);
     let (sender, reports) = mpsc::channel(MOST_UNRECORDED);
     let stop = running.clone();
-    let share = memory.share();
     let queue_of_solver = queue.clone();
     let (key, in_sweep) = (job.key, job.sweep.is_some());
     let solving = tokio::task::spawn_blocking(move || {
         // given back when the solver has returned, or panicked, in this order: another job may have them then
         let _slot = slot;
-        let _memory = memory;
+        let mut memory = memory;
+        memory.free_dropped();
         let Queue { store, solver, .. } = &*queue_of_solver;
         let mesh = mesh.map(|hash| stored_mesh(store, &hash)).transpose()?;
         let members = match in_sweep {
@@ -102,14 +102,15 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
         match solver {
             Solver::Threads(solve) => {
                 let mesh = mesh.as_deref().map(read_mesh).transpose()?;
-                solve_task(&problem, mesh, members.as_ref(), *solve, share, tell)
+                let allowance = memory.allowance();
+                solve_task(&problem, mesh, members.as_ref(), *solve, allowance, tell)
             }
             Solver::Processes(processes) => {
                 let task = Task {
                     problem,
                     members,
                     mesh,
-                    share,
+                    share: memory.share(),
                     second_thread: queue.has_spare_processor(),
                 };
                 processes.solve(task, tell)

@@ -61,6 +61,10 @@ pub struct Summary {
     pub solution: solver::solution::Summary,
     /// Seconds by phase.
     pub timings: Timings,
+    /// Its body was kept from an earlier job with the same mesh, materials, supports, loads and contact boundaries: it was
+    /// not assembled and factored again, which changes no number.
+    #[serde(default)]
+    pub body_reused: bool,
     /// The program that solved it.
     pub solver_version: String,
     /// Fingerprint of the problem.
@@ -98,6 +102,7 @@ impl Document {
         let summary = Summary {
             solution: summary,
             timings: times.phases.clone(),
+            body_reused: !times.factored,
             solver_version,
             input_hash,
             digest,

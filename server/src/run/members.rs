@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use files::sweep::{Group, Neighbour, Plan, Problems};
 use solver::{
+    Prepared,
     error::SolveError,
     family::{End, Family, Member, Start},
     mesh::External,
@@ -21,6 +22,10 @@ pub enum Step<'a> {
     Row(Box<MemberRow>),
 }
 
+/// Checks a problem, and factors and condenses its body or finds it: [`solver::prepare`].
+pub type Prepare<'a> =
+    dyn Fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Prepared, SolveError> + 'a;
+
 /// The members of a sweep that share a body, or may.
 pub struct Members<'a> {
     plan: &'a Plan,
@@ -31,6 +36,8 @@ pub struct Members<'a> {
     mesh: &'a MeshInput,
     /// The mesh that a problem only names or quotes.
     external: &'a dyn Fn(&Problem) -> Option<External>,
+    /// Prepares the first of them.
+    prepare: &'a Prepare<'a>,
     /// Their body, once a member was found that has one.
     family: Option<Family>,
     /// By line, the last member that was solved on it and its end; that of its neighbour if it has none.
@@ -44,6 +51,7 @@ impl<'a> Members<'a> {
         group: &'a Group,
         mesh: &'a MeshInput,
         external: &'a dyn Fn(&Problem) -> Option<External>,
+        prepare: &'a Prepare<'a>,
         family: Option<Family>,
     ) -> Self {
         Members {
@@ -52,6 +60,7 @@ impl<'a> Members<'a> {
             group,
             mesh,
             external,
+            prepare,
             family,
             lines: (0..plan.lines()).map(|_| None).collect(),
         }
@@ -108,10 +117,12 @@ impl<'a> Members<'a> {
             let solution = solver::solve_on(&problem, external, observe)?;
             return Ok(Member::of(&solution.summary));
         }
-        let family = Family::new(&problem, external, observe).map_err(|error| match error {
+        let prepared = (self.prepare)(&problem, external, observe);
+        let prepared = prepared.map_err(|error| match error {
             SolveError::SingularSystem { .. } | SolveError::NonFinite { .. } => Failed::Body(error),
             error => Failed::Member(error),
         })?;
+        let family = Family::of(prepared, &problem);
         // the first on a body is solved whole, as in the service: its balance of forces tells whether the body is sound
         Ok(self.family.insert(family).whole_member(&problem, observe)?)
     }

@@ -26,6 +26,8 @@ pub(super) struct Stopwatch {
 pub(super) struct Times {
     /// Every phase, also one that was not reached; a verification only if it was.
     pub(super) phases: Timings,
+    /// A body was factored.
+    pub(super) factored: bool,
     /// Seconds from the start to the end of each iteration, in the order of their numbers.
     iterations: Vec<f64>,
 }
@@ -41,6 +43,7 @@ impl Stopwatch {
             current: None,
             times: Times {
                 phases,
+                factored: false,
                 iterations: vec![],
             },
             mesh: 0,
@@ -61,6 +64,7 @@ impl Stopwatch {
     /// A phase begins, and with it the one before ends.
     pub(super) fn enter(&mut self, phase: Phase) {
         let now = Instant::now();
+        self.times.factored |= phase == Phase::Factor;
         if let Some((before, since)) = self.current.replace((phase, now)) {
             let seconds = self.times.phases.entry(before.as_str().into());
             *seconds.or_default() += (now - since).as_secs_f64();

@@ -16,14 +16,14 @@ impl Store {
         Ok(())
     }
 
-    /// Sets the memory that running jobs, of which there are so many, share (bytes); once and before any is claimed.
-    pub fn set_budget(&self, bytes: u64, jobs: u16) {
-        let _ = self.budget.set(Budget::new(bytes, jobs)); // fails if it is set already, which is kept
+    /// Sets the memory that running jobs share; once and before any is claimed.
+    pub fn set_budget(&self, budget: Arc<Budget>) {
+        let _ = self.budget.set(budget); // fails if it is set already, which is kept
     }
 
     /// The memory that running jobs share.
-    pub(super) fn budget(&self) -> &Arc<Budget> {
-        self.budget.get_or_init(|| Budget::new(u64::MAX, 1))
+    pub fn budget(&self) -> &Arc<Budget> {
+        self.budget.get_or_init(|| Budget::new(u64::MAX, 1, 0))
     }
 
     /// Whether the queue is paused.

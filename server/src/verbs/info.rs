@@ -9,7 +9,7 @@ use super::{
     submit::MAX_BATCH,
     watch::MAX_WAIT_S,
 };
-use crate::{caller::Caller, config::Isolation, formats::Format};
+use crate::{bodies::BodyCache, caller::Caller, config::Isolation, formats::Format};
 
 /// Version and limits of a service.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -26,6 +26,8 @@ pub struct Info {
     pub isolation: Isolation,
     /// Its limits.
     pub limits: ServiceLimits,
+    /// Condensed bodies that are kept for later jobs; all 0 with isolation `process`.
+    pub body_cache: BodyCache,
     /// Formats of rows (profiles, history), the default first.
     pub table_formats: Vec<String>,
     /// Formats of fields, the default first.
@@ -43,6 +45,8 @@ pub struct ServiceLimits {
     pub max_mesh_bytes: u64,
     /// Bytes of memory that one job may need, by the estimate.
     pub memory_budget_bytes: u64,
+    /// Bytes of it for bodies that are kept; 0: none is kept, as with isolation `process`.
+    pub body_cache_bytes: u64,
     /// Jobs that may wait.
     pub max_queued: u32,
     /// Jobs of a batch.
@@ -55,6 +59,7 @@ pub struct ServiceLimits {
 
 /// Version and limits.
 pub fn info(service: &Service, _caller: &Caller) -> Info {
+    let budget = service.store.budget();
     let names = |formats: &[Format]| formats.iter().map(|f| f.name().to_owned()).collect();
     Info {
         name: "signorini".into(),
@@ -67,11 +72,13 @@ pub fn info(service: &Service, _caller: &Caller) -> Info {
             max_message_bytes: MAX_MESSAGE_BYTES as u64,
             max_mesh_bytes: service.max_mesh_bytes as u64,
             memory_budget_bytes: service.memory_budget_bytes,
+            body_cache_bytes: budget.of_bodies(),
             max_queued: service.max_queued,
             max_batch: MAX_BATCH as u32,
             max_page_size: MAX_PAGE_SIZE as u32,
             max_wait_s: MAX_WAIT_S,
         },
+        body_cache: budget.body_cache(),
         table_formats: names(Format::OF_TABLES),
         field_formats: names(Format::OF_FIELDS),
     }

@@ -42,6 +42,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
         isolation: Isolation::Thread,
         max_queued: 10,
         memory: MemoryBudget::default(),
+        body_cache_bytes: None,
         max_body_bytes: 1 << 20,
         max_mesh_bytes: 1 << 20,
         max_connections: 100,

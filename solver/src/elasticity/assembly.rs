@@ -1,5 +1,7 @@
 //! `assemble_element`, `ElementStiffness`, `assemble_loads`: thesis (2.18), (2.20), (2.27), (2.28).
 
+use serde::Serialize;
+
 use crate::elasticity::Section;
 use crate::elasticity::geometry::{ByShape, Masters, Shape};
 use crate::elasticity::mixed::Mixed;
@@ -229,7 +231,7 @@ fn rotate(k: &mut [[f64; 16]; 16], i: usize, [n, t]: [[f64; 2]; 2]) {
 }
 
 /// External forces on a body.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Loads {
     /// Stresses on edges.
     pub edges: Vec<EdgeLoad>,
@@ -240,7 +242,7 @@ pub struct Loads {
 }
 
 /// A stress on an edge, interpolated between start, end and midside.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct EdgeLoad {
     /// The edge.
     pub edge: Edge,
@@ -251,7 +253,7 @@ pub struct EdgeLoad {
 }
 
 /// Axes of a stress on an edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum LoadAxes {
     /// x and y.
     Fixed,

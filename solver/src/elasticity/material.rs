@@ -1,5 +1,7 @@
 //! Hooke's law (thesis 1.10) in the three two-dimensional theories.
 
+use serde::Serialize;
+
 use crate::problem::{Analysis, Orthotropic};
 
 /// Strains and stresses have four components, in this order: xx, yy, xy, zz (rr, zz, rz, θθ in
@@ -11,7 +13,7 @@ pub type Moduli = [[f64; COMPONENTS]; COMPONENTS];
 
 /// The moduli of a nearly incompressible material in two parts, σ = rest · ε + bulk (ε_xx + ε_yy + ε_zz) m with
 /// m = (1, 1, 0, 1): of an isotropic one 2G and λ.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Split {
     /// What resists all strains alike; positive definite.
     pub rest: Moduli,
@@ -44,7 +46,7 @@ impl Split {
 }
 
 /// The body's theory and its materials, in the plane of the analysis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Section {
     analysis: Analysis,
     moduli: Vec<Moduli>,

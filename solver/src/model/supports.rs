@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::Serialize;
+
 use super::axis::Axis;
 use super::checks::{ALIGNED, Checks};
 use crate::error::{AllChecks, Checked, Reason};
@@ -15,7 +17,7 @@ enum Place<'a> {
 }
 
 /// The displacements that supports prescribe at a node.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub enum Held {
     /// The displacement along one direction.
     Along {

@@ -24,7 +24,7 @@ use super::{
     },
     Order, Reply, Task, send, take,
 };
-use crate::{run::Solve, store::Parts};
+use crate::{memory::Allowance, run::Solve, store::Parts};
 
 /// What a solver may use beyond its share before the system refuses it memory: its program, buffers, and what the
 /// allocator keeps. The share itself is watched by the solver's own thread, which can say what it needed.
@@ -97,7 +97,11 @@ fn solve_task(
     let solving = || {
         let mesh = task.mesh.as_deref().map(read_mesh).transpose()?;
         let members = task.members.as_ref();
-        solve_task_of(&task.problem, mesh, members, solve, task.share, &mut tell)
+        let allowance = Allowance {
+            share: task.share,
+            bodies: None,
+        };
+        solve_task_of(&task.problem, mesh, members, solve, allowance, &mut tell)
     };
     // what a panic leaves behind is not used again
     let solved = catch_unwind(AssertUnwindSafe(solving));

@@ -5,10 +5,13 @@ use serde_json::{Value, json};
 use std::ops::ControlFlow;
 
 use super::*;
-use crate::queue::{
-    ending::NoSolution,
-    report::Told,
-    solving::{Partials, solve_and_store, solve_task},
+use crate::{
+    memory::Allowance,
+    queue::{
+        ending::NoSolution,
+        report::Told,
+        solving::{Partials, solve_and_store, solve_task},
+    },
 };
 
 /// Problems of different shapes, by what is large in them.
@@ -133,6 +136,14 @@ fn wall(lines: u32, radius: f64) -> Value {
     })
 }
 
+/// A share of memory, without kept bodies.
+fn within(share: u64) -> Allowance<'static> {
+    Allowance {
+        share,
+        bodies: None,
+    }
+}
+
 /// What solving a problem has taken at most, and what it was told to.
 fn taken_and_told(problem: &Value) -> (u64, u64) {
     let text = problem.to_string();
@@ -151,7 +162,7 @@ fn taken_and_told(problem: &Value) -> (u64, u64) {
         None,
         None,
         solver::solve_on,
-        u64::MAX,
+        within(u64::MAX),
         partials,
         go_on,
     );
@@ -208,7 +219,7 @@ fn a_job_that_needs_more_than_its_share_is_stopped() {
         None,
         None,
         solver::solve_on,
-        16 << 20,
+        within(16 << 20),
         |told| match told {
             Told::OutOfMemory(outgrown) => {
                 stopped_for = Some(outgrown);
@@ -243,7 +254,7 @@ fn a_verification_that_needs_more_than_the_share_leaves_the_solution() {
         None,
         None,
         solver::solve_on,
-        share,
+        within(share),
         |told| {
             assert!(!matches!(told, Told::OutOfMemory(_)));
             ControlFlow::Continue(())

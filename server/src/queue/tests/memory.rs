@@ -8,7 +8,7 @@ const MIB: u64 = 1 << 20;
 async fn rig_of_100_mib(solve: Solve) -> Rig {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
-    store.set_budget(100 * MIB, 2);
+    store.set_budget(Budget::new(100 * MIB, 2, 0));
     let queue = Queue::new(store.clone(), Solver::Threads(solve), 2);
     queue.start();
     Rig {

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod attempts;
+mod bodies;
 mod coalescing;
 mod estimates;
 mod failpoints;
@@ -29,6 +30,7 @@ use crate::{
     event::{Event, Payload},
     fake,
     job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status, Waiting},
+    memory::Budget,
     run::Solve,
     store::{
         Accepted, CancelOutcome, Edit, Ending, Filter, FinalBatch, GroupBy, NewJob, Order, Parts,

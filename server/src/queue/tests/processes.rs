@@ -58,7 +58,7 @@ fn overflow(depth: u64) -> u64 {
 async fn processes() -> Rig {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
-    store.set_budget(256 << 20, 1);
+    store.set_budget(Budget::new(256 << 20, 1, 0));
     let solver = Solver::Processes(Processes::new(worker_process));
     let queue = Queue::new(store.clone(), solver, 1);
     queue.start();

@@ -26,7 +26,12 @@ use std::{
 use fastrand::Rng;
 
 use super::*;
-use crate::{event::Event, job::JobId, memory::Reservation, time::Time};
+use crate::{
+    event::Event,
+    job::JobId,
+    memory::{Budget, Reservation},
+    time::Time,
+};
 
 /// How many seeds are run unless the environment says otherwise; `tests/reliability/unit.py` runs a thousand.
 const SEEDS: u64 = 100;
@@ -125,7 +130,7 @@ impl World {
         restarts::copy(empty, &folder);
         restarts::keep_progress(&folder, home.path());
         let store = Store::open_unwatched(&folder).await.unwrap();
-        store.set_budget(BUDGET, 2);
+        store.set_budget(Budget::new(BUDGET, 2, 0));
         World {
             dice: Rng::with_seed(seed),
             store,

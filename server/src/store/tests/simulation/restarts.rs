@@ -147,7 +147,7 @@ impl World {
         self.full = false;
         self.store = Store::open_unwatched(folder).await.unwrap();
         keep_progress(folder, self.home.path());
-        self.store.set_budget(BUDGET, 2);
+        self.store.set_budget(Budget::new(BUDGET, 2, 0));
         assert_eq!(self.store.is_paused(), self.paused);
         let interrupted = self.store.requeue_interrupted().await.unwrap();
         assert_eq!(interrupted, self.running.len());

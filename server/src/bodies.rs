@@ -1,0 +1,263 @@
+//! Condensed bodies that are kept for later jobs on the same body: within a limit, and the least recently used is dropped
+//! first. Only data: `memory` decides when jobs need the room.
+
+use std::{collections::HashMap, sync::Arc};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use solver::Prepared;
+
+/// Most bodies that are kept, so that looking through all of them takes microseconds.
+const MOST_BODIES: usize = 1000;
+
+/// The SHA-256 of all that a body is made from (`digest::of_body`).
+pub type Key = [u8; 32];
+
+/// Bodies that are kept.
+#[derive(Debug)]
+pub struct Bodies {
+    /// Most bytes of all of them.
+    limit: u64,
+    kept: HashMap<Key, Kept>,
+    /// How often any was used: the time by which the least recent use is found.
+    uses: u64,
+    counts: Counts,
+}
+
+#[derive(Debug)]
+struct Kept {
+    /// Its body, with the model that it was made for.
+    prepared: Arc<Prepared>,
+    bytes: u64,
+    /// The number of its last use.
+    used: u64,
+}
+
+impl Kept {
+    /// No job uses it: dropping it frees its memory.
+    fn is_idle(&self) -> bool {
+        Arc::strong_count(&self.prepared) == 1 && Arc::strong_count(&self.prepared.body) == 1
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts {
+    hits: u64,
+    misses: u64,
+    evictions: u64,
+}
+
+/// Condensed bodies that are kept, and how often that helped since the service started.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct BodyCache {
+    /// Bodies that are kept now.
+    pub bodies: u64,
+    /// Bytes of them.
+    pub bytes: u64,
+    /// How often the body of a job was there.
+    pub hits: u64,
+    /// How often it was not, and had to be factored.
+    pub misses: u64,
+    /// How often a body was dropped to make room, for others or for jobs.
+    pub evictions: u64,
+}
+
+impl Bodies {
+    /// None yet, and at most so many bytes; 0 keeps none.
+    pub fn new(limit: u64) -> Bodies {
+        Bodies {
+            limit,
+            kept: HashMap::new(),
+            uses: 0,
+            counts: Counts::default(),
+        }
+    }
+
+    /// Most bytes of all bodies.
+    pub fn limit(&self) -> u64 {
+        self.limit
+    }
+
+    /// The body with this key and its bytes. The caller compares it, and counts a hit or a miss.
+    pub fn find(&self, key: &Key) -> Option<(Arc<Prepared>, u64)> {
+        let kept = self.kept.get(key)?;
+        Some((kept.prepared.clone(), kept.bytes))
+    }
+
+    /// A job uses the body with this key.
+    pub fn count_hit(&mut self, key: &Key) {
+        self.counts.hits += 1;
+        self.uses += 1;
+        if let Some(kept) = self.kept.get_mut(key) {
+            kept.used = self.uses;
+        }
+    }
+
+    /// The body of a job was not there.
+    pub fn count_miss(&mut self) {
+        self.counts.misses += 1;
+    }
+
+    /// Keeps a body, unless it alone is larger than the limit; in place of one with the same key, which was made at the
+    /// same time. Returns what is no longer kept, to be freed where nobody waits for it.
+    pub fn keep(&mut self, key: Key, prepared: Prepared, bytes: u64) -> Vec<Arc<Prepared>> {
+        if bytes > self.limit {
+            return vec![];
+        }
+        self.uses += 1;
+        let kept = Kept {
+            prepared: Arc::new(prepared),
+            bytes,
+            used: self.uses,
+        };
+        let replaced = self.kept.insert(key, kept).map(|kept| kept.prepared);
+        let mut dropped: Vec<_> = replaced.into_iter().collect();
+        while self.bytes() > self.limit || self.kept.len() > MOST_BODIES {
+            let Some(evicted) = self.evict(|_| true) else {
+                break;
+            };
+            dropped.push(evicted);
+        }
+        dropped
+    }
+
+    /// Drops bodies that no job uses until they have at most so many bytes. Returns them, as [`keep`](Self::keep) does.
+    pub fn shrink_idle(&mut self, most: u64) -> Vec<Arc<Prepared>> {
+        let mut dropped = vec![];
+        while self.idle_bytes() > most {
+            let Some(evicted) = self.evict(Kept::is_idle) else {
+                break;
+            };
+            dropped.push(evicted);
+        }
+        dropped
+    }
+
+    /// How many there are, and how often that helped.
+    pub fn figures(&self) -> BodyCache {
+        let Counts {
+            hits,
+            misses,
+            evictions,
+        } = self.counts;
+        BodyCache {
+            bodies: self.kept.len() as u64,
+            bytes: self.bytes(),
+            hits,
+            misses,
+            evictions,
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        self.kept.values().map(|kept| kept.bytes).sum()
+    }
+
+    /// Bytes of those that no job uses; the others are a part of what the jobs have reserved.
+    fn idle_bytes(&self) -> u64 {
+        let idle = self.kept.values().filter(|kept| kept.is_idle());
+        idle.map(|kept| kept.bytes).sum()
+    }
+
+    /// Drops the least recently used of some.
+    fn evict(&mut self, some: impl Fn(&Kept) -> bool) -> Option<Arc<Prepared>> {
+        let found = self.kept.iter().filter(|(_, kept)| some(kept));
+        let key = *found.min_by_key(|(_, kept)| kept.used)?.0;
+        self.counts.evictions += 1;
+        Some(self.kept.remove(&key)?.prepared)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::fake;
+
+    fn body() -> Prepared {
+        let prepared = solver::prepare(&fake::problem(), None, &mut |_| ControlFlow::Continue(()));
+        prepared.unwrap()
+    }
+
+    /// Whether bodies with these keys are there.
+    fn kept(bodies: &Bodies, keys: &[u8]) -> Vec<bool> {
+        let found = keys.iter().map(|k| bodies.find(&[*k; 32]).is_some());
+        found.collect()
+    }
+
+    #[test]
+    fn the_least_recently_used_goes_first_when_the_limit_is_reached() {
+        let mut bodies = Bodies::new(100);
+        for k in 1..=3 {
+            assert!(bodies.keep([k; 32], body(), 30).is_empty());
+        }
+        bodies.count_hit(&[1; 32]);
+        assert_eq!(bodies.keep([4; 32], body(), 40).len(), 1);
+        assert_eq!(kept(&bodies, &[1, 2, 3, 4]), [true, false, true, true]);
+        assert_eq!(bodies.keep([5; 32], body(), 100).len(), 3);
+        let figures = BodyCache {
+            bodies: 1,
+            bytes: 100,
+            hits: 1,
+            misses: 0,
+            evictions: 4,
+        };
+        assert_eq!(bodies.figures(), figures);
+    }
+
+    #[test]
+    fn a_body_larger_than_the_limit_drops_no_other() {
+        let mut bodies = Bodies::new(100);
+        assert!(bodies.keep([1; 32], body(), 100).is_empty());
+        assert!(bodies.keep([2; 32], body(), 101).is_empty());
+        assert_eq!(kept(&bodies, &[1, 2]), [true, false]);
+        assert!(Bodies::new(0).keep([1; 32], body(), 1).is_empty());
+    }
+
+    #[test]
+    fn of_two_that_were_made_at_the_same_time_one_is_kept() {
+        let mut bodies = Bodies::new(100);
+        assert!(bodies.keep([1; 32], body(), 60).is_empty());
+        assert_eq!(bodies.keep([1; 32], body(), 70).len(), 1);
+        let figures = bodies.figures();
+        assert_eq!(
+            (figures.bodies, figures.bytes, figures.evictions),
+            (1, 70, 0)
+        );
+    }
+
+    #[test]
+    fn only_bodies_that_no_job_uses_give_way_and_the_least_recently_used_first() {
+        let mut bodies = Bodies::new(100);
+        for k in 1..=4 {
+            bodies.keep([k; 32], body(), 10);
+        }
+        let whole = bodies.find(&[1; 32]).unwrap().0;
+        let only_body = bodies.find(&[2; 32]).unwrap().0.body.clone();
+        assert_eq!(bodies.idle_bytes(), 20);
+        assert_eq!(bodies.shrink_idle(10).len(), 1);
+        assert_eq!(kept(&bodies, &[1, 2, 3, 4]), [true, true, false, true]);
+        drop(whole);
+        assert_eq!(bodies.idle_bytes(), 20);
+        assert_eq!(bodies.shrink_idle(0).len(), 2);
+        assert_eq!(kept(&bodies, &[1, 2, 3, 4]), [false, true, false, false]);
+        drop(only_body);
+        assert_eq!(bodies.shrink_idle(0).len(), 1);
+        assert_eq!(bodies.figures().bytes, 0);
+    }
+
+    #[test]
+    fn there_are_not_too_many_small_ones() {
+        let mut bodies = Bodies::new(u64::MAX);
+        let body = body();
+        for k in 0..MOST_BODIES + 5 {
+            let mut key = [0; 32];
+            key[..8].copy_from_slice(&k.to_le_bytes());
+            bodies.keep(key, body.clone(), 1);
+        }
+        let figures = bodies.figures();
+        assert_eq!((figures.bodies, figures.evictions), (MOST_BODIES as u64, 5));
+    }
+}
