@@ -406,7 +406,7 @@ fn problems_read_one_after_the_other_are_those_of_their_text() {
         json!({"base": base, "axes": [
             two(names, json!(["linear", "tanh"])), two("/contacts/0/friction/shear_cap", json!([5, 7])),
             two("/materials/0/youngs_modulus", json!([1000, 2000])), two("/contacts/0/friction/cohesion", json!([0, 2]))]}),
-        json!({"base": base, "points": [{MU: 0.1}, {RHO: 0.2}, {MU: 0.2, RHO: 0.3}, {MU: null}, {}]}),
+        json!({"base": base, "mode": "list", "points": [{MU: 0.1}, {RHO: 0.2}, {MU: 0.2, RHO: 0.3}]}),
         json!({"base": base, "mode": "zip", "axes": [
             two(MU, json!([0.1, 0.2, 0.3])), two("/contacts/0/friction/elastic_slip", json!([1e-4, 2e-4, 3e-4]))]}),
     ];
@@ -449,7 +449,7 @@ fn a_member_of_a_grid_begins_from_one_that_differs_by_one_place_of_one_axis() {
     let list: Vec<Value> = (1..=130)
         .map(|k| json!({MU: 1e-3 * f64::from(k), radius: 8}))
         .collect();
-    let sweep = reading(&json!({"base": base(), "points": list})).unwrap();
+    let sweep = reading(&json!({"base": base(), "mode": "list", "points": list})).unwrap();
     let group: Group = (0..130).collect();
     let from = |place: usize| sweep.plan.neighbour(&group, place).map(|n| n.number);
     assert_eq!(
