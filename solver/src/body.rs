@@ -222,12 +222,17 @@ impl ElasticBody {
         }
     }
 
-    /// Displacements along x and y of every node at a load level, from those of the contact unknowns, on so many threads.
-    pub fn displacements(
+    /// Displacements along x and y of every node at a load level, from those of the contact unknowns.
+    pub fn displacements(&self, contact_displacement: &[f64], level: &Level) -> Vec<[f64; 2]> {
+        self.displacements_on(1, contact_displacement, level)
+    }
+
+    /// The same on so many threads.
+    pub fn displacements_on(
         &self,
+        threads: usize,
         contact_displacement: &[f64],
         level: &Level,
-        threads: usize,
     ) -> Vec<[f64; 2]> {
         let [of_loads, of_supports] = &self.reduced;
         let both = of_loads.iter().zip(of_supports);

@@ -42,8 +42,8 @@ pub fn run(
         let (finished, rows) = load_history.step(number as u32, step, 1, observe);
         // a stopped solution is reported too: the answer of the observer no longer matters
         let _ = observe(Progress::Phase(Phase::Recover));
-        let threads = body.threads(observe);
-        let reported = report(model, body, &load_history.system, &finished, threads)?;
+        load_history.system.threads = body.threads(observe);
+        let reported = report(model, body, &load_history.system, &finished)?;
         let last = number + 1 == steps.len() || !can_continue(reported.summary.outcome);
         let assessed = last && !model.contacts.is_empty();
         let accuracy = assessed.then(|| {
@@ -256,8 +256,8 @@ pub fn run_to_compare(
     let last = load_history.follow(&steps_of(model), 1, observe);
     match last {
         Some(finished) if finished.outcome != Outcome::Canceled => {
-            let threads = body.threads(observe);
-            report(model, body, &load_history.system, &finished, threads)
+            load_history.system.threads = body.threads(observe);
+            report(model, body, &load_history.system, &finished)
         }
         _ => Err(SolveError::Stopped),
     }

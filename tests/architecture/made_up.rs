@@ -176,7 +176,7 @@ fn what_only_some_may_name_is_found_elsewhere() {
         (
             "solver/src/low.rs",
             "use std::thread as t;",
-            "`std::thread` is for nobody in solver/ alone",
+            "`std::thread` is for solver/src/linear/parallel.rs alone",
         ),
         (
             "server/src/high.rs",

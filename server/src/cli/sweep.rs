@@ -123,8 +123,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     let (mut rows, mut told) = (Vec::with_capacity(count), Instant::now());
     for group in &groups {
         let external = |problem: &_| files::external_mesh(problem, None);
-        let mut members =
-            Members::new(plan, group, &base.mesh, &external, &solver::prepare, None);
+        let mut members = Members::new(plan, group, &base.mesh, &external, &solver::prepare, None);
         let solved = members.solve(group, &mut |step| {
             match step {
                 Step::Row(row) => {

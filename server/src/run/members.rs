@@ -248,7 +248,14 @@ mod tests {
         let group: Group = (0..24).collect();
         let solved = |numbers: &[usize]| {
             let none = |_: &Problem| None;
-            let mut members = Members::new(&sweep.plan, &group, &sweep.base.mesh, &none, None);
+            let mut members = Members::new(
+                &sweep.plan,
+                &group,
+                &sweep.base.mesh,
+                &none,
+                &solver::prepare,
+                None,
+            );
             let mut rows = Vec::new();
             let tell = &mut |step: Step<'_>| {
                 if let Step::Row(row) = step {

@@ -154,7 +154,7 @@ mod tests {
         let finished = run(system, controls, Place::default(), None, quiet);
         // small forces that are none of the model's loads are missing in the balance of the result
         assert_eq!(finished.outcome, crate::solution::Outcome::Converged);
-        let reported = report(system.model, system.body, system, &finished, 1).unwrap();
+        let reported = report(system.model, system.body, system, &finished).unwrap();
         (finished.state, reported.quantities)
     }
 

@@ -140,7 +140,6 @@ pub fn settle_near(
         return None;
     }
     region.prepare(system, controls, Some(neighbour), observe);
-    let tolerance = controls.tolerance;
     let (near, factors) = (&region.near, &mut region.factors);
     let mut start = neighbour.state.clone();
     if let Some(before) = before {
@@ -148,14 +147,15 @@ pub fn settle_near(
         pairs.for_each(|(v, before)| *v += *v - before);
     }
     let Some(near) = near else {
-        return settle(system, tolerance, &start, factors, observe);
+        return settle(system, controls, &start, factors, observe);
     };
     let (part, load) = near.part(system);
     let start = near.state_on_part(&start);
-    let (found, steps) = settle(&part, tolerance, &start, factors, observe)?;
+    let (found, steps) = settle(&part, controls, &start, factors, observe)?;
     let (finished, outside) = near.on_whole(system, controls, load, found);
-    let settled =
-        outside.is_empty() && finished.rounding.is_none() && finished.residuals.within(tolerance);
+    let settled = outside.is_empty()
+        && finished.rounding.is_none()
+        && finished.residuals.within(controls.tolerance);
     settled.then_some((finished, steps))
 }
 

@@ -74,13 +74,12 @@ pub fn numbers(
     (contacts, warnings)
 }
 
-/// The results of a final state, on so many threads: forces, extents, profiles, fields and warnings.
+/// The results of a final state: forces, extents, profiles, fields and warnings.
 pub fn report(
     model: &Model,
     body: &ElasticBody,
     system: &System<'_>,
     finished: &Finished,
-    threads: usize,
 ) -> Result<Reported, SolveError> {
     let v = &finished.state.v;
     if system.semidefinite && finished.outcome != Outcome::Canceled {
@@ -88,7 +87,7 @@ pub fn report(
     }
     let forces = Forces::new(system, finished);
     let contact_force = contact_force(system, finished, &forces);
-    let displacements = body.displacements(v, &system.level, threads);
+    let displacements = body.displacements_on(system.threads, v, &system.level);
     let recovered = recover(
         &model.mesh,
         &model.section,

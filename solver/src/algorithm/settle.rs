@@ -8,6 +8,7 @@ use crate::algorithm::convex::{close, least_along, update_active};
 use crate::algorithm::factors::{Factors, free_dofs};
 use crate::algorithm::finished::Finished;
 use crate::algorithm::system::{State, System};
+use crate::problem::SolverControls;
 use crate::solution::{Observer, Outcome, Progress, Residuals, Stage};
 
 /// Steps; eight to twelve are usual.
@@ -28,17 +29,18 @@ const SLOW: f64 = 0.7;
 /// The solution and the number of steps; None if the steps do not lead to it quickly.
 pub(super) fn settle(
     system: &System<'_>,
-    tolerance: f64,
+    controls: &SolverControls,
     start: &State,
     factors: &mut Factors,
     observe: &mut Observer<'_>,
 ) -> Option<(Finished, u32)> {
+    let (tolerance, most) = (controls.tolerance, controls.max_iterations.min(MOST_STEPS));
     let mut state = start.clone();
     let (mut residual_before, mut slow, mut changed) = (f64::INFINITY, 0, true);
     close(system, &mut state);
     let mut elastic_force = system.elastic_force(&state.v);
     let mut before: Option<(Vec<f64>, Vec<f64>)> = None;
-    for steps in 0..MOST_STEPS {
+    for steps in 0..=most {
         let pressures = system.pressures(&system.reactions_of(&state, &elastic_force));
         let bound = system.friction_bound(&pressures);
         let tractions = system.tractions(&state.v, &bound);

@@ -36,6 +36,8 @@ pub struct System<'a> {
     /// A typical nodal force of this problem, for levels where nothing acts: that of the full loads, or of a
     /// contact node pushed by the indentation or the drag.
     pub reference_force: f64,
+    /// How many threads may compute the fields of the whole body; 1 until more are free.
+    pub threads: usize,
     pub(super) body: &'a ElasticBody,
     pub(super) model: &'a Model,
 }
@@ -197,6 +199,7 @@ impl<'a> System<'a> {
             semidefinite: model.held_by_contact,
             dissipated: 0.0,
             reference_force: 0.0,
+            threads: 1,
             body,
             model,
         };

@@ -3,20 +3,17 @@
 use std::ops::ControlFlow;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::mpsc::sync_channel;
 use std::sync::{Mutex, PoisonError};
 use std::thread;
-use std::time::Duration;
 
 use super::breaks::{Breaks, Stopped};
-
-/// Time between two questions of a thread that waits for the others.
-const PAUSE: Duration = Duration::from_millis(10);
 
 /// Does all tasks, on as many threads as there are workspaces. Each thread takes the next task as soon as it is free, so a
 /// task must not depend on what its workspace was used for before.
 ///
-/// The error is the one that a single thread finds first. Only this thread asks whether to go on; the others stop with it.
+/// The error is the one that a single thread finds first. Only this thread asks whether to go on: while it waits, whenever
+/// another one would.
 pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
     tasks: impl Iterator<Item = T> + Send,
     workspaces: &mut [W],
@@ -47,21 +44,26 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
     };
     let mut errors = Vec::new();
     thread::scope(|scope| {
-        let (sender, ended) = channel::<()>();
+        // a question that is waiting already stands for all
+        let (ask, questions) = sync_channel::<()>(1);
         let start = |workspace| {
-            let (sender, stopped, work_on) = (sender.clone(), &stopped, &work_on);
-            scope.spawn(move || {
-                // dropped when this thread ends, however it does
-                let _sender = sender;
-                let mut go_on = || match stopped.load(Relaxed) {
-                    true => ControlFlow::Break(()),
-                    false => ControlFlow::Continue(()),
+            // dropped when the thread ends, however it does
+            let (ask, stopped, work_on) = (ask.clone(), &stopped, &work_on);
+            let run = move || {
+                let mut go_on = || {
+                    let _ = ask.try_send(());
+                    match stopped.load(Relaxed) {
+                        true => ControlFlow::Break(()),
+                        false => ControlFlow::Continue(()),
+                    }
                 };
                 work_on(workspace, &mut Breaks::new(&mut go_on))
-            })
+            };
+            // where the system has no more threads, fewer do the work
+            thread::Builder::new().spawn_scoped(scope, run).ok()
         };
-        let threads: Vec<_> = others.iter_mut().map(start).collect();
-        drop(sender);
+        let threads: Vec<_> = others.iter_mut().filter_map(start).collect();
+        drop(ask);
         let own_error = work_on(own, breaks);
         if let Some((_, error)) = &own_error
             && *error == Stopped.into()
@@ -69,7 +71,8 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
             stopped.store(true, Relaxed);
         }
         errors.extend(own_error);
-        while ended.recv_timeout(PAUSE) == Err(RecvTimeoutError::Timeout) {
+        // until all have ended
+        for () in questions {
             if !stopped.load(Relaxed) && breaks.ask().is_err() {
                 stopped.store(true, Relaxed);
                 failed.store(true, Relaxed);
@@ -136,14 +139,14 @@ mod tests {
     #[test]
     fn the_error_is_that_of_the_first_task_that_fails() {
         for threads in [1, 2] {
-            // the later task fails first
-            let both = Barrier::new(threads);
+            // of two that are begun, the later one fails first
+            let failed = AtomicBool::new(threads == 1);
             let work = |(): &mut (), task: usize, _: &mut Breaks<'_>| {
-                if task < threads {
-                    both.wait();
+                if task == 1 {
+                    failed.store(true, Relaxed);
                 }
-                if task == 0 {
-                    thread::sleep(Duration::from_millis(20));
+                while !failed.load(Relaxed) {
+                    thread::yield_now();
                 }
                 Err(Error::Bad(task))
             };

@@ -199,8 +199,10 @@ impl PatchView<'_> {
         if self.patch.law.is_none() && self.tractions.is_none() {
             return None;
         }
+        /// Relative: solutions within the tolerance differ by less.
+        const EQUAL: f64 = 1e-9;
         let step = 2.0 / SAMPLES as f64;
-        let mut highest: Option<(f64, usize, f64)> = None;
+        let (mut highest, mut most) = (None, 0.0f64);
         let edges = 0..self.patch.contact.boundary.edge_count();
         let rubbed: Vec<usize> = edges.clone().filter(|&edge| self.may_rub(edge)).collect();
         // nothing is highest where all is zero
@@ -224,8 +226,10 @@ impl PatchView<'_> {
                 let value = stress(xi);
                 let sign = value.partial_cmp(&0.0);
                 let seen = value == 0.0 || beside.iter().any(|i| signs[*i] == sign);
-                if seen && highest.is_none_or(|(most, ..)| value.abs() >= most.abs()) {
+                // the last of those that are equal but for rounding, as the two of a symmetric problem
+                if seen && (highest.is_none() || value.abs() >= (1.0 - EQUAL) * most) {
                     highest = Some((value, edge, xi));
+                    most = most.max(value.abs());
                 }
             }
         }

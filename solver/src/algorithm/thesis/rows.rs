@@ -111,7 +111,7 @@ impl Rows {
             rule: self.rule,
         };
         if extrapolated || options.friction_force == 2 {
-            let displacements = system.body.displacements(&state.v, &system.level, 1);
+            let displacements = system.body.displacements(&state.v, &system.level);
             for rows in &self.edges {
                 let (stress, phi) = self.evaluate_edge(system, rows, &displacements);
                 row_values.stress.push(stress);
