@@ -160,12 +160,14 @@ mod tests {
     fn all_threads_stop_with_the_first_and_it_asks_while_it_waits() {
         let both = Barrier::new(2);
         // one task each: the first one's is short, the other's goes on until it is stopped
-        let work = |first: &mut bool, _: usize, breaks: &mut Breaks<'_>| {
+        let work = |first: &mut bool, _: usize, breaks: &mut Breaks<'_>| -> Result<(), Error> {
             both.wait();
-            while !*first {
-                breaks.ask()?;
+            match first {
+                true => Ok(()),
+                false => loop {
+                    breaks.ask()?;
+                },
             }
-            Ok::<(), Error>(())
         };
         let mut asked = 0;
         let mut stop_at_third = || {
