@@ -1,7 +1,8 @@
 //! The system's allocator, which counts for each thread how many bytes it has taken and not given back, and asks for
 //! huge pages.
 //!
-//! A job is solved on one thread, so this is what the job holds; the server ends a job that outgrows its share. The
+//! A job is solved on one thread (a second one that helps it works in the memory that the first has taken), so this is
+//! what the job holds; the server ends a job that outgrows its share. The
 //! crates that count allocations do so for the whole process, or only within a closure for a test: none answers, in the
 //! middle of a job, what this thread holds. So it is written here, and it is all that this crate does: `GlobalAlloc`
 //! can only be implemented with `unsafe`, which the other crates forbid.

@@ -105,7 +105,10 @@ impl ElasticBody {
         let stiffness = || ElementStiffness::new(mesh, section, model.quadrature, &map);
         let mut of_supports = stiffness().load_of_supports();
         let elements = (0..threads).map(|_| {
-            let mut stiffness = stiffness();
+            let mut stiffness = match threads {
+                1 => stiffness(),
+                _ => stiffness().for_another_thread(),
+            };
             move |e: u32, matrix: &mut ElementMatrix| stiffness.put(e, matrix)
         });
         let factored = Factor::new(

@@ -2,8 +2,9 @@
 //! Oden and Pires (A.C. Bolt, MSc thesis, University of Cape Town, 1983). Comments cite the thesis by its
 //! numbers, and docs/formulation.md as "formulation 4.3".
 //!
-//! A library of pure functions: no clock, thread, file or network; the same problem gives the same
-//! bits. Reading and writing of any format is left to the crate `files`. The modules are
+//! A library of pure functions: no clock, file or network; the same problem gives the same bits. A large body is
+//! factored on two threads if the observer lets it ([`solution::Progress::SecondThread`]), with the same bits as on one.
+//! Reading and writing of any format is left to the crate `files`. The modules are
 //! listed from the ground up; each uses only those above it.
 
 // The phases of a solution.

@@ -174,6 +174,10 @@ enum Stop {
 
 impl Watched<'_, '_> {
     fn observe(&mut self, progress: Progress<'_>) -> ControlFlow<()> {
+        // these ask for more than going on: a no is an answer, and does not stop the solution
+        if matches!(progress, Progress::SecondThread | Progress::Room { .. }) {
+            return (self.observe)(progress);
+        }
         let (progress, stop) = match progress {
             Progress::Needs { bytes } => (progress, Stop::Memory(bytes)),
             Progress::OutOfMemory { bytes } => (progress, Stop::Memory(bytes)),

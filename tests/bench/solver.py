@@ -33,7 +33,7 @@ sys.path[:0] = [str(TESTS), str(TESTS / "peers")]
 
 import problem
 import programs
-from measured import ONE_THREAD, peak_bytes
+from measured import ONE_THREAD, measured, peak_bytes
 from outside import BINARY
 
 MIB = 1 << 20

@@ -27,14 +27,14 @@ pub struct Fields<'a> {
 }
 
 /// A field that a mode does not use.
-fn not_used(name: &str, raw: Option<&RawValue>, mode: &str, found: &mut Findings) {
+fn not_used(name: &str, raw: Option<&RawValue>, mode: &str, hint: &str, found: &mut Findings) {
     if raw.is_some_and(|raw| raw.get() != "null") {
         found.add(Violation::new(
             format!("/{name}"),
             Reason::NotUsed,
             format!("`{name}`"),
             format!("no `{name}` with the mode {mode}"),
-            "Leave it out, or choose another mode.",
+            hint,
         ));
     }
 }
@@ -68,9 +68,9 @@ fn counted<'a>(
         found.add(wrong_type(at, raw, &format!("a list of {what}")));
         return None;
     };
-    let reason = match count {
-        0 => Reason::TooFew,
-        _ if count > most => Reason::TooMany,
+    let (reason, hint) = match count {
+        0 => (Reason::TooFew, "Give at least one."),
+        _ if count > most => (Reason::TooMany, hint),
         _ => return Some(items),
     };
     found.add(Violation::new(
@@ -89,9 +89,14 @@ pub(super) fn axes(
     mode: Mode,
     found: &mut Findings,
 ) -> Option<(Vec<Path>, Values)> {
-    not_used("points", fields.points, <&str>::from(mode), found);
+    let hint = "Set `mode` to \"list\" for points, or leave them out.";
+    not_used("points", fields.points, mode.into(), hint, found);
     let some = format!("1 … {MOST_PATHS} axes");
     let Some(raw) = fields.axes else {
+        // points without their mode: that is told already
+        if fields.points.is_some() {
+            return None;
+        }
         let hint =
             "Send {\"axes\": [{\"path\": \"/contacts/0/indentation\", \"values\": [0.1, 0.2]}]}.";
         found.add(Violation::new(
@@ -295,11 +300,16 @@ fn spaced(at: &str, ratios: bool, raw: &RawValue, found: &mut Findings) -> Optio
             0 => start,
             _ if k + 1 == count => stop,
             // each end with its own weight: the difference of both may be infinite
-            _ if ratios => ((1.0 - part) * start.ln() + part * stop.ln()).exp(),
-            _ => (1.0 - part) * start + part * stop,
+            _ if ratios => rounded(((1.0 - part) * start.ln() + part * stop.ln()).exp()),
+            _ => rounded((1.0 - part) * start + part * stop),
         }
     };
     sound.then(|| (0..count).map(|k| number(value(k))).collect())
+}
+
+/// To 15 digits, so that 0.9 is not 0.8999999999999999.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.14e}").parse().unwrap_or(value)
 }
 
 /// A finite number as JSON: a whole one without a fraction, so that it may be a count.
@@ -313,7 +323,8 @@ fn number(value: f64) -> String {
 
 /// The points of a list: each an object from pointer to value.
 pub(super) fn points(fields: &Fields<'_>, found: &mut Findings) -> Option<(Vec<Path>, Values)> {
-    not_used("axes", fields.axes, "list", found);
+    let hint = "Choose the mode grid or zip for axes, or leave them out.";
+    not_used("axes", fields.axes, "list", hint, found);
     let some = format!("1 … {MOST_MEMBERS} points");
     let Some(raw) = fields.points else {
         let hint = "Send {\"points\": [{\"/contacts/0/indentation\": 0.1}, …]}.";

@@ -50,7 +50,7 @@ pub(super) struct Arguments {
 /// How many processors a large problem may use. The result is the same, bit for bit.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct Threads {
-    /// Threads for a large problem, 1 or 2 [default: as many as there are processors]
+    /// Threads for a large problem: 1, or 2 where there are two processors [default: 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=2))]
     threads: Option<u8>,
 }

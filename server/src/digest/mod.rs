@@ -1,5 +1,5 @@
-//! The two fingerprints: of a problem (`input_hash`) and of a result (`digest`). Both are the
-//! SHA-256 of canonical JSON (RFC 8785), so that any client in any language can check them.
+//! The fingerprints of a problem (`input_hash`) and of a result (`digest`) are the SHA-256 of canonical JSON (RFC 8785),
+//! so that any client in any language can check them. That of a body is for this process alone.
 
 mod number;
 

@@ -187,11 +187,11 @@ impl Queue {
         }
     }
 
-    /// Whether there is a processor for a second thread of a job. One that starts a moment later gets its time from the
-    /// system.
+    /// Whether there are processors for a second thread of every job that runs. A job that starts a moment later gets its
+    /// time from the system.
     pub(super) fn has_spare_processor(&self) -> bool {
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
-        self.running().len() < processors
+        2 * self.running().len() <= processors
     }
 
     /// Jobs that a worker of this process is solving, by key.

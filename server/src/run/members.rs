@@ -122,9 +122,13 @@ impl<'a> Members<'a> {
             SolveError::SingularSystem { .. } | SolveError::NonFinite { .. } => Failed::Body(error),
             error => Failed::Member(error),
         })?;
-        let family = Family::of(prepared, &problem);
-        // the first on a body is solved whole, as in the service: its balance of forces tells whether the body is sound
-        Ok(self.family.insert(family).whole_member(&problem, observe)?)
+        let family = self.family.insert(Family::of(prepared, &problem));
+        if self.group.first() == Some(&number) {
+            // it is solved whole, as in the service: its balance of forces tells whether the body is sound
+            return Ok(family.whole_member(&problem, observe)?);
+        }
+        // the first one was refused, or was solved before a restart
+        self.member(number, observe)
     }
 
     /// The members that one begins from, directly or not, as far as their ends are not known: the first of them first.

@@ -83,8 +83,7 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         let needed = match &stored {
             Ok(stored) => stored.memory_bytes,
             // it is not going to be solved
-            Err(StoreError::Damaged(_)) => Some(0),
-            Err(_) => None,
+            Err(_) => Some(0),
         };
         // given back if this transaction is rolled back
         let Some(memory) = change.budget().reserve(needed) else {

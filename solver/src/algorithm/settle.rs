@@ -107,8 +107,8 @@ pub(super) fn settle(
     None
 }
 
-/// How much further than a step to go, by that step and the one before it, each with its place: as far as leaves the
-/// least of the next step, if that follows as this one did.
+/// Anderson's acceleration with one step remembered (formulation 4.9): from two steps d₁, d₂ and the places x₁, x₂ where
+/// they began, −γ (x₂ − x₁ + d₂ − d₁) with the γ that makes d₂ − γ (d₂ − d₁) smallest. Empty unless |γ| < 1.
 fn further(
     (place_before, step_before): &(Vec<f64>, Vec<f64>),
     (place, step): (&[f64], &[f64]),

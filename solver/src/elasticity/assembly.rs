@@ -164,6 +164,12 @@ impl<'a> ElementStiffness<'a> {
         }
     }
 
+    /// The same for another thread, which is to take no memory of its own: this one has to answer for it.
+    pub fn for_another_thread(mut self) -> Self {
+        self.known.reserve();
+        self
+    }
+
     /// Puts the matrix of an element in place.
     pub fn put(&mut self, e: u32, matrix: &mut ElementMatrix) {
         let (map, section, masters) = (self.map, self.section, &self.masters);

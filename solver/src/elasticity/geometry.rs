@@ -287,6 +287,11 @@ impl<T> ByShape<T> {
         }
     }
 
+    /// Takes the memory for all that it will ever remember.
+    pub(super) fn reserve(&mut self) {
+        self.known.reserve_exact(SLOTS);
+    }
+
     /// The value for a shape.
     pub(super) fn of(&mut self, shape: Shape, make: impl FnOnce(&Shape) -> T) -> &T {
         let slot = &mut self.slots[shape.slot()];

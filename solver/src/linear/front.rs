@@ -99,6 +99,7 @@ impl FrontMatrix<'_> {
             solve_lower_triangular_in_place(on_diagonal, part.transpose_mut(), Par::Seq);
             breaks.after((rows * own * own) as f64 / 2.0)
         };
+        let threads = threads.min((height - own).div_ceil(part)).max(1);
         Ok(for_each(parts, &mut vec![(); threads], solve, breaks)?)
     }
 
@@ -150,6 +151,7 @@ impl FrontMatrix<'_> {
                 matmul(under, accum, l_under, l.transpose(), -1.0, Par::Seq);
                 breaks.after((rows * width * own) as f64)
             };
+        let threads = threads.min(boundary.div_ceil(STRIP)).max(1);
         for_each(strips, &mut vec![(); threads], reduce, breaks)
     }
 }

@@ -195,6 +195,11 @@ impl Fronts {
         8 * (self.len + self.above.len() + threads * self.branch.len()) as u64
     }
 
+    /// Rows of the tallest front.
+    pub(super) fn tallest(&self) -> usize {
+        self.fronts.iter().map(Front::height).max().unwrap_or(0)
+    }
+
     /// Whether a second thread is worth its start.
     pub fn is_large(&self) -> bool {
         /// Numbers in the factor: it takes some tenths of a second.

@@ -78,10 +78,10 @@ impl Factor {
         let too_large = FactorError::TooLarge { bytes };
         let mut values = untouched_zeros(fronts.len).ok_or(too_large)?;
         // all memory is taken by this thread, which has to answer for it
-        let mut above = Memory::new(fronts.above, threads).ok_or(too_large)?;
+        let mut above = Memory::new(&fronts, fronts.above, threads).ok_or(too_large)?;
         let mut of_threads = Vec::with_capacity(threads);
         for element in elements {
-            let memory = Memory::new(fronts.branch, 1).ok_or(too_large)?;
+            let memory = Memory::new(&fronts, fronts.branch, 1).ok_or(too_large)?;
             of_threads.push((memory, Assembly::new(element, fronts.unknowns)));
         }
         let bytes = Dense::bytes(fronts.kept);
@@ -145,12 +145,13 @@ struct Memory {
 }
 
 impl Memory {
-    fn new(space: Space, threads: usize) -> Option<Self> {
+    fn new(fronts: &Fronts, space: Space, threads: usize) -> Option<Self> {
+        let runs = || Vec::with_capacity(fronts.tallest());
         Some(Memory {
             values: untouched_zeros(space.len())?,
             space,
             tops: [0; 2],
-            runs: [Vec::new(), Vec::new()],
+            runs: [runs(), runs()],
             threads,
         })
     }

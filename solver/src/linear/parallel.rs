@@ -32,6 +32,7 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
     let failed = AtomicBool::new(false);
     // tasks are begun in their order, so all before one that fails are done as well
     let work_on = |workspace: &mut W, breaks: &mut Breaks<'_>| {
+        let _stops = StopOnPanic([&failed, &stopped]);
         while !failed.load(Relaxed) {
             let next = tasks.lock().unwrap_or_else(PoisonError::into_inner).next();
             let Some((number, task)) = next else { break };
@@ -88,6 +89,17 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
     match errors.into_iter().min_by_key(|(number, _)| *number) {
         Some((_, error)) => Err(error),
         None => Ok(()),
+    }
+}
+
+/// Lets the other threads stop if its own panics.
+struct StopOnPanic<'a>([&'a AtomicBool; 2]);
+
+impl Drop for StopOnPanic<'_> {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            self.0.iter().for_each(|flag| flag.store(true, Relaxed));
+        }
     }
 }
 

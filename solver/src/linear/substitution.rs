@@ -33,7 +33,9 @@ impl Factor {
     /// From y = L⁻¹ f of the eliminated unknowns and u of the kept ones: u of all. Several fields at once, on so many
     /// threads.
     pub fn backward<const FIELDS: usize>(&self, u: &mut [[f64; FIELDS]], threads: usize) {
-        let mut workspaces = vec![Vec::new(); threads];
+        // this thread takes the memory of all: it has to answer for it
+        let tallest = self.fronts.tallest();
+        let mut workspaces: Vec<_> = (0..threads).map(|_| Vec::with_capacity(tallest)).collect();
         let groups = self.fronts.pieces.chunk_by(|a, b| a.branch && b.branch);
         for group in groups.rev() {
             // what the pieces of a group need beside their own unknowns comes after all of them
@@ -53,12 +55,9 @@ impl Factor {
                 Ok::<_, Stopped>(())
             };
             let never = &mut || ControlFlow::Continue(());
-            let _ = for_each(
-                tasks.into_iter(),
-                &mut workspaces,
-                work,
-                &mut Breaks::new(never),
-            );
+            let workspaces = &mut workspaces[..threads.min(tasks.len())];
+            let tasks = tasks.into_iter();
+            let _ = for_each(tasks, workspaces, work, &mut Breaks::new(never));
         }
     }
 
