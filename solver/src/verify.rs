@@ -213,6 +213,27 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    #[test]
+    fn a_no_to_a_second_thread_is_an_answer_and_does_not_stop() {
+        let mut asked = 0;
+        let mut refuse = |progress: Progress<'_>| {
+            asked += 1;
+            match progress {
+                Progress::SecondThread | Progress::Room { .. } => ControlFlow::Break(()),
+                _ => ControlFlow::Continue(()),
+            }
+        };
+        let mut watched = Watched {
+            observe: &mut refuse,
+            stopped: None,
+        };
+        assert!(watched.observe(Progress::SecondThread).is_break());
+        assert!(watched.observe(Progress::Room { bytes: 1 }).is_break());
+        assert!(watched.observe(Progress::Needs { bytes: 1 }).is_continue());
+        assert!(watched.stopped.is_none());
+        assert_eq!(asked, 3);
+    }
+
     /// After adaptive refinement no mesh is solved on that its memory was not estimated for.
     #[test]
     fn a_mesh_that_would_be_too_large_is_not_solved_on() {
