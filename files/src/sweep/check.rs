@@ -91,13 +91,18 @@ fn violations(problem: &Problem) -> Vec<Violation> {
         .unwrap_or_default()
 }
 
-/// Whether a member is solved on meshes of its own.
+/// Whether a problem whose mesh is refined so shares no body with others: it is solved on meshes of its own.
+pub fn has_own_meshes(problem: &Problem, refine: &Refine) -> bool {
+    problem.solver.verifies() || matches!(refine, Refine::Adaptive(_))
+}
+
+/// The same of a member.
 fn is_alone(problem: &Problem, sweep: &Sweep) -> bool {
     let refine = match sweep.plan.changes_mesh() {
-        true => problem.mesh.refine,
-        false => sweep.base.mesh.refine,
+        true => &problem.mesh.refine,
+        false => &sweep.base.mesh.refine,
     };
-    problem.solver.verifies() || matches!(refine, Refine::Adaptive(_))
+    has_own_meshes(problem, refine)
 }
 
 /// What members on one body have in common, as text. The solver decides in the end whether they share it.

@@ -14,7 +14,7 @@ mod read;
 mod template;
 mod values;
 
-pub use check::{Group, MOST_TOLD, groups};
+pub use check::{Group, MOST_TOLD, groups, has_own_meshes};
 pub use neighbours::Neighbour;
 pub use numbers::{Problems, Read};
 pub use plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, MOST_VALUE_BYTES, Mode, Plan};

@@ -49,22 +49,24 @@ impl<'a> Problems<'a> {
             None => Known::Text(*text),
         };
         let values: Vec<Known<'a>> = texts.iter().zip(&numbers).map(known).collect();
-        let same_body = self.last.as_mut().is_some_and(|last| {
-            last.values == values
+        let changed = self.last.take().and_then(|mut last| {
+            let exchanged = last.values == values
                 && paths()
                     .zip(&numbers)
                     .filter_map(|((path, _), number)| Some((path, (*number)?)))
-                    .all(|(path, number)| set(&mut last.problem, path, number))
+                    .all(|(path, number)| set(&mut last.problem, path, number));
+            exchanged.then_some(last)
         });
-        if !same_body {
-            self.last = None;
-            let problem = self.plan.problem(number)?;
-            self.last = Some(Last { values, problem });
-        }
-        match &self.last {
-            Some(Last { problem, .. }) => Ok(Read { problem, same_body }),
-            None => unreachable!("it was set above"),
-        }
+        let same_body = changed.is_some();
+        let last = match changed {
+            Some(last) => last,
+            None => Last {
+                values,
+                problem: self.plan.problem(number)?,
+            },
+        };
+        let problem = &self.last.insert(last).problem;
+        Ok(Read { problem, same_body })
     }
 }
 

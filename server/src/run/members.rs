@@ -2,13 +2,13 @@
 
 use std::ops::ControlFlow;
 
-use files::sweep::{Group, Neighbour, Plan, Problems};
+use files::sweep::{Group, Neighbour, Plan, Problems, has_own_meshes};
 use solver::{
     Prepared,
     error::SolveError,
     family::{End, Family, Member, Start},
     mesh::External,
-    problem::{MeshInput, Problem, Refine},
+    problem::{MeshInput, Problem},
     solution::{Observer, Outcome, Progress},
 };
 
@@ -186,7 +186,7 @@ impl<'a> Members<'a> {
 
 /// Whether a problem shares no body with others: it is solved on meshes of its own.
 pub fn is_alone(problem: &Problem) -> bool {
-    problem.solver.verifies() || matches!(problem.mesh.refine, Refine::Adaptive(_))
+    has_own_meshes(problem, &problem.mesh.refine)
 }
 
 /// Why a member has no numbers.

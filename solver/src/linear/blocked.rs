@@ -27,7 +27,7 @@ const BLOCK: usize = 128;
 /// Columns that a block updates between two questions.
 pub(super) const STRIP: usize = 256;
 
-/// Parallelism: none, as in `factor`.
+/// None: faer's parallel kernels do not promise the same bits.
 const PAR: Par = Par::Seq;
 
 /// Why there is no Cholesky factor.
