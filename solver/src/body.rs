@@ -8,7 +8,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::elasticity::{self, Axes, Dof, DofMap, ElementStiffness, Loads, Section, TOGETHER};
+use crate::elasticity::{
+    self, Axes, Dof, DofMap, ElementStiffness, ElementTables, Elements, Loads, Section, TOGETHER,
+};
 use crate::error::SolveError;
 use crate::linear::{Breaks, Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts};
 use crate::mesh::Mesh;
@@ -37,6 +39,7 @@ pub struct ElasticBody {
     factor: Factor,
     /// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it.
     axis_ends: Vec<[usize; 2]>,
+    tables: ElementTables,
 }
 
 /// What a body is made from: models that are equal in this have one body. The rest of a model that
@@ -84,7 +87,9 @@ impl ElasticBody {
         elasticity::condense_body_force(&model.mesh, &model.section, &model.loads, &mut condensed);
 
         notify(observe, Progress::Phase(Phase::Order))?;
-        let (map, fronts) = number(model)?;
+        let tables = ElementTables::new(&model.mesh, &model.section, model.quadrature);
+        let elements = elements(model, &tables);
+        let (map, fronts) = number(model, elements)?;
         let mut of_loads = on_unknowns(&map, &condensed);
 
         notify(observe, Progress::Phase(Phase::Factor))?;
@@ -101,19 +106,12 @@ impl ElasticBody {
             bytes: bytes(threads),
         };
         notify(observe, needed)?;
-        let (mesh, section) = (&model.mesh, &model.section);
-        let stiffness = || ElementStiffness::new(mesh, section, model.quadrature, &map);
-        let mut of_supports = stiffness().load_of_supports();
-        let elements = (0..threads).map(|_| {
-            let mut stiffness = match threads {
-                1 => stiffness(),
-                _ => stiffness().for_another_thread(),
-            };
-            move |e: u32, matrix: &mut ElementMatrix| stiffness.put(e, matrix)
-        });
+        let element_stiffness = ElementStiffness::new(elements, &map);
+        let mut of_supports = element_stiffness.load_of_supports();
         let factored = Factor::new(
             fronts,
-            elements.collect(),
+            &|e, matrix: &mut ElementMatrix| element_stiffness.put(e, matrix),
+            threads,
             &mut Breaks::new(&mut || observe(Progress::Pulse)),
         );
         let (factor, mut stiffness) = factored.map_err(|error| solve_error(error, &map))?;
@@ -177,7 +175,13 @@ impl ElasticBody {
             reduced: [of_loads, of_supports],
             factor,
             axis_ends,
+            tables,
         })
+    }
+
+    /// The elements of a model that this is the body of.
+    pub fn elements<'a>(&'a self, model: &'a Model) -> Elements<'a> {
+        elements(model, &self.tables)
     }
 
     /// The forces on contact nodes along n and t, from those on the contact unknowns.
@@ -265,6 +269,15 @@ impl ElasticBody {
     }
 }
 
+fn elements<'a>(model: &'a Model, tables: &'a ElementTables) -> Elements<'a> {
+    Elements {
+        mesh: &model.mesh,
+        section: &model.section,
+        quadrature: model.quadrature,
+        tables,
+    }
+}
+
 fn all_finite(values: &[f64]) -> bool {
     values.iter().all(|value| value.is_finite())
 }
@@ -285,7 +298,7 @@ fn axis_ends(model: &Model, contact_dofs: &[[Dof; 2]]) -> Vec<[usize; 2]> {
 
 /// Numbers the unknowns in the order of their elimination, those of contact nodes last, turned to (n, t) and in the order
 /// of the contacts; and plans their elimination.
-fn number(model: &Model) -> Result<(DofMap, Fronts), SolveError> {
+fn number(model: &Model, elements: Elements<'_>) -> Result<(DofMap, Fronts), SolveError> {
     let count = model.mesh.nodes.len();
     let mut axes = vec![None; count];
     // the axes of a node that is held along an oblique direction lie along it
@@ -369,7 +382,8 @@ fn number(model: &Model) -> Result<(DofMap, Fronts), SolveError> {
         .iter()
         .filter(|node| unknown[**node as usize])
         .count();
-    let fronts = Fronts::new(dissection, unknowns_of, kept);
+    let kinds = elements.kinds(&map);
+    let fronts = Fronts::new(dissection, &model.mesh.elements, &kinds, unknowns_of, kept);
     Ok((map, fronts))
 }
 

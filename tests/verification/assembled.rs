@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use faer::Side;
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
-use solver::elasticity::{DofMap, ElementStiffness, Section};
+use solver::elasticity::{DofMap, ElementStiffness, ElementTables, Elements, Section};
 use solver::linear::ElementMatrix;
 use solver::mesh::Mesh;
 
@@ -23,7 +23,14 @@ impl Assembled {
         map: &DofMap,
     ) -> (Assembled, Vec<f64>) {
         let mut rows = vec![BTreeMap::new(); map.unknowns];
-        let mut elements = ElementStiffness::new(mesh, section, quadrature, map);
+        let tables = &ElementTables::new(mesh, section, quadrature);
+        let elements = Elements {
+            mesh,
+            section,
+            quadrature,
+            tables,
+        };
+        let elements = ElementStiffness::new(elements, map);
         let mut matrix = ElementMatrix::default();
         for e in 0..mesh.elements.len() as u32 {
             elements.put(e, &mut matrix);

@@ -238,9 +238,8 @@ fn weighted_errors(
             return None;
         }
         let duals = body.displacements_without_loads(some, threads);
-        let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
-        let difference = &reported.difference;
-        let products = difference.products_with_fields(mesh, section, order, &duals, stop)?;
+        let (difference, elements) = (&reported.difference, body.elements(model));
+        let products = difference.products_with_fields(elements, &duals, stop)?;
         errors.extend(products.into_iter().take(some.len()));
     }
     Some(errors)

@@ -88,16 +88,10 @@ pub fn report(
     let forces = Forces::new(system, finished);
     let contact_force = contact_force(system, finished, &forces);
     let displacements = body.displacements_on(system.threads, v, &system.level);
-    let recovered = recover(
-        &model.mesh,
-        &model.section,
-        model.quadrature,
-        &displacements,
-        model.body_force(&system.level),
-    );
-    let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
-    let difference = StressDifference::new(mesh, order, &recovered);
-    let errors = difference.norms(mesh, section, order);
+    let elements = body.elements(model);
+    let recovered = recover(elements, &displacements, model.body_force(&system.level));
+    let difference = StressDifference::new(elements, &recovered);
+    let errors = difference.norms(elements);
     let (mut quantities, mut missed) = (Vec::new(), Vec::new());
     let circumference = system.circumference;
 

@@ -1,12 +1,15 @@
 //! `assemble_element`, `ElementStiffness`, `assemble_loads`: thesis (2.18), (2.20), (2.27), (2.28).
 
+use std::collections::HashMap;
+
 use serde::Serialize;
 
 use crate::elasticity::Section;
-use crate::elasticity::geometry::{ByShape, Masters, Shape};
+use crate::elasticity::geometry::{Elements, Masters};
 use crate::elasticity::mixed::Mixed;
+use crate::elasticity::shapes::Shape;
 use crate::element::gauss::GAUSS_3;
-use crate::element::{Family, edge3};
+use crate::element::{Element, Family, edge3};
 use crate::linear::ElementMatrix;
 use crate::mesh::{Edge, Mesh};
 
@@ -145,41 +148,36 @@ pub fn assemble_element(
 
 /// The stiffness of a body's elements on its unknowns.
 pub struct ElementStiffness<'a> {
-    mesh: &'a Mesh,
-    section: &'a Section,
-    masters: Masters,
+    elements: Elements<'a>,
     map: &'a DofMap,
-    known: ByShape<[[f64; 16]; 16]>,
+    /// Of the shapes of several elements.
+    of_shapes: Vec<[[f64; 16]; 16]>,
 }
 
 impl<'a> ElementStiffness<'a> {
-    /// `quadrature`: as in `assemble_element`.
-    pub fn new(mesh: &'a Mesh, section: &'a Section, quadrature: u32, map: &'a DofMap) -> Self {
+    /// That of these elements, on the unknowns of `map`.
+    pub fn new(elements: Elements<'a>, map: &'a DofMap) -> Self {
+        let shapes = elements.tables.shapes.shared.iter();
         ElementStiffness {
-            mesh,
-            section,
-            masters: Masters::new(quadrature),
+            of_shapes: shapes.map(|shape| stiffness(elements, shape)).collect(),
+            elements,
             map,
-            known: ByShape::new(),
         }
     }
 
-    /// The same for another thread, which is to take no memory of its own: this one has to answer for it.
-    pub fn for_another_thread(mut self) -> Self {
-        self.known.reserve();
-        self
-    }
-
     /// Puts the matrix of an element in place.
-    pub fn put(&mut self, e: u32, matrix: &mut ElementMatrix) {
-        let (map, section, masters) = (self.map, self.section, &self.masters);
-        let element = &self.mesh.elements[e as usize];
-        let shape = Shape::of(self.mesh, section, e as usize);
-        let split = section.split(section.material_of(e as usize));
-        matrix.entries = *self.known.of(shape, |shape| match split {
-            Some(split) => Mixed::stiffness(section, split, element.family(), &shape.nodes),
-            None => masters.stiffness(section, shape),
-        });
+    pub fn put(&self, e: u32, matrix: &mut ElementMatrix) {
+        let Elements {
+            mesh,
+            section,
+            tables,
+            ..
+        } = self.elements;
+        let (map, element) = (self.map, &mesh.elements[e as usize]);
+        matrix.entries = match tables.shapes.of(e as usize) {
+            Some(shape) => self.of_shapes[shape],
+            None => stiffness(self.elements, &Shape::of(mesh, section, e as usize)),
+        };
         let k = &mut matrix.entries;
         matrix.unknowns = [None; 16];
         for (i, &node) in element.iter().enumerate() {
@@ -195,8 +193,8 @@ impl<'a> ElementStiffness<'a> {
     }
 
     /// Forces on the unknowns by the prescribed displacements, −K_fp u_p.
-    pub fn load_of_supports(&mut self) -> Vec<f64> {
-        let (mesh, map) = (self.mesh, self.map);
+    pub fn load_of_supports(&self) -> Vec<f64> {
+        let (mesh, map) = (self.elements.mesh, self.map);
         let mut load = vec![0.0; map.unknowns];
         let mut matrix = ElementMatrix::default();
         for (e, element) in mesh.elements.iter().enumerate() {
@@ -220,6 +218,39 @@ impl<'a> ElementStiffness<'a> {
             }
         }
         load
+    }
+}
+
+impl Elements<'_> {
+    /// Numbers that are equal for elements with the same matrix, on the same unknown components of their nodes; none for elements
+    /// that no other is like.
+    pub fn kinds(self, map: &DofMap) -> Vec<Option<u32>> {
+        let (mut known, mut turned) = (HashMap::new(), HashMap::new());
+        let mut kind = |(e, element): (usize, &Element)| {
+            let shape = self.tables.shapes.of(e)?;
+            let mut key = [shape as u32; 9];
+            for (key, &node) in key[1..].iter_mut().zip(element.iter()) {
+                let axes = map.axes[node as usize].map(|axes| {
+                    let next = turned.len() as u32 + 1;
+                    let bits = axes.moves.map(|axis| axis.map(f64::to_bits));
+                    *turned.entry(bits).or_insert(next)
+                });
+                let [a, b] = map.dofs[node as usize].map(|dof| matches!(dof, Dof::Free(_)));
+                *key = axes.unwrap_or(0) << 2 | u32::from(a) << 1 | u32::from(b);
+            }
+            let next = known.len() as u32;
+            Some(*known.entry(key).or_insert(next))
+        };
+        let all = self.mesh.elements.iter();
+        all.enumerate().map(&mut kind).collect()
+    }
+}
+
+fn stiffness(elements: Elements<'_>, shape: &Shape) -> [[f64; 16]; 16] {
+    let (section, masters) = (elements.section, &elements.tables.masters);
+    match section.split(usize::from(shape.material)) {
+        Some(split) => Mixed::stiffness(section, split, shape.family, &shape.nodes),
+        None => masters.stiffness(section, shape),
     }
 }
 

@@ -1,7 +1,8 @@
-//! What integrals over an element need of its shape, computed once for all elements of the same shape: a grid has few.
+//! What integrals over an element need of its shape, computed once for all elements of the same shape.
 
 use crate::elasticity::Section;
 use crate::elasticity::material::{COMPONENTS, Moduli};
+use crate::elasticity::shapes::{Shape, Shapes};
 use crate::element::{AtNodes, Family, GaussPoint, Tabulated};
 use crate::mesh::Mesh;
 
@@ -78,10 +79,12 @@ pub(super) struct Stations {
 }
 
 /// The places of stations on the master elements.
+#[derive(Clone)]
 pub(super) struct Masters {
     families: [Master; 2],
 }
 
+#[derive(Clone)]
 struct Master {
     rule: Vec<(Tabulated, f64)>,
     stress: Vec<(Tabulated, f64)>,
@@ -190,117 +193,72 @@ fn add_stiffness(station: &Station, moduli: &Moduli, k: &mut [[[[f64; 8]; 2]; 2]
     }
 }
 
+/// What is computed once for all elements of the same shape.
+#[derive(Clone)]
+pub struct ElementTables {
+    pub(super) shapes: Shapes,
+    pub(super) masters: Masters,
+    /// Of every shape.
+    stations: Vec<Stations>,
+}
+
+impl ElementTables {
+    /// `quadrature`: as in `assemble_element`.
+    pub fn new(mesh: &Mesh, section: &Section, quadrature: u32) -> Self {
+        let (shapes, masters) = (Shapes::new(mesh, section), Masters::new(quadrature));
+        let stations = |shape| masters.stations(section, shape);
+        ElementTables {
+            stations: shapes.shared.iter().map(stations).collect(),
+            shapes,
+            masters,
+        }
+    }
+}
+
+/// The elements of a mesh.
+#[derive(Clone, Copy)]
+pub struct Elements<'a> {
+    /// Their nodes.
+    pub mesh: &'a Mesh,
+    /// Their materials.
+    pub section: &'a Section,
+    /// As in `assemble_element`.
+    pub quadrature: u32,
+    /// Those of this mesh, section and quadrature.
+    pub tables: &'a ElementTables,
+}
+
+impl<'a> Elements<'a> {
+    pub(super) fn stations(self) -> MeshStations<'a> {
+        MeshStations {
+            elements: self,
+            own: None,
+        }
+    }
+}
+
 /// The stations of a mesh's elements.
 pub(super) struct MeshStations<'a> {
-    mesh: &'a Mesh,
-    section: &'a Section,
-    masters: Masters,
-    known: ByShape<Stations>,
+    elements: Elements<'a>,
+    /// Those of the last element with a shape of its own.
+    own: Option<Stations>,
 }
 
-impl<'a> MeshStations<'a> {
-    /// `quadrature`: as in `assemble_element`.
-    pub(super) fn new(mesh: &'a Mesh, section: &'a Section, quadrature: u32) -> Self {
-        MeshStations {
-            mesh,
-            section,
-            masters: Masters::new(quadrature),
-            known: ByShape::new(),
-        }
-    }
-
+impl MeshStations<'_> {
     /// Those of an element.
     pub(super) fn of(&mut self, e: usize) -> &Stations {
-        let shape = Shape::of(self.mesh, self.section, e);
-        let stations = |shape: &Shape| self.masters.stations(self.section, shape);
-        self.known.of(shape, stations)
-    }
-}
-
-/// Values of a function of an element's shape, remembered.
-pub(super) struct ByShape<T> {
-    /// Where the value of a shape may be among those remembered.
-    slots: [Option<u16>; SLOTS],
-    known: Vec<(Shape, T)>,
-}
-
-/// Shapes that are remembered at once: a grid with equal distances has some hundred, since they are equal up to
-/// rounding only.
-const SLOTS: usize = 512;
-
-/// What distinguishes elements: those that are equal here are moved onto each other by a shift that changes no integral.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Shape {
-    family: Family,
-    material: u16,
-    /// Positions relative to the first node; in axisymmetry along the axis only.
-    pub(super) nodes: AtNodes<[f64; 2]>,
-}
-
-impl Shape {
-    /// The shape of an element of a mesh.
-    pub(super) fn of(mesh: &Mesh, section: &Section, e: usize) -> Self {
-        let (element, material) = (&mesh.elements[e], section.material_of(e));
-        Shape::new(
-            element.family(),
-            &mesh.element_nodes(element),
+        let Elements {
+            mesh,
             section,
-            material,
-        )
-    }
-
-    /// The shape of an element with these nodes.
-    pub(super) fn new(
-        family: Family,
-        nodes: &AtNodes<[f64; 2]>,
-        section: &Section,
-        material: usize,
-    ) -> Self {
-        let mut nodes = *nodes;
-        let [x, y] = nodes[0];
-        let x = if section.axisymmetric() { 0.0 } else { x };
-        let own = nodes.iter_mut().take(family.nodes());
-        own.for_each(|node| *node = [node[0] - x, node[1] - y]);
-        Shape {
-            family,
-            material: material as u16,
-            nodes,
+            tables,
+            ..
+        } = self.elements;
+        match tables.shapes.of(e) {
+            Some(shape) => &tables.stations[shape],
+            None => {
+                let shape = Shape::of(mesh, section, e);
+                self.own.insert(tables.masters.stations(section, &shape))
+            }
         }
-    }
-
-    fn slot(&self) -> usize {
-        let bits = self.nodes.iter().flatten().map(|x| x.to_bits());
-        let start = u64::from(self.material) << 1 | u64::from(self.family == Family::Quad);
-        let hash = bits.fold(start, |hash, bits| {
-            (hash.rotate_left(5) ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15)
-        });
-        (hash >> 32) as usize % SLOTS
-    }
-}
-
-impl<T> ByShape<T> {
-    /// Remembers nothing yet.
-    pub(super) fn new() -> Self {
-        ByShape {
-            slots: [None; SLOTS],
-            known: Vec::new(),
-        }
-    }
-
-    /// Takes the memory for all that it will ever remember.
-    pub(super) fn reserve(&mut self) {
-        self.known.reserve_exact(SLOTS);
-    }
-
-    /// The value for a shape.
-    pub(super) fn of(&mut self, shape: Shape, make: impl FnOnce(&Shape) -> T) -> &T {
-        let slot = &mut self.slots[shape.slot()];
-        let place = usize::from(*slot.get_or_insert(self.known.len() as u16));
-        match self.known.get_mut(place) {
-            Some((known, _)) if *known == shape => {}
-            Some(other) => *other = (shape, make(&shape)),
-            None => self.known.push((shape, make(&shape))),
-        }
-        &self.known[place].1
     }
 }

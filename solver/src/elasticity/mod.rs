@@ -5,12 +5,14 @@ mod geometry;
 mod material;
 mod mixed;
 mod recovery;
+mod shapes;
 mod stress_difference;
 
 pub use assembly::{
     Axes, Dof, DofMap, EdgeLoad, ElementStiffness, LoadAxes, Loads, assemble_element,
     assemble_loads, condense_body_force,
 };
+pub use geometry::{ElementTables, Elements};
 pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic, stress};
 pub use mixed::Mixed;
 pub use recovery::{Deformed, Recovered, TOGETHER, recover};

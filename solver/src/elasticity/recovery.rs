@@ -1,7 +1,7 @@
 //! From displacements to stresses, nodal forces and energy.
 
 use crate::elasticity::Section;
-use crate::elasticity::geometry::{MeshStations, Stations};
+use crate::elasticity::geometry::{Elements, MeshStations, Stations};
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::elasticity::mixed::{Inside, Mixed, dilatation, position};
 use crate::element::{AtNodes, Element, Family, Mapped};
@@ -47,14 +47,18 @@ impl Recovered {
 /// Stresses at nodes are taken at the superconvergent points of each element (2 × 2 of a
 /// quadrilateral), carried to its nodes linearly, and averaged over the elements that meet there.
 ///
-/// `quadrature`: as in `assemble_element`; `body_force`: the one (force/volume) that the displacements belong to.
+/// `body_force`: the one (force/volume) that the displacements belong to.
 pub fn recover(
-    mesh: &Mesh,
-    section: &Section,
-    quadrature: u32,
+    elements: Elements<'_>,
     displacements: &[[f64; 2]],
     body_force: [f64; 2],
 ) -> Recovered {
+    let Elements {
+        mesh,
+        section,
+        quadrature,
+        ..
+    } = elements;
     let points = mesh
         .elements
         .iter()
@@ -72,7 +76,7 @@ pub fn recover(
         work_on_bubbles: 0.0,
     };
     let mut at_nodes = Vec::with_capacity(mesh.elements.len());
-    let mut stations = MeshStations::new(mesh, section, quadrature);
+    let mut stations = elements.stations();
     pulp::Arch::new().dispatch(|| {
         for (e, element) in mesh.elements.iter().enumerate() {
             let u = element.gather(|n| displacements[n as usize]);

@@ -3,7 +3,7 @@
 //!
 //!   ‖e‖² = ∫ (σ* − σ) : C⁻¹ (σ* − σ),   σ* = Σ h_i σ_i with the recovered nodal stresses σ_i
 
-use crate::elasticity::geometry::{MeshStations, Stations};
+use crate::elasticity::geometry::{Elements, Stations};
 use crate::elasticity::material::{COMPONENTS, Moduli, inverse, stress};
 use crate::elasticity::mixed::dilatation;
 use crate::elasticity::recovery::{
@@ -21,8 +21,11 @@ pub struct StressDifference {
 }
 
 impl StressDifference {
-    /// `quadrature`: the one that `recovered` was made with.
-    pub fn new(mesh: &Mesh, quadrature: u32, recovered: &Recovered) -> Self {
+    /// That of what was recovered of the same elements.
+    pub fn new(elements: Elements<'_>, recovered: &Recovered) -> Self {
+        let Elements {
+            mesh, quadrature, ..
+        } = elements;
         let mut differences = Vec::with_capacity(recovered.points[0].len());
         let shapes = [Family::Quad, Family::Triangle].map(|family| {
             let points = family.rule(quadrature).iter();
@@ -51,15 +54,8 @@ impl StressDifference {
     /// of both fields have in common is more: with g = θ̄ − div u and t = tr C⁻¹ (σ* − σ),
     ///
     ///   … + κ (g t′ + t g′) − κ (1 − κ mᵀC⁻¹m) g g′
-    pub fn products(
-        &self,
-        mesh: &Mesh,
-        section: &Section,
-        quadrature: u32,
-        other: &StressDifference,
-    ) -> Vec<f64> {
-        let pairs = self.points().zip(other.points());
-        integrate(mesh, section, quadrature, pairs)
+    pub fn products(&self, elements: Elements<'_>, other: &StressDifference) -> Vec<f64> {
+        integrate(elements, self.points().zip(other.points()))
     }
 
     /// The difference at every integration point.
@@ -81,14 +77,18 @@ impl StressDifference {
     /// stress depends on more, are recovered field by field.
     pub fn products_with_fields(
         &self,
-        mesh: &Mesh,
-        section: &Section,
-        quadrature: u32,
+        elements: Elements<'_>,
         fields: &[[[f64; TOGETHER]; 2]],
         stop: &mut dyn FnMut() -> bool,
     ) -> Option<Vec<Vec<f64>>> {
+        let Elements {
+            mesh,
+            section,
+            quadrature,
+            ..
+        } = elements;
         let mut products = vec![vec![0.0; mesh.elements.len()]; TOGETHER];
-        let mut stations = MeshStations::new(mesh, section, quadrature);
+        let mut stations = elements.stations();
         for (material, weights) in weights(section).iter().enumerate() {
             let smooth =
                 recover_nodal_stresses(mesh, section, material, &mut stations, fields, stop)?;
@@ -134,10 +134,10 @@ impl StressDifference {
     }
 
     /// The norm of the difference in every element ((force × length)^½, without 2π).
-    pub fn norms(&self, mesh: &Mesh, section: &Section, quadrature: u32) -> Vec<f64> {
+    pub fn norms(&self, elements: Elements<'_>) -> Vec<f64> {
         let stress = self.points().map(|point| Difference { gap: 0.0, ..point });
         let pairs = stress.map(|point| (point, point));
-        let squares = integrate(mesh, section, quadrature, pairs);
+        let squares = integrate(elements, pairs);
         let norm = |square: f64| square.max(0.0).sqrt();
         squares.into_iter().map(norm).collect()
     }
@@ -212,13 +212,12 @@ fn mixed_product(
 
 /// What the two of every pair, one for each integration point, have in common in each element.
 fn integrate(
-    mesh: &Mesh,
-    section: &Section,
-    quadrature: u32,
+    elements: Elements<'_>,
     mut pairs: impl Iterator<Item = (Difference, Difference)>,
 ) -> Vec<f64> {
+    let Elements { mesh, section, .. } = elements;
     let weights = weights(section);
-    let mut stations = MeshStations::new(mesh, section, quadrature);
+    let mut stations = elements.stations();
     let product = |e: usize| {
         let weights = &weights[section.material_of(e)];
         let mut sum = 0.0;
@@ -293,7 +292,7 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::*;
-    use crate::elasticity::recover;
+    use crate::elasticity::{ElementTables, recover};
     use crate::solution::Observer;
 
     /// In every kind of analysis, with two materials, quadrilaterals and triangles.
@@ -331,32 +330,38 @@ mod tests {
             let problem = serde_json::from_value(problem).unwrap();
             let quiet: &mut Observer<'_> = &mut |_| ControlFlow::Continue(());
             let model = crate::prepare(&problem, None, quiet).unwrap().model;
-            let (mesh, section, order) = (&model.mesh, &model.section, model.quadrature);
+            let (mesh, section, quadrature) = (&model.mesh, &model.section, model.quadrature);
+            let tables = &ElementTables::new(mesh, section, quadrature);
+            let elements = Elements {
+                mesh,
+                section,
+                quadrature,
+                tables,
+            };
             let field = |k: usize| -> Vec<[f64; 2]> {
                 let at = |n: usize, a: usize| ((n * (3 + a) + k) as f64).sin();
                 (0..mesh.nodes.len())
                     .map(|n| [at(n, 0), at(n, 1)])
                     .collect()
             };
-            let difference = |u: &[[f64; 2]]| {
-                StressDifference::new(mesh, order, &recover(mesh, section, order, u, [0.0; 2]))
-            };
+            let difference =
+                |u: &[[f64; 2]]| StressDifference::new(elements, &recover(elements, u, [0.0; 2]));
             let own = difference(&field(0));
             let fields: Vec<_> = (1..=TOGETHER).map(field).collect();
             let together: Vec<_> = (0..mesh.nodes.len())
                 .map(|n| [0, 1].map(|a| std::array::from_fn(|k| fields[k][n][a])))
                 .collect();
             let never = &mut || false;
-            let found = own.products_with_fields(mesh, section, order, &together, never);
+            let found = own.products_with_fields(elements, &together, never);
             for (found, u) in found.unwrap().iter().zip(&fields) {
-                let expected = own.products(mesh, section, order, &difference(u));
+                let expected = own.products(elements, &difference(u));
                 let size: f64 = expected.iter().map(|p| p.abs()).sum();
                 for (a, b) in found.iter().zip(&expected) {
                     assert!((a - b).abs() <= 1e-12 * size, "{kind}: {a} for {b}");
                 }
             }
             assert!(
-                own.products_with_fields(mesh, section, order, &together, &mut || true)
+                own.products_with_fields(elements, &together, &mut || true)
                     .is_none()
             );
         }

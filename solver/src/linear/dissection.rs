@@ -37,7 +37,7 @@ pub struct Dissection {
     pub elements: Vec<u32>,
     /// Nodes in the order of their elimination, then those that are kept.
     pub nodes: Vec<u32>,
-    /// The boundaries of all parts, as places in `nodes`; each is sorted.
+    /// The boundaries of all parts, as places in `nodes`; each is sorted at first.
     pub boundaries: Vec<u32>,
 }
 
@@ -180,6 +180,8 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         };
         let mut own = Vec::new();
         if elements.len() <= LARGEST_LEAF {
+            // so that parts that are alike are found to be: halving has left them in any order
+            elements.sort_unstable();
             for &e in elements.iter() {
                 let nodes = self.cells.elements[e as usize].iter();
                 for &node in nodes {

@@ -35,37 +35,42 @@ impl FrontMatrix<'_> {
         }
     }
 
-    /// Adds some columns of what a half, with `size` unknowns on its boundary, has left.
-    pub(super) fn add(&mut self, runs: &[Run], size: usize, from: &[f64], which: Columns) {
+    /// Adds what a half has left to some of the columns. Its lower triangle may reach above the diagonal here, if the order
+    /// of its unknowns is another one: entries go to the other side then.
+    pub(super) fn add(&mut self, runs: &[Run], from: &[f64], which: Columns) {
+        let size = runs.iter().map(|run| run.len).sum::<usize>();
         for (k, run) in runs.iter().enumerate() {
             for j in 0..run.len {
-                let (source, column) = (run.from + j, run.to + j);
-                let (into, above) = match (which, column.checked_sub(self.own)) {
-                    (Columns::Own, None) => {
-                        let start = column * self.height;
-                        (&mut self.columns[start..start + self.height], 0)
+                let column = &from[(run.from + j) * size..(run.from + j + 1) * size];
+                let to = run.to + j;
+                // the rest of this run from the diagonal on, then the runs after it
+                self.add_to_column(to, to, &column[run.from + j..run.from + run.len], which);
+                for other in &runs[k + 1..] {
+                    let entries = &column[other.from..other.from + other.len];
+                    match other.to > to {
+                        true => self.add_to_column(to, other.to, entries, which),
+                        false => {
+                            for (i, entry) in entries.iter().enumerate() {
+                                let entry = std::slice::from_ref(entry);
+                                self.add_to_column(other.to + i, to, entry, which);
+                            }
+                        }
                     }
-                    (Columns::Left, Some(column)) => {
-                        let boundary = self.height - self.own;
-                        let start = column * boundary;
-                        (&mut self.left[start..start + boundary], self.own)
-                    }
-                    _ => continue,
-                };
-                let from = &from[source * size..(source + 1) * size];
-                // the rest of this run from the diagonal on, then the runs below
-                add(
-                    &mut into[column - above..],
-                    &from[source..run.from + run.len],
-                );
-                for run in &runs[k + 1..] {
-                    add(
-                        &mut into[run.to - above..],
-                        &from[run.from..run.from + run.len],
-                    );
                 }
             }
         }
+    }
+
+    /// Adds to consecutive entries of a column, unless it is one of the others.
+    #[inline(always)]
+    fn add_to_column(&mut self, column: usize, row: usize, entries: &[f64], which: Columns) {
+        let boundary = self.height - self.own;
+        let into = match (which, column.checked_sub(self.own)) {
+            (Columns::Own, None) => &mut self.columns[column * self.height + row..],
+            (Columns::Left, Some(column)) => &mut self.left[column * boundary + row - self.own..],
+            _ => return,
+        };
+        add(into, entries);
     }
 
     /// L_oo and L_bo in place of F_oo and F_bo, on so many threads.
@@ -234,25 +239,11 @@ pub(super) struct Run {
     len: usize,
 }
 
-/// Where the boundary of a half lies in the front of the whole, which owns unknowns from `first` on.
-pub(super) fn find_runs(
-    half: &[u32],
-    (first, own): (usize, usize),
-    rows: &[u32],
-    runs: &mut Vec<Run>,
-) {
+/// Where the boundary of a half lies in the front of the whole; `local`: the places of unknowns there.
+pub(super) fn find_runs(half: &[u32], local: &[u32], runs: &mut Vec<Run>) {
     runs.clear();
-    let mut next = 0;
     for (from, &row) in half.iter().enumerate() {
-        let to = match (row as usize) < first + own {
-            true => row as usize - first,
-            false => {
-                while rows[next] < row {
-                    next += 1;
-                }
-                own + next
-            }
-        };
+        let to = local[row as usize] as usize;
         match runs.last_mut() {
             Some(run) if run.to + run.len == to => run.len += 1,
             _ => runs.push(Run { from, to, len: 1 }),

@@ -1,5 +1,6 @@
 //! Matrices and index sets only; the one room that names faer.
 
+mod alike;
 mod blocked;
 mod breaks;
 mod dense;

@@ -18,7 +18,7 @@ use super::blocked::NoFactor;
 use super::breaks::{Breaks, Stopped, untouched_zeros};
 use super::dense::Dense;
 use super::front::{Columns, FrontMatrix, Run, find_runs};
-use super::fronts::{Front, Fronts, Piece, Space};
+use super::fronts::{Front, Fronts, Space, Stage, Task};
 use super::parallel::for_each;
 
 /// Unknowns of the largest element.
@@ -66,54 +66,66 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Factors the sum of the elements' matrices, and returns Ŝ with it. Each of `elements` puts the matrix of an element
-    /// with a given number in place; there are as many threads as of these.
-    pub fn new<E: FnMut(u32, &mut ElementMatrix) + Send>(
+    /// Factors the sum of the elements' matrices, on so many threads, and returns Ŝ with it. `element` puts the matrix of an
+    /// element with a given number in place.
+    pub fn new(
         fronts: Fronts,
-        elements: Vec<E>,
+        element: &(impl Fn(u32, &mut ElementMatrix) + Sync),
+        threads: usize,
         breaks: &mut Breaks<'_>,
     ) -> Result<(Self, Dense), FactorError> {
-        let threads = elements.len();
         let bytes = fronts.bytes(threads);
         let too_large = FactorError::TooLarge { bytes };
         let mut values = untouched_zeros(fronts.len).ok_or(too_large)?;
         // all memory is taken by this thread, which has to answer for it
         let mut above = Memory::new(&fronts, fronts.above, threads).ok_or(too_large)?;
-        let mut of_threads = Vec::with_capacity(threads);
-        for element in elements {
-            let memory = Memory::new(&fronts, fronts.branch, 1).ok_or(too_large)?;
-            of_threads.push((memory, Assembly::new(element, fronts.unknowns)));
-        }
+        let of_threads = (0..threads).map(|_| Memory::new(&fronts, fronts.branch, 1));
+        let mut of_threads: Vec<_> = of_threads.collect::<Option<_>>().ok_or(too_large)?;
         let bytes = Dense::bytes(fronts.kept);
         let schur = Dense::try_zero(fronts.kept, breaks)?;
         let mut schur = schur.ok_or(FactorError::TooLarge { bytes })?;
+        let mut slots: Vec<Vec<f64>> = Vec::new();
+        slots.resize_with(fronts.slots.len(), Vec::new);
         let mut rest = &mut values[..];
-        for group in fronts.pieces.chunk_by(|a, b| a.branch && b.branch) {
-            let mut values = Vec::with_capacity(group.len());
-            for piece in group {
-                let (own, others) = rest.split_at_mut(piece.len);
-                values.push(own);
-                rest = others;
-            }
-            match group {
-                [piece] if !piece.branch => {
-                    let front = &fronts.fronts[piece.fronts.start];
-                    let is_whole = piece.fronts.end == fronts.fronts.len();
+        for (k, stage) in fronts.stages.iter().enumerate() {
+            match stage {
+                Stage::Above(task) => {
+                    let (values, others) = rest.split_at_mut(task.len);
+                    rest = others;
+                    let is_whole = k + 1 == fronts.stages.len();
                     let left = is_whole.then(|| schur.values_mut());
-                    let assembly = of_threads.first_mut().map(|(_, assembly)| assembly);
-                    above.eliminate(&fronts, front, left, assembly, values[0], breaks)?;
+                    above.work_on(task, left, values, (&fronts, &slots, element), breaks)?;
                 }
-                branches => {
-                    let left = above.put(&fronts, branches);
-                    let tasks = branches.iter().zip(left).zip(values);
+                Stage::Each(tasks) => {
+                    let mut filled = Vec::new();
+                    for slot in fronts.slots_of(stage) {
+                        let zeros = untouched_zeros(fronts.slots[slot].0).ok_or(too_large)?;
+                        filled.push((slot, zeros));
+                    }
+                    let mut columns = Vec::with_capacity(tasks.len());
+                    for task in tasks {
+                        let (own, others) = rest.split_at_mut(task.len);
+                        columns.push(own);
+                        rest = others;
+                    }
+                    let left = above.put(&fronts, tasks, &mut filled);
                     for_each(
-                        tasks,
+                        tasks.iter().zip(left).zip(columns),
                         &mut of_threads,
-                        |(memory, assembly), ((branch, left), values), breaks| {
-                            memory.eliminate_branch(&fronts, branch, left, assembly, values, breaks)
+                        |memory, ((task, left), values), breaks| {
+                            let of_all = (&fronts, &slots[..], element);
+                            memory.work_on(task, Some(left), values, of_all, breaks)
                         },
                         breaks,
                     )?;
+                    for (slot, values) in filled {
+                        slots[slot] = values;
+                    }
+                }
+            }
+            for (slot, (_, last)) in slots.iter_mut().zip(&fronts.slots) {
+                if *last == k {
+                    *slot = Vec::new();
                 }
             }
         }
@@ -126,7 +138,7 @@ impl Factor {
         self.fronts.is_large()
     }
 
-    /// Entries of L.
+    /// Entries of L that are kept: fronts that are alike have theirs in common.
     pub fn entries(&self) -> usize {
         self.values.len()
     }
@@ -139,72 +151,82 @@ struct Memory {
     values: Vec<f64>,
     space: Space,
     tops: [usize; 2],
-    runs: [Vec<Run>; 2],
+    assembly: Assembly,
     /// How many work on one front.
     threads: usize,
 }
 
+/// What all threads read: the plan, what waits in its slots, and the matrices of elements.
+type OfAll<'a, E> = (&'a Fronts, &'a [Vec<f64>], &'a E);
+
 impl Memory {
     fn new(fronts: &Fronts, space: Space, threads: usize) -> Option<Self> {
-        let runs = || Vec::with_capacity(fronts.tallest());
         Some(Memory {
             values: untouched_zeros(space.len())?,
             space,
             tops: [0; 2],
-            runs: [runs(), runs()],
+            assembly: Assembly::new(fronts),
             threads,
         })
     }
 
-    /// Puts what branches are about to leave on the stacks.
-    fn put(&mut self, fronts: &Fronts, branches: &[Piece]) -> Vec<&mut [f64]> {
+    /// Where the last fronts of tasks put what they leave: on the stacks, or into slots.
+    fn put<'a>(
+        &'a mut self,
+        fronts: &Fronts,
+        tasks: &[Task],
+        slots: &'a mut [(usize, Vec<f64>)],
+    ) -> Vec<&'a mut [f64]> {
         let (_, [even, odd]) = self.space.divide(&mut self.values);
         let mut free = [&mut even[self.tops[0]..], &mut odd[self.tops[1]..]];
-        let mut left = Vec::with_capacity(branches.len());
-        for branch in branches {
-            let front = &fronts.fronts[branch.fronts.end - 1];
-            let size = front.boundary().pow(2);
-            let stack = std::mem::take(&mut free[front.stack]);
-            let (own, rest) = stack.split_at_mut(size);
-            free[front.stack] = rest;
-            self.tops[front.stack] += size;
-            left.push(own);
+        let mut slots = slots.iter_mut();
+        let mut left = Vec::with_capacity(tasks.len());
+        for task in tasks {
+            let front = fronts.last(task);
+            left.push(match front.slot {
+                Some(_) => slots.next().map_or(&mut [][..], |(_, slot)| &mut slot[..]),
+                None => {
+                    let (stack, size) = (front.stack, front.boundary().pow(2));
+                    let (own, rest) = std::mem::take(&mut free[stack]).split_at_mut(size);
+                    free[stack] = rest;
+                    self.tops[stack] += size;
+                    own
+                }
+            });
         }
         left
     }
 
-    /// Eliminates what a branch owns; what the whole branch leaves goes to `left`.
-    fn eliminate_branch<E: FnMut(u32, &mut ElementMatrix)>(
+    /// Puts the columns of a task's fronts into the factor; what the last one leaves goes to `left`, or waits on its stack.
+    fn work_on<E: Fn(u32, &mut ElementMatrix)>(
         &mut self,
-        fronts: &Fronts,
-        branch: &Piece,
-        left: &mut [f64],
-        assembly: &mut Assembly<E>,
+        task: &Task,
+        left: Option<&mut [f64]>,
         values: &mut [f64],
+        of_all: OfAll<'_, E>,
         breaks: &mut Breaks<'_>,
     ) -> Result<(), FactorError> {
-        let (mut left, mut values) = (Some(left), values);
-        for number in branch.fronts.clone() {
-            let front = &fronts.fronts[number];
-            let left = match number + 1 == branch.fronts.end {
+        let (mut left, mut values) = (left, values);
+        for place in task.fronts.clone() {
+            let front = &of_all.0.fronts[of_all.0.order[place] as usize];
+            let left = match place + 1 == task.fronts.end {
                 true => left.take(),
                 false => None,
             };
             let (own, others) = values.split_at_mut(front.len());
             values = others;
-            self.eliminate(fronts, front, left, Some(assembly), own, breaks)?;
+            self.eliminate(front, left, own, of_all, breaks)?;
         }
         Ok(())
     }
 
     /// Puts the columns of a front into the factor; what it leaves goes to `left`, or waits on its stack.
-    fn eliminate<E: FnMut(u32, &mut ElementMatrix)>(
+    fn eliminate<E: Fn(u32, &mut ElementMatrix)>(
         &mut self,
-        fronts: &Fronts,
         front: &Front,
         left: Option<&mut [f64]>,
-        assembly: Option<&mut Assembly<E>>,
         values: &mut [f64],
+        (fronts, slots, element): OfAll<'_, E>,
         breaks: &mut Breaks<'_>,
     ) -> Result<(), FactorError> {
         let (height, boundary, threads) = (front.height(), front.boundary(), self.threads);
@@ -233,35 +255,42 @@ impl Memory {
             },
             NoFactor::Stopped => FactorError::Stopped,
         };
+        self.assembly.place(fronts, front);
         match front.halves {
             None => {
                 into.left.fill(0.0);
-                if let Some(assembly) = assembly {
-                    assembly.add(fronts, front, &mut into)?;
-                }
+                self.assembly
+                    .add_elements(fronts, front, element, &mut into)?;
                 into.eliminate(threads, breaks).map_err(failed)?;
                 into.reduce(Accum::Add, threads, breaks)?;
             }
             Some(halves) => {
-                let [a, b] = halves.map(|half| fronts.fronts[half].boundary());
-                let end = self.tops[1 - front.stack];
-                let middle = end - b * b;
-                let start = middle - a * a;
-                let halves_left = [(a, &theirs[start..middle]), (b, &theirs[middle..end])];
-                self.tops[1 - front.stack] = start;
-                for (runs, half) in self.runs.iter_mut().zip(halves) {
-                    let half = fronts.rows(&fronts.fronts[half]);
-                    find_runs(half, (front.first, front.own), fronts.rows(front), runs);
+                let halves = halves.map(|half| &fronts.fronts[half]);
+                let top = &mut self.tops[1 - front.stack];
+                // the later one is on top
+                let mut take = |half: &Front| match half.slot {
+                    Some(slot) => &slots[slot][..],
+                    None => {
+                        let end = *top;
+                        *top -= half.boundary().pow(2);
+                        &theirs[*top..end]
+                    }
+                };
+                let b = take(halves[1]);
+                let halves_left = [take(halves[0]), b];
+                for (runs, half) in self.assembly.runs.iter_mut().zip(halves) {
+                    find_runs(fronts.rows(half), &self.assembly.local, runs);
                 }
-                for (runs, (size, from)) in self.runs.iter().zip(halves_left) {
-                    into.add(runs, size, from, Columns::Own);
+                let halves = self.assembly.runs.iter().zip(halves_left);
+                for (runs, from) in halves.clone() {
+                    into.add(runs, from, Columns::Own);
                 }
                 into.eliminate(threads, breaks).map_err(failed)?;
                 into.reduce(Accum::Replace, threads, breaks)?;
-                for (runs, (size, from)) in self.runs.iter().zip(halves_left) {
-                    into.add(runs, size, from, Columns::Left);
+                for (runs, from) in halves {
+                    into.add(runs, from, Columns::Left);
+                    breaks.after(from.len() as f64)?;
                 }
-                breaks.after((a * a + b * b) as f64)?;
             }
         }
         let mut values = values;
@@ -274,37 +303,44 @@ impl Memory {
     }
 }
 
-/// Adds elements to fronts that are not divided.
-struct Assembly<E> {
-    element: E,
+/// Adds to fronts.
+struct Assembly {
     matrix: ElementMatrix,
     /// Places of unknowns in a front.
     local: Vec<u32>,
+    /// Where the boundaries of the halves lie in it.
+    runs: [Vec<Run>; 2],
 }
 
-impl<E: FnMut(u32, &mut ElementMatrix)> Assembly<E> {
-    fn new(element: E, unknowns: usize) -> Self {
+impl Assembly {
+    fn new(fronts: &Fronts) -> Self {
+        let runs = || Vec::with_capacity(fronts.tallest());
         Assembly {
-            element,
             matrix: ElementMatrix::default(),
-            local: vec![0; unknowns],
+            local: vec![0; fronts.unknowns],
+            runs: [runs(), runs()],
         }
     }
 
-    /// Adds the elements of a part that is not divided.
-    fn add(
-        &mut self,
-        fronts: &Fronts,
-        front: &Front,
-        into: &mut FrontMatrix<'_>,
-    ) -> Result<(), FactorError> {
+    /// Notes the places of a front's unknowns.
+    fn place(&mut self, fronts: &Fronts, front: &Front) {
         let own = (front.first..front.first + front.own).map(|row| row as u32);
         let unknowns = own.chain(fronts.rows(front).iter().copied());
         for (k, row) in unknowns.enumerate() {
             self.local[row as usize] = k as u32;
         }
+    }
+
+    /// Adds the elements of a part that is not divided.
+    fn add_elements(
+        &mut self,
+        fronts: &Fronts,
+        front: &Front,
+        element: &impl Fn(u32, &mut ElementMatrix),
+        into: &mut FrontMatrix<'_>,
+    ) -> Result<(), FactorError> {
         for &e in &fronts.elements[front.elements[0]..front.elements[1]] {
-            (self.element)(e, &mut self.matrix);
+            element(e, &mut self.matrix);
             let ElementMatrix { unknowns, entries } = &self.matrix;
             if !entries.iter().flatten().all(|entry| entry.is_finite()) {
                 return Err(FactorError::NonFinite);
@@ -336,19 +372,67 @@ mod tests {
     /// A made-up body: cells with positive definite matrices on nodes with 0, 1 or 2 unknowns.
     struct Body {
         elements: Vec<Vec<u32>>,
+        /// Whether a cell has the matrix that its kind has, or one of its own.
+        of_kinds: Option<Vec<Option<u32>>>,
         /// The first unknown of each node, in the order of elimination, and how many it has.
         unknowns: Vec<(usize, usize)>,
         fronts: Option<Fronts>,
     }
 
     impl Body {
+        /// Of cells none of which is like another.
         fn new(x: usize, y: usize, kept: &[u32]) -> Self {
-            let (elements, positions) = grid(&lines(x), &lines(y));
             let count = |node: u32| (3 + node as usize * 5 % 7) / 3 % 3;
+            let (elements, positions) = grid(&lines(x), &lines(y));
+            Body::of(elements, &positions, kept, count, None)
+        }
+
+        /// Of cells of a few kinds, between lines that are `x` and `y` cells apart; some nodes in the first column have
+        /// no unknowns, or one. Cells are of another kind beyond two thirds of x.
+        fn of_kinds(x: usize, y: usize, kept: &[u32]) -> Self {
+            let (mut elements, mut positions) = grid(&lines(x), &lines(y));
+            let count = move |node: u32| match node as usize % (2 * (x + 1)) {
+                0 => 0,
+                column if column == x + 1 => 1,
+                _ => 2,
+            };
+            let kind = |e: usize| {
+                let [first, _, _, last] = [0, 1, 2, 3].map(|i| count(elements[e][i]));
+                let beyond = usize::from(e % x > 2 * x / 3);
+                // one in a corner is like no other
+                (e > 0).then_some((9 * beyond + 3 * first + last) as u32)
+            };
+            let kinds: Vec<_> = (0..elements.len()).map(kind).collect();
+            // a body of its own besides, of the same cells
+            elements.extend(elements.clone().into_iter().map(|cell| {
+                cell.into_iter()
+                    .map(|node| node + positions.len() as u32)
+                    .collect()
+            }));
+            let kinds: Vec<Option<u32>> = [&kinds, &kinds].into_iter().flatten().copied().collect();
+            let beside: Vec<_> = positions.iter().map(|[x, y]| [x + 100.0, *y]).collect();
+            let nodes = positions.len() as u32;
+            positions.extend(beside);
+            Body::of(
+                elements,
+                &positions,
+                kept,
+                move |node| count(node % nodes),
+                Some(kinds),
+            )
+        }
+
+        fn of(
+            elements: Vec<Vec<u32>>,
+            positions: &[[f64; 2]],
+            kept: &[u32],
+            count: impl Fn(u32) -> usize,
+            of_kinds: Option<Vec<Option<u32>>>,
+        ) -> Self {
             let unknown: Vec<bool> = (0..positions.len() as u32).map(|n| count(n) > 0).collect();
             let cells = Cells {
                 elements: &elements,
-                positions: &positions,
+                positions,
                 unknown: &unknown,
             };
             let dissection = Dissection::new(&cells, kept);
@@ -358,9 +442,12 @@ mod tests {
                 next += count(node);
             }
             let kept = kept.iter().filter(|node| unknown[**node as usize]).count();
-            let fronts = Some(Fronts::new(dissection, count, kept));
+            let none = vec![None; elements.len()];
+            let kinds = of_kinds.as_ref().unwrap_or(&none);
+            let fronts = Some(Fronts::new(dissection, &elements, kinds, count, kept));
             Body {
                 elements,
+                of_kinds,
                 unknowns,
                 fronts,
             }
@@ -372,9 +459,11 @@ mod tests {
                 let (first, count) = self.unknowns[node as usize];
                 (0..count).for_each(|a| matrix.unknowns[2 * i + a] = Some((first + a) as u32));
             }
+            let of_kind = self.of_kinds.as_ref().map(|kinds| kinds[e as usize]);
+            let own = of_kind.flatten().unwrap_or(e) as usize;
             for i in 0..ELEMENT {
                 for j in 0..ELEMENT {
-                    let off = (((i * j + e as usize) % 5) as f64 - 2.0) / 20.0;
+                    let off = (((i * j + own) % 5) as f64 - 2.0) / 20.0;
                     matrix.entries[i][j] = if i == j { 1.0 } else { off };
                 }
             }
@@ -401,7 +490,7 @@ mod tests {
             let fronts = self.fronts.take().unwrap();
             let go_on = &mut || ControlFlow::Continue(());
             let element = |e: u32, matrix: &mut ElementMatrix| self.matrix(e, matrix);
-            Factor::new(fronts, vec![element; threads], &mut Breaks::new(go_on))
+            Factor::new(fronts, &element, threads, &mut Breaks::new(go_on))
         }
     }
 
@@ -440,8 +529,11 @@ mod tests {
             (29, 2, &all[..80]),
             (29, 2, &all),
         ];
-        for (x, y, kept) in cases {
-            let mut body = Body::new(x, y, kept);
+        let bodies = cases.map(|(x, y, kept)| Body::new(x, y, kept));
+        let kept = [150, 151, 152, 153, 154, 155, 11, 12, 13, 2, 1];
+        let repeated = [(9, 8, &kept[..]), (8, 5, &kept[6..]), (2, 30, &[])];
+        let repeated = repeated.map(|(x, y, kept)| Body::of_kinds(x, y, kept));
+        for mut body in bodies.into_iter().chain(repeated) {
             let dense = body.dense();
             let n = dense.len();
             let (factor, schur) = body.factor(1).unwrap();
@@ -491,8 +583,7 @@ mod tests {
                     }
                 }
             };
-            let refused =
-                Factor::new(fronts, vec![element; threads], &mut Breaks::new(go_on)).err();
+            let refused = Factor::new(fronts, &element, threads, &mut Breaks::new(go_on)).err();
             let expected = match bad.is_nan() {
                 true => FactorError::NonFinite,
                 false => FactorError::NotPositiveDefinite { unknown: 7 },
@@ -513,8 +604,7 @@ mod tests {
                 ControlFlow::Break(())
             };
             let element = |e: u32, matrix: &mut ElementMatrix| body.matrix(e, matrix);
-            let elements = vec![element; threads];
-            let stopped = Factor::new(fronts, elements, &mut Breaks::new(&mut stop)).err();
+            let stopped = Factor::new(fronts, &element, threads, &mut Breaks::new(&mut stop)).err();
             assert_eq!((stopped, asked), (Some(FactorError::Stopped), 1));
         }
     }
@@ -523,8 +613,26 @@ mod tests {
     #[test]
     fn two_threads_make_the_same_factor_as_one() {
         let kept: Vec<u32> = (0..400).collect();
-        for (x, y, kept) in [(150, 150, &kept[..]), (700, 2, &kept[..3]), (3, 1, &[])] {
-            let [one, two] = [1, 2].map(|threads| Body::new(x, y, kept).factor(threads).unwrap());
+        let bodies = [
+            (false, 150, 150, &kept[..]),
+            (false, 700, 2, &kept[..3]),
+            (false, 3, 1, &[]),
+            (true, 200, 150, &kept[..]),
+            (true, 100, 2, &[]),
+        ];
+        for (of_kinds, x, y, kept) in bodies {
+            let [one, two] = [1, 2].map(|threads| {
+                let mut body = match of_kinds {
+                    true => Body::of_kinds(x, y, kept),
+                    false => Body::new(x, y, kept),
+                };
+                body.factor(threads).unwrap()
+            });
+            let all: usize = one.0.fronts.fronts.iter().map(Front::len).sum();
+            match of_kinds {
+                true => assert!(3 * one.0.entries() < all),
+                false => assert_eq!(one.0.entries(), all),
+            }
             assert_eq!(one.1, two.1);
             assert_eq!(one.0.values, two.0.values);
             assert_eq!(one.0.fronts.len, one.0.values.len());
