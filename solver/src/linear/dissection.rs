@@ -1,5 +1,6 @@
 //! An order of elimination for the nodes of a mesh in the plane: its elements are halved again and again by their
-//! centres, and the nodes that two halves share are eliminated after both.
+//! centres, and the nodes that two halves share are eliminated after both. Between the lines of a grid a cut is as short
+//! as can be; halves of a free mesh are improved (the module `halves`).
 //!
 //! The result is a binary tree of *parts*. A part owns the nodes that lie in it alone, but in neither of its halves
 //! alone; a part that is not divided owns all that lie in it alone. Nodes that are kept are owned by none. Once its
@@ -7,6 +8,8 @@
 //! the rest of the body, or that are kept.
 
 use std::ops::Deref;
+
+use super::halves::Halves;
 
 /// Parts with more elements are divided: smaller ones cost more administration than they save arithmetic.
 const LARGEST_LEAF: usize = 6;
@@ -17,6 +20,12 @@ const SMALLEST_SHARE: f64 = 0.25;
 
 /// Centres nearer to each other than this part of the extent lie on one line of a grid.
 const SAME_LINE: f64 = 1e-10;
+
+/// Halves with fewer elements are not improved.
+const SMALLEST_IMPROVED: usize = 12;
+
+/// Directions across which parts are cut: x, y and the diagonals.
+const DIRECTIONS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
 
 /// A mesh, as far as it matters here.
 pub struct Cells<'a, E> {
@@ -138,15 +147,31 @@ struct Halving<'a, E> {
     seen: Vec<u32>,
     stamp: u32,
     keys: Vec<f64>,
+    /// Made for the first halves that are improved.
+    halves: Option<Halves<'a, E>>,
     parts: Vec<Part>,
     nodes: Vec<u32>,
 }
 
-/// A line across a part, perpendicular to an axis.
+/// A line across a part, perpendicular to one of the directions.
 #[derive(Clone, Copy)]
 struct Cut {
-    axis: usize,
+    direction: usize,
     at: f64,
+    /// Whether it lies between two lines of centres, as in a grid.
+    between_lines: bool,
+}
+
+impl Cut {
+    fn is_below(&self, centre: [f64; 2]) -> bool {
+        along(self.direction, centre) < self.at
+    }
+}
+
+/// A coordinate along one of the directions.
+fn along(direction: usize, [x, y]: [f64; 2]) -> f64 {
+    let [a, b] = DIRECTIONS[direction];
+    a * x + b * y
 }
 
 impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
@@ -166,6 +191,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
             seen: vec![0; cells.positions.len()],
             stamp: 0,
             keys: Vec::with_capacity(cells.elements.len()),
+            halves: None,
             parts: Vec::new(),
             nodes: Vec::new(),
         }
@@ -192,18 +218,23 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
             }
         } else {
             let cut = self.best_cut(elements);
-            let middle = self.part_by(elements, cut);
+            let mut middle = self.part_by(elements, cut);
+            let is_exact = cut.is_some_and(|cut| cut.between_lines);
+            if !is_exact && elements.len() >= SMALLEST_IMPROVED {
+                let mesh = self.cells;
+                let make = || Halves::new(mesh.elements, mesh.positions.len());
+                let halves = self.halves.get_or_insert_with(make);
+                middle = halves.improve(elements, middle, &self.free);
+            }
             let (low, high) = elements.split_at_mut(middle);
             // before the halves take what is theirs
             self.shared(low, high, &mut own);
             own.iter()
                 .for_each(|node| self.free[*node as usize] = false);
-            let along = 1 - cut.map_or(0, |cut| cut.axis);
-            let position = |node: &u32| self.cells.positions[*node as usize];
-            own.sort_unstable_by(|a, b| {
-                let (x, y) = (position(a), position(b));
-                x[along].total_cmp(&y[along]).then(a.cmp(b))
-            });
+            // the other of x and y, or of the diagonals
+            let other = cut.map_or(1, |cut| cut.direction ^ 1);
+            let position = |node: &u32| along(other, self.cells.positions[*node as usize]);
+            own.sort_unstable_by(|a, b| position(a).total_cmp(&position(b)).then(a.cmp(b)));
             let halves = [
                 self.divide(low, first, depth + 1),
                 self.divide(high, first + middle, depth + 1),
@@ -219,21 +250,28 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
 
     /// The cut through the fewest nodes; none if all centres coincide.
     fn best_cut(&mut self, elements: &[u32]) -> Option<Cut> {
-        let cuts = [0, 1].map(|axis| self.middle(elements, axis));
-        match cuts {
-            [Some(a), Some(b)] => {
-                let [of_a, of_b] = [a, b].map(|cut| self.count_shared(elements, cut));
-                Some(if of_a <= of_b { a } else { b })
+        let mut best: Option<(usize, Cut)> = None;
+        for direction in 0..DIRECTIONS.len() {
+            // a grid is cut along its lines
+            if direction == 2 && best.is_some_and(|(_, cut)| cut.between_lines) {
+                break;
             }
-            [one, other] => one.or(other),
+            if let Some(cut) = self.middle(elements, direction) {
+                let shared = self.count_shared(elements, cut);
+                if best.is_none_or(|(fewest, _)| shared < fewest) {
+                    best = Some((shared, cut));
+                }
+            }
         }
+        best.map(|(_, cut)| cut)
     }
 
     /// Between two lines of centres, as near to the middle as can be.
-    fn middle(&mut self, elements: &[u32], axis: usize) -> Option<Cut> {
+    fn middle(&mut self, elements: &[u32], direction: usize) -> Option<Cut> {
         let keys = &mut self.keys;
         keys.clear();
-        keys.extend(elements.iter().map(|e| self.centres[*e as usize][axis]));
+        let centres = elements.iter().map(|e| self.centres[*e as usize]);
+        keys.extend(centres.map(|centre| along(direction, centre)));
         let count = keys.len();
         let (below, &mut middle, above) =
             keys.select_nth_unstable_by(count / 2, |a, b| a.total_cmp(b));
@@ -257,6 +295,8 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
                 count_until += 1;
             }
         }
+        // some lines of a grid, not two centres of a free mesh by chance
+        let between_lines = count_until > 1 && 16 * count_until.pow(2) > count;
         count_until += count_before;
         let off = |n: usize| (n as f64 / count as f64 - 0.5).abs();
         let (off_before, off_after) = (off(count_before), off(count_until));
@@ -267,17 +307,21 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
             true => 0.5 * (before + from),
             false => 0.5 * (to + after),
         };
-        Some(Cut { axis, at })
+        Some(Cut {
+            direction,
+            at,
+            between_lines,
+        })
     }
 
     /// Puts the elements below the cut before the others, and says how many they are.
     fn part_by(&self, elements: &mut [u32], cut: Option<Cut>) -> usize {
-        let Some(Cut { axis, at }) = cut else {
+        let Some(cut) = cut else {
             return elements.len() / 2;
         };
         let mut low = 0;
         for i in 0..elements.len() {
-            if self.centres[elements[i] as usize][axis] < at {
+            if cut.is_below(self.centres[elements[i] as usize]) {
                 elements.swap(low, i);
                 low += 1;
             }
@@ -293,7 +337,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
     /// How many free nodes lie on both sides of a cut.
     fn count_shared(&mut self, elements: &[u32], cut: Cut) -> usize {
         let (low, high) = self.stamps();
-        let below = |e: &&u32| self.centres[**e as usize][cut.axis] < cut.at;
+        let below = |e: &&u32| cut.is_below(self.centres[**e as usize]);
         for &e in elements.iter().filter(below) {
             for &node in self.cells.elements[e as usize].iter() {
                 self.seen[node as usize] = low;
@@ -433,6 +477,39 @@ pub(super) mod tests {
         assert_eq!(sizes(&graded, &lines(40)), even);
         // that of a 20 × 10 part with three sides inside
         assert_eq!(even.iter().max(), Some(&51));
+    }
+
+    /// Where no centres lie on lines: the nodes of a grid, moved about at random, cost about what they do on their lines.
+    #[test]
+    fn a_free_mesh_is_dissected_nearly_as_well_as_a_grid() {
+        let (elements, mut positions) = grid(&lines(60), &lines(60));
+        let unknown = vec![true; positions.len()];
+        let cost = |positions: &[[f64; 2]]| {
+            let (elements, unknown) = (&elements[..], &unknown[..]);
+            let cells = Cells {
+                elements,
+                positions,
+                unknown,
+            };
+            let found = Dissection::new(&cells, &[]);
+            let entries = found.parts.iter().enumerate().map(|(number, part)| {
+                let own = part.own[1] - part.own[0];
+                own * (own + 1) / 2 + own * found.boundary(number).len()
+            });
+            entries.sum::<usize>()
+        };
+        let on_lines = cost(&positions);
+        for (k, [x, y]) in positions.iter_mut().enumerate() {
+            let (moved, angle) = (0.03, 0.4f64);
+            let at = [
+                *x + moved * (k as f64 * 1.7).sin(),
+                *y + moved * (k as f64 * 2.3).cos(),
+            ];
+            *x = angle.cos() * at[0] - angle.sin() * at[1];
+            *y = angle.sin() * at[0] + angle.cos() * at[1];
+        }
+        let moved = cost(&positions);
+        assert!(4 * moved < 5 * on_lines, "{moved} {on_lines}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod dissection;
 mod eliminated;
 mod front;
 mod fronts;
+mod halves;
 mod multifrontal;
 mod parallel;
 mod substitution;
