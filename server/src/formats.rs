@@ -162,6 +162,11 @@ fn members_table(paths: &[String], rows: &[MemberRow]) -> Table {
             let codes: Vec<&str> = row.warnings.iter().map(|code| code.as_str()).collect();
             codes.join(" ").into()
         }),
+        text("detail", |row| {
+            let violations = row.violations.iter().map(ToString::to_string);
+            let all: Vec<String> = row.detail.iter().cloned().chain(violations).collect();
+            all.join("; ").into()
+        }),
     ]);
     Table { columns }
 }
@@ -272,6 +277,7 @@ mod tests {
             .insert(other.into(), serde_json::json!({"kind": "flat", "to": 1}));
         rows[1].number = 1;
         rows[1].normal_force = Some(7.5);
+        rows[1].detail = Some("after 3 iterations, and \"so on\"".to_owned());
         let paths = [number.to_owned(), other.to_owned()];
         let written = |format| members(&paths, &rows, format).unwrap();
         let csv = String::from_utf8(written(Format::Csv)).unwrap();
@@ -284,6 +290,10 @@ mod tests {
             "{csv}"
         );
         assert!(lines[2].starts_with("1,,,queued,,7.5,"), "{csv}");
+        assert!(
+            lines[2].ends_with(r#","after 3 iterations, and ""so on""""#),
+            "{csv}"
+        );
         let jsonl = String::from_utf8(written(Format::Jsonl)).unwrap();
         let row: Value = serde_json::from_str(jsonl.lines().next().unwrap()).unwrap();
         assert_eq!(

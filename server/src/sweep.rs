@@ -135,10 +135,17 @@ impl MemberRow {
             Outcome::FalseConvergence => (Status::Failed, Some(Reason::FalseConvergence)),
             Outcome::Canceled => (Status::Canceled, Some(Reason::UserCancel)),
         };
+        let detail = (status == Status::Failed).then(|| {
+            format!(
+                "after {iterations} iterations the residuals are kkt {:.1e}, friction {:.1e}, monolithic {:.1e}",
+                residuals.kkt, residuals.friction, residuals.monolithic
+            )
+        });
         MemberRow {
             number: number_of(number),
             status,
             reason,
+            detail,
             normal_force: Some(normal_force),
             tangential_force: Some(tangential_force),
             friction_force: Some(friction_force),

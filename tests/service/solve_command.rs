@@ -165,6 +165,12 @@ fn the_help_lists_every_exit_code() {
             "{own}"
         );
     }
+    let warning = help(&["explain", "no-contact"]);
+    assert!(
+        warning.contains("never touches") && warning.contains("no_contact, a warning"),
+        "{warning}"
+    );
+    assert!(help(&["explain"]).contains("mesh_too_coarse_for_radius"));
     let unknown = Command::new(SIGNORINI)
         .args(["explain", "nonsense"])
         .output()

@@ -12,7 +12,7 @@ use anyhow::Context;
 use clap::Args;
 use files::{ReadError, plot::Theme};
 use solver::{
-    error::{SolveError, Violation},
+    error::{Reason, SolveError, Violation},
     problem::Problem,
     solution::Observer,
 };
@@ -78,7 +78,17 @@ pub(super) fn run(
     let start = Instant::now();
     let problem = match read(file) {
         Ok(problem) => problem,
-        Err(ReadError::Invalid(violations)) => return Ok(invalid(file, &violations)),
+        Err(ReadError::Invalid(violations)) => {
+            let exit = invalid(file, &violations);
+            let of_sweep = |violation: &Violation| {
+                violation.reason == Reason::UnknownName
+                    && ["/base", "/axes", "/points"].contains(&violation.pointer.as_str())
+            };
+            if violations.iter().any(of_sweep) {
+                eprintln!("This seems to be a sweep: solve it by `signorini sweep`.");
+            }
+            return Ok(exit);
+        }
         Err(ReadError::Io(error)) => {
             return Err(error).with_context(|| format!("cannot read {}", file.display()));
         }
