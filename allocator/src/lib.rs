@@ -37,9 +37,9 @@ pub fn give_back_large_memory() {
     }
 }
 
-/// Bytes from which an allocation asks for huge pages: eight of the usual 2 MiB, since one that is used in part takes up
+/// Bytes from which an allocation asks for huge pages: four of the usual 2 MiB, since one that is used in part takes up
 /// to one of them more than it uses. The many answers of a server are mostly smaller.
-const LARGE: usize = 16 << 20;
+const LARGE: usize = 8 << 20;
 
 /// Asks for huge pages where the system leaves that to programs; elsewhere nothing changes.
 fn ask_for_huge_pages(memory: *mut u8, size: usize) {
