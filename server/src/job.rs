@@ -4,6 +4,7 @@ use std::{borrow::Cow, collections::BTreeMap, fmt};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use solver::solution::{Outcome, Residuals};
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 use uuid::Uuid;
 
@@ -512,6 +513,24 @@ impl Failure {
             detail: detail.into(),
         }
     }
+}
+
+/// What became of iterations that have ended without a solution.
+pub fn without_solution(outcome: Outcome, iterations: u32, residuals: &Residuals) -> String {
+    let Residuals {
+        kkt,
+        friction,
+        monolithic,
+        equilibrium,
+    } = residuals;
+    let found = match outcome {
+        Outcome::FalseConvergence => format!(
+            "the residual of the whole problem is {monolithic:.3e}, and the forces on the body are out of balance by \
+             {equilibrium:.3e} of their size"
+        ),
+        _ => format!("the residual is {kkt:.3e} and the friction residual {friction:.3e}"),
+    };
+    format!("after {iterations} iterations {found}")
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use solver::{
 };
 
 use crate::{
-    job::{Limits, Reason, Status, SweepId},
+    job::{Limits, Reason, Status, SweepId, without_solution},
     time::Time,
 };
 
@@ -135,12 +135,8 @@ impl MemberRow {
             Outcome::FalseConvergence => (Status::Failed, Some(Reason::FalseConvergence)),
             Outcome::Canceled => (Status::Canceled, Some(Reason::UserCancel)),
         };
-        let detail = (status == Status::Failed).then(|| {
-            format!(
-                "after {iterations} iterations the residuals are kkt {:.1e}, friction {:.1e}, monolithic {:.1e}",
-                residuals.kkt, residuals.friction, residuals.monolithic
-            )
-        });
+        let failed = status == Status::Failed;
+        let detail = failed.then(|| without_solution(outcome, iterations, &residuals));
         MemberRow {
             number: number_of(number),
             status,

@@ -39,6 +39,7 @@ pub struct ElasticBody {
     factor: Factor,
     /// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it.
     axis_ends: Vec<[usize; 2]>,
+    /// Of the elements of its models.
     tables: ElementTables,
 }
 
@@ -223,7 +224,7 @@ impl ElasticBody {
 
     /// How many threads may work on the fields of this body: a second one is asked for if that is worth it.
     pub fn threads(&self, observe: &mut Observer<'_>) -> usize {
-        match self.factor.is_large() && observe(Progress::SecondThread).is_continue() {
+        match self.factor.has_large_fields() && observe(Progress::SecondThread).is_continue() {
             true => 2,
             false => 1,
         }
@@ -273,7 +274,6 @@ fn elements<'a>(model: &'a Model, tables: &'a ElementTables) -> Elements<'a> {
     Elements {
         mesh: &model.mesh,
         section: &model.section,
-        quadrature: model.quadrature,
         tables,
     }
 }

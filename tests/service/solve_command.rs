@@ -171,6 +171,14 @@ fn the_help_lists_every_exit_code() {
         "{warning}"
     );
     assert!(help(&["explain"]).contains("mesh_too_coarse_for_radius"));
+    let sweep = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/sweeps/sheet.json");
+    let sweep = Command::new(SIGNORINI)
+        .args(["solve", sweep])
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&sweep.stderr);
+    assert!(told.contains("solve it by `signorini sweep`"), "{told}");
+    assert_eq!(sweep.status.code(), Some(2));
     let unknown = Command::new(SIGNORINI)
         .args(["explain", "nonsense"])
         .output()

@@ -27,7 +27,6 @@ impl Assembled {
         let elements = Elements {
             mesh,
             section,
-            quadrature,
             tables,
         };
         let elements = ElementStiffness::new(elements, map);

@@ -8,6 +8,9 @@ use strum::VariantArray;
 use super::{exit::Exit, output};
 use crate::catalog::{Code, Kind};
 
+/// Letters of the longest code.
+const WIDTH: usize = 28;
+
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// A code: the `code` or `type` of an error, the `reason` of a job, or the `code` of a warning; without it, all are
@@ -19,13 +22,13 @@ pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
     let Some(code) = code else {
         let line = |code: &Code| {
             let Kind { code, title, .. } = code.kind();
-            format!("{code:<24} {title}\n")
+            format!("{code:<WIDTH$} {title}\n")
         };
         let errors: String = Code::VARIANTS.iter().map(line).collect();
-        let line = |(code, meaning): (String, String)| format!("{code:<24} {meaning}\n");
+        let line = |(code, meaning): (String, String)| format!("{code:<WIDTH$} {meaning}\n");
         let warnings: String = warnings().map(line).collect();
         output::print(&format!(
-            "{errors}\nWarnings, with which a result is to be read:\n\n{warnings}"
+            "{errors}\nCodes of warnings: the result is there, but read the warning first.\n\n{warnings}"
         ))?;
         return Ok(Exit::Ok);
     };
@@ -84,5 +87,8 @@ mod tests {
         let known: Vec<String> = warnings().map(|(code, _)| code).collect();
         let all = WarningCode::VARIANTS.iter().map(|code| code.as_str());
         assert_eq!(known, all.collect::<Vec<_>>());
+        let errors = Code::VARIANTS.iter().map(|code| code.kind().code.len());
+        let longest = known.iter().map(String::len).chain(errors).max();
+        assert_eq!(longest, Some(WIDTH));
     }
 }

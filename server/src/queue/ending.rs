@@ -10,7 +10,7 @@ use uuid::Uuid;
 use super::running::StopReason;
 use crate::{
     error::size,
-    job::{Failure, Job, Reason, ResultAvailable, Status},
+    job::{Failure, Job, Reason, ResultAvailable, Status, without_solution},
     memory::Outgrown,
     run::Document,
     store::{Ending, Parts},
@@ -59,29 +59,13 @@ impl From<SolveError> for NoSolution {
 /// What the outcome of a solution means for its job.
 pub(super) fn ending_of_solution(document: &Document) -> Ending {
     let (summary, partial) = (&document.summary.solution, ResultAvailable::Partial);
-    let residuals = &summary.residuals;
-    let failed = |reason, found: String| {
-        let detail = format!(
-            "after {} iterations {found}; the last state and the history are kept",
-            summary.iterations
-        );
+    let failed = |reason| {
+        let detail = without_solution(summary.outcome, summary.iterations, &summary.residuals);
+        let detail = format!("{detail}; the last state and the history are kept");
         Ending {
             result: partial,
             ..Ending::failed(reason, detail)
         }
-    };
-    let unsettled = || {
-        format!(
-            "the residual is {:.3e} and the friction residual {:.3e}",
-            residuals.kkt, residuals.friction
-        )
-    };
-    let no_solution = || {
-        format!(
-            "the residual of the whole problem is {:.3e}, and the forces on the body are out of balance by {:.3e} of \
-             their size",
-            residuals.monolithic, residuals.equilibrium
-        )
     };
     match summary.outcome {
         Outcome::Converged => Ending {
@@ -90,9 +74,9 @@ pub(super) fn ending_of_solution(document: &Document) -> Ending {
             failure: None,
             result: ResultAvailable::Final,
         },
-        Outcome::NotConverged => failed(Reason::NotConverged, unsettled()),
-        Outcome::ContactCycling => failed(Reason::ContactCycling, unsettled()),
-        Outcome::FalseConvergence => failed(Reason::FalseConvergence, no_solution()),
+        Outcome::NotConverged => failed(Reason::NotConverged),
+        Outcome::ContactCycling => failed(Reason::ContactCycling),
+        Outcome::FalseConvergence => failed(Reason::FalseConvergence),
         Outcome::Canceled => Ending {
             result: partial,
             ..Ending::canceled()

@@ -222,8 +222,8 @@ impl<'a> ElementStiffness<'a> {
 }
 
 impl Elements<'_> {
-    /// Numbers that are equal for elements with the same matrix, on the same unknown components of their nodes; none for elements
-    /// that no other is like.
+    /// Numbers that are equal for elements with the same matrix, on the same unknown components of their nodes; none for
+    /// elements whose shape no other has.
     pub fn kinds(self, map: &DofMap) -> Vec<Option<u32>> {
         let (mut known, mut turned) = (HashMap::new(), HashMap::new());
         let mut kind = |(e, element): (usize, &Element)| {
@@ -379,8 +379,9 @@ fn add_edge_load(mesh: &Mesh, section: &Section, load: &EdgeLoad, forces: &mut [
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::elasticity::isotropic;
+    use crate::elasticity::{ElementTables, isotropic};
     use crate::element::Element;
     use crate::problem::Analysis;
 
@@ -471,5 +472,120 @@ mod tests {
             .sum();
         assert!((total + 3.0 * 0.5 * area).abs() < 1e-13);
         assert_eq!(forces[2][0], 7.0);
+    }
+
+    /// Two rows of quadrilaterals and triangles on computed lines, of two materials, one of them nearly incompressible.
+    fn mixed(kind: &str) -> crate::model::Model {
+        let mut analysis = serde_json::json!({"kind": kind});
+        if kind == "plane_stress" {
+            analysis["thickness"] = 0.7.into();
+        }
+        // quadrilaterals, in the first columns, have no node in the middle
+        let is_used = |i: u32, j: u32| i % 2 == 0 || j % 2 == 0 || i > 6;
+        // nodes at half steps: those between the lines are the midside nodes
+        let nodes: Vec<[f64; 2]> = (0..=4)
+            .flat_map(|j| (0..=12).map(move |i| (i, j)))
+            .filter(|(i, j)| is_used(*i, *j))
+            .map(|(i, j)| [1.0 + 0.05 * f64::from(i), f64::from(j) / 6.0])
+            .collect();
+        let before = |n: u32| (0..n).filter(|k| !is_used(k % 13, k / 13)).count() as u32;
+        let at = |i: u32, j: u32| 13 * j + i - before(13 * j + i);
+        let with_midsides = |corners: &[[u32; 2]]| -> Vec<u32> {
+            let next = corners.iter().cycle().skip(1);
+            let middle = |([a, b], [c, d]): (&[u32; 2], &[u32; 2])| at((a + c) / 2, (b + d) / 2);
+            let ends = corners.iter().map(|[i, j]| at(*i, *j));
+            ends.chain(corners.iter().zip(next).map(middle)).collect()
+        };
+        let (mut elements, mut groups) = (Vec::new(), [Vec::new(), Vec::new()]);
+        for (row, column) in (0..2).flat_map(|row| (0..6).map(move |column| (row, column))) {
+            let (i, j, first) = (2 * column, 2 * row, elements.len());
+            let [a, b, c, d] = [[i, j], [i + 2, j], [i + 2, j + 2], [i, j + 2]];
+            match column < 3 {
+                true => elements.push(with_midsides(&[a, b, c, d])),
+                false => {
+                    elements.extend([[a, b, c], [a, c, d]].map(|corners| with_midsides(&corners)));
+                }
+            }
+            groups[row as usize].extend(first..elements.len());
+        }
+        let side = |a: [u32; 2], b: [u32; 2]| {
+            let middle = at((a[0] + b[0]) / 2, (a[1] + b[1]) / 2);
+            [at(a[0], a[1]), at(b[0], b[1]), middle]
+        };
+        let along = |j: u32| -> Vec<_> {
+            (0..6)
+                .map(|column| side([2 * column, j], [2 * column + 2, j]))
+                .collect()
+        };
+        let problem = serde_json::json!({
+            "analysis": analysis,
+            "mesh": {"inline": {
+                "nodes": nodes, "elements": elements,
+                "groups": {"low": groups[0], "high": groups[1]},
+                "boundaries": {
+                    "bottom": along(0), "top": along(4),
+                    "left": [side([0, 0], [0, 2]), side([0, 2], [0, 4])]
+                }
+            }, "refine": 2},
+            "materials": [
+                {"group": "low", "youngs_modulus": 1000, "poissons_ratio": 0.3},
+                {"group": "high", "youngs_modulus": 10, "poissons_ratio": if kind == "plane_stress" { 0.2 } else { 0.4999 }}
+            ],
+            "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}, {"boundary": "left", "ux": 0}],
+            "contacts": [{"boundary": "top", "obstacle": {"kind": "flat"}, "indentation": 0.1}]
+        });
+        let problem = serde_json::from_value(problem).unwrap();
+        let quiet: &mut crate::solution::Observer<'_> =
+            &mut |_| std::ops::ControlFlow::Continue(());
+        crate::prepare(&problem, None, quiet).unwrap().model
+    }
+
+    /// Against each element by itself: what is shared, and what is of its own, is the right one.
+    #[test]
+    fn elements_of_a_shape_have_the_matrix_of_each_of_them() {
+        for kind in ["plane_strain", "plane_stress", "axisymmetric"] {
+            let model = mixed(kind);
+            let (mesh, section, quadrature) = (&model.mesh, &model.section, model.quadrature);
+            let tables = &ElementTables::new(mesh, section, quadrature);
+            let elements = Elements {
+                mesh,
+                section,
+                tables,
+            };
+            let free = |n: usize| [Dof::Free(2 * n), Dof::Free(2 * n + 1)];
+            let mut map = DofMap {
+                dofs: (0..mesh.nodes.len()).map(free).collect(),
+                axes: vec![None; mesh.nodes.len()],
+                unknowns: 2 * mesh.nodes.len(),
+            };
+            let all = ElementStiffness::new(elements, &map);
+            let mut matrix = ElementMatrix::default();
+            let mut shared = 0;
+            for (e, element) in mesh.elements.iter().enumerate() {
+                let nodes = mesh.element_nodes(element);
+                let (family, material) = (element.family(), section.material_of(e));
+                let own = assemble_element(family, &nodes, section, material, quadrature);
+                all.put(e as u32, &mut matrix);
+                let size = own.iter().flatten().fold(0.0f64, |m, k| m.max(k.abs()));
+                for (a, b) in own.iter().flatten().zip(matrix.entries.iter().flatten()) {
+                    assert!((a - b).abs() <= 1e-9 * size, "{kind}, element {e}: {a} {b}");
+                }
+                shared += usize::from(tables.shapes.of(e).is_some());
+            }
+            assert!(2 * shared > mesh.elements.len(), "{kind}: {shared}");
+            // a held component and other axes make another kind, on all elements of the node
+            let kinds = elements.kinds(&map);
+            let same: Vec<usize> = (0..kinds.len())
+                .filter(|e| kinds[*e].is_some() && kinds[*e] == kinds[0])
+                .collect();
+            assert!(same.len() > 3 && kinds[0].is_some(), "{kind}: {same:?}");
+            map.dofs[mesh.elements[same[1]][0] as usize][1] = Dof::Fixed(0.0);
+            map.axes[mesh.elements[same[2]][0] as usize] =
+                Some(Axes::perpendicular([[0.6, 0.8], [0.8, -0.6]]));
+            let kinds = elements.kinds(&map);
+            let of_three = [same[1], same[2], same[same.len() - 1]].map(|e| kinds[e]);
+            let differ = (0..3).all(|i| of_three[i] != of_three[(i + 1) % 3]);
+            assert!(differ, "{kind}: {of_three:?}");
+        }
     }
 }

@@ -79,12 +79,10 @@ pub(super) struct Stations {
 }
 
 /// The places of stations on the master elements.
-#[derive(Clone)]
 pub(super) struct Masters {
     families: [Master; 2],
 }
 
-#[derive(Clone)]
 struct Master {
     rule: Vec<(Tabulated, f64)>,
     stress: Vec<(Tabulated, f64)>,
@@ -194,8 +192,9 @@ fn add_stiffness(station: &Station, moduli: &Moduli, k: &mut [[[[f64; 8]; 2]; 2]
 }
 
 /// What is computed once for all elements of the same shape.
-#[derive(Clone)]
 pub struct ElementTables {
+    /// As in `assemble_element`.
+    pub quadrature: u32,
     pub(super) shapes: Shapes,
     pub(super) masters: Masters,
     /// Of every shape.
@@ -209,6 +208,7 @@ impl ElementTables {
         let stations = |shape| masters.stations(section, shape);
         ElementTables {
             stations: shapes.shared.iter().map(stations).collect(),
+            quadrature,
             shapes,
             masters,
         }
@@ -222,9 +222,7 @@ pub struct Elements<'a> {
     pub mesh: &'a Mesh,
     /// Their materials.
     pub section: &'a Section,
-    /// As in `assemble_element`.
-    pub quadrature: u32,
-    /// Those of this mesh, section and quadrature.
+    /// Those of this mesh and section.
     pub tables: &'a ElementTables,
 }
 

@@ -53,12 +53,8 @@ pub fn recover(
     displacements: &[[f64; 2]],
     body_force: [f64; 2],
 ) -> Recovered {
-    let Elements {
-        mesh,
-        section,
-        quadrature,
-        ..
-    } = elements;
+    let Elements { mesh, section, .. } = elements;
+    let quadrature = elements.tables.quadrature;
     let points = mesh
         .elements
         .iter()

@@ -43,17 +43,17 @@ impl Shape {
         }
     }
 
-    /// The smaller of its extents along x and y.
-    fn extent(&self) -> f64 {
-        let along = |a: usize| {
-            let own = self.nodes.iter().take(self.family.nodes());
-            let ends = own.map(|node| node[a]);
-            let ends = ends.fold((f64::MAX, f64::MIN), |(low, high), c| {
-                (low.min(c), high.max(c))
-            });
-            ends.1 - ends.0
-        };
-        along(0).min(along(1))
+    /// Its area over the longest distance between its corners: how thin it is.
+    fn thickness(&self) -> f64 {
+        let corners = &self.nodes[..self.family.nodes() / 2];
+        let (mut area, mut longest) = (0.0, 0.0f64);
+        for (i, [x, y]) in corners.iter().enumerate() {
+            let [next_x, next_y] = corners[(i + 1) % corners.len()];
+            area += 0.5 * (x * next_y - next_x * y);
+            let distances = corners.iter().map(|[a, b]| (a - x).hypot(b - y));
+            longest = distances.fold(longest, f64::max);
+        }
+        area.abs() / longest
     }
 
     /// Whether every node has the same place up to `tolerance`.
@@ -86,7 +86,7 @@ impl Shape {
 ///
 /// An element of such a shape is treated as if it had exactly that of the first one. This moves its nodes by no more than
 /// their coordinates are in doubt after a few operations with rounding.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Shapes {
     /// By element.
     of: Vec<Option<u16>>,
@@ -94,17 +94,17 @@ pub(super) struct Shapes {
     pub(super) shared: Vec<Shape>,
 }
 
-/// Places in units in the last place of the largest coordinate that shapes may differ by.
+/// How far nodes of equal shapes may be apart, in roundings of the largest coordinate.
 const ROUNDING: f64 = 16.0;
 
-/// And in extents of the element.
-const OF_EXTENT: f64 = 1e-10;
+/// And at most this part of how thin the element is.
+const OF_THICKNESS: f64 = 1e-10;
 
-/// Shapes that are looked for: where a mesh has more, most are those of one element.
-const MOST: usize = 1024;
+/// Hashes of shapes that are looked for: the most frequent ones.
+const MOST: usize = 512;
 
-/// A shape is compared with no more others than these.
-const MOST_COMPARED: usize = 8;
+/// Shapes with the same hash that are told apart.
+const MOST_COMPARED: usize = 4;
 
 impl Shapes {
     /// Those of a mesh.
@@ -114,55 +114,45 @@ impl Shapes {
         let rounding = ROUNDING * f64::EPSILON * largest;
         // rounding rarely leads into another cell
         let cell = f64::from(1 << 20) * rounding;
-        let (mut known, mut counts): (Vec<Shape>, Vec<u32>) = (Vec::new(), Vec::new());
-        let mut by_hash: HashMap<u64, Vec<u16>> = HashMap::new();
-        let mut last = 0;
-        let mut of = vec![None; mesh.elements.len()];
-        for (e, of) in of.iter_mut().enumerate() {
+        let hash = |e: usize| {
             let shape = Shape::of(mesh, section, e);
-            let extent = shape.extent();
-            if extent < cell {
+            (shape.thickness() > cell).then(|| shape.hash(cell))
+        };
+        let hashes: Vec<Option<u64>> = (0..mesh.elements.len()).map(hash).collect();
+        let numbers = frequent(&hashes);
+        // by number, the shapes met with it, as places among all of them; each with the number of its elements
+        let mut met: Vec<Vec<u16>> = vec![Vec::new(); numbers.len()];
+        let mut known: Vec<(Shape, u32)> = Vec::new();
+        let mut of = vec![None; mesh.elements.len()];
+        for (e, hash) in hashes.into_iter().enumerate() {
+            let Some(&number) = hash.and_then(|hash| numbers.get(&hash)) else {
                 continue;
+            };
+            let shape = Shape::of(mesh, section, e);
+            let tolerance = rounding.min(OF_THICKNESS * shape.thickness());
+            let met = &mut met[usize::from(number)];
+            let is_near = |place: &u16| known[usize::from(*place)].0.is_near(&shape, tolerance);
+            let mut place = met.iter().copied().find(is_near);
+            if place.is_none() && met.len() < MOST_COMPARED {
+                place = Some(known.len() as u16);
+                met.push(known.len() as u16);
+                known.push((shape, 0));
             }
-            let tolerance = rounding.min(OF_EXTENT * extent);
-            let is_near = |place: &u16| {
-                let other = known.get(usize::from(*place));
-                other.is_some_and(|other| shape.is_near(other, tolerance))
-            };
-            // most often that of the element before
-            let place = match is_near(&last) {
-                true => Some(last),
-                false => {
-                    let places = by_hash.entry(shape.hash(cell)).or_default();
-                    let found = places.iter().copied().find(is_near);
-                    let is_new =
-                        found.is_none() && known.len() < MOST && places.len() < MOST_COMPARED;
-                    found.or_else(|| {
-                        is_new.then(|| {
-                            places.push(known.len() as u16);
-                            known.push(shape);
-                            counts.push(0);
-                            known.len() as u16 - 1
-                        })
-                    })
-                }
-            };
             if let Some(place) = place {
-                counts[usize::from(place)] += 1;
-                last = place;
+                known[usize::from(place)].1 += 1;
             }
-            *of = place;
+            of[e] = place;
         }
         let mut shared = Vec::new();
-        let numbers = known.into_iter().zip(counts).map(|(shape, count)| {
+        let places = known.into_iter().map(|(shape, count)| {
             (count > 1).then(|| {
                 shared.push(shape);
                 shared.len() as u16 - 1
             })
         });
-        let numbers: Vec<Option<u16>> = numbers.collect();
+        let places: Vec<Option<u16>> = places.collect();
         for place in &mut of {
-            *place = place.and_then(|place| numbers[usize::from(place)]);
+            *place = place.and_then(|place| places[usize::from(place)]);
         }
         Shapes { of, shared }
     }
@@ -170,5 +160,142 @@ impl Shapes {
     /// The number of an element's shape; none if no other element has it.
     pub(super) fn of(&self, e: usize) -> Option<usize> {
         self.of[e].map(usize::from)
+    }
+}
+
+/// Numbers for those that occur most often, and twice at least.
+fn frequent(hashes: &[Option<u64>]) -> HashMap<u64, u16> {
+    let mut sorted: Vec<u64> = hashes.iter().flatten().copied().collect();
+    sorted.sort_unstable();
+    let runs = sorted.chunk_by(|a, b| a == b).filter(|run| run.len() > 1);
+    let mut runs: Vec<(usize, u64)> = runs.map(|run| (run.len(), run[0])).collect();
+    runs.sort_unstable_by(|a, b| b.cmp(a));
+    runs.truncate(MOST);
+    let numbered = runs.into_iter().enumerate();
+    numbered
+        .map(|(number, (_, hash))| (hash, number as u16))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::elasticity::isotropic;
+    use crate::element::Element;
+    use crate::problem::Analysis;
+
+    /// Quadrilaterals between lines, with midside nodes of their own.
+    fn mesh(x: &[f64], y: &[f64]) -> Mesh {
+        let mut mesh = Mesh::default();
+        for y in y.windows(2) {
+            for x in x.windows(2) {
+                let first = mesh.nodes.len() as u32;
+                let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
+                mesh.nodes.extend(corners);
+                let middle = |a: usize| {
+                    let ([ax, ay], [bx, by]) = (corners[a], corners[(a + 1) % 4]);
+                    [0.5 * (ax + bx), 0.5 * (ay + by)]
+                };
+                mesh.nodes.extend([0, 1, 2, 3].map(middle));
+                mesh.elements
+                    .push(Element::Quad(std::array::from_fn(|i| first + i as u32)));
+            }
+        }
+        mesh
+    }
+
+    fn lines(count: usize, step: f64) -> Vec<f64> {
+        (0..=count).map(|i| i as f64 * step).collect()
+    }
+
+    fn section(analysis: Analysis) -> Section {
+        Section::uniform(analysis, isotropic(&analysis, 1000.0, 0.3))
+    }
+
+    fn numbers(mesh: &Mesh, section: &Section) -> Vec<Option<usize>> {
+        let shapes = Shapes::new(mesh, section);
+        (0..mesh.elements.len()).map(|e| shapes.of(e)).collect()
+    }
+
+    /// Their widths differ in the last places: a third and a tenth have no exact form.
+    #[test]
+    fn computed_equidistant_lines_make_one_shape() {
+        let mesh = mesh(&lines(40, 1.0 / 3.0), &lines(30, 0.1));
+        let plane = section(Analysis::PlaneStrain {});
+        assert_eq!(numbers(&mesh, &plane), vec![Some(0); 1200]);
+        // in axisymmetry a column has its own radius
+        let found = numbers(&mesh, &section(Analysis::Axisymmetric {}));
+        assert_eq!(found[0], found[40]);
+        assert_eq!(
+            found[..40]
+                .iter()
+                .collect::<std::collections::BTreeSet<_>>()
+                .len(),
+            40
+        );
+    }
+
+    #[test]
+    fn what_differs_by_more_than_rounding_has_no_shape_in_common() {
+        let plane = section(Analysis::PlaneStrain {});
+        let mut mesh = mesh(&lines(3, 1.0), &lines(1, 1.0));
+        assert_eq!(numbers(&mesh, &plane), [Some(0); 3]);
+        mesh.nodes[4][1] += 1e-9;
+        assert_eq!(numbers(&mesh, &plane), [None, Some(0), Some(0)]);
+        // a corner is enough, and two that are alike again share
+        for e in [1, 2] {
+            mesh.nodes[8 * e + 2][0] += 1e-12;
+        }
+        assert_eq!(numbers(&mesh, &plane), [None, Some(0), Some(0)]);
+    }
+
+    /// Layers that lie obliquely: of 10⁻⁸ of the body's size, with lines that rounding moves by as much as matters to them.
+    #[test]
+    fn thin_elements_share_only_what_is_equal_for_them() {
+        let plane = section(Analysis::PlaneStrain {});
+        let mut mesh = mesh(&lines(20, 1e-3), &lines(1, 1e-7));
+        for [x, y] in &mut mesh.nodes {
+            [*x, *y] = [0.6 * *x - 0.8 * *y + 1.0, 0.8 * *x + 0.6 * *y + 1.0];
+        }
+        let shapes = Shapes::new(&mesh, &plane);
+        for e in 0..20 {
+            let Some(shared) = shapes.of(e).map(|number| &shapes.shared[number]) else {
+                continue;
+            };
+            let own = Shape::of(&mesh, &plane, e);
+            let pairs = own
+                .nodes
+                .iter()
+                .flatten()
+                .zip(shared.nodes.iter().flatten());
+            assert!(
+                pairs
+                    .into_iter()
+                    .all(|(a, b)| (a - b).abs() <= 1e-10 * 1e-7)
+            );
+        }
+    }
+
+    /// The first thousands of a free mesh do not keep those of a grid after them from being found.
+    #[test]
+    fn frequent_shapes_are_found_among_very_many() {
+        let widths: Vec<f64> = (0..3000)
+            .map(|i| i as f64 + 1e-8 * (i * i) as f64)
+            .collect();
+        let mut mesh = mesh(&widths, &[0.0, 1.0]);
+        let grid = super::tests::mesh(&lines(10, 0.5), &lines(10, 0.25));
+        let offset = mesh.nodes.len() as u32;
+        mesh.nodes.extend(grid.nodes);
+        for element in grid.elements {
+            let nodes = std::array::from_fn(|i| element[i] + offset);
+            mesh.elements.push(Element::Quad(nodes));
+        }
+        let found = numbers(&mesh, &section(Analysis::PlaneStrain {}));
+        assert!(
+            found[2999..]
+                .iter()
+                .all(|number| number.is_some() && *number == found[2999])
+        );
     }
 }

@@ -23,9 +23,7 @@ pub struct StressDifference {
 impl StressDifference {
     /// That of what was recovered of the same elements.
     pub fn new(elements: Elements<'_>, recovered: &Recovered) -> Self {
-        let Elements {
-            mesh, quadrature, ..
-        } = elements;
+        let (mesh, quadrature) = (elements.mesh, elements.tables.quadrature);
         let mut differences = Vec::with_capacity(recovered.points[0].len());
         let shapes = [Family::Quad, Family::Triangle].map(|family| {
             let points = family.rule(quadrature).iter();
@@ -81,12 +79,8 @@ impl StressDifference {
         fields: &[[[f64; TOGETHER]; 2]],
         stop: &mut dyn FnMut() -> bool,
     ) -> Option<Vec<Vec<f64>>> {
-        let Elements {
-            mesh,
-            section,
-            quadrature,
-            ..
-        } = elements;
+        let Elements { mesh, section, .. } = elements;
+        let quadrature = elements.tables.quadrature;
         let mut products = vec![vec![0.0; mesh.elements.len()]; TOGETHER];
         let mut stations = elements.stations();
         for (material, weights) in weights(section).iter().enumerate() {
@@ -335,7 +329,6 @@ mod tests {
             let elements = Elements {
                 mesh,
                 section,
-                quadrature,
                 tables,
             };
             let field = |k: usize| -> Vec<[f64; 2]> {

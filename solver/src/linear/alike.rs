@@ -131,7 +131,7 @@ impl Search {
     /// A part of two halves, by the first ones that are like them, and their boundaries.
     fn describe_halves(&mut self, firsts: [usize; 2], boundaries: [&[u32]; 2]) {
         self.start();
-        // no part has no elements
+        // the key of a part that is not divided begins with the number of its elements, which is not 0
         self.key.push(0);
         self.key.extend(firsts.map(|first| first as u32));
         for &place in boundaries[0] {

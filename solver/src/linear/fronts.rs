@@ -10,8 +10,12 @@ use super::alike::find_alike;
 use super::dissection::Dissection;
 
 /// Fronts of a lower depth are worked on one after the other, by all threads; each branch of the tree below them is left
-/// to one thread. Two branches that hang on one front have about the same number of elements.
+/// to one thread. Two branches that hang on one front have about the same number of elements. A front that several take is
+/// left to one thread with all that it needs, however high it stands.
 const SHARED_DEPTH: u32 = 3;
+
+/// So many numbers take some tenths of a second.
+const LARGE: usize = 5_000_000;
 
 /// The structure of a factor.
 pub struct Fronts {
@@ -27,12 +31,14 @@ pub struct Fronts {
     pub(super) slots: Vec<(usize, usize)>,
     /// Elements in the order of the parts that are not divided.
     pub(super) elements: Vec<u32>,
-    /// Unknowns of all boundaries, those of each front ascending; in the same order as the first front's that it is like.
+    /// Unknowns of all boundaries: those of each front ascending, or in the order of the first front that it is like.
     rows: Vec<u32>,
     pub(super) unknowns: usize,
     pub(super) kept: usize,
     /// Numbers in the factor.
     pub(super) len: usize,
+    /// Numbers in the columns of all fronts: more, if some are alike.
+    len_of_all: usize,
     /// The fronts above the branches: their widest columns, and what the two stacks hold at most.
     pub(super) above: Space,
     /// The same of the branches, each for itself.
@@ -171,6 +177,7 @@ impl Fronts {
             stages: Vec::new(),
             slots: Vec::new(),
             len: 0,
+            len_of_all: 0,
             elements: dissection.elements,
             rows,
             unknowns,
@@ -208,7 +215,7 @@ impl Fronts {
         }
     }
 
-    /// First what goes to slots, in as many stages as it takes until what a front needs is there; then the rest.
+    /// First what goes to slots, in stages, each after those that it needs; then the rest.
     fn find_stages(&mut self, first_alike: &[usize]) {
         let mut stage_of = vec![0; self.fronts.len()];
         let mut stages: Vec<Vec<usize>> = Vec::new();
@@ -250,6 +257,7 @@ impl Fronts {
                 [piece] if !piece.branch => {
                     self.stages.extend(tasks.pop().map(Stage::Above));
                 }
+                _ if tasks.is_empty() => {}
                 _ => self.stages.push(Stage::Each(tasks)),
             }
         }
@@ -285,6 +293,7 @@ impl Fronts {
         }
         for (number, &first) in first_alike.iter().enumerate() {
             self.fronts[number].values = self.fronts[first].values;
+            self.len_of_all += self.fronts[number].len();
         }
     }
 
@@ -384,10 +393,12 @@ impl Fronts {
         }
     }
 
-    /// What the factor takes, and what waits while it is made on so many threads (bytes).
+    /// What the factor takes, and what waits while it is made on so many threads, with the places of unknowns in fronts
+    /// (bytes).
     pub fn bytes(&self, threads: usize) -> u64 {
         let waits = self.above.len() + threads * self.branch.len() + self.in_slots;
-        8 * (self.len + waits) as u64
+        let places = (threads + 1) * self.unknowns;
+        8 * (self.len + waits) as u64 + 4 * places as u64
     }
 
     /// Rows of the tallest front.
@@ -395,11 +406,14 @@ impl Fronts {
         self.fronts.iter().map(Front::height).max().unwrap_or(0)
     }
 
-    /// Whether a second thread is worth its start.
+    /// Whether a second thread is worth its start for a factor.
     pub fn is_large(&self) -> bool {
-        /// Numbers in the factor: it takes some tenths of a second.
-        const LARGE: usize = 5_000_000;
         self.len > LARGE
+    }
+
+    /// Whether it is for fields, which go through all fronts.
+    pub(super) fn has_large_fields(&self) -> bool {
+        self.len_of_all > LARGE
     }
 
     /// Number of those that are kept.

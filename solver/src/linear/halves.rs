@@ -34,7 +34,7 @@ pub(super) struct Halves<'a, E> {
     /// By how many the nodes in both halves become fewer if the element goes.
     gains: Vec<i32>,
     /// By node: how many elements of each half it has.
-    counts: Vec<[u16; 2]>,
+    counts: Vec<[u32; 2]>,
     waiting: BinaryHeap<(i32, Reverse<u32>)>,
     gone: Vec<u32>,
 }
@@ -287,5 +287,14 @@ mod tests {
     fn the_best_cut_stays() {
         let (before, after, sizes) = improved(&[true; 441], |x, _| x < 10);
         assert_eq!((before, after, sizes), (21, 21, [200; 2]));
+    }
+
+    /// As in a fan of triangles: more than a number of 16 bits holds.
+    #[test]
+    fn one_node_may_have_very_many_elements() {
+        let elements: Vec<Vec<u32>> = (0..140_000).map(|e| vec![e, 140_000]).collect();
+        let mut part: Vec<u32> = (0..140_000).collect();
+        let mut halves = Halves::new(&elements, 140_001);
+        assert_eq!(halves.improve(&mut part, 70_000, &[true; 140_001]), 70_000);
     }
 }

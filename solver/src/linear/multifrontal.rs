@@ -109,9 +109,10 @@ impl Factor {
                         rest = others;
                     }
                     let left = above.put(&fronts, tasks, &mut filled);
+                    let workers = threads.min(tasks.len());
                     for_each(
                         tasks.iter().zip(left).zip(columns),
-                        &mut of_threads,
+                        &mut of_threads[..workers],
                         |memory, ((task, left), values), breaks| {
                             let of_all = (&fronts, &slots[..], element);
                             memory.work_on(task, Some(left), values, of_all, breaks)
@@ -133,9 +134,9 @@ impl Factor {
         Ok((Factor { fronts, values }, schur))
     }
 
-    /// Whether a second thread is worth its start.
-    pub fn is_large(&self) -> bool {
-        self.fronts.is_large()
+    /// Whether a second thread is worth its start for fields.
+    pub fn has_large_fields(&self) -> bool {
+        self.fronts.has_large_fields()
     }
 
     /// Entries of L that are kept: fronts that are alike have theirs in common.
@@ -146,8 +147,8 @@ impl Factor {
 
 /// Memory for fronts that are worked on one after the other, used again and again.
 struct Memory {
-    /// First the columns that a front owns; then two stacks with what fronts have left, until the front of the whole takes
-    /// it: what its halves leave is on one stack, what it leaves itself goes to the other.
+    /// First the columns that a front owns; then two stacks with what fronts without a slot have left, until the front of
+    /// the whole takes it: what its halves leave is on one stack, what it leaves itself goes to the other.
     values: Vec<f64>,
     space: Space,
     tops: [usize; 2],
@@ -281,13 +282,13 @@ impl Memory {
                 for (runs, half) in self.assembly.runs.iter_mut().zip(halves) {
                     find_runs(fronts.rows(half), &self.assembly.local, runs);
                 }
-                let halves = self.assembly.runs.iter().zip(halves_left);
-                for (runs, from) in halves.clone() {
+                let added = self.assembly.runs.iter().zip(halves_left);
+                for (runs, from) in added.clone() {
                     into.add(runs, from, Columns::Own);
                 }
                 into.eliminate(threads, breaks).map_err(failed)?;
                 into.reduce(Accum::Replace, threads, breaks)?;
-                for (runs, from) in halves {
+                for (runs, from) in added {
                     into.add(runs, from, Columns::Left);
                     breaks.after(from.len() as f64)?;
                 }
