@@ -481,7 +481,7 @@ mod tests {
             analysis["thickness"] = 0.7.into();
         }
         // quadrilaterals, in the first columns, have no node in the middle
-        let is_used = |i: u32, j: u32| i % 2 == 0 || j % 2 == 0 || i > 6;
+        let is_used = |i: u32, j: u32| i.is_multiple_of(2) || j.is_multiple_of(2) || i > 6;
         // nodes at half steps: those between the lines are the midside nodes
         let nodes: Vec<[f64; 2]> = (0..=4)
             .flat_map(|j| (0..=12).map(move |i| (i, j)))
