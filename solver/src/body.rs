@@ -89,7 +89,7 @@ impl ElasticBody {
 
         notify(observe, Progress::Phase(Phase::Order))?;
         let tables = ElementTables::new(&model.mesh, &model.section, model.quadrature);
-        let elements = elements(model, &tables);
+        let elements = tables.elements(&model.mesh, &model.section);
         let (map, fronts) = number(model, elements)?;
         let mut of_loads = on_unknowns(&map, &condensed);
 
@@ -182,7 +182,7 @@ impl ElasticBody {
 
     /// The elements of a model that this is the body of.
     pub fn elements<'a>(&'a self, model: &'a Model) -> Elements<'a> {
-        elements(model, &self.tables)
+        self.tables.elements(&model.mesh, &model.section)
     }
 
     /// The forces on contact nodes along n and t, from those on the contact unknowns.
@@ -267,14 +267,6 @@ impl ElasticBody {
         }
         self.factor.backward(&mut u, threads);
         self.map.displacements_together(&u)
-    }
-}
-
-fn elements<'a>(model: &'a Model, tables: &'a ElementTables) -> Elements<'a> {
-    Elements {
-        mesh: &model.mesh,
-        section: &model.section,
-        tables,
     }
 }
 

@@ -139,11 +139,16 @@ pub fn assemble_element(
     material: usize,
     quadrature: u32,
 ) -> [[f64; 16]; 16] {
-    if let Some(split) = section.split(material) {
-        return Mixed::stiffness(section, split, family, nodes);
-    }
     let shape = Shape::new(family, nodes, section, material);
-    Masters::new(quadrature).stiffness(section, &shape)
+    stiffness(&Masters::new(quadrature), section, &shape)
+}
+
+/// That of elements of a shape.
+fn stiffness(masters: &Masters, section: &Section, shape: &Shape) -> [[f64; 16]; 16] {
+    match section.split(usize::from(shape.material)) {
+        Some(split) => Mixed::stiffness(section, split, shape.family, &shape.nodes),
+        None => masters.stiffness(section, shape),
+    }
 }
 
 /// The stiffness of a body's elements on its unknowns.
@@ -157,9 +162,10 @@ pub struct ElementStiffness<'a> {
 impl<'a> ElementStiffness<'a> {
     /// That of these elements, on the unknowns of `map`.
     pub fn new(elements: Elements<'a>, map: &'a DofMap) -> Self {
-        let shapes = elements.tables.shapes.shared.iter();
+        let (tables, section) = (elements.tables, elements.section);
+        let of_shape = |shape| stiffness(&tables.masters, section, shape);
         ElementStiffness {
-            of_shapes: shapes.map(|shape| stiffness(elements, shape)).collect(),
+            of_shapes: tables.shapes.shared.iter().map(of_shape).collect(),
             elements,
             map,
         }
@@ -176,7 +182,10 @@ impl<'a> ElementStiffness<'a> {
         let (map, element) = (self.map, &mesh.elements[e as usize]);
         matrix.entries = match tables.shapes.of(e as usize) {
             Some(shape) => self.of_shapes[shape],
-            None => stiffness(self.elements, &Shape::of(mesh, section, e as usize)),
+            None => {
+                let shape = Shape::of(mesh, section, e as usize);
+                stiffness(&tables.masters, section, &shape)
+            }
         };
         let k = &mut matrix.entries;
         matrix.unknowns = [None; 16];
@@ -243,14 +252,6 @@ impl Elements<'_> {
         };
         let all = self.mesh.elements.iter();
         all.enumerate().map(&mut kind).collect()
-    }
-}
-
-fn stiffness(elements: Elements<'_>, shape: &Shape) -> [[f64; 16]; 16] {
-    let (section, masters) = (elements.section, &elements.tables.masters);
-    match section.split(usize::from(shape.material)) {
-        Some(split) => Mixed::stiffness(section, split, shape.family, &shape.nodes),
-        None => masters.stiffness(section, shape),
     }
 }
 
@@ -547,11 +548,7 @@ mod tests {
             let model = mixed(kind);
             let (mesh, section, quadrature) = (&model.mesh, &model.section, model.quadrature);
             let tables = &ElementTables::new(mesh, section, quadrature);
-            let elements = Elements {
-                mesh,
-                section,
-                tables,
-            };
+            let elements = tables.elements(mesh, section);
             let free = |n: usize| [Dof::Free(2 * n), Dof::Free(2 * n + 1)];
             let mut map = DofMap {
                 dofs: (0..mesh.nodes.len()).map(free).collect(),

@@ -213,6 +213,15 @@ impl ElementTables {
             masters,
         }
     }
+
+    /// The elements of the mesh and section that these were made of.
+    pub fn elements<'a>(&'a self, mesh: &'a Mesh, section: &'a Section) -> Elements<'a> {
+        Elements {
+            mesh,
+            section,
+            tables: self,
+        }
+    }
 }
 
 /// The elements of a mesh.

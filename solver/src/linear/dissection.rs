@@ -46,7 +46,8 @@ pub struct Dissection {
     pub elements: Vec<u32>,
     /// Nodes in the order of their elimination, then those that are kept.
     pub nodes: Vec<u32>,
-    /// The boundaries of all parts, as places in `nodes`; each is sorted at first.
+    /// The boundaries of all parts, as places in `nodes`; each is sorted, unless the module `alike` has brought it into the
+    /// order of another part's.
     pub boundaries: Vec<u32>,
 }
 
@@ -295,7 +296,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
                 count_until += 1;
             }
         }
-        // some lines of a grid, not two centres of a free mesh by chance
+        // as many on one line as a quarter of the side of a square, not two centres of a free mesh by chance
         let between_lines = count_until > 1 && 16 * count_until.pow(2) > count;
         count_until += count_before;
         let off = |n: usize| (n as f64 / count as f64 - 0.5).abs();

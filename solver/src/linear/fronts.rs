@@ -27,8 +27,8 @@ pub struct Fronts {
     pub(super) order: Vec<u32>,
     /// What is done one after the other.
     pub(super) stages: Vec<Stage>,
-    /// Numbers in each slot, and the stage after which it is free again.
-    pub(super) slots: Vec<(usize, usize)>,
+    /// What waits for several fronts.
+    pub(super) slots: Vec<Slot>,
     /// Elements in the order of the parts that are not divided.
     pub(super) elements: Vec<u32>,
     /// Unknowns of all boundaries: those of each front ascending, or in the order of the first front that it is like.
@@ -65,6 +65,14 @@ pub(super) struct Front {
     pub(super) slot: Option<usize>,
 }
 
+/// Where what a front leaves waits for several others.
+pub(super) struct Slot {
+    /// Numbers in it.
+    pub(super) len: usize,
+    /// The stage in which it is taken for the last time.
+    pub(super) last_stage: usize,
+}
+
 /// Fronts of unknowns that follow each other.
 pub(super) struct Piece {
     pub(super) fronts: Range<usize>,
@@ -78,6 +86,15 @@ pub(super) enum Stage {
     Above(Task),
     /// Each is left to one thread.
     Each(Vec<Task>),
+}
+
+impl Stage {
+    fn tasks(&self) -> &[Task] {
+        match self {
+            Stage::Above(task) => std::slice::from_ref(task),
+            Stage::Each(tasks) => tasks,
+        }
+    }
 }
 
 /// Fronts that one thread works on, one after the other: the last one takes what the others leave.
@@ -189,6 +206,7 @@ impl Fronts {
         planned.find_slots(&first_alike);
         planned.find_stages(&first_alike);
         planned.place_columns(&first_alike);
+        planned.find_last_stages();
         planned.find_space();
         planned
     }
@@ -208,7 +226,10 @@ impl Fronts {
                 continue;
             }
             let slot = self.fronts[first].slot.unwrap_or_else(|| {
-                self.slots.push((self.fronts[first].boundary().pow(2), 0));
+                self.slots.push(Slot {
+                    len: self.fronts[first].boundary().pow(2),
+                    last_stage: 0,
+                });
                 self.slots.len() - 1
             });
             self.fronts[number].slot = Some(slot);
@@ -297,18 +318,29 @@ impl Fronts {
         }
     }
 
+    /// The stages after which slots are free again.
+    fn find_last_stages(&mut self) {
+        for (k, stage) in self.stages.iter().enumerate() {
+            let fronts = stage.tasks().iter().flat_map(|task| task.fronts.clone());
+            for place in fronts {
+                let front = &self.fronts[self.order[place] as usize];
+                for half in front.halves.into_iter().flatten() {
+                    if let Some(slot) = self.fronts[half].slot {
+                        self.slots[slot].last_stage = k;
+                    }
+                }
+            }
+        }
+    }
+
     /// What the fronts above the branches take, the branches at most, and the slots.
     fn find_space(&mut self) {
         let (mut above, mut branches) = (Space::default(), Space::default());
         let mut tops = [0; 2];
         let whole = self.fronts.len() - 1;
-        let mut slots = std::mem::take(&mut self.slots);
-        for (k, stage) in self.stages.iter().enumerate() {
-            let (tasks, is_above) = match stage {
-                Stage::Above(task) => (std::slice::from_ref(task), true),
-                Stage::Each(tasks) => (&tasks[..], false),
-            };
-            for task in tasks {
+        for stage in &self.stages {
+            let is_above = matches!(stage, Stage::Above(_));
+            for task in stage.tasks() {
                 let fronts = self.order[task.fronts.clone()].iter();
                 let fronts: Vec<&Front> = fronts.map(|n| &self.fronts[*n as usize]).collect();
                 let columns = fronts.iter().map(|front| front.own * front.height());
@@ -317,11 +349,6 @@ impl Fronts {
                     false => &mut branches,
                 };
                 space.widest = columns.fold(space.widest, usize::max);
-                for half in fronts.iter().flat_map(|front| front.halves).flatten() {
-                    if let Some(slot) = self.fronts[half].slot {
-                        slots[slot].1 = k;
-                    }
-                }
                 // all but what the last one leaves waits on stacks of the task's own
                 let Some((last, within)) = fronts.split_last() else {
                     continue;
@@ -341,7 +368,6 @@ impl Fronts {
                 }
             }
         }
-        self.slots = slots;
         (self.above, self.branch) = (above, branches);
         self.in_slots = self.most_in_slots();
     }
@@ -350,24 +376,19 @@ impl Fronts {
     fn most_in_slots(&self) -> usize {
         let (mut most, mut held) = (0, 0);
         for (k, stage) in self.stages.iter().enumerate() {
-            held += self
-                .slots_of(stage)
-                .map(|slot| self.slots[slot].0)
-                .sum::<usize>();
+            let filled = self.slots_of(stage).map(|slot| self.slots[slot].len);
+            held += filled.sum::<usize>();
             most = most.max(held);
-            let freed = self.slots.iter().filter(|(_, last)| *last == k);
-            held -= freed.map(|(len, _)| len).sum::<usize>();
+            let freed = self.slots.iter().filter(|slot| slot.last_stage == k);
+            held -= freed.map(|slot| slot.len).sum::<usize>();
         }
         most
     }
 
     /// The slots that a stage fills, in the order of its tasks.
     pub(super) fn slots_of(&self, stage: &Stage) -> impl Iterator<Item = usize> {
-        let tasks = match stage {
-            Stage::Above(_) => &[],
-            Stage::Each(tasks) => &tasks[..],
-        };
-        tasks.iter().filter_map(|task| self.last(task).slot)
+        let tasks = stage.tasks().iter();
+        tasks.filter_map(|task| self.last(task).slot)
     }
 
     /// The last front of a task.

@@ -99,7 +99,7 @@ impl Factor {
                 Stage::Each(tasks) => {
                     let mut filled = Vec::new();
                     for slot in fronts.slots_of(stage) {
-                        let zeros = untouched_zeros(fronts.slots[slot].0).ok_or(too_large)?;
+                        let zeros = untouched_zeros(fronts.slots[slot].len).ok_or(too_large)?;
                         filled.push((slot, zeros));
                     }
                     let mut columns = Vec::with_capacity(tasks.len());
@@ -124,9 +124,9 @@ impl Factor {
                     }
                 }
             }
-            for (slot, (_, last)) in slots.iter_mut().zip(&fronts.slots) {
-                if *last == k {
-                    *slot = Vec::new();
+            for (values, slot) in slots.iter_mut().zip(&fronts.slots) {
+                if slot.last_stage == k {
+                    *values = Vec::new();
                 }
             }
         }
