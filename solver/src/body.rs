@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::elasticity::{
-    self, Axes, Dof, DofMap, ElementStiffness, ElementTables, Elements, Loads, Section, TOGETHER,
+    self, Axes, Dof, DofMap, ElementStiffness, ElementTables, Elements, Loads, Section,
 };
 use crate::error::SolveError;
 use crate::linear::{Breaks, Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts};
@@ -252,13 +252,13 @@ impl ElasticBody {
     }
 
     /// Displacements along x and y of every node under the given displacements of the contact unknowns alone, of
-    /// [`TOGETHER`] such fields at most; on so many threads.
-    pub fn displacements_without_loads(
+    /// so many such fields at most; on so many threads.
+    pub fn displacements_without_loads<const FIELDS: usize>(
         &self,
         contact_displacements: &[Vec<f64>],
         threads: usize,
-    ) -> Vec<[[f64; TOGETHER]; 2]> {
-        let mut u = vec![[0.0; TOGETHER]; self.map.unknowns];
+    ) -> Vec<[[f64; FIELDS]; 2]> {
+        let mut u = vec![[0.0; FIELDS]; self.map.unknowns];
         for (k, contact) in contact_displacements.iter().enumerate() {
             let contact = self.nodal_displacements(contact);
             let kept = &mut u[self.map.unknowns - contact.len()..];

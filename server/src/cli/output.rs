@@ -24,7 +24,7 @@ pub(super) fn help() -> String {
     format!(
         "Write the result to this file, in the format of its extension: .json everything; {} the profile of the \
          contact; .npz fields, profiles and history; .vtu the fields; .svg the profile as a figure. Put a part before \
-         the extension to choose it: punch.history.csv, punch.fields.npz, punch.mesh.svg, punch.deformed.svg, \
+         the extension to choose it: punch.summary.json, punch.history.csv, punch.fields.npz, punch.mesh.svg, punch.deformed.svg, \
          punch.convergence.svg; with several contacts name the boundary: punch.profile.top.csv. Can be repeated; - \
          writes JSON to standard output. Without it a summary is printed",
         Format::endings(&tables)
@@ -43,6 +43,8 @@ pub(super) struct Output {
 #[derive(Clone, Debug, PartialEq)]
 enum Part {
     Everything,
+    /// All but what has a row for each node, point or iteration.
+    Summary,
     /// The profile of this contact boundary.
     Profile(String),
     History,
@@ -118,6 +120,10 @@ impl Output {
                 Ok(vec![])
             }
             Part::Everything => formats::everything_as_npz(document),
+            Part::Summary => {
+                serde_json::to_writer(&mut out, &document.summary)?;
+                Ok(vec![])
+            }
             Part::Profile(boundary) => match document.profiles.get(boundary) {
                 Some(profile) => formats::profile(profile, self.format),
                 None => Err(format!("the result has no profile of {boundary:?}")),
@@ -165,13 +171,15 @@ fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
     let known = named.iter().find(|name| contacts.contains(&name.as_str()));
     let asked = match known.or(named.last()) {
         Some(boundary) => Some(("profile", Some(boundary.clone()))),
-        None => ["profile", "history", "fields"]
+        None => ["summary", "profile", "history", "fields"]
             .into_iter()
             .find(|word| *word == last)
             .map(|word| (word, None)),
     };
     let ending = format.name();
     match (asked, format) {
+        (Some(("summary", _)), Format::Json) => Ok(Part::Summary),
+        (Some(("summary", _)), _) => Err("the summary is written as .json only".into()),
         (Some(("fields", _)), f) if !Format::OF_FIELDS.contains(&f) => Err(format!(
             "fields are not written as .{ending}, but as one of {}",
             Format::endings(Format::OF_FIELDS)
@@ -266,6 +274,8 @@ mod tests {
             ("punch.profile.arrow", top(), Format::Arrow),
             ("punch.profile.top.csv", top(), Format::Csv),
             ("profile.top.json", top(), Format::Json),
+            ("summary.json", Part::Summary, Format::Json),
+            ("punch.summary.json", Part::Summary, Format::Json),
             ("history.csv", Part::History, Format::Csv),
             ("punch.history.npz", Part::History, Format::Npz),
             ("punch.fields.npz", Part::Fields, Format::Npz),
@@ -286,6 +296,7 @@ mod tests {
             ("punch.xlsx", vec!["top"], ".vtu"),
             ("no-such-folder/punch.csv", vec!["top"], "no folder"),
             ("punch.fields.csv", vec!["top"], ".npz"),
+            ("punch.summary.csv", vec!["top"], ".json"),
             (
                 "punch.history.vtu",
                 vec!["top"],

@@ -17,7 +17,8 @@ pub use halved::{OnOtherMesh, unverified, verified};
 use crate::algorithm::{Estimable, Finished, Quantity, Reported, System, influences};
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::contact::edge_nodes;
-use crate::elasticity::{Dof, TOGETHER};
+use crate::elasticity::Dof;
+use crate::linear::{Breaks, Stopped};
 use crate::model::Model;
 use crate::origins::{Added, Origins};
 use crate::solution::{
@@ -230,19 +231,36 @@ fn weighted_errors(
     influences: &[Vec<f64>],
     observe: &mut Observer<'_>,
 ) -> Option<Vec<Vec<f64>>> {
+    /// Duals that are treated together: eight numbers fill a line of the cache, but many problems have few.
+    const MANY: usize = 8;
+    const FEW: usize = 4;
     let threads = body.threads(observe);
-    let stop = &mut || observe(Progress::Pulse).is_break();
+    let mut go_on = || observe(Progress::Pulse);
+    let breaks = &mut Breaks::new(&mut go_on);
     let mut errors = Vec::with_capacity(influences.len());
-    for some in influences.chunks(TOGETHER) {
-        if stop() {
-            return None;
-        }
-        let duals = body.displacements_without_loads(some, threads);
-        let (difference, elements) = (&reported.difference, body.elements(model));
-        let products = difference.products_with_fields(elements, &duals, stop)?;
-        errors.extend(products.into_iter().take(some.len()));
+    for some in influences.chunks(MANY) {
+        let of_some = match some.len() {
+            ..=FEW => weighted_errors_of::<FEW>((model, body), reported, some, threads, breaks),
+            _ => weighted_errors_of::<MANY>((model, body), reported, some, threads, breaks),
+        };
+        errors.extend(of_some.ok()?);
     }
     Some(errors)
+}
+
+/// The same of so many duals at most.
+fn weighted_errors_of<const DUALS: usize>(
+    (model, body): (&Model, &ElasticBody),
+    reported: &Reported,
+    influences: &[Vec<f64>],
+    threads: usize,
+    breaks: &mut Breaks<'_>,
+) -> Result<Vec<Vec<f64>>, Stopped> {
+    breaks.ask()?;
+    let duals = body.displacements_without_loads::<DUALS>(influences, threads);
+    let (difference, elements) = (&reported.difference, body.elements(model));
+    let products = difference.products_with_fields(elements, &duals, breaks)?;
+    Ok(products.into_iter().take(influences.len()).collect())
 }
 
 /// What elements and edges add to the bound of a quantity with a gradient: weighted errors, and pressures brought back

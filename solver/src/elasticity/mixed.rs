@@ -56,11 +56,15 @@ impl Frame {
         [1.0, xi, eta]
     }
 
+    /// The ψ_k at a position.
+    fn functions(&self, position: [f64; 2]) -> [f64; 3] {
+        let q = self.monomials(position);
+        self.orthonormal.map(|row| dot(&row, &q))
+    }
+
     /// Σ_k c_k ψ_k at a position.
     fn combine(&self, coefficients: &[f64; 3], position: [f64; 2]) -> f64 {
-        let q = self.monomials(position);
-        let psi = self.orthonormal.map(|row| dot(&row, &q));
-        dot(coefficients, &psi)
+        dot(coefficients, &self.functions(position))
     }
 }
 
@@ -265,6 +269,102 @@ impl Inside<'_> {
             .iter()
             .for_each(|c| stress[*c] += self.split.bulk * dilatation);
         (dilatation, stress)
+    }
+}
+
+/// An element as a function of the displacements of its nodes alone, x and y in turn, without a force on its bubble.
+pub(super) struct OfNodes<'a> {
+    split: &'a Split,
+    frame: Frame,
+    /// a.
+    bubble: [[f64; 16]; 2],
+    /// The coefficients of θ̄.
+    dilatation: [[f64; 16]; 3],
+}
+
+/// What the displacements of the nodes cause at a place.
+pub(super) struct OfNodesAt<'a> {
+    split: &'a Split,
+    /// The strain, with the bubble's part.
+    strain: [[f64; 16]; COMPONENTS],
+    /// θ̄.
+    projected: [f64; 16],
+}
+
+impl<'a> OfNodes<'a> {
+    pub(super) fn new(element: &Mixed<'a>) -> Self {
+        let b = 2 * element.nodes;
+        let (mut bubble, mut dilatation) = ([[0.0; 16]; 2], [[0.0; 16]; 3]);
+        for j in 0..b {
+            let own = element.bubble_from(&element.bubble.map(|row| -row[j]));
+            (0..2).for_each(|p| bubble[p][j] = own[p]);
+            for (all, g) in dilatation.iter_mut().zip(&element.dilatation) {
+                all[j] = g[j] + g[b] * own[0] + g[b + 1] * own[1];
+            }
+        }
+        OfNodes {
+            split: element.split,
+            frame: element.frame,
+            bubble,
+            dilatation,
+        }
+    }
+
+    /// At a place in master coordinates, which is mapped to `m`; `nodes`: where the element's nodes are.
+    #[inline(always)]
+    pub(super) fn at(
+        &self,
+        section: &Section,
+        (family, nodes): (Family, &AtNodes<[f64; 2]>),
+        m: &Mapped,
+        place: [f64; 2],
+    ) -> OfNodesAt<'a> {
+        let mut strain = [[0.0; 16]; COMPONENTS];
+        for i in 0..8 {
+            let b = section.strain(m.shape[i], m.gradient[i], m.x);
+            for (strain, b) in strain.iter_mut().zip(b) {
+                (strain[2 * i], strain[2 * i + 1]) = (b[0], b[1]);
+            }
+        }
+        let (shape, gradient) = bubble(family, m, place);
+        let b = section.strain(shape, gradient, m.x);
+        for (strain, b) in strain.iter_mut().zip(b) {
+            (0..16).for_each(|j| strain[j] += b[0] * self.bubble[0][j] + b[1] * self.bubble[1][j]);
+        }
+        let psi = self.frame.functions(position(m, nodes));
+        OfNodesAt {
+            split: self.split,
+            strain,
+            projected: std::array::from_fn(|j| {
+                (0..3).map(|k| psi[k] * self.dilatation[k][j]).sum()
+            }),
+        }
+    }
+}
+
+impl OfNodesAt<'_> {
+    /// The components of the stress.
+    #[inline(always)]
+    pub(super) fn stress(&self) -> [[f64; 16]; COMPONENTS] {
+        std::array::from_fn(|c| {
+            let mut unit = [0.0; COMPONENTS];
+            unit[c] = 1.0;
+            self.sum(&unit, 0.0)
+        })
+    }
+
+    /// `stress` : σ + `gap` (θ̄ − div u).
+    #[inline(always)]
+    pub(super) fn sum(&self, stress: &[f64; COMPONENTS], gap: f64) -> [f64; 16] {
+        let Split { rest, bulk, .. } = self.split;
+        let mut of_strain: [f64; COMPONENTS] =
+            std::array::from_fn(|d| (0..COMPONENTS).map(|c| stress[c] * rest[c][d]).sum());
+        NORMAL.iter().for_each(|c| of_strain[*c] -= gap);
+        let of_projected = bulk * dilatation(stress) + gap;
+        std::array::from_fn(|j| {
+            let strain = (0..COMPONENTS).map(|d| of_strain[d] * self.strain[d][j]);
+            strain.sum::<f64>() + of_projected * self.projected[j]
+        })
     }
 }
 

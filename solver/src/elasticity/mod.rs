@@ -15,5 +15,5 @@ pub use assembly::{
 pub use geometry::{ElementTables, Elements};
 pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic, stress};
 pub use mixed::Mixed;
-pub use recovery::{Deformed, Recovered, TOGETHER, recover};
+pub use recovery::{Deformed, Recovered, recover};
 pub use stress_difference::StressDifference;

@@ -3,8 +3,9 @@
 use crate::elasticity::Section;
 use crate::elasticity::geometry::{Elements, MeshStations, Stations};
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
-use crate::elasticity::mixed::{Inside, Mixed, dilatation, position};
+use crate::elasticity::mixed::{Inside, Mixed, OfNodes, dilatation, position};
 use crate::element::{AtNodes, Element, Family, Mapped};
+use crate::linear::{Breaks, Stopped};
 use crate::mesh::Mesh;
 
 /// Stresses, forces and energy of a displacement field.
@@ -208,32 +209,28 @@ fn average(
     sum.iter().zip(&count).map(mean).collect()
 }
 
-/// Elements between two questions whether to stop.
+/// Elements between two questions whether to go on.
 pub(super) const ELEMENTS_PER_QUESTION: usize = 1 << 14;
 
-/// Displacement fields that are treated together: their eight numbers fill a line of the cache.
-pub const TOGETHER: usize = 8;
-
 /// The components of a stress in each of several fields.
-pub(super) type Stresses = [[f64; TOGETHER]; COMPONENTS];
+pub(super) type Stresses<const FIELDS: usize> = [[f64; FIELDS]; COMPONENTS];
 
 /// The stresses of several displacement fields at the nodes, averaged over the elements of one material, as
-/// [`recover`] does; 0 at nodes of other materials. None if `stop` says so.
-pub(super) fn recover_nodal_stresses(
-    mesh: &Mesh,
-    section: &Section,
+/// [`recover`] does; 0 at nodes of other materials.
+pub(super) fn recover_nodal_stresses<const FIELDS: usize>(
+    elements: Elements<'_>,
     material: usize,
     stations: &mut MeshStations<'_>,
-    fields: &[[[f64; TOGETHER]; 2]],
-    stop: &mut dyn FnMut() -> bool,
-) -> Option<Vec<Stresses>> {
-    let mut sums = vec![[[0.0; TOGETHER]; COMPONENTS]; mesh.nodes.len()];
+    fields: &[[[f64; FIELDS]; 2]],
+    breaks: &mut Breaks<'_>,
+) -> Result<Vec<Stresses<FIELDS>>, Stopped> {
+    let Elements { mesh, section, .. } = elements;
+    let mut sums = vec![[[0.0; FIELDS]; COMPONENTS]; mesh.nodes.len()];
     let mut count = vec![0u32; mesh.nodes.len()];
     let moduli = &section.materials()[material];
+    let split = section.split(material);
     for (k, elements) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
-        if stop() {
-            return None;
-        }
+        breaks.ask()?;
         pulp::Arch::new().dispatch(|| {
             for (i, element) in elements.iter().enumerate() {
                 let e = k * ELEMENTS_PER_QUESTION + i;
@@ -241,14 +238,17 @@ pub(super) fn recover_nodal_stresses(
                     continue;
                 }
                 element.iter().for_each(|&node| count[node as usize] += 1);
-                let own = if section.split(material).is_some() {
-                    mixed_stresses(mesh, (section, material), element, fields)
-                } else {
-                    stations.of(e).stresses_at_nodes(moduli, element, fields)
+                let own = match split {
+                    Some(split) => {
+                        let (family, nodes) = (element.family(), mesh.element_nodes(element));
+                        let body = OfNodes::new(&Mixed::new(section, split, family, &nodes));
+                        mixed_stresses_at_nodes(section, &body, (element, &nodes), fields)
+                    }
+                    None => stations.of(e).stresses_at_nodes(moduli, element, fields),
                 };
                 for (&node, own) in element.iter().zip(&own) {
                     for (sum, own) in sums[node as usize].iter_mut().zip(own) {
-                        (0..TOGETHER).for_each(|k| sum[k] += own[k]);
+                        (0..FIELDS).for_each(|k| sum[k] += own[k]);
                     }
                 }
             }
@@ -258,61 +258,72 @@ pub(super) fn recover_nodal_stresses(
         let scale = f64::from((*n).max(1)).recip();
         sum.iter_mut().flatten().for_each(|v| *v *= scale);
     }
-    Some(sums)
+    Ok(sums)
 }
 
 /// The stresses of several fields at the nodes of a nearly incompressible element.
-fn mixed_stresses(
-    mesh: &Mesh,
-    (section, material): (&Section, usize),
-    element: &Element,
-    fields: &[[[f64; TOGETHER]; 2]],
-) -> [Stresses; 8] {
-    let (family, nodes) = (element.family(), mesh.element_nodes(element));
-    let body = Undeformed::new(section, material, family, &nodes);
-    let mut stresses = [[[0.0; TOGETHER]; COMPONENTS]; 8];
-    for k in 0..TOGETHER {
-        let u = element.gather(|n| fields[n as usize].map(|u| u[k]));
-        let at_nodes = body.displaced(&u, [0.0; 2]).at_nodes();
-        for (all, own) in stresses.iter_mut().zip(at_nodes) {
-            (0..COMPONENTS).for_each(|c| all[c][k] = own[c]);
+#[inline(always)]
+fn mixed_stresses_at_nodes<const FIELDS: usize>(
+    section: &Section,
+    body: &OfNodes<'_>,
+    (element, nodes): (&Element, &AtNodes<[f64; 2]>),
+    fields: &[[[f64; FIELDS]; 2]],
+) -> [Stresses<FIELDS>; 8] {
+    let family = element.family();
+    let mut at_nodes = [[[0.0; FIELDS]; COMPONENTS]; 8];
+    for (point, place) in family.stress_points().iter().enumerate() {
+        let m = family.map(nodes, place.place);
+        let of_nodes = body.at(section, (family, nodes), &m, place.place).stress();
+        let mut stress = [[0.0; FIELDS]; COMPONENTS];
+        for (i, &node) in element.iter().enumerate() {
+            let [ux, uy] = &fields[node as usize];
+            for (stress, row) in stress.iter_mut().zip(&of_nodes) {
+                let (x, y) = (row[2 * i], row[2 * i + 1]);
+                (0..FIELDS).for_each(|k| stress[k] += x * ux[k] + y * uy[k]);
+            }
+        }
+        for (at_node, &place) in at_nodes.iter_mut().zip(family.places()) {
+            let weight = family.from_stress_points(place)[point];
+            for (all, own) in at_node.iter_mut().zip(&stress) {
+                (0..FIELDS).for_each(|k| all[k] += weight * own[k]);
+            }
         }
     }
-    stresses
+    at_nodes
 }
 
 impl Stations {
     /// The stresses of several fields at the nodes.
     #[inline(always)]
-    fn stresses_at_nodes(
+    fn stresses_at_nodes<const FIELDS: usize>(
         &self,
         moduli: &Moduli,
         element: &Element,
-        fields: &[[[f64; TOGETHER]; 2]],
-    ) -> [Stresses; 8] {
-        let mut at_nodes = [[[0.0; TOGETHER]; COMPONENTS]; 8];
+        fields: &[[[f64; FIELDS]; 2]],
+    ) -> [Stresses<FIELDS>; 8] {
+        let mut at_nodes = [[[0.0; FIELDS]; COMPONENTS]; 8];
         for (point, station) in self.stress.iter().enumerate() {
-            let mut strain = [[0.0; TOGETHER]; COMPONENTS];
+            let mut strain = [[0.0; FIELDS]; COMPONENTS];
             for (i, &node) in element.iter().enumerate() {
                 let [ux, uy] = &fields[node as usize];
                 let (dx, dy, hoop) = (station.dx[i], station.dy[i], station.hoop[i]);
-                for k in 0..TOGETHER {
+                for k in 0..FIELDS {
                     strain[0][k] += dx * ux[k];
                     strain[1][k] += dy * uy[k];
                     strain[2][k] += dy * ux[k] + dx * uy[k];
                     strain[3][k] += hoop * ux[k];
                 }
             }
-            let mut stress = [[0.0; TOGETHER]; COMPONENTS];
+            let mut stress = [[0.0; FIELDS]; COMPONENTS];
             for (stress, row) in stress.iter_mut().zip(moduli) {
                 for (strain, d) in strain.iter().zip(row) {
-                    (0..TOGETHER).for_each(|k| stress[k] += d * strain[k]);
+                    (0..FIELDS).for_each(|k| stress[k] += d * strain[k]);
                 }
             }
             for (at_node, weights) in at_nodes.iter_mut().zip(&self.to_nodes) {
                 let weight = weights[point];
                 for (all, own) in at_node.iter_mut().zip(&stress) {
-                    (0..TOGETHER).for_each(|k| all[k] += weight * own[k]);
+                    (0..FIELDS).for_each(|k| all[k] += weight * own[k]);
                 }
             }
         }
@@ -332,16 +343,6 @@ impl Stations {
     }
 }
 
-/// An element before its nodes are displaced.
-pub(super) struct Undeformed<'a> {
-    section: &'a Section,
-    material: usize,
-    family: Family,
-    nodes: &'a AtNodes<[f64; 2]>,
-    /// Of a nearly incompressible material.
-    mixed: Option<Mixed<'a>>,
-}
-
 /// An element with the displacements of its nodes.
 pub struct Deformed<'a> {
     section: &'a Section,
@@ -356,50 +357,11 @@ pub struct Deformed<'a> {
 
 /// Strain and stress at a place of an element.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct DeformedAt {
+struct DeformedAt {
     strain: [f64; COMPONENTS],
-    pub(super) stress: [f64; COMPONENTS],
+    stress: [f64; COMPONENTS],
     /// θ̄ − div u; 0 of other materials.
-    pub(super) dilatation_gap: f64,
-}
-
-impl<'a> Undeformed<'a> {
-    /// `material`: its number in the section.
-    pub(super) fn new(
-        section: &'a Section,
-        material: usize,
-        family: Family,
-        nodes: &'a AtNodes<[f64; 2]>,
-    ) -> Self {
-        let split = section.split(material);
-        Undeformed {
-            section,
-            material,
-            family,
-            nodes,
-            mixed: split.map(|split| Mixed::new(section, split, family, nodes)),
-        }
-    }
-
-    /// `body_force`: the one (force/volume) that the displacements belong to.
-    pub(super) fn displaced(&self, u: &'a AtNodes<[f64; 2]>, body_force: [f64; 2]) -> Deformed<'a> {
-        let (mut inside, mut work_on_bubble) = (None, 0.0);
-        if let Some(mixed) = &self.mixed {
-            let force = mixed.force_on_bubble(body_force);
-            let state = mixed.inside(u, &force);
-            work_on_bubble = force[0] * state.bubble[0] + force[1] * state.bubble[1];
-            inside = Some(state);
-        }
-        Deformed {
-            section: self.section,
-            material: self.material,
-            family: self.family,
-            nodes: self.nodes,
-            u,
-            inside,
-            work_on_bubble,
-        }
-    }
+    dilatation_gap: f64,
 }
 
 impl<'a> Deformed<'a> {
@@ -412,7 +374,23 @@ impl<'a> Deformed<'a> {
         u: &'a AtNodes<[f64; 2]>,
         body_force: [f64; 2],
     ) -> Self {
-        Undeformed::new(section, material, family, nodes).displaced(u, body_force)
+        let (mut inside, mut work_on_bubble) = (None, 0.0);
+        if let Some(split) = section.split(material) {
+            let mixed = Mixed::new(section, split, family, nodes);
+            let force = mixed.force_on_bubble(body_force);
+            let state = mixed.inside(u, &force);
+            work_on_bubble = force[0] * state.bubble[0] + force[1] * state.bubble[1];
+            inside = Some(state);
+        }
+        Deformed {
+            section,
+            material,
+            family,
+            nodes,
+            u,
+            inside,
+            work_on_bubble,
+        }
     }
 
     /// Stress at a place in master coordinates.
@@ -422,7 +400,7 @@ impl<'a> Deformed<'a> {
     }
 
     /// At a place in master coordinates, which is mapped to `m`.
-    pub(super) fn at(&self, m: &Mapped, place: [f64; 2]) -> DeformedAt {
+    fn at(&self, m: &Mapped, place: [f64; 2]) -> DeformedAt {
         let mut strain = self.strain_of_nodes(m);
         let Some(inside) = &self.inside else {
             return DeformedAt {

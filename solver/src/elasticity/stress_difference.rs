@@ -5,13 +5,11 @@
 
 use crate::elasticity::geometry::{Elements, Stations};
 use crate::elasticity::material::{COMPONENTS, Moduli, inverse, stress};
-use crate::elasticity::mixed::dilatation;
-use crate::elasticity::recovery::{
-    ELEMENTS_PER_QUESTION, Stresses, TOGETHER, Undeformed, recover_nodal_stresses,
-};
+use crate::elasticity::mixed::{Mixed, OfNodes, dilatation};
+use crate::elasticity::recovery::{ELEMENTS_PER_QUESTION, Stresses, recover_nodal_stresses};
 use crate::elasticity::{Recovered, Section};
-use crate::element::{Element, Family, GaussPoint, Mapped};
-use crate::mesh::Mesh;
+use crate::element::{AtNodes, Element, Family, GaussPoint};
+use crate::linear::{Breaks, Stopped};
 
 /// σ* − σ at the integration points.
 pub struct StressDifference {
@@ -67,49 +65,50 @@ impl StressDifference {
         })
     }
 
-    /// The same products with the differences of [`TOGETHER`] fields, by their displacements at the nodes. None if
-    /// `stop` says so, which is asked now and then.
+    /// The same products with the differences of several fields, by their displacements at the nodes.
     ///
     /// Both σ* and σ of those fields are linear in what is known at the nodes, so that each element's integral is a sum
-    /// over its nodes: the points of integration are visited once for all fields. Nearly incompressible elements, whose
-    /// stress depends on more, are recovered field by field.
-    pub fn products_with_fields(
+    /// over its nodes: the points of integration are visited once for all fields.
+    pub fn products_with_fields<const FIELDS: usize>(
         &self,
         elements: Elements<'_>,
-        fields: &[[[f64; TOGETHER]; 2]],
-        stop: &mut dyn FnMut() -> bool,
-    ) -> Option<Vec<Vec<f64>>> {
+        fields: &[[[f64; FIELDS]; 2]],
+        breaks: &mut Breaks<'_>,
+    ) -> Result<[Vec<f64>; FIELDS], Stopped> {
         let Elements { mesh, section, .. } = elements;
         let quadrature = elements.tables.quadrature;
-        let mut products = vec![vec![0.0; mesh.elements.len()]; TOGETHER];
+        let mut products = std::array::from_fn(|_| vec![0.0; mesh.elements.len()]);
         let mut stations = elements.stations();
         for (material, weights) in weights(section).iter().enumerate() {
-            let smooth =
-                recover_nodal_stresses(mesh, section, material, &mut stations, fields, stop)?;
+            let split = section.split(material);
+            let smooth = recover_nodal_stresses(elements, material, &mut stations, fields, breaks)?;
             let mut first = 0;
             for (k, elements) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
-                if stop() {
-                    return None;
-                }
+                breaks.ask()?;
                 pulp::Arch::new().dispatch(|| {
                     for (i, element) in elements.iter().enumerate() {
                         let e = k * ELEMENTS_PER_QUESTION + i;
-                        let points = element.family().rule(quadrature).len();
-                        let own = first..first + points;
+                        let family = element.family();
+                        let own = first..first + family.rule(quadrature).len();
                         first = own.end;
                         if section.material_of(e) != material {
                             continue;
                         }
-                        let of_fields = (fields, &smooth[..]);
-                        let product = if weights.bulk == 0.0 {
-                            let stations = stations.of(e);
-                            let compliance = &weights.compliance;
-                            product(stations, &self.stress[own], compliance, element, of_fields)
-                        } else {
-                            let own: Vec<Difference> = own.map(|p| self.point(p)).collect();
-                            let body = (section, material, weights);
-                            mixed_product(mesh, body, (element, &own), quadrature, of_fields)
+                        let in_common = match split {
+                            None => {
+                                let own = &self.stress[own];
+                                InCommon::new(stations.of(e), own, &weights.compliance)
+                            }
+                            Some(split) => {
+                                let nodes = mesh.element_nodes(element);
+                                let body = Mixed::new(section, split, family, &nodes);
+                                let body = (section, &OfNodes::new(&body));
+                                let own = own.map(|point| self.point(point));
+                                let rule = family.rule(quadrature).iter().zip(own);
+                                InCommon::of_mixed(body, weights, (family, &nodes), rule)
+                            }
                         };
+                        let product = in_common.with(element, fields, &smooth);
                         for (products, product) in products.iter_mut().zip(product) {
                             products[e] = product;
                         }
@@ -117,7 +116,7 @@ impl StressDifference {
                 });
             }
         }
-        Some(products)
+        Ok(products)
     }
 
     fn point(&self, point: usize) -> Difference {
@@ -137,71 +136,82 @@ impl StressDifference {
     }
 }
 
-/// Nodal values of several fields: their displacements, and their recovered stresses.
-type OfFields<'a> = (&'a [[[f64; TOGETHER]; 2]], &'a [Stresses]);
-
-/// What an element has in common with several fields.
-#[inline(always)]
-fn product(
-    stations: &Stations,
-    own: &[[f64; COMPONENTS]],
-    compliance: &Moduli,
-    element: &Element,
-    (fields, smooth): OfFields<'_>,
-) -> [f64; TOGETHER] {
-    // ∫ h_i C⁻¹ (σ* − σ), and the same as forces of a stress: ∫ B_iᵀ (σ* − σ)
-    let mut by_stress = [[0.0; 8]; COMPONENTS];
-    let (mut by_ux, mut by_uy) = ([0.0; 8], [0.0; 8]);
-    for (station, own) in stations.rule.iter().zip(own) {
-        for (by_stress, row) in by_stress.iter_mut().zip(compliance) {
-            let strain: f64 = (0..COMPONENTS).map(|j| row[j] * own[j]).sum();
-            let strain = station.weight * strain;
-            (0..8).for_each(|i| by_stress[i] += station.shape[i] * strain);
-        }
-        station.add_force(station.weight, own, &mut by_ux, &mut by_uy);
-    }
-    let mut product = [0.0; TOGETHER];
-    for (i, &node) in element.iter().enumerate() {
-        let ([ux, uy], smooth) = (&fields[node as usize], &smooth[node as usize]);
-        for k in 0..TOGETHER {
-            product[k] -= by_ux[i] * ux[k] + by_uy[i] * uy[k];
-        }
-        for (by_stress, smooth) in by_stress.iter().zip(smooth) {
-            (0..TOGETHER).for_each(|k| product[k] += by_stress[i] * smooth[k]);
-        }
-    }
-    product
+/// What an element's difference has in common with that of another field, by its values at the nodes.
+#[derive(Default)]
+struct InCommon {
+    /// By its recovered stresses: ∫ h_i C⁻¹ (σ* − σ).
+    by_stress: [[f64; 8]; COMPONENTS],
+    /// By its displacements, −∫ B_iᵀ (σ* − σ).
+    by_ux: [f64; 8],
+    by_uy: [f64; 8],
 }
 
-/// The same of a nearly incompressible element.
-fn mixed_product(
-    mesh: &Mesh,
-    (section, material, weights): (&Section, usize, &Weights),
-    (element, own): (&Element, &[Difference]),
-    quadrature: u32,
-    (fields, smooth): OfFields<'_>,
-) -> [f64; TOGETHER] {
-    let (family, nodes) = (element.family(), mesh.element_nodes(element));
-    let rule = family.rule(quadrature);
-    let map = |point: &GaussPoint| family.map(&nodes, point.place);
-    let mapped: Vec<Mapped> = rule.iter().map(map).collect();
-    let body = Undeformed::new(section, material, family, &nodes);
-    std::array::from_fn(|k| {
-        let u = element.gather(|n| fields[n as usize].map(|u| u[k]));
-        let smooth = element.gather(|n| smooth[n as usize].map(|stress| stress[k]));
-        let deformed = body.displaced(&u, [0.0; 2]);
-        let mut product = 0.0;
-        for ((point, m), own) in rule.iter().zip(&mapped).zip(own) {
-            let at = deformed.at(m, point.place);
-            let other = Difference {
-                stress: difference(&m.shape, &smooth, &at.stress),
-                gap: at.dilatation_gap,
-            };
+impl InCommon {
+    #[inline(always)]
+    fn new(stations: &Stations, own: &[[f64; COMPONENTS]], compliance: &Moduli) -> Self {
+        let mut found = InCommon::default();
+        for (station, own) in stations.rule.iter().zip(own) {
+            let strain = stress(compliance, own).map(|strain| station.weight * strain);
+            found.add_smooth(&station.shape, &strain);
+            let InCommon { by_ux, by_uy, .. } = &mut found;
+            station.add_force(-station.weight, own, by_ux, by_uy);
+        }
+        found
+    }
+
+    /// The same of a nearly incompressible element, whose stress depends on more.
+    #[inline(always)]
+    fn of_mixed<'a>(
+        (section, body): (&Section, &OfNodes<'_>),
+        weights: &Weights,
+        (family, nodes): (Family, &AtNodes<[f64; 2]>),
+        rule: impl Iterator<Item = (&'a GaussPoint, Difference)>,
+    ) -> Self {
+        let mut found = InCommon::default();
+        for (point, own) in rule {
+            let m = family.map(nodes, point.place);
             let weight = point.weight * m.det * section.depth(m.x);
-            product += weight * weights.density(own, &other);
+            let (of_stress, of_gap) = weights.of_other(&own);
+            let of_stress = of_stress.map(|s| weight * s);
+            found.add_smooth(&m.shape, &of_stress);
+            let at = body.at(section, (family, nodes), &m, point.place);
+            let by_u = at.sum(&of_stress.map(|s| -s), weight * of_gap);
+            for i in 0..8 {
+                found.by_ux[i] += by_u[2 * i];
+                found.by_uy[i] += by_u[2 * i + 1];
+            }
+        }
+        found
+    }
+
+    /// Adds what `of_stress` : σ* at a point is by the recovered stresses at the nodes.
+    #[inline(always)]
+    fn add_smooth(&mut self, shape: &[f64; 8], of_stress: &[f64; COMPONENTS]) {
+        for (by_stress, of_stress) in self.by_stress.iter_mut().zip(of_stress) {
+            (0..8).for_each(|i| by_stress[i] += shape[i] * of_stress);
+        }
+    }
+
+    /// With several fields, by their displacements and recovered stresses at the nodes.
+    #[inline(always)]
+    fn with<const FIELDS: usize>(
+        &self,
+        element: &Element,
+        fields: &[[[f64; FIELDS]; 2]],
+        smooth: &[Stresses<FIELDS>],
+    ) -> [f64; FIELDS] {
+        let mut product = [0.0; FIELDS];
+        for (i, &node) in element.iter().enumerate() {
+            let ([ux, uy], smooth) = (&fields[node as usize], &smooth[node as usize]);
+            for k in 0..FIELDS {
+                product[k] += self.by_ux[i] * ux[k] + self.by_uy[i] * uy[k];
+            }
+            for (by_stress, smooth) in self.by_stress.iter().zip(smooth) {
+                (0..FIELDS).for_each(|k| product[k] += by_stress[i] * smooth[k]);
+            }
         }
         product
-    })
+    }
 }
 
 /// What the two of every pair, one for each integration point, have in common in each element.
@@ -254,14 +264,24 @@ struct Weights {
 impl Weights {
     /// What two fields have in common at a point (energy per volume): see [`StressDifference::products`].
     fn density(&self, own: &Difference, other: &Difference) -> f64 {
-        let strain = stress(&self.compliance, &other.stress);
-        let density: f64 = (0..COMPONENTS).map(|i| own.stress[i] * strain[i]).sum();
+        let (of_stress, of_gap) = self.of_other(own);
+        let density: f64 = (0..COMPONENTS)
+            .map(|c| of_stress[c] * other.stress[c])
+            .sum();
+        density + of_gap * other.gap
+    }
+
+    /// The same as factors of the other field's stress and gap.
+    #[inline(always)]
+    fn of_other(&self, own: &Difference) -> ([f64; COMPONENTS], f64) {
+        let mut strain = stress(&self.compliance, &own.stress);
         if self.bulk == 0.0 {
-            return density;
+            return (strain, 0.0);
         }
-        let of_own = dilatation(&stress(&self.compliance, &own.stress));
-        let gaps = own.gap * dilatation(&strain) + other.gap * of_own;
-        density + self.bulk * gaps - self.rest * own.gap * other.gap
+        let of_gap = self.bulk * dilatation(&strain) - self.rest * own.gap;
+        let of_pressure = stress(&self.compliance, &[1.0, 1.0, 0.0, 1.0]);
+        (0..COMPONENTS).for_each(|c| strain[c] += self.bulk * own.gap * of_pressure[c]);
+        (strain, of_gap)
     }
 }
 
@@ -336,12 +356,12 @@ mod tests {
             let difference =
                 |u: &[[f64; 2]]| StressDifference::new(elements, &recover(elements, u, [0.0; 2]));
             let own = difference(&field(0));
-            let fields: Vec<_> = (1..=TOGETHER).map(field).collect();
-            let together: Vec<_> = (0..mesh.nodes.len())
+            let fields: Vec<_> = (1..=5).map(field).collect();
+            let together: Vec<[[f64; 5]; 2]> = (0..mesh.nodes.len())
                 .map(|n| [0, 1].map(|a| std::array::from_fn(|k| fields[k][n][a])))
                 .collect();
-            let never = &mut || false;
-            let found = own.products_with_fields(elements, &together, never);
+            let go_on = &mut || ControlFlow::Continue(());
+            let found = own.products_with_fields(elements, &together, &mut Breaks::new(go_on));
             for (found, u) in found.unwrap().iter().zip(&fields) {
                 let expected = own.products(elements, &difference(u));
                 let size: f64 = expected.iter().map(|p| p.abs()).sum();
@@ -349,10 +369,9 @@ mod tests {
                     assert!((a - b).abs() <= 1e-12 * size, "{kind}: {a} for {b}");
                 }
             }
-            assert!(
-                own.products_with_fields(elements, &together, &mut || true)
-                    .is_none()
-            );
+            let stop = &mut || ControlFlow::Break(());
+            let stopped = own.products_with_fields(elements, &together, &mut Breaks::new(stop));
+            assert_eq!(stopped, Err(Stopped));
         }
     }
 }

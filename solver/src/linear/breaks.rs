@@ -57,7 +57,7 @@ impl<'a> Breaks<'a> {
     }
 
     /// Asks now.
-    pub(super) fn ask(&mut self) -> Result<(), Stopped> {
+    pub fn ask(&mut self) -> Result<(), Stopped> {
         match (self.ask)() {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Stopped),
