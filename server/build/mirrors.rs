@@ -145,6 +145,8 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("ServiceLimits", "info::ServiceLimits").answer(),
     fields("BodyCache", "bodies::BodyCache").answer(),
     fields("QueueState", "queue::QueueState").answer(),
+    fields("Token", "token::Token").answer(),
+    fields("NewToken", "tokens::NewToken").answer(),
 
     // stored meshes
     fields("MeshInfo", "mesh::MeshInfo").answer().ours(&["extent: [extent_x, extent_y]"]),

@@ -72,6 +72,23 @@ async fn clean_up(store: &Store) -> store::Result<()> {
     Ok(())
 }
 
+/// The service would listen to other machines, and everyone there could do everything.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[error(
+    "{0} can be reached from other machines, and there is no token: whoever reaches it could do everything. Create a token \
+     first (`signorini token create --help`), or name a proxy that identifies users (--trusted-proxy), or listen on \
+     127.0.0.1; --allow-unauthenticated starts all the same"
+)]
+pub struct OpenToAll(SocketAddr);
+
+fn refuse_open(config: &Config, store: &Store) -> Result<(), OpenToAll> {
+    let closed = config.listen.ip().is_loopback() || store.has_tokens() || config.trust.is_on();
+    match closed || config.allow_unauthenticated {
+        true => Ok(()),
+        false => Err(OpenToAll(config.listen)),
+    }
+}
+
 impl App {
     /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
@@ -90,6 +107,7 @@ impl App {
             Isolation::Thread => Solver::Threads(solver::solve_on),
             Isolation::Process => Solver::Processes(Processes::new(worker_process)),
         };
+        refuse_open(config, &store)?;
         let queue = Queue::new(store.clone(), solver, config.workers);
         let service = Arc::new(Service::new(config, store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;
@@ -110,8 +128,8 @@ impl App {
             "listening on {address}: version {version}, store in {data}, {workers}, isolation {isolation}, {budget} of \
              memory for jobs"
         );
-        if !address.ip().is_loopback() {
-            warn!(%address, "anyone who can reach {address} can do everything: there is no authentication");
+        if config.allow_unauthenticated && !store.has_tokens() && !config.trust.is_on() {
+            warn!(%address, "anyone who can reach {address} can do everything: there is no token");
         }
         Ok(App {
             address,

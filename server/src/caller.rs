@@ -1,9 +1,9 @@
 //! The caller of a request: its owner name, its scopes, and whose jobs it sees.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, net::IpAddr};
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use strum::VariantArray;
 
 /// What a caller may do.
@@ -16,7 +16,9 @@ use strum::VariantArray;
     PartialOrd,
     Ord,
     Serialize,
+    Deserialize,
     JsonSchema,
+    strum::EnumString,
     strum::IntoStaticStr,
     strum::VariantArray,
 )]
@@ -31,6 +33,32 @@ pub enum Scope {
     Cancel,
     /// All of these on the jobs of every owner, and pause the queue.
     Admin,
+}
+
+/// The address that a request comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Peer(pub IpAddr);
+
+/// Who may use an operation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Everyone, without identification.
+    Open,
+    /// Every caller who is identified.
+    Identified,
+    /// Callers with this scope, and those with the scope `admin`.
+    Needs(Scope),
+}
+
+impl Access {
+    /// For people and programs: `open`, `identified`, or the scope.
+    pub fn name(self) -> &'static str {
+        match self {
+            Access::Open => "open",
+            Access::Identified => "identified",
+            Access::Needs(scope) => scope.into(),
+        }
+    }
 }
 
 /// The caller of a request; every verb takes one.
@@ -51,9 +79,24 @@ impl Caller {
         }
     }
 
-    /// The caller of every request as long as there is no authentication: one owner, with all scopes.
+    /// The caller of every request to a service without authentication: one owner, with all scopes.
     pub fn local() -> Caller {
         Caller::new("local", Scope::VARIANTS.iter().copied())
+    }
+
+    /// Someone who is not identified, and may use open operations only.
+    pub fn anonymous() -> Caller {
+        Caller::new("", [])
+    }
+
+    /// Whether this caller may use operations that need this scope.
+    pub fn may(&self, scope: Scope) -> bool {
+        self.scopes.contains(&scope) || self.is_admin()
+    }
+
+    /// Whether this caller may do everything, with the jobs of every owner.
+    pub fn is_admin(&self) -> bool {
+        self.scopes.contains(&Scope::Admin)
     }
 
     /// The owner of what this caller submits.
@@ -68,11 +111,20 @@ impl Caller {
 
     /// The owners whose jobs this caller sees.
     pub fn visible_owners(&self) -> Owners<'_> {
-        match self.scopes.contains(&Scope::Admin) {
+        match self.is_admin() {
             true => Owners::All,
             false => Owners::Only(&self.owner),
         }
     }
+}
+
+/// Longest name of an owner.
+pub const MAX_OWNER: usize = 64;
+
+/// Whether an owner may have this name: it stands in addresses, logs and headers.
+pub fn is_owner(name: &str) -> bool {
+    let allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"._@+-".contains(&byte);
+    (1..=MAX_OWNER).contains(&name.len()) && name.bytes().all(allowed)
 }
 
 /// The owners whose jobs a query to the store is about.
@@ -106,5 +158,19 @@ mod tests {
         assert_eq!(ada.visible_owners(), Owners::Only("ada"));
         assert!(ada.visible_owners().include("ada") && !ada.visible_owners().include("bob"));
         assert!(local.visible_owners().include("bob"));
+    }
+
+    #[test]
+    fn a_scope_allows_itself_and_admin_allows_all() {
+        let ada = Caller::new("ada", [Scope::Read, Scope::Submit]);
+        assert!(ada.may(Scope::Read) && ada.may(Scope::Submit));
+        assert!(!ada.may(Scope::Cancel) && !ada.may(Scope::Admin));
+        let root = Caller::new("root", [Scope::Admin]);
+        assert!(Scope::VARIANTS.iter().all(|scope| root.may(*scope)));
+        assert!(
+            !Scope::VARIANTS
+                .iter()
+                .any(|scope| Caller::anonymous().may(*scope))
+        );
     }
 }

@@ -1,14 +1,18 @@
 //! The configuration: one struct, whose doc comments are the help text, in the order of the help.
 
 use std::{
-    net::{SocketAddr, ToSocketAddrs},
+    net::{IpAddr, SocketAddr, ToSocketAddrs},
     path::PathBuf,
 };
 
+use axum::http::HeaderName;
 use clap::{Args, ValueEnum};
+use ipnet::IpNet;
 use schemars::JsonSchema;
 use serde::Serialize;
 use strum::Display;
+
+use crate::caller::{Caller, Scope};
 
 /// Settings of the service. A flag takes precedence over its environment variable.
 #[derive(Clone, Debug, Args)]
@@ -31,6 +35,19 @@ pub struct Config {
         value_name = "FOLDER"
     )]
     pub data: PathBuf,
+
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the command
+    pub web: Web,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub trust: ProxyTrust,
+
+    /// Listen on an address that other machines reach although there is no token and no trusted proxy: whoever reaches it
+    /// may do everything
+    #[arg(long, env = "SIGNORINI_ALLOW_UNAUTHENTICATED")]
+    pub allow_unauthenticated: bool,
 
     /// Jobs solved at the same time, each on one core
     #[arg(long, env = "SIGNORINI_WORKERS", default_value_t = 2, value_name = "N",
@@ -106,6 +123,122 @@ impl Config {
     }
 }
 
+/// What requests from browsers may name.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Web {
+    /// A host name by which clients reach this service, as lab.example or lab.example:8443; can be repeated, or a list with
+    /// commas. Addresses by number, localhost and the name of this machine are allowed anyway, others refused: a page on
+    /// another site could lead its own name here
+    #[arg(
+        long = "allowed-host",
+        env = "SIGNORINI_ALLOWED_HOSTS",
+        value_name = "HOST",
+        value_delimiter = ','
+    )]
+    pub allowed_hosts: Vec<String>,
+
+    /// An origin whose pages may use this service, as https://dashboard.example; can be repeated, or a list with commas.
+    /// Requests from pages of all others but this service's own are refused
+    #[arg(long = "allowed-origin", env = "SIGNORINI_ALLOWED_ORIGINS", value_name = "ORIGIN", value_delimiter = ',',
+          value_parser = origin)]
+    pub allowed_origins: Vec<String>,
+}
+
+/// A proxy that identifies users, and what they may do.
+#[derive(Clone, Debug, Args)]
+pub struct ProxyTrust {
+    /// Address, or network as 10.0.0.0/8, of a proxy that identifies users: what it says in the user header is believed.
+    /// Requests from elsewhere need a token. Can be repeated, or a list with commas
+    #[arg(long = "trusted-proxy", env = "SIGNORINI_TRUSTED_PROXIES", value_name = "ADDRESS", value_delimiter = ',',
+          value_parser = network)]
+    proxies: Vec<IpNet>,
+
+    /// The header in which it names the user
+    #[arg(
+        long = "proxy-user-header",
+        env = "SIGNORINI_PROXY_USER_HEADER",
+        value_name = "NAME",
+        default_value = "x-remote-user"
+    )]
+    pub user_header: HeaderName,
+
+    /// What users that it names may do
+    #[arg(long = "proxy-scopes", env = "SIGNORINI_PROXY_SCOPES", value_name = "SCOPES", value_delimiter = ',',
+          default_value = "read,submit,cancel", value_parser = scope)]
+    scopes: Vec<Scope>,
+
+    /// A user that it names who is an administrator; can be repeated, or a list with commas
+    #[arg(
+        long = "proxy-admin",
+        env = "SIGNORINI_PROXY_ADMINS",
+        value_name = "USER",
+        value_delimiter = ','
+    )]
+    admins: Vec<String>,
+}
+
+impl Default for ProxyTrust {
+    /// No proxy.
+    fn default() -> Self {
+        ProxyTrust {
+            proxies: vec![],
+            user_header: HeaderName::from_static("x-remote-user"),
+            scopes: vec![Scope::Read, Scope::Submit, Scope::Cancel],
+            admins: vec![],
+        }
+    }
+}
+
+impl ProxyTrust {
+    /// Whether any proxy is trusted.
+    pub fn is_on(&self) -> bool {
+        !self.proxies.is_empty()
+    }
+
+    /// Whether a request from this address comes from a trusted proxy.
+    pub fn includes(&self, address: IpAddr) -> bool {
+        let address = address.to_canonical();
+        self.proxies
+            .iter()
+            .any(|network| network.contains(&address))
+    }
+
+    /// A user that it names.
+    pub fn caller(&self, user: &str) -> Caller {
+        let admin = self.admins.iter().any(|admin| admin == user);
+        let scopes = self.scopes.iter().copied();
+        Caller::new(user, scopes.chain(admin.then_some(Scope::Admin)))
+    }
+}
+
+/// An address as a network of one, or a network.
+fn network(text: &str) -> Result<IpNet, String> {
+    let one = text.parse::<IpAddr>().map(IpNet::from);
+    let found = one.or_else(|_| text.parse());
+    found.map_err(|_| "expected an address or a network, such as 127.0.0.1 or 10.0.0.0/8".into())
+}
+
+fn scope(text: &str) -> Result<Scope, String> {
+    text.parse()
+        .map_err(|_| "expected read, submit, cancel or admin".into())
+}
+
+/// Scheme, host and port, as a browser writes them.
+fn origin(text: &str) -> Result<String, String> {
+    let host = text
+        .strip_prefix("https://")
+        .or(text.strip_prefix("http://"));
+    match host {
+        Some(host) if !host.is_empty() && !host.contains(['/', '*', '?', '#', ' ']) => {
+            Ok(text.to_ascii_lowercase())
+        }
+        _ => Err(
+            "expected scheme, host and port without a path, such as https://dashboard.example"
+                .into(),
+        ),
+    }
+}
+
 /// An address and a port, by number or by name; of several addresses, the first.
 fn address(text: &str) -> Result<SocketAddr, String> {
     const EXPECTED: &str =
@@ -164,7 +297,61 @@ fn machine_memory() -> u64 {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn a_proxy_is_an_address_or_a_network() {
+        let trust = ProxyTrust {
+            proxies: ["127.0.0.1", "10.1.0.0/16", "fd00::/8"]
+                .map(|text| network(text).unwrap())
+                .into(),
+            scopes: vec![Scope::Read],
+            admins: vec!["root".into()],
+            ..ProxyTrust::default()
+        };
+        for (address, inside) in [
+            ("127.0.0.1", true),
+            ("::ffff:127.0.0.1", true),
+            ("127.0.0.2", false),
+            ("10.1.255.3", true),
+            ("10.2.0.1", false),
+            ("fd12::1", true),
+            ("::1", false),
+        ] {
+            assert_eq!(
+                trust.includes(address.parse().unwrap()),
+                inside,
+                "{address}"
+            );
+        }
+        assert!(
+            ["", "10.0.0.0/33", "proxy"]
+                .iter()
+                .all(|text| network(text).is_err())
+        );
+        assert_eq!(trust.caller("ada"), Caller::new("ada", [Scope::Read]));
+        assert!(trust.caller("root").is_admin());
+    }
+
+    #[test]
+    fn an_origin_has_a_scheme_and_a_host_and_nothing_else() {
+        assert_eq!(
+            origin("https://Lab.example:8443"),
+            Ok("https://lab.example:8443".into())
+        );
+        for wrong in [
+            "*",
+            "lab.example",
+            "https://",
+            "https://lab.example/",
+            "ftp://lab",
+            "null",
+            "https://*.lab",
+        ] {
+            assert!(origin(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn an_address_is_a_number_or_a_name_with_a_port() {

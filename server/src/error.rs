@@ -62,6 +62,12 @@ pub enum ApiError {
     /// Others occupy the memory for transfers, or the connections.
     #[error("other requests occupy the memory for transfers, or all connections; try again")]
     Overloaded,
+    /// The caller is not identified.
+    #[error("{0}")]
+    Unauthenticated(&'static str),
+    /// The caller, or where the request comes from, may not do this.
+    #[error("{0}")]
+    Forbidden(String),
     /// It does not exist.
     #[error("{0}")]
     NotFound(String),
@@ -211,6 +217,8 @@ impl ApiError {
             ApiError::UriTooLong => Code::UriTooLong,
             ApiError::HeaderTooLarge => Code::HeaderTooLarge,
             ApiError::Overloaded => Code::Overloaded,
+            ApiError::Unauthenticated(_) => Code::Unauthenticated,
+            ApiError::Forbidden(_) => Code::Forbidden,
             ApiError::NotFound(_) => Code::NotFound,
             ApiError::Deleted(_) | ApiError::SweepDeleted(_) => Code::Deleted,
             ApiError::NoResult(_) => Code::NoResult,

@@ -1,7 +1,7 @@
 //! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms of its own
 //! group and of the groups above it; ARCHITECTURE.md has the finer order.
 
-// Basic types, for every module: kept bodies, callers, kinds of errors, points in time, jobs and their changes of status, sweeps, events.
+// Basic types, for every module: kept bodies, callers and their tokens, kinds of errors, points in time, jobs and their changes of status, sweeps, events.
 pub mod bodies;
 pub mod caller;
 pub mod catalog;
@@ -11,6 +11,7 @@ pub mod memory;
 pub mod mesh;
 pub mod sweep;
 pub mod time;
+pub mod token;
 
 // The messages of gRPC, read within a limit.
 pub mod codec;

@@ -14,7 +14,7 @@ use tonic::transport::Channel;
 use super::{examples, exit::Exit, output, report};
 use crate::{
     app::App,
-    config::{Config, Isolation, MemoryBudget},
+    config::{Config, Isolation, MemoryBudget, ProxyTrust, Web},
     event::{Event, Payload},
     job::{Job, Status},
     pb::{self, job_service_client::JobServiceClient},
@@ -30,6 +30,9 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
     let config = Config {
         listen: ([127, 0, 0, 1], 0).into(),
         data: folder.path().to_path_buf(),
+        web: Web::default(),
+        trust: ProxyTrust::default(),
+        allow_unauthenticated: false,
         workers: 2,
         isolation: Isolation::Thread,
         max_queued: 100,

@@ -2,7 +2,11 @@
 
 use strum::VariantArray;
 
-use crate::{app::CannotListen, store::StoreError};
+use crate::{
+    app::{CannotListen, OpenToAll},
+    error::ApiError,
+    store::StoreError,
+};
 
 /// How a command ends. A signal ends it as the system does, for a shell 128 and its number: Ctrl-C during `solve` 130;
 /// a panic with 101.
@@ -39,13 +43,13 @@ impl Exit {
                 "anything else: a file that cannot be read or written, a body that its contacts do not hold in the end, no memory"
             }
             Exit::Invalid => {
-                "invalid or too large: the problem, an option, or the code to be explained"
+                "invalid or too large: the problem, an option, a token, or the code to be explained"
             }
             Exit::Listen => "serve: cannot listen at the address",
-            Exit::Folder => "serve, doctor: the folder cannot be used",
-            Exit::Locked => "serve, doctor: another server uses the folder",
-            Exit::Schema => "serve, doctor: the tables are of another program or version",
-            Exit::Damaged => "serve, doctor: stored data is missing or damaged",
+            Exit::Folder => "serve, doctor, token: the folder cannot be used",
+            Exit::Locked => "serve, doctor, token: another server uses the folder",
+            Exit::Schema => "serve, doctor, token: the tables are of another program or version",
+            Exit::Damaged => "serve, doctor, token: stored data is missing or damaged",
             Exit::NotConverged => {
                 "solve: not converged; sweep: some members failed; the result is written all the same"
             }
@@ -69,9 +73,14 @@ impl Exit {
                 Exit::Damaged
             }
             _ if error.is::<CannotListen>() => Exit::Listen,
+            _ if error.is::<OpenToAll>() || is_invalid(error) => Exit::Invalid,
             _ => Exit::Failed,
         }
     }
+}
+
+fn is_invalid(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(ApiError::InvalidProblem(_)))
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ mod report;
 mod serve;
 mod solve;
 mod sweep;
+mod token;
 
 use std::process::ExitCode;
 
@@ -18,7 +19,7 @@ use clap::{Parser, Subcommand};
 use tracing::level_filters::LevelFilter;
 
 use self::exit::Exit;
-use crate::{app::WORKER, config::Config, rest};
+use crate::{app::WORKER, config::Config, error::ApiError, rest};
 
 /// Solves frictional contact problems, one at a time or as jobs of a service
 #[derive(Debug, Parser)]
@@ -38,6 +39,9 @@ enum Command {
     /// used, 5 a server uses it, 6 its tables are of another program or version, 7 something is missing or damaged, 2 an
     /// invalid option, 1 anything else
     Doctor(doctor::Arguments),
+    /// Create, list, revoke and rotate tokens, by which clients are identified. Exit code: 0 done, 4 the folder cannot be used,
+    /// 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else
+    Token(token::Arguments),
     /// Solve one problem without a service. Exit code: 0 converged, 9 not converged (the result is written), 2 invalid or
     /// too large, 1 anything else, such as a file that cannot be read, or a body that its contacts do not hold
     Solve(solve::Arguments),
@@ -73,6 +77,10 @@ pub fn main() -> ExitCode {
             let _lines = log::start(LevelFilter::WARN);
             with_runtime(doctor::run(arguments))
         }
+        Command::Token(arguments) => {
+            let _lines = log::start(LevelFilter::WARN);
+            with_runtime(token::run(arguments))
+        }
         Command::Solve(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
             solve::run(&arguments)
@@ -100,7 +108,14 @@ pub fn main() -> ExitCode {
         }
     };
     let exit = exit.unwrap_or_else(|error| {
-        eprintln!("signorini: {error:#}");
+        match error.downcast_ref() {
+            Some(ApiError::InvalidProblem(violations)) => {
+                violations
+                    .iter()
+                    .for_each(|violation| eprintln!("signorini: {violation}"));
+            }
+            _ => eprintln!("signorini: {error:#}"),
+        }
         Exit::of(&error)
     });
     ExitCode::from(exit as u8)

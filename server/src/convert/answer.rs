@@ -1,12 +1,14 @@
 //! Parts of answers whose shape differs from that of their messages: points in time, names, words, events, and
 //! what the service adds to a summary.
 
+use std::collections::BTreeSet;
+
 use prost_types::Timestamp;
 use solver::solution::{Phase, Stage, WarningCode};
 
 use super::IntoMessage;
 use crate::{
-    caller::Caller,
+    caller::{Caller, Scope},
     event::{Event, Payload, TimedIteration},
     job::{JobId, Reason, SweepId, Waiting},
     pb,
@@ -71,6 +73,13 @@ words!(
     Waiting,
     WarningCode
 );
+
+impl IntoMessage<Vec<String>> for BTreeSet<Scope> {
+    fn into_message(self) -> Vec<String> {
+        let scopes = self.into_iter().map(<&str>::from);
+        scopes.map(str::to_owned).collect()
+    }
+}
 
 impl From<Caller> for pb::Caller {
     fn from(caller: Caller) -> Self {

@@ -12,8 +12,8 @@ use crate::{
     config::Isolation,
     job, mesh, pb,
     run::Summary,
-    sweep,
-    verbs::{bulk, info, jobs, lists, problems, queue, results},
+    sweep, token,
+    verbs::{bulk, info, jobs, lists, problems, queue, results, tokens},
 };
 
 /// A type that is written as a message, by itself and as a field that is always set.

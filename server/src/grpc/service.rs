@@ -36,6 +36,7 @@ use crate::{
         retry::{self, Changes},
         submit::{self, Submitted},
         sweeps,
+        tokens::{self, TOKEN, TokenRequest},
         watch::{self, AFTER_SEQ, Until, WAIT},
     },
     violations,
@@ -378,6 +379,54 @@ impl JobService for Grpc {
     async fn get_caller(&self, request: Request<pb::GetCallerRequest>) -> Reply<pb::Caller> {
         let (caller, _) = caller_and_message(request)?;
         Ok(Response::new(caller.into()))
+    }
+
+    async fn create_token(&self, request: Request<pb::CreateTokenRequest>) -> Reply<pb::NewToken> {
+        let (caller, request) = caller_and_message(request)?;
+        let pb::CreateTokenRequest {
+            name,
+            owner,
+            scopes,
+            expires_in_s,
+        } = request;
+        let request = TokenRequest {
+            name,
+            owner,
+            scopes,
+            expires_in_s,
+        };
+        let new = tokens::create(&self.service.store, &caller, request).await?;
+        Ok(Response::new(new.into()))
+    }
+
+    async fn list_tokens(
+        &self,
+        request: Request<pb::ListTokensRequest>,
+    ) -> Reply<pb::ListTokensResponse> {
+        let (caller, _) = caller_and_message(request)?;
+        let all = tokens::list(&self.service.store, &caller);
+        let fitting: Vec<pb::Token> = all.into_iter().map(Into::into).collect();
+        if messages_that_fit(&fitting) < fitting.len() {
+            return Err(ApiError::AnswerTooLarge {
+                instead: "GET /v1/tokens",
+            }
+            .into());
+        }
+        Ok(Response::new(pb::ListTokensResponse { tokens: fitting }))
+    }
+
+    async fn revoke_token(&self, request: Request<pb::RevokeTokenRequest>) -> Reply<pb::Token> {
+        let (caller, request) = caller_and_message(request)?;
+        let id = TOKEN.read(&request.id)?;
+        let token = tokens::revoke(&self.service.store, &caller, &id).await?;
+        Ok(Response::new(token.into()))
+    }
+
+    async fn rotate_token(&self, request: Request<pb::RotateTokenRequest>) -> Reply<pb::NewToken> {
+        let (caller, request) = caller_and_message(request)?;
+        let id = TOKEN.read(&request.id)?;
+        let new = tokens::rotate(&self.service.store, &caller, &id).await?;
+        Ok(Response::new(new.into()))
     }
 
     async fn get_queue(&self, request: Request<pb::GetQueueRequest>) -> Reply<pb::QueueState> {

@@ -30,7 +30,7 @@ use super::{
     guarded::Guarded,
     places::Place,
 };
-use crate::{error::ApiError, rest};
+use crate::{caller::Peer, error::ApiError, rest};
 
 /// Requests at the same time on one connection; a client with more waits or opens another one.
 const MOST_STREAMS: u32 = 100;
@@ -45,7 +45,7 @@ const PING: Duration = Duration::from_secs(60);
 
 /// Serves a connection until it ends, is idle or stalled for too long, or its place is given to another one.
 pub(super) async fn serve(
-    stream: TcpStream,
+    (stream, peer): (TcpStream, Peer),
     router: Router,
     place: Place,
     closing: CancellationToken,
@@ -53,7 +53,8 @@ pub(super) async fn serve(
     let activity = place.activity().clone();
     let io = TokioIo::new(Guarded::new(stream, activity.clone()));
     let service = service_fn(|request: Request<Incoming>| {
-        let request = request.map(Body::new);
+        let mut request = request.map(Body::new);
+        request.extensions_mut().insert(peer);
         answer(router.clone(), request, place.is_reserved(), &activity)
     });
     let mut builder = Builder::new(TokioExecutor::new());

@@ -24,6 +24,7 @@ use tokio_util::{sync::CancellationToken, task::TaskTracker};
 use tracing::{info, warn};
 
 use self::places::Places;
+use crate::caller::Peer;
 
 pub use files::most_connections;
 
@@ -74,7 +75,13 @@ impl Listener {
                 accepted = self.socket.accept() => accepted,
             };
             match accepted {
-                Ok((stream, _)) => self.open(stream, &connections, &router, &closing, &mut logged),
+                Ok((stream, peer)) => self.open(
+                    (stream, Peer(peer.ip())),
+                    &connections,
+                    &router,
+                    &closing,
+                    &mut logged,
+                ),
                 // this one connection has gone already
                 Err(error) if of_connection(&error) => {}
                 Err(error) => {
@@ -95,7 +102,7 @@ impl Listener {
     /// Serves a connection in a task of its own, if there is a place for it.
     fn open(
         &self,
-        stream: TcpStream,
+        (stream, peer): (TcpStream, Peer),
         connections: &TaskTracker,
         router: &Router,
         closing: &CancellationToken,
@@ -114,7 +121,7 @@ impl Listener {
         if place.is_reserved() && is_due(logged) {
             info!("all connections are busy; further ones can only ask for the probes");
         }
-        let serving = connection::serve(stream, router.clone(), place, closing.clone());
+        let serving = connection::serve((stream, peer), router.clone(), place, closing.clone());
         connections.spawn(serving);
     }
 }

@@ -1,13 +1,144 @@
-//! The one place where the caller of a request is identified, for both protocols.
+//! The one place where the caller of a request is identified, and where the policy of the operations is applied: for
+//! both protocols, streams, documents and probes alike.
 
-use axum::{extract::Request, middleware::Next, response::Response};
+use std::{collections::BTreeMap, sync::Arc, sync::LazyLock};
 
-use crate::caller::Caller;
+use axum::{
+    extract::{MatchedPath, Request, State},
+    http::{HeaderMap, Method, header},
+    middleware::Next,
+    response::Response,
+};
+use base64::{Engine, prelude::BASE64_STANDARD};
 
-/// Puts the caller of a request into its extensions, where handlers and rpcs read it. There is no authentication yet:
-/// every request comes from the local caller. Probes pass through here as well; they have no credentials, and an
-/// authentication must let them through.
-pub(super) async fn authenticate(mut request: Request, next: Next) -> Response {
-    request.extensions_mut().insert(Caller::local());
-    next.run(request).await
+use super::{
+    operations,
+    reply::{is_grpc, refusal},
+    while_valid::while_valid,
+};
+use crate::{
+    caller::{Access, Caller, Peer},
+    error::ApiError,
+    token::Presented,
+    verbs::{
+        Service,
+        identify::{Credentials, Identified, identify},
+    },
+};
+
+/// Puts the caller of a request into its extensions, where handlers and rpcs read it; refuses a request that its caller
+/// may not make.
+pub(super) async fn authenticate(
+    State(service): State<Arc<Service>>,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    match admit(&service, &request) {
+        Ok(Identified { caller, token }) => {
+            request.extensions_mut().insert(caller);
+            let answer = next.run(request).await;
+            match token {
+                Some(token) => while_valid(answer, service.store.clone(), token),
+                None => answer,
+            }
+        }
+        Err(error) => {
+            let path = request.uri().path().to_owned();
+            refusal(is_grpc(&request), &path, error)
+        }
+    }
+}
+
+/// The caller, if the request is one that they may make.
+fn admit(service: &Service, request: &Request) -> Result<Identified, ApiError> {
+    let access = access(request);
+    let peer = request.extensions().get::<Peer>().copied();
+    let credentials = credentials(request.headers(), &service.trust.user_header);
+    let identified = match identify(&service.store, &service.trust, peer, &credentials) {
+        Ok(identified) => identified,
+        // also with a token that is no longer valid, as a monitor may have it
+        Err(_) if access == Access::Open => Identified {
+            caller: Caller::anonymous(),
+            token: None,
+        },
+        Err(error) => return Err(error),
+    };
+    let caller = &identified.caller;
+    match access {
+        Access::Needs(scope) if !caller.may(scope) => {
+            let scope: &str = scope.into();
+            Err(ApiError::Forbidden(format!(
+                "this needs the scope {scope}, which {} does not have here",
+                caller.owner()
+            )))
+        }
+        Access::Open | Access::Identified | Access::Needs(_) => Ok(identified),
+    }
+}
+
+/// Who may make a request. What is no operation is answered by 404, 405 or UNIMPLEMENTED, which says nothing that
+/// `/openapi.json` of any installation does not.
+fn access(request: &Request) -> Access {
+    static OPERATIONS: LazyLock<BTreeMap<(&str, &str), Access>> = LazyLock::new(|| {
+        let all = operations::all().into_iter();
+        all.map(|operation| ((operation.method, operation.path), operation.access))
+            .collect()
+    });
+    static RPCS: LazyLock<BTreeMap<&str, Access>> = LazyLock::new(|| {
+        let all = operations::all().into_iter();
+        all.flat_map(|operation| {
+            operation
+                .rpcs
+                .iter()
+                .map(move |rpc| (*rpc, operation.access))
+        })
+        .collect()
+    });
+    let path = request.uri().path();
+    if let Some(rpc) = path.strip_prefix("/signorini.v1.JobService/") {
+        return RPCS.get(rpc).copied().unwrap_or(Access::Identified);
+    }
+    if path.starts_with("/grpc.reflection.") {
+        return operations::DESCRIPTION;
+    }
+    let Some(route) = request.extensions().get::<MatchedPath>() else {
+        return Access::Open;
+    };
+    let method = match request.method() {
+        // answered by the handler of GET
+        method if *method == Method::HEAD => "GET",
+        method => method.as_str(),
+    };
+    let found = OPERATIONS.get(&(method, route.as_str()));
+    found.copied().unwrap_or(Access::Open)
+}
+
+/// What a request shows of its caller: a token as bearer, or as the password that a browser asks for.
+fn credentials(headers: &HeaderMap, user_header: &header::HeaderName) -> Credentials {
+    let mut sent = headers.get_all(header::AUTHORIZATION).iter();
+    let token = sent.next().map(|value| {
+        if sent.next().is_some() {
+            return Err(()); // a proxy might have looked at the other one
+        }
+        let text = value.to_str().map_err(|_| ())?;
+        let (scheme, rest) = text.split_once(' ').ok_or(())?;
+        let rest = rest.trim();
+        let token = match scheme {
+            _ if scheme.eq_ignore_ascii_case("bearer") => rest.to_owned(),
+            _ if scheme.eq_ignore_ascii_case("basic") => {
+                let pair = BASE64_STANDARD.decode(rest).map_err(|_| ())?;
+                let pair = String::from_utf8(pair).map_err(|_| ())?;
+                pair.split_once(':').ok_or(())?.1.to_owned()
+            }
+            _ => return Err(()),
+        };
+        Presented::parse(&token).ok_or(())
+    });
+    let users = headers.get_all(user_header).iter();
+    Credentials {
+        token,
+        users: users
+            .map(|value| String::from_utf8_lossy(value.as_bytes()).into_owned())
+            .collect(),
+    }
 }

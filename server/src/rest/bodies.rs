@@ -1,7 +1,7 @@
 //! Bodies of requests in JSON: their schemas, and reading them with all errors reported together. A problem inside is
 //! read by the parser of `files`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use files::sweep::{MOST_MEMBERS, MOST_PATHS};
 use schemars::JsonSchema;
@@ -14,6 +14,7 @@ use solver::{
 
 use super::object::{First, Object, Read, Texts};
 use crate::{
+    caller::{MAX_OWNER, Scope},
     error::ApiError,
     job::{Cache, Limits, MAX_PRIORITY, MIN_PRIORITY},
     parameters::Values,
@@ -23,6 +24,7 @@ use crate::{
         retry::Changes,
         submit::MAX_BATCH,
         sweeps::SweepRequest,
+        tokens::{self, TokenRequest},
     },
     violations::{PROBLEM, prefixed},
 };
@@ -187,6 +189,25 @@ pub(super) struct NewLimits {
 #[allow(dead_code)]
 struct Label(#[schemars(length(max = MAX_LABEL))] String);
 
+/// A body that makes a token; for its schema only.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[allow(dead_code)]
+pub(super) struct TokenFields {
+    /// For people: where it is used.
+    #[schemars(length(min = 1, max = tokens::MAX_NAME))]
+    name: String,
+    /// The owner of the jobs that it submits: letters, digits and . _ @ + -
+    #[schemars(length(min = 1, max = MAX_OWNER), regex(pattern = r"^[A-Za-z0-9._@+-]+$"))]
+    owner: String,
+    /// What it allows; the first token of a service must have admin.
+    #[schemars(length(min = 1))]
+    scopes: BTreeSet<Scope>,
+    /// Seconds until it expires; absent: it does not expire.
+    #[schemars(default, range(min = tokens::MIN_EXPIRES_IN_S, max = tokens::MAX_EXPIRES_IN_S))]
+    expires_in_s: Option<f64>,
+}
+
 /// A body with a problem and nothing else; for its schema only.
 #[derive(JsonSchema)]
 #[schemars(deny_unknown_fields)]
@@ -331,6 +352,25 @@ pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
     };
     let changes = body.finish("limits, priority", Some(changes));
     changes.map_err(ApiError::InvalidProblem)
+}
+
+/// A body `{name, owner, scopes, expires_in_s}`. What is missing is empty, which the verb refuses.
+pub(super) fn token(text: &str) -> Result<TokenRequest, ApiError> {
+    /// One more than there are: the verb reports the excess as repeated or unknown.
+    const MOST: usize = 16;
+    let mut body = Object::open(text, "an object with name, owner and scopes")?;
+    let scopes = body.take::<Vec<String>>("scopes", "a list of read, submit, cancel and admin");
+    let mut scopes = scopes.unwrap_or_default();
+    scopes.truncate(MOST);
+    let request = TokenRequest {
+        name: body.take("name", "a string").unwrap_or_default(),
+        owner: body.take("owner", "a string").unwrap_or_default(),
+        scopes,
+        expires_in_s: body.take("expires_in_s", "a number of seconds"),
+    };
+    let known = "name, owner, scopes, expires_in_s";
+    body.finish(known, Some(request))
+        .map_err(ApiError::InvalidProblem)
 }
 
 /// A body `{problem}`.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use axum::{
     extract::{Request, State},
-    http::{Method, Version, header},
+    http::Method,
     middleware::Next,
     response::Response,
 };
@@ -13,7 +13,7 @@ use axum::{
 use tonic_types::StatusExt;
 
 use super::{
-    refused,
+    origin, refused,
     reply::{is_grpc, refusal},
     service::is_probe,
 };
@@ -32,7 +32,7 @@ pub(super) async fn limits(
     next: Next,
 ) -> Response {
     let (grpc, path) = (is_grpc(&request), request.uri().path().to_owned());
-    if let Err(error) = check_host(&request) {
+    if let Err(error) = origin::check(&request, &service.web) {
         return refusal(grpc, &path, error);
     }
     // its answer would be refused when the work is done
@@ -82,52 +82,5 @@ fn note_status(status: &tonic::Status, path: &str) {
         let kind = status.get_details_error_info().map(|info| info.reason);
         let kind = kind.unwrap_or_else(|| format!("gRPC {:?}", status.code()));
         refused::note(&kind, path);
-    }
-}
-
-/// RFC 9112, 3.2: a request over HTTP/1.1 has exactly one Host; two could mean different things to a proxy and to us.
-fn check_host(request: &Request) -> Result<(), ApiError> {
-    let hosts: Vec<_> = request.headers().get_all(header::HOST).iter().collect();
-    let authority = request
-        .uri()
-        .authority()
-        .map(|authority| authority.as_str());
-    let wrong = |what: &str| Err(ApiError::BadRequest(what.into()));
-    match hosts[..] {
-        [] if request.version() == Version::HTTP_11 => wrong("the request has no Host header"),
-        [] => Ok(()),
-        [host] => match authority {
-            Some(authority) if authority.as_bytes() != host.as_bytes() => {
-                wrong("the Host header differs from the authority of the address")
-            }
-            _ => Ok(()),
-        },
-        _ => wrong("the request has several Host headers"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use axum::body::Body;
-
-    use super::*;
-
-    #[test]
-    fn a_request_has_one_host() {
-        let check = |version: Version, address: &str, hosts: &[&str]| {
-            let mut request = Request::builder().version(version).uri(address);
-            for host in hosts {
-                request = request.header(header::HOST, *host);
-            }
-            check_host(&request.body(Body::empty()).unwrap()).is_ok()
-        };
-        assert!(check(Version::HTTP_11, "/", &["a"]));
-        assert!(!check(Version::HTTP_11, "/", &[]));
-        assert!(!check(Version::HTTP_11, "/", &["a", "a"]));
-        assert!(check(Version::HTTP_10, "/", &[]));
-        assert!(check(Version::HTTP_2, "http://a/", &[]));
-        assert!(check(Version::HTTP_2, "http://a/", &["a"]));
-        assert!(!check(Version::HTTP_2, "http://a/", &["b"]));
     }
 }

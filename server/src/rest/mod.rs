@@ -11,11 +11,13 @@ mod headers;
 mod input;
 mod limits;
 mod object;
+mod origin;
 
 // Answers.
 mod data;
 mod refused;
 mod reply;
+mod while_valid;
 
 // Handlers, by subject.
 mod docs;
@@ -27,6 +29,7 @@ mod results;
 mod service;
 mod submit;
 mod sweeps;
+mod tokens;
 
 // The list of operations, and what is made from it.
 mod openapi;

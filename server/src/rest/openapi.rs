@@ -12,6 +12,7 @@ use solver::error::Violation;
 
 use super::operations::{self, Answer, Content, Operation};
 use crate::{
+    caller::Access,
     catalog::{Code, Kind},
     parameters::{Description, Location},
 };
@@ -46,7 +47,12 @@ fn document() -> Value {
         "servers": [{ "url": "/" }],
         "tags": operations::GROUPS.map(|(name, meaning, _)| json!({ "name": name, "description": meaning })),
         "paths": paths,
-        "components": { "schemas": schemas.into_components() },
+        "components": {
+            "schemas": schemas.into_components(),
+            "securitySchemes": {
+                "token": { "type": "http", "scheme": "bearer", "description": "A token, as `signorini token create` prints it" },
+            },
+        },
     })
 }
 
@@ -86,6 +92,12 @@ impl Schemas {
             "tags": [operation.group],
             "responses": {},
         });
+        // a service without tokens asks for none
+        described["security"] = match operation.access {
+            Access::Open => json!([]),
+            Access::Identified | Access::Needs(_) => json!([{ "token": [] }, {}]),
+        };
+        described["x-access"] = json!(operation.access.name());
         let parameters: Vec<Value> = operation.parameters.iter().map(parameter).collect();
         if !parameters.is_empty() {
             described["parameters"] = json!(parameters);

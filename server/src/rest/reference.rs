@@ -6,6 +6,7 @@ use strum::VariantArray;
 
 use super::operations::{self, Operation};
 use crate::{
+    caller::Access,
     catalog::{Code, grpc_code_name},
     parameters::{Description, Location},
 };
@@ -54,6 +55,12 @@ fn section(out: &mut String, operation: &Operation) {
     if !operation.rpcs.is_empty() {
         let _ = writeln!(out, "- gRPC: {}", rpcs(operation));
     }
+    let who = match operation.access {
+        Access::Open => "everyone, without a token".to_owned(),
+        Access::Identified => "every token".to_owned(),
+        Access::Needs(scope) => format!("tokens with the scope `{}`", <&str>::from(scope)),
+    };
+    let _ = writeln!(out, "- for {who}");
     let named = |parameter: &&Description| parameter.location != Location::Path;
     for Description {
         location,

@@ -22,6 +22,15 @@ impl IntoResponse for ApiError {
                 .headers_mut()
                 .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
         }
+        if let ApiError::Unauthenticated(_) = &self {
+            // a browser takes the second one, and asks for a password: the token
+            const WAYS: HeaderValue = HeaderValue::from_static(
+                "Bearer realm=\"signorini\", Basic realm=\"signorini: any name, and a token as the password\"",
+            );
+            response
+                .headers_mut()
+                .insert(header::WWW_AUTHENTICATE, WAYS);
+        }
         if let ApiError::RangeNotSatisfiable(bytes) = &self
             && let Ok(value) = HeaderValue::from_str(&format!("bytes */{bytes}"))
         {

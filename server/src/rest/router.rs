@@ -21,7 +21,10 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         .merge(grpc)
         // after the merge: the fallback of the gRPC router would answer every unknown path with a gRPC status.
         .fallback(reply::not_found)
-        .layer(middleware::from_fn(authenticate))
+        .layer(middleware::from_fn_with_state(
+            service.clone(),
+            authenticate,
+        ))
         .layer(CatchPanicLayer::custom(reply::panicked))
         // `body::json_text` has a limit of its own, and answers with an error document
         .layer(DefaultBodyLimit::disable())

@@ -5,7 +5,7 @@ use std::{
     ops::{Deref, DerefMut},
     path::Path,
     sync::{
-        Arc, Mutex, MutexGuard, OnceLock, PoisonError,
+        Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock,
         atomic::{AtomicBool, AtomicI64, Ordering::Relaxed},
     },
     time::Duration,
@@ -28,7 +28,7 @@ use super::{
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
-use crate::memory::Budget;
+use crate::{memory::Budget, token::Tokens};
 
 /// How long a list waits for a connection.
 const LIST_PATIENCE: Duration = Duration::from_secs(5);
@@ -46,6 +46,10 @@ pub struct Store {
     pub(super) waiting: Mutex<WaitingJobs>,
     /// Whether the queue is paused, as it is on the disk after every commit.
     pub(super) paused: AtomicBool,
+    /// Who may use the service, as it is on the disk after every commit.
+    pub(super) tokens: RwLock<Tokens>,
+    /// There is a token, or was.
+    pub(super) any_tokens: AtomicBool,
     /// The memory that running jobs share; without limit until it is set.
     pub(super) budget: OnceLock<Arc<Budget>>,
     /// One transaction at a time changes the jobs that wait.
@@ -166,6 +170,8 @@ impl Store {
             lists,
             waiting: Mutex::default(),
             paused: AtomicBool::default(),
+            tokens: RwLock::default(),
+            any_tokens: AtomicBool::default(),
             budget: OnceLock::new(),
             change_lock: tokio::sync::Mutex::default(),
             inbox,

@@ -237,6 +237,11 @@ impl Report {
                     for piece in pieces.await? {
                         insert(&mut tx, "mesh_piece", &piece).await?;
                     }
+                    let owners = "select * from mesh_owner where hash = ?";
+                    let owners = sqlx::query(owners).bind(&hash).fetch_all(&mut *source);
+                    for owner in owners.await? {
+                        insert(&mut tx, "mesh_owner", &owner).await?;
+                    }
                     tx.commit().await?;
                 }
             }

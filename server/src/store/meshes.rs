@@ -7,7 +7,7 @@ use super::{
     database::Store,
     error::{Record, Result, StoreError},
 };
-use crate::mesh::MeshInfo;
+use crate::{caller::Owners, mesh::MeshInfo, time::Time};
 
 /// The effect of removing a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,22 +30,42 @@ pub struct StoredMesh {
 }
 
 impl Store {
-    /// The description of a mesh, as clients see it.
-    pub async fn mesh(&self, hash: &str) -> Result<Option<MeshInfo>> {
+    /// The description of a mesh of these owners, as clients see it.
+    pub async fn mesh(&self, owners: Owners<'_>, hash: &str) -> Result<Option<MeshInfo>> {
         let read = async {
-            let row = sqlx::query("select * from mesh where hash = ?")
+            let row = match owners {
+                Owners::All => sqlx::query("select * from mesh where hash = ?").bind(hash),
+                Owners::Only(owner) => sqlx::query(
+                    "select mesh.* from mesh join mesh_owner using (hash) where hash = ? and owner = ?",
+                )
                 .bind(hash)
-                .fetch_optional(&self.reader)
-                .await?;
+                .bind(owner),
+            };
+            let row = row.fetch_optional(&self.reader).await?;
             row.as_ref().map(|row| Ok(described(row)?.info)).transpose()
         };
         self.damages.noting(read).await
     }
 
-    /// Meshes that were stored before the one with key `before`, newest first.
-    pub async fn meshes(&self, before: Option<i64>, limit: i64) -> Result<Vec<StoredMesh>> {
+    /// Meshes of these owners that were stored before the one with key `before`, newest first.
+    pub async fn meshes(
+        &self,
+        owners: Owners<'_>,
+        before: Option<i64>,
+        limit: i64,
+    ) -> Result<Vec<StoredMesh>> {
         let read = async {
-            let rows = sqlx::query("select * from mesh where id < ? order by id desc limit ?")
+            let rows = match owners {
+                Owners::All => {
+                    sqlx::query("select * from mesh where id < ? order by id desc limit ?")
+                }
+                Owners::Only(owner) => sqlx::query(
+                    "select mesh.* from mesh join mesh_owner using (hash)
+                     where owner = ? and id < ? order by id desc limit ?",
+                )
+                .bind(owner),
+            };
+            let rows = rows
                 .bind(before.unwrap_or(i64::MAX))
                 .bind(limit)
                 .fetch_all(&self.reader)
@@ -82,9 +102,33 @@ impl Store {
         self.writing(write).await
     }
 
-    /// Completes a mesh with this number of pieces; false if it was stored already. `None`: some pieces were removed
-    /// meanwhile, with an earlier mesh of the same file, and must be written again.
-    pub async fn insert_mesh(&self, info: &MeshInfo, pieces: i64) -> Result<Option<bool>> {
+    /// Makes a stored mesh one of this owner's, too; false if it was before. `None`: it is not stored.
+    pub async fn own_mesh(&self, owner: &str, hash: &str) -> Result<Option<bool>> {
+        let write = async {
+            let mut tx = self.begin().await?;
+            let stored: bool =
+                sqlx::query_scalar("select exists (select 1 from mesh where hash = ?)")
+                    .bind(hash)
+                    .fetch_one(&mut *tx)
+                    .await?;
+            if !stored {
+                return Ok(None);
+            }
+            let new = own(&mut tx, owner, hash, self.now()).await?;
+            tx.commit().await?;
+            Ok(Some(new))
+        };
+        self.writing(write).await
+    }
+
+    /// Completes a mesh with this number of pieces as this owner's; false if it was theirs already. `None`: some pieces
+    /// were removed meanwhile, with an earlier mesh of the same file, and must be written again.
+    pub async fn insert_mesh(
+        &self,
+        owner: &str,
+        info: &MeshInfo,
+        pieces: i64,
+    ) -> Result<Option<bool>> {
         let write = async {
             let mut tx = self.begin().await?;
             let there: i64 = sqlx::query_scalar("select count(*) from mesh_piece where hash = ?")
@@ -114,8 +158,9 @@ impl Store {
                     .execute(&mut *tx)
                     .await?;
             }
+            let new = own(&mut tx, owner, &info.hash, info.created_at).await?;
             tx.commit().await?;
-            Ok(Some(key.is_some()))
+            Ok(Some(new))
         };
         self.writing(write).await
     }
@@ -126,31 +171,53 @@ impl Store {
         self.damages.noting(read_body(&mut connection, hash)).await
     }
 
-    /// Removes a mesh, unless a job that waits or runs needs it.
-    pub async fn remove_mesh(&self, hash: &str) -> Result<Removal> {
+    /// Removes a mesh of these owners, unless one of their jobs that wait or run needs it. Its content goes with the last
+    /// owner, as soon as no job needs it.
+    pub async fn remove_mesh(&self, owners: Owners<'_>, hash: &str) -> Result<Removal> {
         let write = async {
             let mut tx = self.begin().await?;
-            let needed: bool = sqlx::query_scalar(
-                "select exists (select 1 from problem join job using (input_hash)
-                 where problem.mesh = ? and job.status in ('queued', 'running'))",
+            let only = match owners {
+                Owners::All => None,
+                Owners::Only(owner) => Some(owner),
+            };
+            let theirs: bool = sqlx::query_scalar(
+                "select exists (select 1 from mesh where hash = ?1
+                 and (?2 is null or exists (select 1 from mesh_owner where hash = ?1 and owner = ?2)))",
             )
             .bind(hash)
+            .bind(only)
             .fetch_one(&mut *tx)
             .await?;
-            if needed {
-                return Ok(Removal::InUse);
-            }
-            let done = sqlx::query("delete from mesh where hash = ?")
-                .bind(hash)
-                .execute(&mut *tx)
-                .await?;
-            if done.rows_affected() == 0 {
+            if !theirs {
                 return Ok(Removal::Unknown);
             }
-            sqlx::query("delete from mesh_piece where hash = ?")
+            if is_needed(&mut tx, only, hash).await? {
+                return Ok(Removal::InUse);
+            }
+            sqlx::query("delete from mesh_owner where hash = ?1 and (?2 is null or owner = ?2)")
                 .bind(hash)
+                .bind(only)
                 .execute(&mut *tx)
                 .await?;
+            let others: bool =
+                sqlx::query_scalar("select exists (select 1 from mesh_owner where hash = ?)")
+                    .bind(hash)
+                    .fetch_one(&mut *tx)
+                    .await?;
+            if others {
+                tx.commit().await?;
+                return Ok(Removal::Removed);
+            }
+            // an administrator's, on a mesh that was another's
+            if is_needed(&mut tx, None, hash).await? {
+                return Ok(Removal::InUse);
+            }
+            for statement in [
+                "delete from mesh where hash = ?",
+                "delete from mesh_piece where hash = ?",
+            ] {
+                sqlx::query(statement).bind(hash).execute(&mut *tx).await?;
+            }
             tx.commit().await?;
             Ok(Removal::Removed)
         };
@@ -176,6 +243,28 @@ impl Store {
         })
         .await
     }
+}
+
+/// Makes a mesh one of this owner's; false if it was before.
+async fn own(tx: &mut SqliteConnection, owner: &str, hash: &str, now: Time) -> Result<bool> {
+    let done = sqlx::query(
+        "insert into mesh_owner (hash, owner, created_at) values (?, ?, ?) on conflict do nothing",
+    )
+    .bind(hash)
+    .bind(owner)
+    .bind(now.micros())
+    .execute(tx)
+    .await?;
+    Ok(done.rows_affected() > 0)
+}
+
+/// Whether a job that waits or runs needs the mesh: one of this owner, or any.
+async fn is_needed(tx: &mut SqliteConnection, owner: Option<&str>, hash: &str) -> Result<bool> {
+    let needed = sqlx::query_scalar(
+        "select exists (select 1 from problem join job using (input_hash)
+         where problem.mesh = ?1 and job.status in ('queued', 'running') and (?2 is null or job.owner = ?2))",
+    );
+    Ok(needed.bind(hash).bind(owner).fetch_one(tx).await?)
 }
 
 /// How many pieces the mesh has; one of them: its number, its bytes, its checksum.

@@ -68,6 +68,7 @@ mod snapshot;
 // What is not a job.
 mod meshes;
 mod settings;
+mod tokens;
 
 // A store that no server has open.
 mod inspect;
@@ -114,6 +115,7 @@ impl Store {
         let (store, submissions) = Store::connect(folder).await?;
         store.read_waiting_jobs().await?;
         store.read_settings().await?;
+        store.read_tokens().await?;
         store.read_clock().await?;
         let store = Arc::new(store);
         let committing = submit::commit_submissions(Arc::downgrade(&store), submissions);

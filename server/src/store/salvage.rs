@@ -95,6 +95,8 @@ pub(super) async fn copy_the_rest(
     for (table, statement) in [
         ("deleted_job", "select * from deleted_job"),
         ("setting", "select * from setting"),
+        // a damaged one identifies nobody, and still tells that a token is needed
+        ("token", "select * from token"),
     ] {
         let rows = sqlx::query(statement).fetch_all(&mut *source).await;
         for row in rows.unwrap_or_default() {

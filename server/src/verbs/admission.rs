@@ -77,7 +77,11 @@ pub(super) async fn replayed(
 }
 
 /// Checks a job in depth.
-pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJob, ApiError> {
+pub(super) async fn admit(
+    service: &Service,
+    caller: &Caller,
+    prepared: Prepared,
+) -> Result<NewJob, ApiError> {
     let Prepared {
         envelope,
         problem,
@@ -86,7 +90,7 @@ pub(super) async fn admit(service: &Service, prepared: Prepared) -> Result<NewJo
         payload,
     } = prepared;
     let admitted = match problem {
-        Ok((problem, input_hash)) => match problems::admit(service, problem).await {
+        Ok((problem, input_hash)) => match problems::admit(service, caller, problem).await {
             Err(ApiError::InvalidProblem(more)) => Err(more),
             admitted => Ok((admitted?, input_hash)),
         },

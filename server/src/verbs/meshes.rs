@@ -22,7 +22,7 @@ use super::{
     service::{Service, detached},
 };
 use crate::{
-    caller::Caller,
+    caller::{Caller, Owners},
     digest,
     error::ApiError,
     mesh::MeshInfo,
@@ -65,7 +65,7 @@ impl Values for Hashes {
 /// and from there through the reader: only the parsed mesh is held in memory.
 pub async fn upload(
     service: &Arc<Service>,
-    _caller: &Caller,
+    caller: &Caller,
     mut pieces: impl Stream<Item = Result<impl AsRef<[u8]>, ApiError>> + Unpin,
 ) -> Result<(MeshInfo, bool), ApiError> {
     service.accepting()?;
@@ -90,8 +90,11 @@ pub async fn upload(
     }
     out.flush().await.map_err(unwritten)?;
     let hash = digest::sha256_text(hash);
-    if let Some(known) = service.store.mesh(&hash).await? {
-        return Ok((known, false));
+    let owner = caller.owner().to_owned();
+    if let Some(known) = service.store.mesh(Owners::All, &hash).await?
+        && let Some(new) = service.store.own_mesh(&owner, &hash).await?
+    {
+        return Ok((known, new));
     }
     let name = hash.clone();
     let folder = service.data.clone();
@@ -104,7 +107,7 @@ pub async fn upload(
         let mut encoded = tokio::fs::File::from_std(encoded);
         let new = loop {
             let pieces = store(&service, &info.hash, &mut encoded).await?;
-            if let Some(new) = service.store.insert_mesh(&info, pieces).await? {
+            if let Some(new) = service.store.insert_mesh(&owner, &info, pieces).await? {
                 break new;
             }
         };
@@ -181,8 +184,8 @@ fn unwritten(error: std::io::Error) -> ApiError {
 }
 
 /// A stored mesh, without its nodes and elements.
-pub async fn get(service: &Service, _caller: &Caller, hash: &str) -> Result<MeshInfo, ApiError> {
-    let found = service.store.mesh(hash).await?;
+pub async fn get(service: &Service, caller: &Caller, hash: &str) -> Result<MeshInfo, ApiError> {
+    let found = service.store.mesh(caller.visible_owners(), hash).await?;
     found.ok_or_else(|| unknown(hash))
 }
 
@@ -196,11 +199,12 @@ const LIST: &str = "meshes";
 /// Lists meshes, newest first.
 pub async fn list(
     service: &Service,
-    _caller: &Caller,
+    caller: &Caller,
     paging: &Paging,
 ) -> Result<Page<MeshInfo>, ApiError> {
     let before = paging.cursor(LIST)?.map(|cursor| cursor.key);
-    let meshes = service.store.meshes(before, paging.limit()).await?;
+    let owners = caller.visible_owners();
+    let meshes = service.store.meshes(owners, before, paging.limit()).await?;
     let at = |mesh: &StoredMesh| Cursor {
         micros: mesh.info.created_at.micros(),
         key: mesh.key,
@@ -210,11 +214,12 @@ pub async fn list(
     Ok(Page { items, next })
 }
 
-/// Removes a mesh that no waiting or running job needs.
-pub async fn delete(service: &Arc<Service>, _caller: &Caller, hash: &str) -> Result<(), ApiError> {
-    let (service, hash) = (service.clone(), hash.to_owned());
+/// Removes a mesh of the caller that none of their waiting or running jobs needs.
+pub async fn delete(service: &Arc<Service>, caller: &Caller, hash: &str) -> Result<(), ApiError> {
+    let (service, caller, hash) = (service.clone(), caller.clone(), hash.to_owned());
     detached(async move {
-        match service.store.remove_mesh(&hash).await? {
+        let removed = service.store.remove_mesh(caller.visible_owners(), &hash);
+        match removed.await? {
             Removal::Removed => Ok(()),
             Removal::Unknown => Err(unknown(&hash)),
             Removal::InUse => Err(ApiError::MeshInUse),
@@ -224,10 +229,14 @@ pub async fn delete(service: &Arc<Service>, _caller: &Caller, hash: &str) -> Res
 }
 
 /// The stored mesh that a problem refers to, or the violation that it is not stored.
-pub(super) async fn load(service: &Service, hash: &str) -> Result<(MeshInfo, Mesh), ApiError> {
+pub(super) async fn load(
+    service: &Service,
+    caller: &Caller,
+    hash: &str,
+) -> Result<(MeshInfo, Mesh), ApiError> {
     // loaded once there is a permit, so that waiting requests use no memory
     let load = async {
-        let found = match service.store.mesh(hash).await? {
+        let found = match service.store.mesh(caller.visible_owners(), hash).await? {
             Some(info) => service
                 .store
                 .mesh_body(hash)

@@ -35,6 +35,10 @@ pub mod plots;
 pub mod profiles;
 pub mod results;
 
+// Who makes a request; tokens.
+pub mod identify;
+pub mod tokens;
+
 // The service itself.
 pub mod info;
 pub mod queue;

@@ -37,7 +37,7 @@ pub struct Validation {
 /// Checks a problem and stores nothing. An invalid problem is not an error here: its violations are the answer.
 pub async fn validate(
     service: &Service,
-    _caller: &Caller,
+    caller: &Caller,
     problem: Result<Problem, Vec<Violation>>,
 ) -> Result<Validation, ApiError> {
     let problem = match problem {
@@ -45,7 +45,7 @@ pub async fn validate(
         Err(violations) => return Ok(Validation::unread(violations)),
     };
     let budget_bytes = service.memory_budget_bytes;
-    let stored = match stored(service, &problem).await {
+    let stored = match stored(service, caller, &problem).await {
         Err(ApiError::InvalidProblem(violations)) => {
             return Ok(Validation::unread(violations));
         }
@@ -135,18 +135,23 @@ pub(super) struct Admitted {
 /// The stored mesh that a problem refers to, if it does.
 async fn stored(
     service: &Service,
+    caller: &Caller,
     problem: &Problem,
 ) -> Result<Option<(MeshInfo, Mesh)>, ApiError> {
     match problem.mesh.stored() {
-        Some(hash) => Ok(Some(meshes::load(service, hash).await?)),
+        Some(hash) => Ok(Some(meshes::load(service, caller, hash).await?)),
         None => Ok(None),
     }
 }
 
 /// Admits a problem that is valid and within the memory budget.
-pub(super) async fn admit(service: &Service, mut problem: Problem) -> Result<Admitted, ApiError> {
+pub(super) async fn admit(
+    service: &Service,
+    caller: &Caller,
+    mut problem: Problem,
+) -> Result<Admitted, ApiError> {
     let budget_bytes = service.memory_budget_bytes;
-    let stored = stored(service, &problem).await?;
+    let stored = stored(service, caller, &problem).await?;
     let admit = move || {
         let within = |estimate: Estimate| match estimate.memory_bytes > budget_bytes {
             true => Err(ApiError::ProblemTooLarge {

@@ -88,7 +88,7 @@ pub async fn retry(
         let prepared = prepare(&service, request, None).await?;
         let new = NewJob {
             parent: Some(id),
-            ..admit(&service, prepared).await?
+            ..admit(&service, &caller, prepared).await?
         };
         let Accepted { jobs, replayed, .. } = enqueue(&service, &caller, vec![new], key).await?;
         single(jobs, replayed)

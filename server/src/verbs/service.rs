@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::{sync::Semaphore, time::timeout};
 
 use crate::{
-    config::{Config, Isolation},
+    config::{Config, Isolation, ProxyTrust, Web},
     error::ApiError,
     queue::Queue,
     store::{Health, Store, StoreError},
@@ -40,6 +40,10 @@ pub struct Service {
     pub received: Limit,
     /// Bytes of answers in memory, over all requests.
     pub sent: Limit,
+    /// The proxies that identify users.
+    pub trust: ProxyTrust,
+    /// What requests from browsers may name.
+    pub web: Web,
     /// The folder for uploads until they are read.
     pub(super) data: PathBuf,
 }
@@ -58,6 +62,8 @@ impl Service {
             max_mesh_bytes: config.max_mesh_bytes,
             received: Limit::new(config.max_received_bytes),
             sent: Limit::new(config.max_sent_bytes),
+            trust: config.trust.clone(),
+            web: config.web.clone(),
             data: config.data.clone(),
         }
     }

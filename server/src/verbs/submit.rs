@@ -60,7 +60,7 @@ pub async fn create(
                 return single(vec![old], true);
             }
         }
-        let new = admit(&service, prepared).await?;
+        let new = admit(&service, &caller, prepared).await?;
         let Accepted { jobs, replayed, .. } = enqueue(&service, &caller, vec![new], key).await?;
         single(jobs, replayed)
     })
@@ -102,7 +102,7 @@ pub async fn create_batch(
             let replayed = true;
             return Ok(Submitted { accepted, replayed });
         }
-        let jobs = each(prepared, |prepared| admit(&service, prepared)).await?;
+        let jobs = each(prepared, |prepared| admit(&service, &caller, prepared)).await?;
         let Accepted { jobs, replayed, .. } = enqueue(&service, &caller, jobs, key).await?;
         Ok(Submitted {
             accepted: jobs,

@@ -138,13 +138,13 @@ pub async fn create(
             })
             .await?;
         let Checked { definition, groups } = checked;
-        let memory_bytes = admit_base(&service, &definition.base, &mut found).await?;
+        let memory_bytes = admit_base(&service, &caller, &definition.base, &mut found).await?;
         let groups = groups.map_err(|more| found.extend(more)).ok();
         let (Some(memory_bytes), Some(groups)) = (memory_bytes, groups) else {
             return Err(ApiError::InvalidProblem(found.into_violations()));
         };
         let parts = (definition, groups, memory_bytes);
-        let (jobs, sweep) = admitted(&service, parts, (envelope, limits), found).await?;
+        let (jobs, sweep) = admitted(&service, &caller, parts, (envelope, limits), found).await?;
         let Accepted { jobs, replayed, .. } =
             enqueue_sweep(&service, &caller, jobs, Some(sweep), key).await?;
         of_jobs(&service, &caller, &jobs, replayed).await
@@ -155,6 +155,7 @@ pub async fn create(
 /// Checks the base as a job's problem is checked; the memory that it needs, if nothing is wrong with it.
 async fn admit_base(
     service: &Arc<Service>,
+    caller: &Caller,
     base: &Problem,
     found: &mut Findings,
 ) -> Result<Option<u64>, ApiError> {
@@ -162,7 +163,7 @@ async fn admit_base(
         envelope: Envelope::default(),
         problem: Ok(base.clone()),
     };
-    match admit(service, prepare(service, request, None).await?).await {
+    match admit(service, caller, prepare(service, request, None).await?).await {
         Ok(job) => Ok(Some(job.memory_bytes)),
         Err(ApiError::InvalidProblem(more)) => {
             let of_base = |v: Violation| {
@@ -182,6 +183,7 @@ async fn admit_base(
 /// The jobs of a sweep, one for each group, each with the problem of its first member.
 async fn admitted(
     service: &Arc<Service>,
+    caller: &Caller,
     (definition, groups, base_bytes): (Definition, Vec<Vec<usize>>, u64),
     (envelope, limits): (Envelope, Option<Limits>),
     mut found: Findings,
@@ -189,7 +191,11 @@ async fn admitted(
     let id = SweepId::new();
     let Definition { base, plan } = definition;
     let mesh_size = match base.mesh.stored() {
-        Some(hash) => service.store.mesh(hash).await?.map(|info| info.size()),
+        Some(hash) => service
+            .store
+            .mesh(caller.visible_owners(), hash)
+            .await?
+            .map(|info| info.size()),
         None => None,
     };
     let budget_bytes = service.memory_budget_bytes;

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     caller::{Caller, Scope},
-    config::{Config, Isolation, MemoryBudget},
+    config::{Config, Isolation, MemoryBudget, ProxyTrust, Web},
     error::ApiError,
     fake,
     formats::Format,
@@ -38,6 +38,9 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
     let config = Config {
         listen: ([127, 0, 0, 1], 0).into(),
         data: folder.to_path_buf(),
+        web: Web::default(),
+        trust: ProxyTrust::default(),
+        allow_unauthenticated: false,
         workers: 1,
         isolation: Isolation::Thread,
         max_queued: 10,

@@ -3,7 +3,7 @@
 use super::{
     content::{json, lines, nothing, stream, submission, the_problem},
     headers::{etag, location, preference_applied, replayed, retry_after},
-    operation::{Operation, delete, get, patch, post, put},
+    operation::{CANCEL, Operation, READ, SUBMIT, delete, get, patch, post, put},
 };
 use crate::{
     catalog::Code,
@@ -31,13 +31,13 @@ pub(super) const KEY: Header<Keys> = Header(IDEMPOTENCY_KEY);
 
 pub(super) fn operations() -> Vec<Operation> {
     vec![
-        post("/v1/jobs", (KEY, PREFER), submit::create)
+        post(SUBMIT, "/v1/jobs", (KEY, PREFER), submit::create)
             .rpcs(&["CreateJob", "SubmitAndWatch"])
             .summary("Submits a job; when the answer is sent, the job is stored on disk")
             .body(json::<Submission>())
             .example(submission())
             .submits(),
-        put("/v1/jobs/{id}", (ID, KEY, PREFER), submit::put)
+        put(SUBMIT, "/v1/jobs/{id}", (ID, KEY, PREFER), submit::put)
             .rpcs(&["CreateJob"])
             .named("PutJob")
             .summary("Submits a job under an id chosen by the client; repeating the request changes nothing")
@@ -48,7 +48,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .sometimes_with(replayed())
             .submits()
             .fails(&[Code::IdConflict]),
-        post("/v1/jobs/batch", (KEY,), submit::create_batch)
+        post(SUBMIT, "/v1/jobs/batch", (KEY,), submit::create_batch)
             .rpcs(&["BatchCreateJobs"])
             .summary("Submits up to 1000 jobs, all or none of them")
             .body(json::<Submissions>())
@@ -56,62 +56,62 @@ pub(super) fn operations() -> Vec<Operation> {
             .with([retry_after()])
             .sometimes_with(replayed())
             .fails(SUBMITTING),
-        get("/v1/jobs", (FILTERS, PAGE_SIZE, PAGE_TOKEN, ORDER_BY), jobs::list)
+        get(READ, "/v1/jobs", (FILTERS, PAGE_SIZE, PAGE_TOKEN, ORDER_BY), jobs::list)
             .rpcs(&["ListJobs"])
             .summary("Lists jobs, newest first")
             .answers(200, "A page of jobs", json::<jobs::List>())
             .fails(&[Code::BadPageToken]),
-        get("/v1/jobs/count", (FILTERS, GROUP_BY), jobs::count)
+        get(READ, "/v1/jobs/count", (FILTERS, GROUP_BY), jobs::count)
             .rpcs(&["CountJobs"])
             .summary("Counts jobs")
             .answers(200, "The number of jobs", json::<Count>()),
-        get("/v1/jobs/{id}", (ID, WAIT, UNTIL, IF_NONE_MATCH), jobs::get)
+        get(READ, "/v1/jobs/{id}", (ID, WAIT, UNTIL, IF_NONE_MATCH), jobs::get)
             .rpcs(&["GetJob", "WaitJob"])
             .summary("Returns a job now, or after it has changed or ended")
             .answers(200, "The job", json::<Job>())
             .with([etag()])
             .answers(304, "The job has not changed", nothing())
             .with([etag()]),
-        get("/v1/jobs/{id}/problem", (ID,), jobs::problem)
+        get(READ, "/v1/jobs/{id}/problem", (ID,), jobs::problem)
             .rpcs(&["GetJobProblem"])
             .summary("Returns the exact input of a job, with its defaults filled in")
             .answers(200, "The problem", the_problem()),
-        get("/v1/jobs/{id}/events", (ID, AFTER_SEQ, Header(LAST_EVENT_ID)), events::events)
+        get(READ, "/v1/jobs/{id}/events", (ID, AFTER_SEQ, Header(LAST_EVENT_ID)), events::events)
             .rpcs(&["WatchJob"])
             .summary("Streams the events of a job, past ones first, then live ones, until `done`")
             .answers(200, "The events, each with its number; a comment every 15 s", [stream::<Event>(), lines()].concat())
             .answers(204, "The job has ended, and there are no events after that number", nothing())
             .fails(&[Code::NotAcceptable, Code::Draining]),
-        patch("/v1/jobs/{id}", (ID, IF_MATCH), jobs::update)
+        patch(SUBMIT, "/v1/jobs/{id}", (ID, IF_MATCH), jobs::update)
             .rpcs(&["UpdateJob"])
             .summary("Changes the name, labels or priority of a job, or whether it is kept permanently")
             .body(json::<Edits>())
             .answers(200, "The changed job", json::<Job>())
             .with([etag()])
             .fails(&[Code::InvalidProblem, Code::StaleVersion, Code::StorageFull]),
-        post("/v1/jobs/{id}/cancel", (ID,), jobs::cancel)
+        post(CANCEL, "/v1/jobs/{id}/cancel", (ID,), jobs::cancel)
             .rpcs(&["CancelJob"])
             .summary("Asks a job to stop; it is terminal within half a second")
             .answers(200, "The effect, and the job", json::<jobs::Canceled>())
             .with([etag()])
             .fails(&[Code::StorageFull]),
-        post("/v1/jobs/{id}/retry", (ID, KEY, PREFER), submit::retry)
+        post(SUBMIT, "/v1/jobs/{id}/retry", (ID, KEY, PREFER), submit::retry)
             .rpcs(&["RetryJob"])
             .summary("Submits the problem of an ended job again: a new job, with the old one as its parent, that is solved without the cache; a body changes its limits and priority")
             .optional_body(json::<Retry>())
             .submits()
             .fails(&[Code::JobActive]),
-        delete("/v1/jobs/{id}", (ID,), jobs::delete)
+        delete(CANCEL, "/v1/jobs/{id}", (ID,), jobs::delete)
             .rpcs(&["DeleteJob"])
             .summary("Deletes a job that has ended, with its events and its result")
             .answers(204, "It is deleted; for 7 days its id answers 410", nothing())
             .fails(&[Code::JobActive, Code::StorageFull]),
-        post("/v1/jobs/cancel", (FILTERS,), jobs::cancel_many)
+        post(CANCEL, "/v1/jobs/cancel", (FILTERS,), jobs::cancel_many)
             .rpcs(&["CancelJobs"])
             .summary("Asks all jobs that match the filters to stop")
             .answers(200, "How many jobs matched, and how many of them changed", json::<BulkResult>())
             .fails(&[Code::MissingFilter, Code::StorageFull]),
-        delete("/v1/jobs", (FILTERS,), jobs::delete_many)
+        delete(CANCEL, "/v1/jobs", (FILTERS,), jobs::delete_many)
             .rpcs(&["DeleteJobs"])
             .summary("Deletes all jobs that match the filters and have ended, pinned ones too")
             .answers(200, "How many jobs matched, and how many of them were deleted", json::<BulkResult>())

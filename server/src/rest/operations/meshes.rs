@@ -3,7 +3,7 @@
 use super::{
     content::{bytes, json, nothing},
     headers::location,
-    operation::{Operation, delete, get, post},
+    operation::{CANCEL, Operation, READ, SUBMIT, delete, get, post},
 };
 use crate::{
     catalog::Code,
@@ -17,7 +17,7 @@ use crate::{
 
 pub(super) fn operations() -> Vec<Operation> {
     vec![
-        post("/v1/meshes", (), meshes::upload)
+        post(SUBMIT, "/v1/meshes", (), meshes::upload)
             .rpcs(&["UploadMesh"])
             .summary("Stores a mesh file (Gmsh, Abaqus or CalculiX, inline JSON) once, under the hash of its content")
             .body(bytes("application/octet-stream"))
@@ -26,16 +26,16 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(201, "A new mesh", json::<MeshInfo>())
             .with([location()])
             .fails(&[Code::MalformedJson, Code::InvalidProblem, Code::PayloadTooLarge, Code::UnsupportedMedia, Code::Draining, Code::StorageFull]),
-        get("/v1/meshes", (PAGE_SIZE, PAGE_TOKEN), meshes::list)
+        get(READ, "/v1/meshes", (PAGE_SIZE, PAGE_TOKEN), meshes::list)
             .rpcs(&["ListMeshes"])
             .summary("Lists stored meshes, newest first")
             .answers(200, "A page of meshes", json::<meshes::List>())
             .fails(&[Code::BadPageToken]),
-        get("/v1/meshes/{hash}", (HASH,), meshes::get)
+        get(READ, "/v1/meshes/{hash}", (HASH,), meshes::get)
             .rpcs(&["GetMesh"])
             .summary("Returns the size, names and quality of a stored mesh")
             .answers(200, "The mesh, without its nodes and elements", json::<MeshInfo>()),
-        delete("/v1/meshes/{hash}", (HASH,), meshes::delete)
+        delete(CANCEL, "/v1/meshes/{hash}", (HASH,), meshes::delete)
             .rpcs(&["DeleteMesh"])
             .summary("Deletes a stored mesh that no waiting or running job needs")
             .answers(204, "It is deleted", nothing())

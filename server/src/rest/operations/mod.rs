@@ -17,15 +17,20 @@ mod meshes;
 mod results;
 mod service;
 mod sweeps;
+mod tokens;
 
 use axum::Router;
 
 pub(super) use operation::{Answer, Content, Operation};
 
 use super::call::AppState;
+use crate::caller::Access;
+
+/// Who may read the description of the API, over either protocol.
+pub(super) const DESCRIPTION: Access = operation::READ;
 
 /// The groups in the order in which they are documented: name, subject and operations.
-pub(super) const GROUPS: [Group; 5] = [
+pub(super) const GROUPS: [Group; 6] = [
     ("jobs", "Submit, get, list, watch, cancel", jobs::operations),
     ("results", "What a job has computed", results::operations),
     (
@@ -38,6 +43,11 @@ pub(super) const GROUPS: [Group; 5] = [
         "service",
         "Checking a problem without a job, and the service itself",
         service::operations,
+    ),
+    (
+        "tokens",
+        "Who may use the service; for administrators",
+        tokens::operations,
     ),
 ];
 

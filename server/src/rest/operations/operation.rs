@@ -6,6 +6,7 @@ use serde_json::Value;
 use strum::VariantArray;
 
 use crate::{
+    caller::{Access, Scope},
     catalog::Code,
     parameters::{Description, Location},
     rest::{
@@ -14,12 +15,22 @@ use crate::{
     },
 };
 
+// Who may use an operation; an entry begins with it, so that none is without.
+pub(super) const OPEN: Access = Access::Open;
+pub(super) const IDENTIFIED: Access = Access::Identified;
+pub(super) const READ: Access = Access::Needs(Scope::Read);
+pub(super) const SUBMIT: Access = Access::Needs(Scope::Submit);
+pub(super) const CANCEL: Access = Access::Needs(Scope::Cancel);
+pub(super) const ADMIN: Access = Access::Needs(Scope::Admin);
+
 /// An operation of the API.
 pub(in crate::rest) struct Operation {
     /// The HTTP method, in capitals.
     pub(in crate::rest) method: &'static str,
     /// The path, with its variables in braces.
     pub(in crate::rest) path: &'static str,
+    /// Who may use it.
+    pub(in crate::rest) access: Access,
     pub(super) route: MethodRouter<AppState>,
     /// Name of its group.
     pub(in crate::rest) group: &'static str,
@@ -60,6 +71,7 @@ pub(in crate::rest) type SchemaOf = fn(&mut SchemaGenerator) -> Schema;
 
 /// The handler receives the values of `input`, so that it cannot use a parameter that is not listed.
 fn operation<T, H>(
+    access: Access,
     (method, filter): (&'static str, MethodFilter),
     path: &'static str,
     input: T,
@@ -71,6 +83,7 @@ where
     H: Handler<T::Value>,
 {
     Operation {
+        access,
         method,
         path,
         parameters: input.descriptions(),
@@ -90,20 +103,27 @@ where
 
 macro_rules! methods {
     ($($name:ident $word:literal $filter:ident),*) => {
-        $(pub(super) fn $name<T, H>(path: &'static str, input: T, handler: H) -> Operation
+        $(pub(super) fn $name<T, H>(access: Access, path: &'static str, input: T, handler: H) -> Operation
         where
             T: Input<Value: Send> + Send + Sync + 'static,
             H: Handler<T::Value>,
         {
-            operation(($word, MethodFilter::$filter), path, input, true, handler)
+            operation(access, ($word, MethodFilter::$filter), path, input, true, handler)
         })*
     };
 }
 methods!(get "GET" GET, post "POST" POST, put "PUT" PUT, patch "PATCH" PATCH, delete "DELETE" DELETE);
 
-/// A probe: clients may add parameters of their own.
+/// A probe: open to everyone, and clients may add parameters of their own.
 pub(super) fn probe<H: Handler<()>>(path: &'static str, handler: H) -> Operation {
-    operation(("GET", MethodFilter::GET), path, (), false, handler)
+    operation(
+        Access::Open,
+        ("GET", MethodFilter::GET),
+        path,
+        (),
+        false,
+        handler,
+    )
 }
 
 impl Operation {
@@ -196,7 +216,11 @@ impl Operation {
             Code::RateLimited,
             Code::Internal,
             Code::Overloaded,
+            Code::Forbidden, // its Host or Origin, too
         ];
+        if self.access != Access::Open {
+            codes.push(Code::Unauthenticated);
+        }
         if self.body.is_some() {
             codes.push(Code::RequestTimeout);
         }

@@ -4,7 +4,7 @@ use solver::solution::{ContactProfile, Fields};
 
 use super::{
     content::{bytes, data, json, nothing},
-    operation::{Content, Operation, get},
+    operation::{Content, Operation, READ, get},
 };
 use crate::{
     catalog::Code,
@@ -29,12 +29,13 @@ pub(super) fn operations() -> Vec<Operation> {
     const TABLE: FormatOf = FormatOf(Format::OF_TABLES);
     const FIELDS: FormatOf = FormatOf(Format::OF_FIELDS);
     vec![
-        get("/v1/jobs/{id}/result", (ID,), results::result)
+        get(READ, "/v1/jobs/{id}/result", (ID,), results::result)
             .rpcs(&["GetResult"])
             .summary("Returns the summary of a job's result, and one for each load step")
             .answers(200, "The summary", json::<JobResult>())
             .fails(NO_RESULT),
         get(
+            READ,
             "/v1/jobs/{id}/history",
             (ID, TABLE, MAX_POINTS, PART),
             results::history,
@@ -43,6 +44,7 @@ pub(super) fn operations() -> Vec<Operation> {
         .summary("Returns the iterations of a job's last attempt, a row each")
         .file("The rows", data::<Vec<TimedIteration>>(Format::OF_TABLES)),
         get(
+            READ,
             "/v1/jobs/{id}/profiles/{boundary}",
             (ID, BOUNDARY, TABLE, STEP, POINTS, PART),
             results::profile,
@@ -51,12 +53,18 @@ pub(super) fn operations() -> Vec<Operation> {
         .summary("Returns columns along a contact boundary, by arc length")
         .file("The columns", data::<ContactProfile>(Format::OF_TABLES))
         .fails(NO_RESULT),
-        get("/v1/jobs/{id}/fields", (ID, FIELDS, PART), results::fields)
-            .rpcs(&["StreamResult"])
-            .summary("Returns mesh, displacements and stresses")
-            .file("The fields", data::<Fields>(Format::OF_FIELDS))
-            .fails(NO_RESULT),
         get(
+            READ,
+            "/v1/jobs/{id}/fields",
+            (ID, FIELDS, PART),
+            results::fields,
+        )
+        .rpcs(&["StreamResult"])
+        .summary("Returns mesh, displacements and stresses")
+        .file("The fields", data::<Fields>(Format::OF_FIELDS))
+        .fails(NO_RESULT),
+        get(
+            READ,
             "/v1/jobs/{id}/plots/{plot}",
             (ID, PLOT, THEME, STRESS),
             plots::plot,

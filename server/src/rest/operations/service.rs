@@ -2,7 +2,7 @@
 
 use super::{
     content::{bytes, json, submission},
-    operation::{Operation, get, post, probe},
+    operation::{ADMIN, IDENTIFIED, OPEN, Operation, READ, SUBMIT, get, post, probe},
 };
 use crate::{
     caller::Caller,
@@ -18,56 +18,56 @@ use crate::{
 
 pub(super) fn operations() -> Vec<Operation> {
     vec![
-        post("/v1/problems/validate", (), submit::validate)
+        post(SUBMIT, "/v1/problems/validate", (), submit::validate)
             .rpcs(&["ValidateProblem"])
             .summary("Checks a problem and estimates its cost; stores nothing; an invalid problem is also answered with 200")
             .body(json::<BareProblem>())
             .example(submission())
             .answers(200, "Whether it is valid, and its estimated cost", json::<Validation>())
             .fails(&[Code::InvalidProblem]),
-        get("/v1/queue", (), service::queue)
+        get(READ, "/v1/queue", (), service::queue)
             .rpcs(&["GetQueue"])
             .summary("Returns the state of the queue")
             .answers(200, "Its state", json::<QueueState>()),
-        post("/v1/queue/pause", (), service::pause)
+        post(ADMIN, "/v1/queue/pause", (), service::pause)
             .rpcs(&["PauseQueue"])
             .summary("Starts no more jobs until the queue is resumed, also after a restart; running jobs continue")
             .answers(200, "The state of the queue", json::<QueueState>())
             .fails(&[Code::StorageFull]),
-        post("/v1/queue/resume", (), service::resume)
+        post(ADMIN, "/v1/queue/resume", (), service::resume)
             .rpcs(&["ResumeQueue"])
             .summary("Starts jobs again")
             .answers(200, "The state of the queue", json::<QueueState>())
             .fails(&[Code::StorageFull]),
-        get("/v1/info", (), service::info)
+        get(READ, "/v1/info", (), service::info)
             .rpcs(&["GetServerInfo"])
             .summary("Returns the version and the limits of this service")
             .answers(200, "Version and limits", json::<Info>()),
-        get("/v1/me", (), service::me)
+        get(IDENTIFIED, "/v1/me", (), service::me)
             .rpcs(&["GetCaller"])
             .summary("Returns the caller: their owner name and scopes")
             .answers(200, "The caller", json::<Caller>()),
-        get("/v1/errors/{code}", (CODE,), service::error)
+        get(OPEN, "/v1/errors/{code}", (CODE,), service::error)
             .rest_only("GetError")
             .summary("Explains a kind of error and what to do, for programs or as a page")
             .answers(200, "The explanation", [json::<Kind>(), bytes("text/html")].concat()),
-        get("/v1/schema/problem.json", (), service::schema)
+        get(READ, "/v1/schema/problem.json", (), service::schema)
             .rest_only("GetProblemSchema")
             .summary("Returns the JSON Schema of a problem: every field with its meaning and default")
             .answers(200, "The schema", bytes("application/json")),
-        get("/openapi.json", (), service::openapi)
+        get(READ, "/openapi.json", (), service::openapi)
             .rest_only("GetOpenApi")
             .summary("Returns this description of the API over REST")
             .answers(200, "An OpenAPI document", bytes("application/json")),
-        get("/proto/signorini.proto", (), service::proto)
+        get(READ, "/proto/signorini.proto", (), service::proto)
             .rest_only("GetProto")
             .summary("Returns the description of the API over gRPC")
             .answers(200, "The protocol buffers", bytes("text/plain")),
-        get("/docs", (), docs::page)
+        get(READ, "/docs", (), docs::page)
             .rest_only("GetDocs")
             .summary("Shows a page with this description, where it can be tried out; it works offline")
             .answers(200, "The page", bytes("text/html")),
-        get("/docs/{file}", (FILE,), docs::file)
+        get(READ, "/docs/{file}", (FILE,), docs::file)
             .rest_only("GetDocsFile")
             .summary("Returns a file that this page loads")
             .answers(200, "The file", PARTS.map(bytes).concat()),

@@ -4,7 +4,7 @@ use super::{
     content::{self, data, json, lines, nothing, stream},
     headers::{etag, location, replayed, retry_after},
     jobs::{KEY, SUBMITTING},
-    operation::{Operation, delete, get, post},
+    operation::{CANCEL, Operation, READ, SUBMIT, delete, get, post},
 };
 use crate::{
     catalog::Code,
@@ -27,7 +27,7 @@ use crate::{
 pub(super) fn operations() -> Vec<Operation> {
     const TABLE: FormatOf = FormatOf(Format::OF_TABLES);
     vec![
-        post("/v1/sweeps", (KEY,), sweeps::create)
+        post(SUBMIT, "/v1/sweeps", (KEY,), sweeps::create)
             .rpcs(&["CreateSweep"])
             .summary("Submits a sweep: one problem with many values, at most 10,000 members, all or none; members on the same body are solved by one job")
             .body(json::<SweepSubmission>())
@@ -36,20 +36,19 @@ pub(super) fn operations() -> Vec<Operation> {
             .with([location(), etag(), retry_after()])
             .sometimes_with(replayed())
             .fails(SUBMITTING),
-        get("/v1/sweeps", (PAGE_SIZE, PAGE_TOKEN), sweeps::list)
+        get(READ, "/v1/sweeps", (PAGE_SIZE, PAGE_TOKEN), sweeps::list)
             .rpcs(&["ListSweeps"])
             .summary("Lists sweeps, newest first")
             .answers(200, "A page of sweeps", json::<sweeps::List>())
             .fails(&[Code::BadPageToken]),
-        get("/v1/sweeps/{id}", (ID, WAIT, IF_NONE_MATCH), sweeps::get)
+        get(READ, "/v1/sweeps/{id}", (ID, WAIT, IF_NONE_MATCH), sweeps::get)
             .rpcs(&["GetSweep"])
             .summary("Returns a sweep now, or when it has ended: its status, and how many of its members have ended")
             .answers(200, "The sweep", json::<Sweep>())
             .with([etag()])
             .answers(304, "The sweep has not changed", nothing())
             .with([etag()]),
-        get(
-            "/v1/sweeps/{id}/results",
+        get(READ, "/v1/sweeps/{id}/results",
             (ID, TABLE, PAGE_SIZE, PAGE_TOKEN, PART),
             sweeps::results,
         )
@@ -57,8 +56,7 @@ pub(super) fn operations() -> Vec<Operation> {
         .summary("Returns the table of a sweep, a row for each member by number, which fills while it runs: in pages as JSON, whole in the other formats")
         .file("The rows", data::<sweeps::Rows>(Format::OF_TABLES))
         .fails(&[Code::BadPageToken]),
-        get(
-            "/v1/sweeps/{id}/events",
+        get(READ, "/v1/sweeps/{id}/events",
             (ID, AFTER_SEQ, Header(sweeps::LAST_EVENT_ID)),
             sweeps::events,
         )
@@ -67,19 +65,18 @@ pub(super) fn operations() -> Vec<Operation> {
         .answers(200, "The events, each with its number; a comment every 15 s", [stream::<SweepEvent>(), lines()].concat())
         .answers(204, "The sweep has ended, and there are no events after that number", nothing())
         .fails(&[Code::NotAcceptable, Code::Draining]),
-        post("/v1/sweeps/{id}/cancel", (ID,), sweeps::cancel)
+        post(CANCEL, "/v1/sweeps/{id}/cancel", (ID,), sweeps::cancel)
             .rpcs(&["CancelSweep"])
             .summary("Asks all jobs of a sweep to stop; the rows that it has are kept")
             .answers(200, "The sweep", json::<Sweep>())
             .with([etag()])
             .fails(&[Code::StorageFull]),
-        delete("/v1/sweeps/{id}", (ID,), sweeps::delete)
+        delete(CANCEL, "/v1/sweeps/{id}", (ID,), sweeps::delete)
             .rpcs(&["DeleteSweep"])
             .summary("Deletes a sweep that has ended, with its jobs and rows")
             .answers(204, "It is deleted; for 7 days its id answers 410", nothing())
             .fails(&[Code::JobActive, Code::StorageFull]),
-        post(
-            "/v1/sweeps/{id}/members/{number}/job",
+        post(SUBMIT, "/v1/sweeps/{id}/members/{number}/job",
             (ID, NUMBER, KEY, PREFER),
             sweeps::solve_member,
         )

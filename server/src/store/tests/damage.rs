@@ -53,7 +53,7 @@ async fn everything(store: &Store, id: JobId, mesh: &str) -> Vec<(&'static str, 
         ("problem", text(store.problem(1).await)),
         ("events", text(store.events_after(1, 0, 100).await)),
         ("piece", text(store.piece(1, "fields", 0).await)),
-        ("mesh", text(store.mesh(mesh).await)),
+        ("mesh", text(store.mesh(Owners::All, mesh).await)),
         ("mesh body", text(store.mesh_body(mesh).await)),
     ];
     match store.snapshot(Owners::All, id).await {
@@ -123,7 +123,7 @@ async fn no_column_can_change_unnoticed() {
         .write_mesh_pieces(&mesh.hash, 0, &[vec![1], vec![2]])
         .await
         .unwrap();
-    store.insert_mesh(&mesh, 2).await.unwrap().unwrap();
+    store.insert_mesh("local", &mesh, 2).await.unwrap().unwrap();
     let job = solved(
         &store,
         NewJob {

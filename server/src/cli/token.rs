@@ -1,0 +1,346 @@
+//! `signorini token`: in a store that no server uses, or through a running service.
+
+use std::{path::PathBuf, sync::Arc};
+
+use anyhow::{Context, bail};
+use clap::{Args, Subcommand};
+use reqwest::{Client, Method};
+use serde_json::{Value, json};
+
+use super::{exit::Exit, output};
+use crate::{
+    caller::Caller,
+    store::{Store, StoreError},
+    time::Time,
+    token::Token,
+    verbs::tokens::{self, TokenRequest},
+};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Create a token and print it; it is not stored, and cannot be printed again. The first one must have the scope admin;
+    /// once there is one, every request needs a token
+    Create {
+        /// For people: where it is used
+        #[arg(long)]
+        name: String,
+        /// Whose jobs it submits: letters, digits and . _ @ + -
+        #[arg(long)]
+        owner: String,
+        /// read, submit, cancel or admin, which includes the others for the jobs of all owners; can be repeated, or a list
+        /// with commas
+        #[arg(
+            long = "scope",
+            value_delimiter = ',',
+            default_value = "read,submit,cancel"
+        )]
+        scopes: Vec<String>,
+        /// Seconds, or with a unit as 90d, 12h, 30m, until it expires [default: it does not]
+        #[arg(long, value_name = "TIME", value_parser = duration_s)]
+        expires_in: Option<f64>,
+        #[command(flatten)]
+        place: Place,
+    },
+    /// List all tokens, without their secrets
+    List {
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Revoke a token: from then on it is refused
+    Revoke {
+        /// Its id, as `list` shows it
+        id: String,
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Give a token another secret and print it; from then on the old one is refused
+    Rotate {
+        /// Its id, as `list` shows it
+        id: String,
+        #[command(flatten)]
+        place: Place,
+    },
+}
+
+/// Where the tokens are.
+#[derive(Debug, Args)]
+struct Place {
+    /// Folder of the store, if no server is using it
+    #[arg(
+        long,
+        env = "SIGNORINI_DATA",
+        default_value = "./signorini-data",
+        value_name = "FOLDER"
+    )]
+    data: PathBuf,
+
+    /// Address of a running service, as http://127.0.0.1:8080. It is called with the token in SIGNORINI_TOKEN
+    #[arg(long, env = "SIGNORINI_URL", value_name = "URL")]
+    url: Option<String>,
+}
+
+pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
+    match arguments.command {
+        Command::Create {
+            name,
+            owner,
+            scopes,
+            expires_in,
+            place,
+        } => {
+            let request = TokenRequest {
+                name,
+                owner,
+                scopes,
+                expires_in_s: expires_in,
+            };
+            let (token, secret) = match place.open().await? {
+                Door::Store(store) => {
+                    let new = tokens::create(&store, &Caller::local(), request).await;
+                    close(store).await;
+                    let new = new?;
+                    (new.token, new.secret)
+                }
+                Door::Service(service) => {
+                    let TokenRequest {
+                        name,
+                        owner,
+                        scopes,
+                        expires_in_s,
+                    } = request;
+                    let mut body = json!({"name": name, "owner": owner, "scopes": scopes});
+                    if let Some(seconds) = expires_in_s {
+                        body["expires_in_s"] = json!(seconds);
+                    }
+                    new_token(
+                        service
+                            .call(Method::POST, "/v1/tokens", Some(&body))
+                            .await?,
+                    )?
+                }
+            };
+            eprintln!("{}", told(&token));
+            output::print(&format!("{secret}\n"))?;
+        }
+        Command::List { place } => {
+            let all = match place.open().await? {
+                Door::Store(store) => {
+                    let all = tokens::list(&store, &Caller::local());
+                    close(store).await;
+                    all
+                }
+                Door::Service(service) => {
+                    let mut answer = service.call(Method::GET, "/v1/tokens", None).await?;
+                    serde_json::from_value(answer["tokens"].take()).context(NOT_OURS)?
+                }
+            };
+            output::print(&table(&all))?;
+        }
+        Command::Revoke { id, place } => {
+            let token = match place.open().await? {
+                Door::Store(store) => {
+                    let revoked = tokens::revoke(&store, &Caller::local(), &id).await;
+                    close(store).await;
+                    revoked?
+                }
+                Door::Service(service) => {
+                    let path = format!("/v1/tokens/{id}");
+                    let answer = service.call(Method::DELETE, &path, None).await?;
+                    serde_json::from_value(answer).context(NOT_OURS)?
+                }
+            };
+            eprintln!("{}", told(&token));
+        }
+        Command::Rotate { id, place } => {
+            let (token, secret) = match place.open().await? {
+                Door::Store(store) => {
+                    let new = tokens::rotate(&store, &Caller::local(), &id).await;
+                    close(store).await;
+                    let new = new?;
+                    (new.token, new.secret)
+                }
+                Door::Service(service) => {
+                    let path = format!("/v1/tokens/{id}/rotate");
+                    new_token(service.call(Method::POST, &path, None).await?)?
+                }
+            };
+            eprintln!("{}", told(&token));
+            output::print(&format!("{secret}\n"))?;
+        }
+    }
+    Ok(Exit::Ok)
+}
+
+const NOT_OURS: &str = "the answer is not that of this version of signorini";
+
+fn new_token(mut answer: Value) -> anyhow::Result<(Token, String)> {
+    let token = serde_json::from_value(answer["token"].take()).context(NOT_OURS)?;
+    let secret = answer["secret"].as_str().context(NOT_OURS)?.to_owned();
+    Ok((token, secret))
+}
+
+/// What leads to the tokens.
+enum Door {
+    Store(Arc<Store>),
+    Service(Remote),
+}
+
+/// A running service.
+struct Remote {
+    client: Client,
+    url: String,
+    token: Option<String>,
+}
+
+impl Place {
+    async fn open(&self) -> anyhow::Result<Door> {
+        let Some(url) = &self.url else {
+            let store = Store::open(&self.data).await;
+            return match store {
+                Err(StoreError::Locked(text)) => Err(StoreError::Locked(format!(
+                    "{text}; while it runs, give its address with --url"
+                ))
+                .into()),
+                opened => Ok(Door::Store(opened?)),
+            };
+        };
+        Ok(Door::Service(Remote {
+            client: Client::builder().build()?,
+            url: url.trim_end_matches('/').to_owned(),
+            token: std::env::var("SIGNORINI_TOKEN").ok(),
+        }))
+    }
+}
+
+impl Remote {
+    async fn call(
+        &self,
+        method: Method,
+        path: &str,
+        body: Option<&Value>,
+    ) -> anyhow::Result<Value> {
+        let mut request = self.client.request(method, format!("{}{path}", self.url));
+        if let Some(token) = &self.token {
+            request = request.bearer_auth(token);
+        }
+        if let Some(body) = body {
+            request = request.json(body);
+        }
+        let answer = request.send().await;
+        let answer = answer.with_context(|| format!("cannot reach {}", self.url))?;
+        let status = answer.status();
+        let document: Value = answer.json().await.context(NOT_OURS)?;
+        if !status.is_success() {
+            let detail = document["detail"].as_str().unwrap_or_default();
+            bail!("{}: {status}: {detail}", self.url);
+        }
+        Ok(document)
+    }
+}
+
+async fn close(store: Arc<Store>) {
+    store.close().await;
+}
+
+fn told(token: &Token) -> String {
+    let Token {
+        id, name, owner, ..
+    } = token;
+    format!(
+        "token {id} ({name}) of {owner}, for {}; {}",
+        scopes(token),
+        state(token, Time::now())
+    )
+}
+
+fn scopes(token: &Token) -> String {
+    let words: Vec<&str> = token.scopes.iter().map(|scope| (*scope).into()).collect();
+    words.join(",")
+}
+
+fn state(token: &Token, now: Time) -> String {
+    match (token.revoked_at, token.expires_at) {
+        (Some(time), _) => format!("revoked {time}"),
+        (None, Some(end)) if end <= now => format!("expired {end}"),
+        (None, Some(end)) => format!("valid until {end}"),
+        (None, None) => "valid".into(),
+    }
+}
+
+/// A line for each, below their headings.
+fn table(tokens: &[Token]) -> String {
+    let now = Time::now();
+    let mut rows = vec![["ID", "OWNER", "NAME", "SCOPES", "STATE"].map(String::from)];
+    rows.extend(tokens.iter().map(|token| {
+        let Token {
+            id, owner, name, ..
+        } = token;
+        [
+            id.clone(),
+            owner.clone(),
+            name.clone(),
+            scopes(token),
+            state(token, now),
+        ]
+    }));
+    let width = |column: usize| {
+        let lengths = rows.iter().map(|row| row[column].chars().count());
+        lengths.max().unwrap_or_default()
+    };
+    let widths: [usize; 5] = std::array::from_fn(width);
+    let line = |row: &[String; 5]| {
+        let cells = row.iter().zip(widths);
+        let cells: Vec<String> = cells
+            .map(|(cell, width)| format!("{cell:width$}"))
+            .collect();
+        cells.join("  ").trim_end().to_owned() + "\n"
+    };
+    rows.iter().map(line).collect()
+}
+
+/// Seconds, or a number with one of the units s, m, h, d.
+fn duration_s(text: &str) -> Result<f64, String> {
+    let (number, unit) = match text.strip_suffix(['s', 'm', 'h', 'd']) {
+        Some(number) => (number, &text[number.len()..]),
+        None => (text, "s"),
+    };
+    let seconds = match unit {
+        "d" => 86400.0,
+        "h" => 3600.0,
+        "m" => 60.0,
+        _ => 1.0,
+    };
+    let number: f64 = number
+        .parse()
+        .map_err(|_| "expected seconds, or a number with a unit, such as 90d, 12h or 30m")?;
+    Ok(number * seconds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_duration_is_a_number_of_seconds_or_has_a_unit() {
+        for (text, seconds) in [
+            ("60", 60.0),
+            ("1.5h", 5400.0),
+            ("90d", 7_776_000.0),
+            ("2m", 120.0),
+            ("5s", 5.0),
+        ] {
+            assert_eq!(duration_s(text), Ok(seconds), "{text}");
+        }
+        assert!(
+            ["", "d", "1w", "1 d"]
+                .iter()
+                .all(|text| duration_s(text).is_err())
+        );
+    }
+}

@@ -1,0 +1,188 @@
+//! Where a request may come from, as far as a browser says: it names one host that this service answers for, and is
+//! made by no page of another site. Otherwise any page that a user of the lab opens could submit, cancel and read with
+//! that user's reach: by a form or a script, or after leading its own name to this address (DNS rebinding).
+
+use std::{net::Ipv4Addr, net::Ipv6Addr, sync::LazyLock};
+
+use axum::{
+    extract::Request,
+    http::{HeaderMap, Version, header, uri::Authority},
+};
+
+use crate::{config::Web, error::ApiError};
+
+/// An error if the request names no host or a foreign one, or comes from a page of another site.
+pub(super) fn check(request: &Request, web: &Web) -> Result<(), ApiError> {
+    let Some(host) = host_of(request)? else {
+        return Ok(()); // HTTP/1.0: no browser
+    };
+    if !is_own_host(&host, web) {
+        return Err(ApiError::Forbidden(format!(
+            "the request names the host {:?}, for which this service does not answer; its administrator can allow it with \
+             --allowed-host",
+            shortened(host.as_str())
+        )));
+    }
+    check_origin(request.headers(), &host, web)
+}
+
+/// RFC 9112, 3.2: a request over HTTP/1.1 has exactly one Host; two could mean different things to a proxy and to us.
+fn host_of(request: &Request) -> Result<Option<Authority>, ApiError> {
+    let hosts: Vec<_> = request.headers().get_all(header::HOST).iter().collect();
+    let authority = request.uri().authority();
+    let wrong = |what: &str| Err(ApiError::BadRequest(what.into()));
+    let named = match hosts[..] {
+        [] if request.version() == Version::HTTP_11 => {
+            return wrong("the request has no Host header");
+        }
+        [] => return Ok(authority.cloned()),
+        [host] => host,
+        _ => return wrong("the request has several Host headers"),
+    };
+    match authority {
+        Some(authority) if authority.as_str().as_bytes() != named.as_bytes() => {
+            wrong("the Host header differs from the authority of the address")
+        }
+        _ => match Authority::try_from(named.as_bytes()) {
+            Ok(host) => Ok(Some(host)),
+            Err(_) => wrong("the Host header is not a host"),
+        },
+    }
+}
+
+/// A number cannot be led elsewhere, and neither can the names that this machine has for itself.
+fn is_own_host(host: &Authority, web: &Web) -> bool {
+    static MACHINE: LazyLock<String> = LazyLock::new(|| {
+        let system = rustix::system::uname();
+        system.nodename().to_string_lossy().to_ascii_lowercase()
+    });
+    let name = host.host().to_ascii_lowercase();
+    let number = name.trim_start_matches('[').trim_end_matches(']');
+    number.parse::<Ipv4Addr>().is_ok()
+        || number.parse::<Ipv6Addr>().is_ok()
+        || name == "localhost"
+        || name.ends_with(".localhost")
+        || (!MACHINE.is_empty() && name == *MACHINE)
+        || web.allowed_hosts.iter().any(|allowed| {
+            allowed.eq_ignore_ascii_case(&name) || allowed.eq_ignore_ascii_case(host.as_str())
+        })
+}
+
+/// A browser adds the origin of the page to all requests but the safest.
+fn check_origin(headers: &HeaderMap, host: &Authority, web: &Web) -> Result<(), ApiError> {
+    for origin in headers.get_all(header::ORIGIN) {
+        let text = String::from_utf8_lossy(origin.as_bytes()).to_ascii_lowercase();
+        let own = text
+            .strip_prefix("http://")
+            .or(text.strip_prefix("https://"))
+            .is_some_and(|page| page.eq_ignore_ascii_case(host.as_str()));
+        if !own && !web.allowed_origins.contains(&text) {
+            return Err(ApiError::Forbidden(format!(
+                "the request comes from a page of {:?}, and not of this service; its administrator can allow that with \
+                 --allowed-origin",
+                shortened(&text)
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn shortened(text: &str) -> String {
+    solver::error::shortened(text, 100)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use axum::body::Body;
+
+    use super::*;
+
+    fn request(version: Version, address: &str, headers: &[(&str, &str)]) -> Request {
+        let mut request = Request::builder().version(version).uri(address);
+        for (name, value) in headers {
+            request = request.header(*name, *value);
+        }
+        request.body(Body::empty()).unwrap()
+    }
+
+    #[test]
+    fn a_request_has_one_host() {
+        let check = |version: Version, address: &str, hosts: &[&str]| {
+            let hosts: Vec<_> = hosts.iter().map(|host| ("host", *host)).collect();
+            check(&request(version, address, &hosts), &Web::default()).is_ok()
+        };
+        assert!(check(Version::HTTP_11, "/", &["localhost"]));
+        assert!(!check(Version::HTTP_11, "/", &[]));
+        assert!(!check(Version::HTTP_11, "/", &["localhost", "localhost"]));
+        assert!(!check(Version::HTTP_11, "/", &["local host"]));
+        assert!(check(Version::HTTP_10, "/", &[]));
+        assert!(check(Version::HTTP_2, "http://localhost/", &[]));
+        assert!(check(Version::HTTP_2, "http://localhost/", &["localhost"]));
+        assert!(!check(Version::HTTP_2, "http://localhost/", &["127.0.0.1"]));
+    }
+
+    #[test]
+    fn a_host_is_a_number_or_a_name_that_is_known() {
+        let web = Web {
+            allowed_hosts: vec!["lab.example".into(), "other.example:81".into()],
+            ..Web::default()
+        };
+        let allowed = |host: &str| {
+            let request = request(Version::HTTP_11, "/", &[("host", host)]);
+            check(&request, &web).is_ok()
+        };
+        for own in [
+            "127.0.0.1:8080",
+            "192.168.0.7",
+            "[::1]:8080",
+            "LOCALHOST:1",
+            "a.localhost",
+            "lab.example",
+            "Lab.Example:8443",
+            "other.example:81",
+        ] {
+            assert!(allowed(own), "{own}");
+        }
+        for foreign in [
+            "evil.example",
+            "127.0.0.1.evil.example",
+            "localhost.evil.example",
+            "lab.example.evil.example",
+            "other.example:82",
+            "evillab.example",
+        ] {
+            assert!(!allowed(foreign), "{foreign}");
+        }
+    }
+
+    #[test]
+    fn a_page_of_another_origin_is_refused() {
+        let web = Web {
+            allowed_origins: vec!["https://dashboard.example".into()],
+            ..Web::default()
+        };
+        let allowed = |origin: &str| {
+            let headers = [("host", "127.0.0.1:8080"), ("origin", origin)];
+            check(&request(Version::HTTP_11, "/", &headers), &web).is_ok()
+        };
+        for own in [
+            "http://127.0.0.1:8080",
+            "https://127.0.0.1:8080",
+            "https://dashboard.example",
+        ] {
+            assert!(allowed(own), "{own}");
+        }
+        for foreign in [
+            "null",
+            "http://127.0.0.1:8081",
+            "http://127.0.0.1",
+            "http://dashboard.example",
+            "https://evil.example",
+            "https://dashboard.example.evil.example",
+            "",
+        ] {
+            assert!(!allowed(foreign), "{foreign}");
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! `/v1/tokens`.
+
+use axum::{
+    Json,
+    http::{StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{bodies, call::Call};
+use crate::{
+    error::ApiError,
+    token::Token,
+    verbs::tokens::{self as verbs, NewToken},
+};
+
+/// All tokens.
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "TokenList")]
+pub(super) struct List {
+    /// The oldest first, those that are no longer valid among them.
+    tokens: Vec<Token>,
+}
+
+pub(super) async fn create(mut call: Call) -> Result<Response, ApiError> {
+    let request = bodies::token(&call.json().await?)?;
+    let new = verbs::create(&call.service.store, &call.caller, request).await?;
+    let location = format!("/v1/tokens/{}", new.token.id);
+    let headers = [(header::LOCATION, location)];
+    Ok((StatusCode::CREATED, headers, shown_once(new)).into_response())
+}
+
+pub(super) async fn list(call: Call) -> Result<Json<List>, ApiError> {
+    let tokens = verbs::list(&call.service.store, &call.caller);
+    Ok(Json(List { tokens }))
+}
+
+pub(super) async fn revoke(call: Call, id: String) -> Result<Json<Token>, ApiError> {
+    let revoked = verbs::revoke(&call.service.store, &call.caller, &id).await?;
+    Ok(Json(revoked))
+}
+
+pub(super) async fn rotate(call: Call, id: String) -> Result<Response, ApiError> {
+    let new = verbs::rotate(&call.service.store, &call.caller, &id).await?;
+    Ok(shown_once(new).into_response())
+}
+
+/// No cache on the way may keep it.
+fn shown_once(new: NewToken) -> impl IntoResponse {
+    ([(header::CACHE_CONTROL, "no-store")], Json(new))
+}

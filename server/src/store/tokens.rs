@@ -1,0 +1,184 @@
+//! Tokens. All of them are also kept in memory, since every request is identified by one.
+
+use std::sync::{PoisonError, RwLockReadGuard, RwLockWriteGuard, atomic::Ordering::Relaxed};
+
+use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
+
+use super::{
+    checksum,
+    database::Store,
+    error::{Record, Result, StoreError},
+};
+use crate::{
+    time::Time,
+    token::{Presented, SecretHash, Token, Tokens},
+};
+
+impl Store {
+    /// Reads the tokens, when the store is opened. One that is damaged identifies nobody.
+    pub(super) async fn read_tokens(&self) -> Result<()> {
+        let rows = sqlx::query("select * from token")
+            .fetch_all(&self.reader)
+            .await?;
+        let mut tokens = Tokens::new();
+        for row in &rows {
+            match self.damages.noting(async { read(row) }).await {
+                Ok((token, hash)) => {
+                    tokens.insert(token.id.clone(), (token, hash));
+                }
+                Err(StoreError::Damaged(_)) => {} // logged
+                Err(error) => return Err(error),
+            }
+        }
+        self.any_tokens.store(!rows.is_empty(), Relaxed);
+        *self.tokens_mut() = tokens;
+        Ok(())
+    }
+
+    /// Whether there is a token, or was: from then on every request needs one.
+    pub fn has_tokens(&self) -> bool {
+        self.any_tokens.load(Relaxed)
+    }
+
+    /// The valid token that was sent, if it is one.
+    pub fn find_token(&self, presented: &Presented, now: Time) -> Option<Token> {
+        let tokens = self.tokens_in_memory();
+        let (token, hash) = tokens.get(&presented.id)?;
+        (*hash == presented.hash && token.is_valid(now)).then(|| token.clone())
+    }
+
+    /// Whether the token with this id is still valid.
+    pub fn is_valid_token(&self, id: &str, now: Time) -> bool {
+        let tokens = self.tokens_in_memory();
+        tokens.get(id).is_some_and(|(token, _)| token.is_valid(now))
+    }
+
+    /// All tokens, the oldest first.
+    pub fn tokens(&self) -> Vec<Token> {
+        let mut all: Vec<Token> = self
+            .tokens_in_memory()
+            .values()
+            .map(|(token, _)| token.clone())
+            .collect();
+        all.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
+        all
+    }
+
+    /// Stores a new token.
+    pub async fn insert_token(&self, token: &Token, hash: SecretHash) -> Result<()> {
+        self.control(|| self.write_token(token, hash, true)).await?;
+        self.any_tokens.store(true, Relaxed);
+        let entry = (token.clone(), hash);
+        self.tokens_mut().insert(token.id.clone(), entry);
+        Ok(())
+    }
+
+    /// Revokes a token, once and for all; `None` if there is none with this id.
+    pub async fn revoke_token(&self, id: &str, now: Time) -> Result<Option<Token>> {
+        self.change_token(id, |token, _| {
+            token.revoked_at.get_or_insert(now);
+        })
+        .await
+    }
+
+    /// Gives a token another secret; the old one is refused from then on.
+    pub async fn rotate_token(&self, id: &str, new: SecretHash) -> Result<Option<Token>> {
+        self.change_token(id, |_, hash| *hash = new).await
+    }
+
+    async fn change_token(
+        &self,
+        id: &str,
+        change: impl FnOnce(&mut Token, &mut SecretHash),
+    ) -> Result<Option<Token>> {
+        // one after the other: what two change at once would be what the later one has read
+        let _lock = self.change_lock.lock().await;
+        let found = self.tokens_in_memory().get(id).cloned();
+        let Some((mut token, mut hash)) = found else {
+            return Ok(None);
+        };
+        change(&mut token, &mut hash);
+        self.control(|| self.write_token(&token, hash, false))
+            .await?;
+        self.tokens_mut().insert(id.into(), (token.clone(), hash));
+        Ok(Some(token))
+    }
+
+    async fn write_token(&self, token: &Token, hash: SecretHash, new: bool) -> Result<()> {
+        let mut tx = self.begin_control().await?;
+        let statement = match new {
+            true => {
+                "insert into token (id, name, owner, scopes, hash, created_at, expires_at, revoked_at)
+                 values (?, ?, ?, ?, ?, ?, ?, ?)"
+            }
+            false => {
+                "insert or replace into token (id, name, owner, scopes, hash, created_at, expires_at, revoked_at)
+                 values (?, ?, ?, ?, ?, ?, ?, ?)"
+            }
+        };
+        sqlx::query(statement)
+            .bind(&token.id)
+            .bind(&token.name)
+            .bind(&token.owner)
+            .bind(serde_json::to_string(&token.scopes)?)
+            .bind(&hash.0[..])
+            .bind(token.created_at.micros())
+            .bind(token.expires_at.map(Time::micros))
+            .bind(token.revoked_at.map(Time::micros))
+            .execute(&mut *tx)
+            .await?;
+        seal(&mut tx, &token.id).await?;
+        tx.commit().await
+    }
+
+    fn tokens_in_memory(&self) -> RwLockReadGuard<'_, Tokens> {
+        self.tokens.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn tokens_mut(&self) -> RwLockWriteGuard<'_, Tokens> {
+        self.tokens.write().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Sets the checksum of a row that was written.
+async fn seal(tx: &mut SqliteConnection, id: &str) -> Result<()> {
+    let row = sqlx::query("select * from token where id = ?")
+        .bind(id)
+        .fetch_one(&mut *tx)
+        .await?;
+    sqlx::query("update token set checksum = ? where id = ?")
+        .bind(checksum::of_row(&row)?)
+        .bind(id)
+        .execute(tx)
+        .await?;
+    Ok(())
+}
+
+/// A row of the table.
+pub(super) fn read(row: &SqliteRow) -> Result<(Token, SecretHash)> {
+    let id: String = row.try_get("id")?;
+    let record = || Record::named(format!("token {id}"));
+    if !checksum::row_is_intact(row)? {
+        return Err(record().damaged("its checksum is not that of its content"));
+    }
+    let scopes = serde_json::from_str(row.try_get("scopes")?);
+    let scopes = scopes.map_err(|error| record().damaged(error))?;
+    let hash: Vec<u8> = row.try_get("hash")?;
+    let hash = hash
+        .try_into()
+        .map_err(|_| record().damaged("its hash has another length"))?;
+    let time = |name: &str| -> Result<Option<Time>> {
+        let micros: Option<i64> = row.try_get(name)?;
+        Ok(micros.map(Time::from_micros))
+    };
+    let token = Token {
+        name: row.try_get("name")?,
+        owner: row.try_get("owner")?,
+        scopes,
+        created_at: Time::from_micros(row.try_get("created_at")?),
+        expires_at: time("expires_at")?,
+        revoked_at: time("revoked_at")?,
+        id,
+    };
+    Ok((token, SecretHash(hash)))
+}

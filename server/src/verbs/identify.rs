@@ -1,0 +1,71 @@
+//! Who makes a request: by a token, by what a proxy says that is trusted, or, without either, everyone is the same.
+
+use crate::{
+    caller::{Caller, Peer, is_owner},
+    config::ProxyTrust,
+    error::ApiError,
+    store::Store,
+    time::Time,
+    token::Presented,
+};
+
+/// What a request shows of its caller.
+#[derive(Clone, Debug, Default)]
+pub struct Credentials {
+    /// The token that it sends; an `Err` if what it sends is not one.
+    pub token: Option<Result<Presented, ()>>,
+    /// Users named by the header of a proxy; more than one is wrong.
+    pub users: Vec<String>,
+}
+
+/// A caller, and the id of the token that identified them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identified {
+    /// The caller.
+    pub caller: Caller,
+    /// Their token.
+    pub token: Option<String>,
+}
+
+/// The caller of a request from `peer`, or why there is none.
+pub fn identify(
+    store: &Store,
+    trust: &ProxyTrust,
+    peer: Option<Peer>,
+    credentials: &Credentials,
+) -> Result<Identified, ApiError> {
+    const UNKNOWN: &str = "the token is unknown, was revoked or has expired";
+    if let Some(Ok(presented)) = &credentials.token {
+        let token = store.find_token(presented, Time::now());
+        let token = token.ok_or(ApiError::Unauthenticated(UNKNOWN))?;
+        return Ok(Identified {
+            caller: token.caller(),
+            token: Some(token.id),
+        });
+    }
+    let known = |caller| Identified {
+        caller,
+        token: None,
+    };
+    if peer.is_some_and(|Peer(address)| trust.includes(address)) {
+        match &credentials.users[..] {
+            [user] if is_owner(user) => return Ok(known(trust.caller(user))),
+            [] => {}
+            [..] => {
+                return Err(ApiError::Unauthenticated(
+                    "the proxy does not name one user in the characters A-Z a-z 0-9 . _ @ + -",
+                ));
+            }
+        }
+    }
+    // what is not a token may be what a proxy asks for, but of nobody else
+    if credentials.token.is_some() {
+        return Err(ApiError::Unauthenticated(UNKNOWN));
+    }
+    match store.has_tokens() || trust.is_on() {
+        true => Err(ApiError::Unauthenticated(
+            "this service needs a token: send it as `Authorization: Bearer TOKEN`",
+        )),
+        false => Ok(known(Caller::local())),
+    }
+}

@@ -1,0 +1,231 @@
+//! Tokens: made, listed, revoked, and given another secret, by administrators.
+
+use std::{collections::BTreeSet, sync::Arc};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use solver::error::{Findings, Reason, Violation};
+use tracing::info;
+
+use super::service::detached;
+use crate::{
+    caller::{Caller, MAX_OWNER, Scope, is_owner},
+    error::ApiError,
+    parameters::{Values, Variable},
+    store::Store,
+    time::Time,
+    token::{Secret, Token, new_id},
+};
+
+/// Longest name of a token, in characters.
+pub const MAX_NAME: usize = 64;
+/// Most tokens that are valid at the same time.
+pub const MAX_TOKENS: usize = 10_000;
+/// Shortest time until a token expires.
+pub const MIN_EXPIRES_IN_S: f64 = 60.0;
+/// Longest time until a token expires: ten years.
+pub const MAX_EXPIRES_IN_S: f64 = 10.0 * 366.0 * 86400.0;
+
+/// A token in a path.
+pub const TOKEN: Variable<TokenIds> = Variable {
+    name: "token",
+    kind: "token",
+    meaning: "The token, by its id",
+    values: TokenIds,
+};
+
+/// The ids of tokens.
+#[derive(Clone, Copy, Debug)]
+pub struct TokenIds;
+
+impl Values for TokenIds {
+    type Value = String;
+
+    fn schema(&self) -> serde_json::Value {
+        serde_json::json!({ "type": "string", "pattern": "^[0-9a-f]{12}$" })
+    }
+
+    fn expected(&self) -> String {
+        "12 digits from 0 to f, in lower case".into()
+    }
+
+    fn read(&self, text: &str) -> Option<String> {
+        let digit = |byte: u8| matches!(byte, b'0'..=b'9' | b'a'..=b'f');
+        (text.len() == 12 && text.bytes().all(digit)).then(|| text.to_owned())
+    }
+}
+
+/// What a new token is to be.
+#[derive(Clone, Debug, Default)]
+pub struct TokenRequest {
+    /// For people: where it is used.
+    pub name: String,
+    /// Whose jobs it submits.
+    pub owner: String,
+    /// What it allows.
+    pub scopes: Vec<String>,
+    /// Seconds until it expires; absent: never.
+    pub expires_in_s: Option<f64>,
+}
+
+/// A token whose secret is shown, this once.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct NewToken {
+    /// The token.
+    pub token: Token,
+    /// What clients send, as `Authorization: Bearer SECRET`. It is not stored, and cannot be shown again.
+    pub secret: String,
+}
+
+/// The checked content of a request, or all that is wrong with it. `first`: there is no token yet.
+fn checked(request: &TokenRequest, first: bool) -> Result<BTreeSet<Scope>, ApiError> {
+    let mut found = Findings::default();
+    let mut wrong = |pointer: &str, reason, got: &str, expected: String, hint: &str| {
+        found.add(Violation::new(pointer, reason, got, expected, hint));
+    };
+    let length = request.name.chars().count();
+    if !(1..=MAX_NAME).contains(&length) || request.name.chars().any(char::is_control) {
+        wrong(
+            "/name",
+            Reason::OutOfRange,
+            &format!("{length} characters"),
+            format!("1 … {MAX_NAME} characters, none of them a control character"),
+            "Say where the token is used: laptop, nightly study.",
+        );
+    }
+    if !is_owner(&request.owner) {
+        wrong(
+            "/owner",
+            Reason::OutOfRange,
+            &format!("{:?}", request.owner),
+            format!("1 … {MAX_OWNER} of the characters A-Z a-z 0-9 . _ @ + -"),
+            "The name of the person, or of the program, whose jobs it submits.",
+        );
+    }
+    let mut scopes = BTreeSet::new();
+    for (n, word) in request.scopes.iter().enumerate() {
+        match word.parse() {
+            Ok(scope) => {
+                scopes.insert(scope);
+            }
+            Err(_) => wrong(
+                &format!("/scopes/{n}"),
+                Reason::UnknownName,
+                &format!("{word:?}"),
+                "read, submit, cancel or admin".into(),
+                "admin includes the others, for the jobs of all owners.",
+            ),
+        }
+    }
+    if request.scopes.is_empty() {
+        wrong(
+            "/scopes",
+            Reason::Missing,
+            "none",
+            "one or more of read, submit, cancel and admin".into(),
+            "read, submit and cancel are for users; admin also creates tokens and pauses the queue.",
+        );
+    } else if first && !scopes.contains(&Scope::Admin) {
+        wrong(
+            "/scopes",
+            Reason::Missing,
+            &request.scopes.join(", "),
+            "admin, since this is the first token".into(),
+            "Once there is a token every request needs one, and without an administrator nobody could create another.",
+        );
+    }
+    if let Some(seconds) = request.expires_in_s
+        && !(MIN_EXPIRES_IN_S..=MAX_EXPIRES_IN_S).contains(&seconds)
+    {
+        wrong(
+            "/expires_in_s",
+            Reason::OutOfRange,
+            &seconds.to_string(),
+            format!("{MIN_EXPIRES_IN_S} … {MAX_EXPIRES_IN_S} seconds"),
+            "Leave it out for a token that does not expire.",
+        );
+    }
+    found.into_result(scopes).map_err(ApiError::InvalidProblem)
+}
+
+/// Makes a token. The first one closes the service to requests without one.
+pub async fn create(
+    store: &Arc<Store>,
+    caller: &Caller,
+    request: TokenRequest,
+) -> Result<NewToken, ApiError> {
+    let now = Time::now();
+    let scopes = checked(&request, !store.has_tokens())?;
+    let valid = store.tokens().iter().filter(|t| t.is_valid(now)).count();
+    if valid >= MAX_TOKENS {
+        return Err(ApiError::InvalidProblem(vec![Violation::new(
+            "",
+            Reason::TooMany,
+            format!("{valid} valid tokens"),
+            format!("at most {MAX_TOKENS}"),
+            "Revoke those that are no longer used, or let tokens expire.",
+        )]));
+    }
+    let id = new_id().map_err(ApiError::internal)?;
+    let (secret, hash) = Secret::new(&id).map_err(ApiError::internal)?;
+    let token = Token {
+        id,
+        name: request.name,
+        owner: request.owner,
+        scopes,
+        created_at: now,
+        expires_at: request.expires_in_s.map(|seconds| now.after_s(seconds)),
+        revoked_at: None,
+    };
+    let (store, by) = (store.clone(), caller.owner().to_owned());
+    detached(async move {
+        store.insert_token(&token, hash).await?;
+        let Token { id, owner, .. } = &token;
+        info!(
+            token.id = id,
+            owner, by, "token {id} of {owner} was created by {by}"
+        );
+        Ok(NewToken {
+            token,
+            secret: secret.reveal(),
+        })
+    })
+    .await
+}
+
+/// All tokens, the oldest first, those that are no longer valid among them.
+pub fn list(store: &Store, _caller: &Caller) -> Vec<Token> {
+    store.tokens()
+}
+
+/// Revokes a token: from now on it is refused, and streams that it has opened end.
+pub async fn revoke(store: &Arc<Store>, caller: &Caller, id: &str) -> Result<Token, ApiError> {
+    let (store, by, id) = (store.clone(), caller.owner().to_owned(), id.to_owned());
+    detached(async move {
+        let revoked = store.revoke_token(&id, Time::now()).await?;
+        let token = revoked.ok_or_else(|| unknown(&id))?;
+        info!(token.id = id, by, "token {id} was revoked by {by}");
+        Ok(token)
+    })
+    .await
+}
+
+/// Gives a token another secret: from now on the old one is refused.
+pub async fn rotate(store: &Arc<Store>, caller: &Caller, id: &str) -> Result<NewToken, ApiError> {
+    let (store, by, id) = (store.clone(), caller.owner().to_owned(), id.to_owned());
+    let (secret, hash) = Secret::new(&id).map_err(ApiError::internal)?;
+    detached(async move {
+        let rotated = store.rotate_token(&id, hash).await?;
+        let token = rotated.ok_or_else(|| unknown(&id))?;
+        info!(token.id = id, by, "token {id} has a new secret, by {by}");
+        Ok(NewToken {
+            token,
+            secret: secret.reveal(),
+        })
+    })
+    .await
+}
+
+fn unknown(id: &str) -> ApiError {
+    ApiError::NotFound(format!("there is no token {id}"))
+}
