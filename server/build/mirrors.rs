@@ -145,6 +145,8 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("ServiceLimits", "info::ServiceLimits").answer(),
     fields("BodyCache", "bodies::BodyCache").answer(),
     fields("QueueState", "queue::QueueState").answer(),
+    fields("Caller", "info::Me").answer(),
+    fields("Share", "info::Share").answer(),
     fields("Token", "token::Token").answer(),
     fields("NewToken", "tokens::NewToken").answer(),
 

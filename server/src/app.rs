@@ -103,6 +103,9 @@ impl App {
         }
         let (bytes, of_bodies) = (config.memory.bytes(), config.body_cache_bytes());
         store.set_budget(Budget::new(bytes, config.workers, of_bodies));
+        if let Some(most) = config.max_running_per_owner {
+            store.set_most_running_of_owner(most.into());
+        }
         let solver = match config.isolation {
             Isolation::Thread => Solver::Threads(solver::solve_on),
             Isolation::Process => Solver::Processes(Processes::new(worker_process)),

@@ -62,7 +62,7 @@ impl Access {
 }
 
 /// The caller of a request; every verb takes one.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Caller {
     /// The owner of the jobs that this caller submits.
     owner: String,

@@ -68,6 +68,21 @@ pub struct Config {
     )]
     pub max_queued: u32,
 
+    /// Maximum number of jobs of one owner in the queue, where there are tokens or a trusted proxy; further ones are refused
+    #[arg(
+        long,
+        env = "SIGNORINI_MAX_QUEUED_PER_OWNER",
+        default_value_t = 2_000,
+        value_name = "N"
+    )]
+    pub max_queued_per_owner: u32,
+
+    /// Maximum number of jobs of one owner that run at the same time, even if workers are idle [default: as many as there are
+    /// workers]
+    #[arg(long, env = "SIGNORINI_MAX_RUNNING_PER_OWNER", value_name = "N",
+          value_parser = clap::value_parser!(u16).range(1..))]
+    pub max_running_per_owner: Option<u16>,
+
     #[command(flatten)]
     #[allow(missing_docs)] // a doc comment here would become the help of the command
     pub memory: MemoryBudget,

@@ -2,6 +2,7 @@
 //! an error becomes the HTTP document, and the gRPC status with its details.
 
 use axum::http::StatusCode;
+use serde::Serialize;
 use serde_json::{Value, json};
 use solver::{
     Estimate,
@@ -157,6 +158,9 @@ pub enum ApiError {
     /// The problem, or what was submitted with it, is invalid.
     #[error("{}", summed_up(.0))]
     InvalidProblem(Vec<Violation>),
+    /// The owner has as many of something as they may.
+    #[error("{0}")]
+    QuotaExceeded(Quota),
     /// Too many requests at once.
     #[error("more requests arrive at once than can be answered soon")]
     RateLimited,
@@ -194,6 +198,22 @@ pub enum ApiError {
     /// The disk is full.
     #[error("the disk is full, or cannot be written")]
     StorageFull,
+}
+
+/// What an owner has as much of as they may.
+#[derive(Clone, Debug, Serialize, thiserror::Error)]
+#[error("{owner} has {used} jobs in the queue, and may have {limit}; this would be {asked} more")]
+pub struct Quota {
+    /// Whose.
+    pub owner: String,
+    /// What: `queued`.
+    pub of: &'static str,
+    /// As much as they may have.
+    pub limit: u64,
+    /// As much as they have.
+    pub used: u64,
+    /// What the request would add.
+    pub asked: u64,
 }
 
 impl ApiError {
@@ -238,6 +258,7 @@ impl ApiError {
             | ApiError::AnswerTooLarge { .. } => Code::PayloadTooLarge,
             ApiError::ProblemTooLarge { .. } => Code::ProblemTooLarge,
             ApiError::InvalidProblem(_) => Code::InvalidProblem,
+            ApiError::QuotaExceeded(_) => Code::QuotaExceeded,
             ApiError::RateLimited => Code::RateLimited,
             ApiError::Internal { .. } => Code::Internal,
             ApiError::QueueFull { .. } => Code::QueueFull,
@@ -291,6 +312,7 @@ impl ApiError {
                 document["estimate"] = json!(estimate);
                 document["memory_budget_bytes"] = json!(budget_bytes);
             }
+            ApiError::QuotaExceeded(quota) => document["quota"] = json!(quota),
             _ => {}
         }
         document
@@ -324,6 +346,10 @@ impl From<ApiError> for Status {
                     estimate.memory_bytes.to_string(),
                 );
                 metadata.insert("memory_budget_bytes".to_string(), budget_bytes.to_string());
+            }
+            ApiError::QuotaExceeded(quota) => {
+                let subject = format!("owner:{}", quota.owner);
+                details.add_quota_failure_violation(subject, quota.to_string());
             }
             _ => {}
         }

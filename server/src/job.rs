@@ -460,6 +460,8 @@ pub enum Waiting {
     Memory,
     /// The queue is paused.
     Paused,
+    /// Its owner has as many running jobs as they may.
+    OwnerLimit,
     /// It is coalesced into a job with the same input that waits or runs, and will end with its result.
     Coalesced,
 }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use service::pb;
 use suite::{
     example_json,
-    harness::{Server, answer, large},
+    harness::{Server, answer, block, large},
 };
 use tonic::Code;
 
@@ -385,7 +385,8 @@ async fn time_limits_end_a_job_with_reasons_of_their_own() {
         let job = server.create_job(&body).await;
         job["id"].as_str().unwrap().to_owned()
     };
-    let long = post(large(), json!({ "timeout_s": 1.0 })).await;
+    // longer than the second between two looks at what waits
+    let long = post(block(600, 280), json!({ "timeout_s": 1.5 })).await;
     let late = post(example_json("sheet"), json!({ "queue_ttl_s": 0.2 })).await;
     let done = server.until_done(&late).await;
     assert_eq!(

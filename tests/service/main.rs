@@ -24,6 +24,7 @@ mod rest_and_grpc_agree;
 mod restart;
 mod results;
 mod same_errors;
+mod shares;
 mod solve_command;
 mod submit;
 mod sweeps;

@@ -295,9 +295,14 @@ async fn both_protocols_return_the_same_about_the_service() {
         .unwrap()
         .into_inner();
     let me = server.json("/v1/me").await;
+    let share = |share: Option<pb::Share>| {
+        let share = share.unwrap();
+        json!({ "used": share.used, "limit": share.limit })
+    };
     assert_eq!(
         me,
-        json!({ "owner": caller.owner, "scopes": caller.scopes })
+        json!({ "owner": caller.owner, "scopes": caller.scopes,
+            "queued": share(caller.queued), "running": share(caller.running) })
     );
     // right after the start the dispatcher holds a worker while it looks for a job
     let queue = soon("all workers are idle", async {

@@ -36,6 +36,8 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         workers: 2,
         isolation: Isolation::Thread,
         max_queued: 100,
+        max_queued_per_owner: 100,
+        max_running_per_owner: None,
         memory: MemoryBudget::default(),
         body_cache_bytes: None,
         max_body_bytes: 16 << 20,

@@ -8,7 +8,7 @@ use solver::solution::{Phase, Stage, WarningCode};
 
 use super::IntoMessage;
 use crate::{
-    caller::{Caller, Scope},
+    caller::Scope,
     event::{Event, Payload, TimedIteration},
     job::{JobId, Reason, SweepId, Waiting},
     pb,
@@ -78,16 +78,6 @@ impl IntoMessage<Vec<String>> for BTreeSet<Scope> {
     fn into_message(self) -> Vec<String> {
         let scopes = self.into_iter().map(<&str>::from);
         scopes.map(str::to_owned).collect()
-    }
-}
-
-impl From<Caller> for pb::Caller {
-    fn from(caller: Caller) -> Self {
-        let scopes = caller.scopes().map(<&str>::from);
-        pb::Caller {
-            owner: caller.owner().to_owned(),
-            scopes: scopes.map(str::to_owned).collect(),
-        }
     }
 }
 

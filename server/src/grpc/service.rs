@@ -378,7 +378,7 @@ impl JobService for Grpc {
 
     async fn get_caller(&self, request: Request<pb::GetCallerRequest>) -> Reply<pb::Caller> {
         let (caller, _) = caller_and_message(request)?;
-        Ok(Response::new(caller.into()))
+        Ok(Response::new(info::me(&self.service, &caller).into()))
     }
 
     async fn create_token(&self, request: Request<pb::CreateTokenRequest>) -> Reply<pb::NewToken> {

@@ -9,12 +9,11 @@ use serde_json::Value;
 
 use super::{accept::prefers, call::Call};
 use crate::{
-    caller::Caller,
     catalog::{Code, Kind},
     error::ApiError,
     parameters::{Variable, Words},
     verbs::{
-        info::{self as about, Info},
+        info::{self as about, Info, Me},
         queue::{self as verbs, QueueState},
     },
 };
@@ -35,8 +34,8 @@ pub(super) async fn info(call: Call) -> Result<Json<Info>, ApiError> {
     Ok(Json(about::info(&call.service, &call.caller)))
 }
 
-pub(super) async fn me(call: Call) -> Result<Json<Caller>, ApiError> {
-    Ok(Json(call.caller))
+pub(super) async fn me(call: Call) -> Result<Json<Me>, ApiError> {
+    Ok(Json(about::me(&call.service, &call.caller)))
 }
 
 /// A kind of error in a path.

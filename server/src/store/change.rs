@@ -142,11 +142,6 @@ impl Change<'_> {
         }
     }
 
-    /// How many parts were found damaged so far.
-    pub(super) fn damaged_parts(&self) -> usize {
-        self.store.damages.summary().0
-    }
-
     /// The problem of a job. It is read beside the transaction first: a page that cannot be read would end that.
     pub(super) async fn problem(&mut self, job: &Job) -> Result<StoredProblem> {
         let mut reader = self.store.reader.acquire().await?;
@@ -188,11 +183,25 @@ impl Change<'_> {
             .to_vec()
     }
 
+    /// How many jobs of this owner wait, with the changes of this transaction.
+    pub(super) fn waiting_of(&self, owner: &str) -> usize {
+        let mut waiting = self.store.waiting_jobs();
+        waiting.with(&self.moves, |waiting| waiting.len_of(owner))
+    }
+
+    /// The next job that waits, with the changes of this transaction, and its owner's turn.
+    pub(super) fn next(&self, damaged: &BTreeSet<i64>) -> Option<(i64, Move)> {
+        let most_running = self.store.most_running_of_owner();
+        let mut waiting = self.store.waiting_jobs();
+        waiting.with(&self.moves, |waiting| waiting.next(damaged, most_running))
+    }
+
     /// How many jobs wait, with the changes of this transaction.
     pub(super) fn waiting(&self) -> usize {
         let difference = |change: &Move| match change {
-            Move::Enter { .. } | Move::Attach => 1,
-            Move::Leave { .. } | Move::Detach => -1,
+            Move::Enter(_) | Move::Attach(_) => 1,
+            Move::Leave(_) | Move::Detach(_) => -1,
+            Move::Start(_) | Move::Stop(_) | Move::Turn { .. } => 0,
         };
         let change: isize = self.moves.iter().map(difference).sum();
         self.store
@@ -242,9 +251,9 @@ impl Change<'_> {
         }
         self.tx.commit().await?;
         let mut waiting = self.store.waiting_jobs();
-        self.moves
-            .into_iter()
-            .for_each(|change| waiting.apply(change));
+        for change in self.moves {
+            waiting.apply(change);
+        }
         drop(waiting);
         self.log_lines.iter().for_each(|(id, line)| line.log(*id));
         Ok(self.changed)

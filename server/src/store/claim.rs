@@ -1,5 +1,7 @@
 //! The next job of the queue, claimed for a worker.
 
+use std::collections::BTreeSet;
+
 use super::{
     change::Change,
     coalescing,
@@ -9,6 +11,7 @@ use super::{
     lifecycle::{self, Ending},
     rows::read,
     submission::Claim,
+    waiting::Move,
 };
 use crate::{
     failpoint::{self, Point},
@@ -16,8 +19,7 @@ use crate::{
 };
 
 impl Store {
-    /// Starts an attempt of the next job of the queue: highest priority first, then in order of arrival. Jobs
-    /// before it for which there is a result by now are answered. Also returns all jobs that have changed.
+    /// Starts an attempt of the next job of the queue, in the order of `waiting`. Jobs before it for which there is a result by now are answered. Also returns all jobs that have changed.
     pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
         self.writing(self.try_to_claim_next()).await
     }
@@ -30,30 +32,18 @@ impl Store {
     }
 }
 
-/// The next job of the queue. The index is named because the planner, which does not know how many jobs there are,
-/// would sort all waiting ones instead.
-pub(super) const NEXT: &str = "select id from job indexed by job_queue
-     where status = 'queued' and coalesced_into is null order by priority desc, id limit ?";
-
-/// The next job of the queue, but for damaged ones, of which nothing can be trusted: they wait until the operator
-/// removes them, and the others go on.
-async fn next(change: &mut Change<'_>) -> Result<Option<Job>> {
-    loop {
-        let damaged = change.damaged_parts();
-        let keys: Vec<i64> = sqlx::query_scalar(NEXT)
-            .bind(damaged as i64 + 1)
-            .fetch_all(change.sql())
-            .await?;
-        for key in keys {
-            let found = read(change.sql(), key).await;
-            if let Some(job) = change.unless_damaged(found).await? {
-                return Ok(Some(job));
-            }
-        }
-        if change.damaged_parts() == damaged {
-            return Ok(None); // none waits but those
-        }
+/// The next job of the queue and its owner's turn, but for damaged ones, of which nothing can be trusted: they wait until
+/// the operator removes them, and the others go on.
+async fn next(change: &mut Change<'_>) -> Result<Option<(Job, Move)>> {
+    let mut damaged = BTreeSet::new();
+    while let Some((key, turn)) = change.next(&damaged) {
+        let found = read(change.sql(), key).await;
+        match change.unless_damaged(found).await? {
+            Some(job) => return Ok(Some((job, turn))),
+            None => damaged.insert(key),
+        };
     }
+    Ok(None)
 }
 
 /// Claims within a transaction. The next job waits until it fits into the memory budget, and those after it wait with
@@ -63,7 +53,7 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
     /// With more jobs than this, one transaction would take too long.
     const MOST_ANSWERED: usize = 100;
     for _ in 0..MOST_ANSWERED {
-        let Some(waiting) = next(change).await? else {
+        let Some((waiting, turn)) = next(change).await? else {
             return Ok(None);
         };
         // there may be a result by now
@@ -90,6 +80,7 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
             return Ok(None);
         };
         let job = lifecycle::start_attempt(change, &waiting).await?;
+        change.move_job(turn);
         let (problem, mesh) = match stored {
             Ok(stored) => (stored.body, stored.mesh),
             // it fails alone, and does not stop the queue

@@ -14,7 +14,7 @@ use super::{
     results,
     rows::{from_row, read},
     submission::NewJob,
-    waiting::Move,
+    waiting::{Move, Place},
 };
 use crate::job::{Job, Reason, Status};
 
@@ -118,9 +118,9 @@ pub(super) async fn coalesce_into_running(change: &mut Change<'_>, job: &Job) ->
     }
     let coalesced = coalesced_jobs(change, job.key).await?;
     coalesce(change, coalesced.iter().chain([job]), primary).await?;
-    let (priority, key) = (job.priority, job.key);
-    change.move_job(Move::Leave { priority, key });
-    change.move_job(Move::Attach);
+    let place = Place::of(job);
+    change.move_job(Move::Leave(place.clone()));
+    change.move_job(Move::Attach(place.owner));
     Ok(true)
 }
 
@@ -198,8 +198,12 @@ async fn detach(change: &mut Change<'_>, job: &Job, priority: i32) -> Result<()>
         .execute(change.sql())
         .await?;
     change.touched(key);
-    change.move_job(Move::Detach);
-    change.move_job(Move::Enter { priority, key });
+    let place = Place {
+        priority,
+        ..Place::of(job)
+    };
+    change.move_job(Move::Detach(place.owner.clone()));
+    change.move_job(Move::Enter(place));
     Ok(())
 }
 

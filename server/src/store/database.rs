@@ -50,6 +50,8 @@ pub struct Store {
     pub(super) tokens: RwLock<Tokens>,
     /// There is a token, or was.
     pub(super) any_tokens: AtomicBool,
+    /// How many jobs of one owner may run; without limit until it is set.
+    pub(super) most_running: OnceLock<usize>,
     /// The memory that running jobs share; without limit until it is set.
     pub(super) budget: OnceLock<Arc<Budget>>,
     /// One transaction at a time changes the jobs that wait.
@@ -172,6 +174,7 @@ impl Store {
             paused: AtomicBool::default(),
             tokens: RwLock::default(),
             any_tokens: AtomicBool::default(),
+            most_running: OnceLock::new(),
             budget: OnceLock::new(),
             change_lock: tokio::sync::Mutex::default(),
             inbox,

@@ -8,7 +8,7 @@ use super::{
     error::Result,
     labels,
     rows::{read, with_id},
-    waiting::Move,
+    waiting::{Move, Place},
 };
 use crate::{
     caller::Owners,
@@ -86,9 +86,9 @@ impl Store {
                 labels::write(&mut change, key, job.created_at, labels).await?;
             }
             if job.waits_for_a_worker() && priority != job.priority {
-                let old = job.priority;
-                change.move_job(Move::Leave { priority: old, key });
-                change.move_job(Move::Enter { priority, key });
+                let place = Place::of(&job);
+                change.move_job(Move::Leave(place.clone()));
+                change.move_job(Move::Enter(Place { priority, ..place }));
                 coalescing::replace_if_outranked(&mut change, key, priority).await?;
             }
             if let Some(source) = job.coalesced_into {

@@ -25,6 +25,9 @@ pub enum StoreError {
     /// The queue holds as many jobs as it may.
     #[error("the queue is full")]
     QueueFull,
+    /// As many jobs of this owner wait as may.
+    #[error("as many jobs of this owner wait as may")]
+    OwnerQueueFull,
     /// The key was used for another request.
     #[error("the key was used for another request")]
     KeyReuse,

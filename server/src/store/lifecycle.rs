@@ -7,7 +7,7 @@ use super::{
     error::{Damage, Result, StoreError},
     events, results,
     rows::{partial_key, read},
-    waiting::Move,
+    waiting::{Move, Place},
 };
 use crate::{
     event::Payload,
@@ -133,15 +133,18 @@ pub(super) async fn set_status(change: &mut Change<'_>, job: &Job, next: Status)
         .bind(job.key)
         .execute(change.sql())
         .await?;
-    let (priority, key) = (job.priority, job.key);
-    change.touched(key);
-    if job.waits_for_a_worker() {
-        change.move_job(Move::Leave { priority, key });
-    } else if job.status == Status::Queued {
-        change.move_job(Move::Detach);
-    }
-    if next == Status::Queued {
-        change.move_job(Move::Enter { priority, key });
+    change.touched(job.key);
+    let place = Place::of(job);
+    let owner = place.owner.clone();
+    change.move_job(match job.status {
+        Status::Running => Move::Stop(owner.clone()),
+        _ if job.waits_for_a_worker() => Move::Leave(place.clone()),
+        _ => Move::Detach(owner.clone()), // queued: what has ended changes no more
+    });
+    match next {
+        Status::Queued => change.move_job(Move::Enter(place)),
+        Status::Running => change.move_job(Move::Start(owner)),
+        Status::Succeeded | Status::Failed | Status::Canceled => {}
     }
     Ok(())
 }

@@ -96,7 +96,7 @@ pub use self::{
     parts::{PIECE_BYTES, PIECES_PER_COMMIT, Parts, ProfilePoints},
     progress::accept,
     snapshot::Snapshot,
-    submission::{Accepted, Claim, NewJob, NewSweep, RequestKey, Submission},
+    submission::{Accepted, Claim, NewJob, NewSweep, QueueLimits, RequestKey, Submission},
     sweeps::{MemberEvents, MembersTask},
 };
 

@@ -1,28 +1,75 @@
 //! The position of a job in the queue, from the mirror in memory.
 
+use std::collections::BTreeSet;
+
 use sqlx::SqliteConnection;
 
-use super::{database::Store, error::Result, rows::find, waiting::Move};
+use super::{
+    database::Store,
+    error::Result,
+    rows::find,
+    waiting::{Move, Owner, Place},
+};
 use crate::job::{Job, QueuePosition, Status, Waiting};
+
+/// The jobs that wait for a worker.
+pub(super) const WAITING: &str = "select priority, owner, id from job indexed by job_queue
+     where status = 'queued' and coalesced_into is null order by priority desc, id";
 
 impl Store {
     /// Reads the waiting jobs, when the store is opened.
     pub(super) async fn read_waiting_jobs(&self) -> Result<()> {
-        let waiting: Vec<(i32, i64)> = sqlx::query_as(
-            "select priority, id from job where status = 'queued' and coalesced_into is null order by priority desc, id",
-        )
-        .fetch_all(&self.reader)
-        .await?;
-        let coalesced: i64 =
-            sqlx::query_scalar("select count(*) from job where coalesced_into is not null")
-                .fetch_one(&self.reader)
-                .await?;
+        let waiting: Vec<(i32, String, i64)> =
+            sqlx::query_as(WAITING).fetch_all(&self.reader).await?;
+        let owners_of = |statement| sqlx::query_scalar::<_, String>(statement);
+        let coalesced = owners_of("select owner from job where coalesced_into is not null")
+            .fetch_all(&self.reader)
+            .await?;
+        let running = owners_of("select owner from job where status = 'running'")
+            .fetch_all(&self.reader)
+            .await?;
         let mut mirror = self.waiting_jobs();
-        for (priority, key) in waiting {
-            mirror.apply(Move::Enter { priority, key });
+        let mut names: BTreeSet<Owner> = BTreeSet::new();
+        // one text for all jobs of an owner
+        let mut named = |name: String| match names.get(name.as_str()) {
+            Some(known) => known.clone(),
+            None => {
+                let name = Owner::from(name);
+                names.insert(name.clone());
+                name
+            }
+        };
+        for (priority, owner, key) in waiting {
+            let owner = named(owner);
+            mirror.apply(Move::Enter(Place {
+                priority,
+                owner,
+                key,
+            }));
         }
-        (0..coalesced).for_each(|_| mirror.apply(Move::Attach));
+        for owner in coalesced {
+            mirror.apply(Move::Attach(named(owner)));
+        }
+        for owner in running {
+            mirror.apply(Move::Start(named(owner)));
+        }
         Ok(())
+    }
+
+    /// How many jobs of this owner wait, and how many run.
+    pub fn load_of(&self, owner: &str) -> (usize, usize) {
+        let waiting = self.waiting_jobs();
+        (waiting.len_of(owner), waiting.running(owner))
+    }
+
+    /// Sets how many jobs of one owner may run at the same time; once and before any is claimed.
+    pub fn set_most_running_of_owner(&self, most: usize) {
+        let _ = self.most_running.set(most); // fails if it is set already, which is kept
+    }
+
+    /// How many jobs of one owner may run at the same time.
+    pub fn most_running_of_owner(&self) -> usize {
+        self.most_running.get().copied().unwrap_or(usize::MAX)
     }
 
     /// How many jobs wait for a worker, or for the job that they are coalesced into.
@@ -53,29 +100,32 @@ impl Store {
         jobs: &mut [Job],
     ) -> Result<()> {
         for job in jobs.iter_mut().filter(|job| job.status == Status::Queued) {
-            let position = |priority, key| {
-                let ahead = self.waiting_jobs().ahead(priority, key)? as i64;
+            let position = |job: &Job| {
+                let waiting = self.waiting_jobs();
+                let ahead = waiting.ahead(job.priority, &job.owner, job.key)? as i64;
                 Some((ahead + 1, ahead))
             };
             let Some(primary) = job.coalesced_into else {
                 let reason = match self.is_paused() {
                     true => Waiting::Paused,
+                    false if self.load_of(&job.owner).1 >= self.most_running_of_owner() => {
+                        Waiting::OwnerLimit
+                    }
                     false if self.budget().is_short() => Waiting::Memory,
                     false => Waiting::WorkersBusy,
                 };
                 // none if it has been started since it was read
-                job.queue =
-                    position(job.priority, job.key).map(|(position, ahead)| QueuePosition {
-                        position,
-                        ahead,
-                        reason,
-                    });
+                job.queue = position(job).map(|(position, ahead)| QueuePosition {
+                    position,
+                    ahead,
+                    reason,
+                });
                 continue;
             };
             let Some(primary) = find(connection, primary).await? else {
                 continue; // it ended, and was deleted, since this job was read
             };
-            let (position, ahead) = position(primary.priority, primary.key).unwrap_or_default();
+            let (position, ahead) = position(&primary).unwrap_or_default();
             job.progress = primary.progress;
             job.queue = Some(QueuePosition {
                 position,

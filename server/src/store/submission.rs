@@ -80,8 +80,17 @@ pub struct Submission {
     pub sweep: Option<NewSweep>,
     /// The client's key.
     pub key: Option<RequestKey>,
-    /// Maximum number of waiting jobs.
-    pub max_queued: u32,
+    /// How many jobs may wait.
+    pub limits: QueueLimits,
+}
+
+/// How many jobs may wait.
+#[derive(Clone, Copy, Debug)]
+pub struct QueueLimits {
+    /// In all.
+    pub queued: u32,
+    /// Of the owner who submits them; `None`: as many as in all.
+    pub queued_of_owner: Option<u32>,
 }
 
 /// The result of a submission.

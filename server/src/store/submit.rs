@@ -15,9 +15,9 @@ use super::{
     error::{Result, StoreError},
     events, keys, labels, meshes, problems,
     rows::read,
-    submission::{Accepted, MOST_PER_COMMIT, NewJob, Pending, Submission},
+    submission::{Accepted, MOST_PER_COMMIT, NewJob, Pending, QueueLimits, Submission},
     sweeps,
-    waiting::Move,
+    waiting::{Move, Place},
 };
 use crate::{
     event::Payload,
@@ -104,7 +104,7 @@ async fn accept(
         jobs,
         sweep,
         key,
-        max_queued,
+        limits,
     } = submission;
     if let Some(old) = keys::already_submitted(change, &owner, &jobs, key.as_ref()).await? {
         return Ok(Accepted {
@@ -121,7 +121,7 @@ async fn accept(
     };
     let mut groups = sweep.iter().flat_map(|sweep| &sweep.groups);
     for new in &jobs {
-        let key = insert(change, &owner, new, max_queued).await?;
+        let key = insert(change, &owner, new, limits).await?;
         if let (Some(sweep), Some(members)) = (sweep_key, groups.next()) {
             sweeps::insert_members(change.sql(), sweep, key, members).await?;
         }
@@ -176,7 +176,7 @@ pub(super) async fn insert(
     change: &mut Change<'_>,
     owner: &str,
     new: &NewJob,
-    max_queued: u32,
+    limits: QueueLimits,
 ) -> Result<i64> {
     let answer = match new.cache {
         Cache::Use => coalescing::earlier_result(change, &new.input_hash).await?,
@@ -187,8 +187,14 @@ pub(super) async fn insert(
         (None, Cache::Use) => coalescing::primary_for(change, new).await?,
         (None, _) => None,
     };
-    if answer.is_none() && change.waiting() >= max_queued as usize {
+    if answer.is_none() && change.waiting() >= limits.queued as usize {
         return Err(StoreError::QueueFull);
+    }
+    if answer.is_none()
+        && let Some(most) = limits.queued_of_owner
+        && change.waiting_of(owner) >= most as usize
+    {
+        return Err(StoreError::OwnerQueueFull);
     }
     if answer.is_none() {
         meshes::require(change.sql(), new.mesh.as_deref()).await?;
@@ -223,10 +229,13 @@ pub(super) async fn insert(
     labels::write(change, key, now, &new.labels).await?;
     let queued = [(now, Payload::status(Status::Queued))];
     events::append(change.sql(), key, 0, &queued).await?;
-    let priority = new.priority;
     change.move_job(match coalesced_into {
-        None => Move::Enter { priority, key },
-        Some(_) => Move::Attach,
+        None => Move::Enter(Place {
+            priority: new.priority,
+            owner: owner.into(),
+            key,
+        }),
+        Some(_) => Move::Attach(owner.into()),
     });
     if let Some(source) = answer {
         let job = read(change.sql(), key).await?;

@@ -9,10 +9,16 @@ use super::{
     parts::{Part, Parts},
     results,
     rows::read,
-    submission::{NewJob, RequestKey},
+    submission::{NewJob, QueueLimits, RequestKey},
     submit,
 };
 use crate::job::{Cache, JobId, Limits, Reason, ResultAvailable};
+
+/// It is about the database, not about how many jobs wait.
+const UNLIMITED: QueueLimits = QueueLimits {
+    queued: u32::MAX,
+    queued_of_owner: None,
+};
 
 impl Store {
     /// Writes all that belongs to a small job, from its submission to its end, and rolls it back.
@@ -44,7 +50,7 @@ impl Store {
             ..Ending::failed(Reason::Internal, "")
         };
         let mut change = self.control_change().await?;
-        let key = submit::insert(&mut change, "", &job, u32::MAX).await?;
+        let key = submit::insert(&mut change, "", &job, UNLIMITED).await?;
         keys::remember(&mut change, "", &request, &[key]).await?;
         let job = read(change.sql(), key).await?;
         let job = lifecycle::start_attempt(&mut change, &job).await?;

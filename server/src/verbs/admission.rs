@@ -15,9 +15,9 @@ use super::{
 use crate::{
     caller::Caller,
     digest,
-    error::ApiError,
+    error::{ApiError, Quota},
     job::{Job, JobId},
-    store::{Accepted, NewJob, NewSweep, RequestKey, StoreError, Submission},
+    store::{Accepted, NewJob, NewSweep, QueueLimits, RequestKey, StoreError, Submission},
 };
 
 /// A job that was read, but not yet checked in depth.
@@ -137,6 +137,21 @@ pub(super) async fn admit(
     }
 }
 
+/// An error if one of these priorities is above 0, which puts a job before those of all other owners, and the caller is
+/// no administrator.
+pub(super) fn may_have_priorities(
+    caller: &Caller,
+    mut priorities: impl Iterator<Item = i32>,
+) -> Result<(), ApiError> {
+    match priorities.any(|priority| priority > 0) && !caller.is_admin() {
+        true => Err(ApiError::Forbidden(
+            "a priority above 0 needs the scope admin: it puts a job before those of all other owners"
+                .into(),
+        )),
+        false => Ok(()),
+    }
+}
+
 /// Stores jobs in the queue, all or none; the caller is their owner.
 pub(super) async fn enqueue(
     service: &Service,
@@ -155,14 +170,20 @@ pub(super) async fn enqueue_sweep(
     sweep: Option<NewSweep>,
     key: Option<RequestKey>,
 ) -> Result<Accepted, ApiError> {
+    may_have_priorities(caller, jobs.iter().map(|job| job.priority))?;
     let limit = service.max_queued;
+    let asked = jobs.len() as u64;
+    let most_of_owner = service.max_queued_of(caller);
     let hash = jobs.iter().find_map(|job| job.mesh.clone());
     let submission = Submission {
         owner: caller.owner().to_owned(),
         jobs,
         sweep,
         key,
-        max_queued: limit,
+        limits: QueueLimits {
+            queued: limit,
+            queued_of_owner: most_of_owner,
+        },
     };
     let accepted = service.queue.submit(submission).await;
     let accepted = accepted.map_err(|error| match error {
@@ -170,6 +191,13 @@ pub(super) async fn enqueue_sweep(
             limit,
             paused: service.store.is_paused(),
         },
+        StoreError::OwnerQueueFull => ApiError::QuotaExceeded(Quota {
+            owner: caller.owner().to_owned(),
+            of: "queued",
+            limit: most_of_owner.unwrap_or(limit).into(),
+            used: service.store.load_of(caller.owner()).0 as u64,
+            asked,
+        }),
         // it was stored when the problem was checked, and has been deleted since
         StoreError::UnknownMesh => {
             ApiError::InvalidProblem(vec![meshes::missing(&hash.unwrap_or_default())])

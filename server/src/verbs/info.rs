@@ -1,5 +1,7 @@
 //! Version and limits of the service.
 
+use std::collections::BTreeSet;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -9,7 +11,12 @@ use super::{
     submit::MAX_BATCH,
     watch::MAX_WAIT_S,
 };
-use crate::{bodies::BodyCache, caller::Caller, config::Isolation, formats::Format};
+use crate::{
+    bodies::BodyCache,
+    caller::{Caller, Scope},
+    config::Isolation,
+    formats::Format,
+};
 
 /// Version and limits of a service.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -55,6 +62,48 @@ pub struct ServiceLimits {
     pub max_page_size: u32,
     /// Seconds that a request may wait for a job.
     pub max_wait_s: f64,
+}
+
+/// Who the caller is, what they may do, and their share of the service.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Me {
+    /// The owner of the jobs that they submit.
+    pub owner: String,
+    /// What they may do.
+    pub scopes: BTreeSet<Scope>,
+    /// Jobs that wait.
+    pub queued: Share,
+    /// Jobs that run.
+    pub running: Share,
+}
+
+/// How much of something an owner has, and may have.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct Share {
+    /// As much as they have.
+    pub used: u64,
+    /// As much as they may have.
+    pub limit: u64,
+}
+
+/// Who the caller is.
+pub fn me(service: &Service, caller: &Caller) -> Me {
+    let (queued, running) = service.store.load_of(caller.owner());
+    let queued_limit = service.max_queued_of(caller).unwrap_or(service.max_queued);
+    let workers = service.queue.state().workers;
+    let running_limit = service.max_running_per_owner.unwrap_or(workers);
+    Me {
+        owner: caller.owner().to_owned(),
+        scopes: caller.scopes().collect(),
+        queued: Share {
+            used: queued as u64,
+            limit: queued_limit.into(),
+        },
+        running: Share {
+            used: running as u64,
+            limit: running_limit.min(workers).into(),
+        },
+    }
 }
 
 /// Version and limits.

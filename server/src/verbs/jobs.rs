@@ -7,6 +7,7 @@ use serde_json::json;
 use solver::{error::Findings, problem::Problem};
 
 use super::{
+    admission::may_have_priorities,
     envelope,
     service::{Service, detached},
 };
@@ -105,6 +106,7 @@ pub async fn update(
     violations
         .into_result(())
         .map_err(ApiError::InvalidProblem)?;
+    may_have_priorities(caller, edit.priority.into_iter())?;
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
         let (owners, versions) = (caller.visible_owners(), versions.as_deref());

@@ -5,6 +5,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::{sync::Semaphore, time::timeout};
 
 use crate::{
+    caller::Caller,
     config::{Config, Isolation, ProxyTrust, Web},
     error::ApiError,
     queue::Queue,
@@ -29,6 +30,10 @@ pub struct Service {
     checks: Arc<Semaphore>,
     /// Maximum number of waiting jobs; further ones are refused.
     pub(super) max_queued: u32,
+    /// Maximum number of waiting jobs of one owner.
+    max_queued_per_owner: u32,
+    /// Maximum number of running jobs of one owner.
+    pub(super) max_running_per_owner: Option<u16>,
     /// Memory that one job may need, by the estimate.
     pub(super) memory_budget_bytes: u64,
     pub(super) isolation: Isolation,
@@ -56,6 +61,8 @@ impl Service {
             queue,
             checks: Arc::new(Semaphore::new(2)),
             max_queued: config.max_queued,
+            max_queued_per_owner: config.max_queued_per_owner,
+            max_running_per_owner: config.max_running_per_owner,
             memory_budget_bytes: config.memory.bytes(),
             isolation: config.isolation,
             max_body_bytes: config.max_body_bytes,
@@ -66,6 +73,12 @@ impl Service {
             web: config.web.clone(),
             data: config.data.clone(),
         }
+    }
+
+    /// How many jobs of this caller may wait; `None`: as many as of all. The only user of a service without authentication
+    /// shares it with nobody.
+    pub(super) fn max_queued_of(&self, caller: &Caller) -> Option<u32> {
+        (*caller != Caller::local()).then_some(self.max_queued_per_owner)
     }
 
     /// An error once the service is about to stop.

@@ -44,6 +44,8 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
         workers: 1,
         isolation: Isolation::Thread,
         max_queued: 10,
+        max_queued_per_owner: 10,
+        max_running_per_owner: None,
         memory: MemoryBudget::default(),
         body_cache_bytes: None,
         max_body_bytes: 1 << 20,

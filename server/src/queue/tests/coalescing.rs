@@ -120,7 +120,10 @@ async fn coalesced_jobs_count_as_waiting_and_one_of_higher_priority_is_detached(
     let other = rig.submit_as(same()).await;
     assert_eq!(rig.store.waiting(), 3);
     let full = Submission {
-        max_queued: 3,
+        limits: QueueLimits {
+            queued: 3,
+            queued_of_owner: None,
+        },
         ..submission(vec![same()], None)
     };
     let refused = rig.queue.submit(full).await.unwrap_err();

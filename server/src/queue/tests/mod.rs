@@ -34,7 +34,7 @@ use crate::{
     run::Solve,
     store::{
         Accepted, CancelOutcome, Edit, Ending, Filter, FinalBatch, GroupBy, NewJob, Order, Parts,
-        RequestKey, Store, StoreError, Submission,
+        QueueLimits, RequestKey, Store, StoreError, Submission,
     },
     time::Time,
 };
@@ -95,7 +95,10 @@ impl Rig {
             jobs: vec![new],
             sweep: None,
             key: None,
-            max_queued: 10,
+            limits: QueueLimits {
+                queued: 10,
+                queued_of_owner: None,
+            },
         };
         let accepted = self.queue.submit(submission).await.unwrap();
         accepted.jobs.into_iter().next().unwrap()
@@ -181,6 +184,9 @@ fn submission(jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
         jobs,
         sweep: None,
         key,
-        max_queued: 1000,
+        limits: QueueLimits {
+            queued: 1000,
+            queued_of_owner: None,
+        },
     }
 }

@@ -125,6 +125,8 @@ pub(super) const SUBMITTING: &[Code] = &[
     Code::ProblemTooLarge,
     Code::IdempotencyKeyReuse,
     Code::Deleted, // the key or id of a deleted job
+    Code::QuotaExceeded,
+    Code::Forbidden, // a priority above 0
     Code::QueueFull,
     Code::Draining,
     Code::StorageFull,

@@ -5,7 +5,6 @@ use super::{
     operation::{ADMIN, IDENTIFIED, OPEN, Operation, READ, SUBMIT, get, post, probe},
 };
 use crate::{
-    caller::Caller,
     catalog::{Code, Kind},
     rest::{
         bodies::BareProblem,
@@ -13,7 +12,11 @@ use crate::{
         service::{self, CODE},
         submit,
     },
-    verbs::{info::Info, problems::Validation, queue::QueueState},
+    verbs::{
+        info::{Info, Me},
+        problems::Validation,
+        queue::QueueState,
+    },
 };
 
 pub(super) fn operations() -> Vec<Operation> {
@@ -45,8 +48,8 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "Version and limits", json::<Info>()),
         get(IDENTIFIED, "/v1/me", (), service::me)
             .rpcs(&["GetCaller"])
-            .summary("Returns the caller: their owner name and scopes")
-            .answers(200, "The caller", json::<Caller>()),
+            .summary("Returns the caller: their owner name, scopes, and share of the queue")
+            .answers(200, "The caller", json::<Me>()),
         get(OPEN, "/v1/errors/{code}", (CODE,), service::error)
             .rest_only("GetError")
             .summary("Explains a kind of error and what to do, for programs or as a page")

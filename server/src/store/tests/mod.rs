@@ -74,7 +74,10 @@ fn by(owner: &str, jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
         jobs,
         sweep: None,
         key,
-        max_queued: 1_000_000,
+        limits: QueueLimits {
+            queued: 1_000_000,
+            queued_of_owner: None,
+        },
     }
 }
 

@@ -21,7 +21,7 @@ async fn the_queries_of_the_queue_use_indexes() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     for question in [
-        claim::NEXT,
+        positions::WAITING,
         end::EXPIRED,
         coalescing::EARLIER_RESULT,
         coalescing::PRIMARY,

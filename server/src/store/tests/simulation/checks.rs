@@ -100,10 +100,19 @@ impl World {
     /// The mirror in memory agrees with the database.
     fn check_queue(&self, jobs: &[Job]) {
         let mut waiting: Vec<&Job> = jobs.iter().filter(|job| job.waits_for_a_worker()).collect();
-        waiting.sort_by_key(|job| (-job.priority, job.key));
+        let mirror = |job: &Job| {
+            let mirror = self.store.waiting_jobs();
+            mirror.ahead(job.priority, &job.owner, job.key)
+        };
+        // each has a position of its own, by priority and then, of each owner, by arrival
+        waiting.sort_by_key(|job| mirror(job));
+        let arrivals = |a: &Job, b: &Job| a.owner != b.owner || a.key < b.key;
+        let in_order = |a: &&Job, b: &&Job| {
+            a.priority > b.priority || (a.priority == b.priority && arrivals(a, b))
+        };
+        assert!(waiting.is_sorted_by(in_order), "the order of the queue");
         for (ahead, job) in waiting.iter().enumerate() {
-            let mirrored = self.store.waiting_jobs().ahead(job.priority, job.key);
-            assert_eq!(mirrored, Some(ahead), "position of {}", job.key);
+            assert_eq!(mirror(job), Some(ahead), "position of {}", job.key);
             assert_eq!(
                 job.queue.as_ref().map(|queue| queue.ahead),
                 Some(ahead as i64)

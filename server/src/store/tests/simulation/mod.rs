@@ -70,6 +70,9 @@ struct World {
     over: Vec<(i64, i32)>,
     /// The queue is paused.
     paused: bool,
+    /// The number of every owner's last turn since the store was started; and how many turns there were.
+    turns: BTreeMap<String, usize>,
+    turn: usize,
     done: Steps,
 }
 
@@ -143,6 +146,8 @@ impl World {
             running: BTreeMap::new(),
             over: vec![],
             paused: false,
+            turns: BTreeMap::new(),
+            turn: 0,
             done,
         }
     }

@@ -102,7 +102,10 @@ impl World {
         let unanswered = !self.full && self.dice.bool();
         let halfway = unanswered && self.dice.bool();
         let mut submission = Submission {
-            max_queued: 1000,
+            limits: QueueLimits {
+                queued: 1000,
+                queued_of_owner: None,
+            },
             sweep: None,
             key: Some(RequestKey {
                 key,
@@ -143,6 +146,7 @@ impl World {
     }
 
     async fn start(&mut self, folder: &Path) {
+        self.turns.clear(); // all owners begin anew
         self.set_clock();
         self.full = false;
         self.store = Store::open_unwatched(folder).await.unwrap();

@@ -74,7 +74,10 @@ impl World {
             jobs,
             sweep: None,
             key,
-            max_queued,
+            limits: QueueLimits {
+                queued: max_queued,
+                queued_of_owner: None,
+            },
         }
     }
 
@@ -90,7 +93,7 @@ impl World {
     pub(super) async fn submit_this(&mut self, submission: Submission, claim: bool) -> Result<()> {
         self.note(described(&submission, claim));
         let before = match self.expected(&submission).await? {
-            Expected::New if submission.max_queued > 100 => None,
+            Expected::New if submission.limits.queued > 100 => None,
             _ => Some(self.rows().await),
         };
         let answer = self.store.submit(submission.clone(), claim).await;
@@ -148,9 +151,9 @@ impl World {
                 self.accepted(submission, accepted).await;
                 return Ok(true);
             }
-            (Expected::New, Err(StoreError::QueueFull)) if submission.max_queued < 100 => {
+            (Expected::New, Err(StoreError::QueueFull)) if submission.limits.queued < 100 => {
                 let waiting = self.store.waiting() + submission.jobs.len();
-                assert!(waiting > submission.max_queued as usize);
+                assert!(waiting > submission.limits.queued as usize);
             }
             (Expected::KeyReuse, Err(StoreError::KeyReuse))
             | (Expected::IdConflict, Err(StoreError::IdConflict(_)))
@@ -259,6 +262,6 @@ fn described(submission: &Submission, claim: bool) -> String {
     let jobs: Vec<String> = jobs.collect();
     let key = submission.key.as_ref();
     let key = key.map(|key| format!("{} for {}", key.key, key.payload));
-    let (owner, most) = (&submission.owner, submission.max_queued);
+    let (owner, most) = (&submission.owner, submission.limits.queued);
     format!("submit {jobs:?} of {owner}, {key:?}, at most {most}, claim {claim}")
 }

@@ -1,5 +1,7 @@
 //! What workers do.
 
+use std::cmp::Ordering;
+
 use super::*;
 use crate::{
     event::Payload,
@@ -32,14 +34,29 @@ impl World {
     pub(super) async fn started(&mut self, claim: Claim) {
         let job = &claim.job;
         self.note(format!("    {} starts, attempt {}", job.key, job.attempt));
-        let rank = |job: &Job| (-job.priority, job.key);
         let jobs = self.listed().await;
-        let mut waiting = jobs.iter().filter(|job| job.waits_for_a_worker());
-        assert!(
-            waiting.all(|other| rank(job) < rank(other)),
-            "{} has overtaken",
-            job.key
-        );
+        let waiting = jobs.iter().filter(|job| job.waits_for_a_worker());
+        let turn = |owner: &str| self.turns.get(owner).copied();
+        let first_of = |other: &Job| {
+            let theirs = jobs.iter().filter(|one| {
+                one.waits_for_a_worker()
+                    && one.owner == other.owner
+                    && one.priority == other.priority
+            });
+            theirs.map(|one| one.key).min()
+        };
+        let is_before = |other: &Job| match job.priority.cmp(&other.priority) {
+            Ordering::Equal if job.owner == other.owner => job.key < other.key,
+            Ordering::Equal => {
+                (turn(&job.owner), Some(job.key)) < (turn(&other.owner), first_of(other))
+            }
+            order => order == Ordering::Greater,
+        };
+        for other in waiting {
+            assert!(is_before(other), "{} has overtaken {}", job.key, other.key);
+        }
+        self.turn += 1;
+        self.turns.insert(job.owner.clone(), self.turn);
         assert_eq!((job.status, job.coalesced_into), (Status::Running, None));
         let work = Work {
             attempt: job.attempt,

@@ -1,0 +1,30 @@
+"""Promises that tests of the running service show (R32): runs them, and tells how many there were.
+
+    service.py NAME
+"""
+
+import re
+import subprocess
+import sys
+import pathlib
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+
+from outside import TOP, check
+
+FIGURES = {
+    "auth": "every operation with 10 kinds of credentials over both protocols, and tokens, hosts, origins and proxies (%d tests)",
+}
+
+
+def main():
+    name = sys.argv[1]
+    # the same selection of packages as tests/run: nothing is compiled again
+    command = ["cargo", "test", "--release", "--workspace", "--test", "service", name + "::"]
+    told = subprocess.run(command, cwd=TOP, check=True, stdout=subprocess.PIPE, text=True).stdout
+    passed = sum(int(count) for count in re.findall(r"(\d+) passed", told))
+    check(passed > 0, "no test was run")
+    print("figure: " + FIGURES[name] % passed)
+
+
+main()

@@ -1,0 +1,224 @@
+//! Owners share the service: they take turns, and none fills the queue for all.
+
+use std::collections::BTreeMap;
+
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use service::pb::{self, job_service_client::JobServiceClient};
+use suite::{example_json, harness::Server};
+use tonic::{Code, Request};
+use tonic_types::StatusExt;
+
+use crate::SIGNORINI;
+
+/// A server that takes the user from a header, so that tests need no tokens.
+async fn shared(more: &[&str]) -> Server {
+    let mut arguments = vec!["--trusted-proxy", "127.0.0.1", "--proxy-admin", "root"];
+    arguments.extend(more);
+    Server::start(SIGNORINI, &arguments).await
+}
+
+/// Submits so many different jobs at once; the status of the answer and its content.
+async fn batch(server: &Server, user: &str, count: usize) -> (StatusCode, Value) {
+    let job = |n: usize| {
+        let mut problem = example_json("rectangular_punch");
+        let depth = 0.01 * (1.0 + n as f64 / 1e5);
+        problem["contacts"][0]["indentation"] = json!(depth);
+        json!({"problem": problem, "cache": "off"})
+    };
+    let jobs: Vec<Value> = (0..count).map(job).collect();
+    let request = server.post("/v1/jobs/batch").header("x-remote-user", user);
+    let response = request.json(&json!({"jobs": jobs})).send().await.unwrap();
+    let status = response.status();
+    (status, response.json().await.unwrap())
+}
+
+async fn get(server: &Server, user: &str, path: &str) -> Value {
+    let request = server.get(path).header("x-remote-user", user);
+    request.send().await.unwrap().json().await.unwrap()
+}
+
+async fn queue(server: &Server, verb: &str) {
+    let request = server
+        .post(&format!("/v1/queue/{verb}"))
+        .header("x-remote-user", "root");
+    assert_eq!(request.send().await.unwrap().status(), StatusCode::OK);
+}
+
+/// R23, with fewer jobs: `tests/reliability/shares.py` has five thousand.
+#[tokio::test]
+async fn owners_take_turns() {
+    let server = shared(&["--workers", "1"]).await;
+    queue(&server, "pause").await;
+    assert_eq!(batch(&server, "ada", 200).await.0, StatusCode::ACCEPTED);
+    let (_, of_bob) = batch(&server, "bob", 2).await;
+    let ahead = |n: usize| of_bob["jobs"][n]["queue"]["ahead"].as_u64().unwrap();
+    // before it one of ada's at most, who was first; and then one more
+    assert_eq!((ahead(0), ahead(1)), (1, 3));
+    for n in 0..20 {
+        assert_eq!(
+            batch(&server, &format!("user{n:02}"), 3).await.0,
+            StatusCode::ACCEPTED
+        );
+    }
+    queue(&server, "resume").await;
+    // of 22 owners the first 44 starts are two of each
+    let all = loop {
+        let list = get(
+            &server,
+            "root",
+            "/v1/jobs?page_size=1000&status=succeeded,running",
+        )
+        .await;
+        let jobs = list["jobs"].as_array().unwrap().clone();
+        if jobs.len() > 60 {
+            break jobs;
+        }
+        let waiting = get(
+            &server,
+            "root",
+            "/v1/jobs?status=queued&page_size=1&order_by=created_at",
+        )
+        .await;
+        let next = waiting["jobs"][0]["id"].as_str().unwrap().to_owned();
+        get(&server, "root", &format!("/v1/jobs/{next}?wait=1")).await;
+    };
+    let mut started: Vec<(&str, &str)> = all
+        .iter()
+        .map(|job| {
+            (
+                job["started_at"].as_str().unwrap(),
+                job["owner"].as_str().unwrap(),
+            )
+        })
+        .collect();
+    started.sort_unstable();
+    let mut of_each = BTreeMap::<&str, usize>::new();
+    for (_, owner) in &started[..44] {
+        *of_each.entry(owner).or_default() += 1;
+    }
+    assert_eq!(of_each.len(), 22);
+    assert!(of_each.values().all(|count| *count == 2), "{of_each:?}");
+}
+
+#[tokio::test]
+async fn an_owner_may_have_so_many_jobs_in_the_queue_and_is_told() {
+    let server = shared(&["--max-queued-per-owner", "3"]).await;
+    queue(&server, "pause").await;
+    let (status, refused) = batch(&server, "ada", 4).await;
+    assert_eq!(
+        (status, refused["code"].as_str()),
+        (StatusCode::TOO_MANY_REQUESTS, Some("quota-exceeded"))
+    );
+    assert_eq!(
+        refused["quota"],
+        json!({"owner": "ada", "of": "queued", "limit": 3, "used": 0, "asked": 4})
+    );
+    assert_eq!(batch(&server, "ada", 3).await.0, StatusCode::ACCEPTED);
+    let me = get(&server, "ada", "/v1/me").await;
+    assert_eq!(me["queued"], json!({"used": 3, "limit": 3}));
+    // others are not affected
+    assert_eq!(batch(&server, "bob", 3).await.0, StatusCode::ACCEPTED);
+    let mut grpc = JobServiceClient::connect(server.url.clone()).await.unwrap();
+    let mut request = Request::new(pb::CreateJobRequest {
+        problem: Some(crate::grpc::message(&suite::example("rectangular_punch"))),
+        ..Default::default()
+    });
+    request
+        .metadata_mut()
+        .insert("x-remote-user", "ada".parse().unwrap());
+    let refused = grpc.create_job(request).await.unwrap_err();
+    assert_eq!(refused.code(), Code::ResourceExhausted);
+    let failure = refused.get_details_quota_failure().unwrap();
+    assert_eq!(failure.violations[0].subject, "owner:ada");
+    assert!(refused.get_details_retry_info().is_some());
+}
+
+#[tokio::test]
+async fn an_owner_may_have_so_many_jobs_running() {
+    let server = shared(&["--workers", "2", "--max-running-per-owner", "1"]).await;
+    let mut slow = example_json("rectangular_punch");
+    slow["mesh"]["refine"] = json!(5);
+    let submit = async |user: &str, problem: &Value| -> Value {
+        let body = json!({"problem": problem, "cache": "off"});
+        let request = server
+            .post("/v1/jobs")
+            .header("x-remote-user", user)
+            .json(&body);
+        request.send().await.unwrap().json().await.unwrap()
+    };
+    let first = submit("ada", &slow).await;
+    let second = submit("ada", &slow).await;
+    assert_eq!(
+        (first["status"].as_str(), second["status"].as_str()),
+        (Some("running"), Some("queued"))
+    );
+    assert_eq!(second["queue"]["reason"], "owner_limit");
+    // the other worker is idle, for others
+    let other = submit("bob", &example_json("rectangular_punch")).await;
+    let path = format!(
+        "/v1/jobs/{}?wait=60&until=terminal",
+        other["id"].as_str().unwrap()
+    );
+    assert_eq!(get(&server, "bob", &path).await["status"], "succeeded");
+    let path = format!("/v1/jobs/{}", second["id"].as_str().unwrap());
+    assert_eq!(get(&server, "ada", &path).await["status"], "queued");
+    let me = get(&server, "ada", "/v1/me").await;
+    assert_eq!(
+        (&me["running"], &me["queued"]["used"]),
+        (&json!({"used": 1, "limit": 1}), &json!(1))
+    );
+    let path = format!("/v1/jobs/{}/cancel", first["id"].as_str().unwrap());
+    server
+        .post(&path)
+        .header("x-remote-user", "ada")
+        .send()
+        .await
+        .unwrap();
+    let path = format!(
+        "/v1/jobs/{}?wait=60&until=terminal",
+        second["id"].as_str().unwrap()
+    );
+    assert_eq!(get(&server, "ada", &path).await["status"], "succeeded");
+}
+
+#[tokio::test]
+async fn a_priority_above_0_is_for_administrators() {
+    let server = shared(&[]).await;
+    queue(&server, "pause").await;
+    let submit = async |user: &str, priority: i32| {
+        let body = json!({"problem": example_json("rectangular_punch"), "priority": priority, "cache": "off"});
+        let request = server
+            .post("/v1/jobs")
+            .header("x-remote-user", user)
+            .json(&body);
+        let response = request.send().await.unwrap();
+        let status = response.status().as_u16();
+        (status, response.json::<Value>().await.unwrap())
+    };
+    assert_eq!(submit("ada", 1).await.0, 403);
+    assert_eq!(submit("root", 1).await.0, 202);
+    let (status, job) = submit("ada", -1).await;
+    assert_eq!(status, 202);
+    let path = format!("/v1/jobs/{}", job["id"].as_str().unwrap());
+    let edit = async |user: &str, priority: i32| {
+        let request = server
+            .request(reqwest::Method::PATCH, &path)
+            .header("x-remote-user", user);
+        request
+            .json(&json!({"priority": priority}))
+            .send()
+            .await
+            .unwrap()
+            .status()
+            .as_u16()
+    };
+    assert_eq!(
+        (
+            edit("ada", 5).await,
+            edit("ada", 0).await,
+            edit("root", 5).await
+        ),
+        (403, 200, 200)
+    );
+}
