@@ -39,7 +39,7 @@ MANY = ("--max-queued", "1000000")
 
 def request(method, path, body=b"", **headers):
     """The bytes of a request."""
-    lines = ["%s %s HTTP/1.1" % (method, path), "host: bench"]
+    lines = ["%s %s HTTP/1.1" % (method, path), "host: localhost"]
     lines += ["%s: %s" % (name.replace("_", "-"), value) for name, value in headers.items()]
     if body:
         lines += ["content-type: application/json", "content-length: %d" % len(body)]

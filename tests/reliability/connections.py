@@ -18,7 +18,7 @@ FILES = 1700 if SOAK else 300
 HALF = 2000 if SOAK else 100
 VANISHING = 10000 if SOAK else 1000
 HEAD_S, BODY_S, IDLE_S = 30, 60, 75
-HEAD = b"POST /v1/jobs HTTP/1.1\r\nhost: x\r\ncontent-type: application/json\r\ncontent-length: 5000\r\n\r\n{\"pro"
+HEAD = b"POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: 5000\r\n\r\n{\"pro"
 
 
 def crowded():
@@ -51,7 +51,7 @@ def half_requests(server):
     """Connections of each kind that stop, and when the server closed the last of each."""
     kinds = {
         "no byte": (b"", HEAD_S),
-        "half a head": (b"GET /v1/jobs HTTP/1.1\r\nhost: x\r\nx-slow: ", HEAD_S),
+        "half a head": (b"GET /v1/jobs HTTP/1.1\r\nhost: localhost\r\nx-slow: ", HEAD_S),
         "half a preface of HTTP/2": (PREFACE[:9], HEAD_S),
         "HTTP/2 without a request": (PREFACE + settings(), HEAD_S),
     }
@@ -61,7 +61,7 @@ def half_requests(server):
         kinds.update({
             "an answer of which one byte is read, beside a stream": (PREFACE + settings(window=1) + unread, BODY_S),
             "half a body": (HEAD, BODY_S),
-            "idle after an answer": (b"GET /livez HTTP/1.1\r\nhost: x\r\n\r\n", IDLE_S),
+            "idle after an answer": (b"GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n", IDLE_S),
             "idle after an answer over HTTP/2": (PREFACE + settings() + get("/livez", 1), IDLE_S),
         })
     open_ones, times = {}, {}
@@ -105,14 +105,14 @@ def vanishing(server, job):
     """Clients that reset their connections in the middle of submits, waits, streams and downloads."""
     dice = random.Random(8)
     body = submission(example())
-    submit = b"POST /v1/jobs HTTP/1.1\r\nhost: x\r\ncontent-type: application/json\r\ncontent-length: %d\r\n\r\n" % len(body)
+    submit = b"POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: %d\r\n\r\n" % len(body)
     server.call("POST", "/v1/queue/pause")
     slow = server.submit(example())
     asked = [
         submit + body, submit + body[:2000],
-        b"GET /v1/jobs/%s?wait=30 HTTP/1.1\r\nhost: x\r\n\r\n" % slow.encode(),
-        b"GET /v1/jobs/%s/events HTTP/1.1\r\nhost: x\r\n\r\n" % slow.encode(),
-        b"GET /v1/jobs/%s/fields HTTP/1.1\r\nhost: x\r\n\r\n" % job.encode(),
+        b"GET /v1/jobs/%s?wait=30 HTTP/1.1\r\nhost: localhost\r\n\r\n" % slow.encode(),
+        b"GET /v1/jobs/%s/events HTTP/1.1\r\nhost: localhost\r\n\r\n" % slow.encode(),
+        b"GET /v1/jobs/%s/fields HTTP/1.1\r\nhost: localhost\r\n\r\n" % job.encode(),
         PREFACE + settings() + get("/v1/jobs/%s/events" % job, 1),
         PREFACE + settings(window=0) + get("/v1/jobs/%s/fields" % job, 1),
     ]

@@ -73,7 +73,7 @@ class Load:
         host, port = self.server.address.split(":")
         reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 20)
         try:
-            request = "GET /v1/jobs/%s/events?after_seq=%d HTTP/1.1\r\nhost: x\r\n\r\n"
+            request = "GET /v1/jobs/%s/events?after_seq=%d HTTP/1.1\r\nhost: localhost\r\n\r\n"
             writer.write((request % (job, seen)).encode())
             status = (await reader.readuntil(b"\r\n")).split()[1]
             check(status in (b"200", b"204"), "events of %s: %r" % (job, status))

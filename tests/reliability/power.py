@@ -102,7 +102,7 @@ class Load:
             try:
                 host, port = self.server.address.split(":")
                 reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 20)
-                writer.write(b"GET /v1/jobs/%s/events HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n" % job.encode())
+                writer.write(b"GET /v1/jobs/%s/events HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n" % job.encode())
                 status = (await reader.readuntil(b"\r\n")).split()[1]
                 check(status in (b"200", b"204", b"410"), "events of %s: %r" % (job, status))
                 while line := await reader.readline():

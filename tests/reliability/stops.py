@@ -81,7 +81,7 @@ class Load:
                 continue
             before = seen
             try:
-                request = "GET /v1/jobs/%s/events HTTP/1.1\r\nhost: x\r\nlast-event-id: %d\r\n\r\n"
+                request = "GET /v1/jobs/%s/events HTTP/1.1\r\nhost: localhost\r\nlast-event-id: %d\r\n\r\n"
                 writer.write((request % (job, seen)).encode())
                 status = (await reader.readuntil(b"\r\n")).split()[1]
                 check(status in (b"200", b"503"), "events of %s: %r" % (job, status))

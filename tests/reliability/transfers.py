@@ -33,7 +33,7 @@ def post(server, path, headers, pieces):
     began, connection = time.monotonic(), server.socket()
     sent = 0
     try:
-        head = ["POST %s HTTP/1.1" % path, "host: x", "content-type: application/json", *headers, "", ""]
+        head = ["POST %s HTTP/1.1" % path, "host: localhost", "content-type: application/json", *headers, "", ""]
         connection.sendall("\r\n".join(head).encode())
         connection.settimeout(0)
         for piece in pieces:
@@ -141,7 +141,7 @@ def many_bodies(server):
     def upload():
         connection = server.socket()
         try:
-            head = "POST /v1/problems/validate HTTP/1.1\r\nhost: x\r\ncontent-type: application/json\r\ncontent-length: %d\r\n\r\n"
+            head = "POST /v1/problems/validate HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: %d\r\n\r\n"
             connection.sendall((head % (len(body) + 4)).encode())
             try:
                 connection.sendall(body)
@@ -172,7 +172,7 @@ def many_bodies(server):
 def slow_readers(server, job):
     """Downloads that nobody reads: one connection each, and a hundred streams on one."""
     with server.socket() as one:  # the size of one
-        one.sendall(b"GET /v1/jobs/%s/fields HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n" % job.encode())
+        one.sendall(b"GET /v1/jobs/%s/fields HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n" % job.encode())
         size = 0
         while got := one.recv(1 << 20):
             size += len(got)
@@ -181,7 +181,7 @@ def slow_readers(server, job):
     with Bystander(server):
         for number in range(READERS):
             connection = server.socket()
-            connection.sendall(b"GET /v1/jobs/%s/fields HTTP/1.1\r\nhost: x\r\n\r\n" % job.encode())
+            connection.sendall(b"GET /v1/jobs/%s/fields HTTP/1.1\r\nhost: localhost\r\n\r\n" % job.encode())
             stalled.append(connection)
         streams = server.socket()
         streams.sendall(PREFACE + settings(window=0))

@@ -87,7 +87,7 @@ class Watchers:
     async def events(self, slow):
         one = await self.connect(slow)
         with one:
-            asked = b"GET /v1/jobs/%s/events HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n" % self.job.encode()
+            asked = b"GET /v1/jobs/%s/events HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n" % self.job.encode()
             await asyncio.get_running_loop().sock_sendall(one, asked)
             last = b""
             while got := await self.take(one, slow):
@@ -124,7 +124,7 @@ class Watchers:
         while True:
             one = await self.connect(slow)
             with one:
-                asked = b"GET /v1/jobs/%s?wait=30&until=terminal HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n" % self.job.encode()
+                asked = b"GET /v1/jobs/%s?wait=30&until=terminal HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n" % self.job.encode()
                 await loop.sock_sendall(one, asked)
                 answer = b""
                 while got := await self.take(one, slow):
@@ -246,7 +246,7 @@ async def wait_for_the_end(server, job):
     async def wait():
         nonlocal ready
         reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 14)
-        writer.write(b"GET /v1/jobs/%s?wait=60&until=terminal HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n" % job.encode())
+        writer.write(b"GET /v1/jobs/%s?wait=60&until=terminal HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n" % job.encode())
         ready += 1
         answer = await reader.read(-1)
         statuses.append((answer[9:12], b'"status":"canceled"' in answer))

@@ -680,7 +680,36 @@ async fn foreign_hosts_and_origins_are_refused() {
         .send()
         .await
         .unwrap();
-    assert!(!answer.headers().values().any(|value| value == "*"));
+    let headers = answer.headers();
+    assert_eq!(
+        headers["access-control-allow-origin"],
+        "https://dashboard.example"
+    );
+    assert!(!headers.values().any(|value| value == "*"));
+    // a browser asks beforehand, for allowed origins only
+    let ask = async |origin: &str| {
+        let request = server
+            .request(Method::OPTIONS, "/v1/jobs")
+            .header("origin", origin)
+            .header("access-control-request-method", "POST")
+            .header(
+                "access-control-request-headers",
+                "authorization,content-type",
+            );
+        request.send().await.unwrap()
+    };
+    let allowed = ask("https://dashboard.example").await;
+    assert_eq!(allowed.status(), StatusCode::OK);
+    assert!(
+        allowed.headers()["access-control-allow-headers"]
+            .to_str()
+            .unwrap()
+            .contains("authorization")
+    );
+    assert_eq!(
+        ask("https://evil.example").await.status(),
+        StatusCode::FORBIDDEN
+    );
 }
 
 /// A proxy that is trusted names the user; nobody else can.

@@ -123,6 +123,9 @@ pub(super) fn preferred(headers: &HeaderMap) -> Option<Encoding> {
     prefers(headers, &LINES).then_some(Encoding::Lines)
 }
 
+/// nginx as a proxy would keep events until it has four kilobytes of them.
+const UNBUFFERED: [(&str, &str); 1] = [("x-accel-buffering", "no")];
+
 /// A stream of events. An error ends the stream: without `done` the client knows that it is incomplete.
 pub(super) fn write<E: Numbered>(
     events: impl Stream<Item = Result<E, ApiError>> + Send + 'static,
@@ -134,7 +137,8 @@ pub(super) fn write<E: Numbered>(
             let events = events.map(|event| event.and_then(|event| message(&event)));
             let events = events.take_while(|event| std::future::ready(event.is_ok()));
             let keep_alive = KeepAlive::new().interval(PING).text("ping");
-            Sse::new(events).keep_alive(keep_alive).into_response()
+            let stream = Sse::new(events).keep_alive(keep_alive);
+            (UNBUFFERED, stream).into_response()
         }
         Encoding::Lines => {
             let lines = events.map(|event| event.and_then(|event| line(&event)));
@@ -143,7 +147,7 @@ pub(super) fn write<E: Numbered>(
                 (header::CONTENT_TYPE, LINES[0]),
                 (header::CACHE_CONTROL, "no-cache"),
             ];
-            (headers, Body::from_stream(lines)).into_response()
+            (UNBUFFERED, headers, Body::from_stream(lines)).into_response()
         }
     }
 }

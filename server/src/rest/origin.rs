@@ -2,12 +2,17 @@
 //! made by no page of another site. Otherwise any page that a user of the lab opens could submit, cancel and read with
 //! that user's reach: by a form or a script, or after leading its own name to this address (DNS rebinding).
 
-use std::{net::Ipv4Addr, net::Ipv6Addr, sync::LazyLock};
+use std::{
+    net::{Ipv4Addr, Ipv6Addr},
+    sync::LazyLock,
+    time::Duration,
+};
 
 use axum::{
     extract::Request,
-    http::{HeaderMap, Version, header, uri::Authority},
+    http::{HeaderMap, HeaderName, HeaderValue, Method, Version, header, uri::Authority},
 };
+use tower_http::cors::CorsLayer;
 
 use crate::{config::Web, error::ApiError};
 
@@ -85,6 +90,52 @@ fn check_origin(headers: &HeaderMap, host: &Authority, web: &Web) -> Result<(), 
         }
     }
     Ok(())
+}
+
+/// What tells browsers to show answers to pages of the allowed origins; `None` if there are none.
+pub(super) fn cors(web: &Web) -> Option<CorsLayer> {
+    const LASTS: Duration = Duration::from_secs(3600);
+    let names = |names: &[&'static str]| -> Vec<HeaderName> {
+        names
+            .iter()
+            .map(|name| HeaderName::from_static(name))
+            .collect()
+    };
+    let origins = web.allowed_origins.iter();
+    let origins: Vec<HeaderValue> = origins.filter_map(|origin| origin.parse().ok()).collect();
+    let sent = [
+        "accept",
+        "authorization",
+        "content-type",
+        "idempotency-key",
+        "if-match",
+        "if-none-match",
+        "last-event-id",
+        "prefer",
+        "range",
+    ];
+    let read = [
+        "content-range",
+        "etag",
+        "idempotency-replayed",
+        "location",
+        "preference-applied",
+        "retry-after",
+    ];
+    (!origins.is_empty()).then(|| {
+        CorsLayer::new()
+            .allow_origin(origins)
+            .allow_methods([
+                Method::GET,
+                Method::POST,
+                Method::PUT,
+                Method::PATCH,
+                Method::DELETE,
+            ])
+            .allow_headers(names(&sent))
+            .expose_headers(names(&read))
+            .max_age(LASTS)
+    })
 }
 
 fn shortened(text: &str) -> String {

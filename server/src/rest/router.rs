@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use axum::{Router, extract::DefaultBodyLimit, middleware};
+use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 
 use super::{
-    authenticate::authenticate, call::AppState, limits::limits, openapi::openapi, operations, reply,
+    authenticate::authenticate, call::AppState, limits::limits, openapi::openapi, operations,
+    origin, reply,
 };
 use crate::{error::ApiError, verbs::Service};
 
@@ -25,6 +27,8 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
             service.clone(),
             authenticate,
         ))
+        // outside of the authentication: a browser asks beforehand, without the token
+        .layer(option_layer(origin::cors(&service.web)))
         .layer(CatchPanicLayer::custom(reply::panicked))
         // `body::json_text` has a limit of its own, and answers with an error document
         .layer(DefaultBodyLimit::disable())
