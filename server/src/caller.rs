@@ -31,7 +31,7 @@ pub enum Scope {
     Submit,
     /// Cancel and delete them.
     Cancel,
-    /// All of these on the jobs of every owner, and pause the queue.
+    /// All of these on the jobs of every owner; pause the queue, manage tokens, give priorities above 0.
     Admin,
 }
 

@@ -178,7 +178,7 @@ catalog! {
     IdempotencyKeyReuse: of_request("The key was used for another request", 422, Grpc::AlreadyExists, None,
         "This Idempotency-Key (request_id) was used before with another payload. A key belongs to one request; use a new one."),
     QuotaExceeded: of_request("The owner's share is used up", 429, Grpc::ResourceExhausted, Some(10),
-        "As many jobs of this owner wait as may, so that one owner cannot fill the queue for all. `quota` (over gRPC a QuotaFailure) has the limit and what is used, as GET /v1/me (GetCaller) has. Wait until some have run, or cancel some; the administrator sets --max-queued-per-owner."),
+        "This owner already has the maximum number of waiting jobs: one owner cannot fill the queue for all. `quota` (over gRPC a QuotaFailure) has the limit and what is used, as GET /v1/me (GetCaller) has. Wait until some have run, or cancel some; the administrator sets --max-queued-per-owner."),
     RateLimited: of_request("Too many requests at once", 429, Grpc::ResourceExhausted, Some(1),
         "More requests, mostly lists and counts, arrive at the same time than can be answered soon. Ask less often, or follow jobs by their events."),
     HeaderTooLarge: of_request("The headers are too large", 431, Grpc::Unimplemented, None,

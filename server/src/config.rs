@@ -152,7 +152,7 @@ pub struct Web {
     )]
     pub allowed_hosts: Vec<String>,
 
-    /// An origin whose pages may use this service, as https://dashboard.example; can be repeated, or a list with commas.
+    /// An origin whose pages may use this service, as `https://dashboard.example`; can be repeated, or a list with commas.
     /// Requests from pages of all others but this service's own are refused
     #[arg(long = "allowed-origin", env = "SIGNORINI_ALLOWED_ORIGINS", value_name = "ORIGIN", value_delimiter = ',',
           value_parser = origin)]

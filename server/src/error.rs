@@ -202,7 +202,10 @@ pub enum ApiError {
 
 /// What an owner has as much of as they may.
 #[derive(Clone, Debug, Serialize, thiserror::Error)]
-#[error("{owner} has {used} jobs in the queue, and may have {limit}; this would be {asked} more")]
+#[error(
+    "{owner} has {used} jobs in the queue of at most {limit}, and this request would add {asked}{}",
+    if asked > limit { ": submit it in parts" } else { "" }
+)]
 pub struct Quota {
     /// Whose.
     pub owner: String,

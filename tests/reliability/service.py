@@ -13,7 +13,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 from outside import TOP, check
 
 FIGURES = {
-    "auth": "every operation with 10 kinds of credentials over both protocols, and tokens, hosts, origins and proxies (%d tests)",
+    "auth": "every operation with 11 kinds of tokens and none over both protocols; streams, owners, hosts, origins and proxies (%d tests)",
 }
 
 

@@ -11,6 +11,7 @@ no job counts that as a death.
 
 import asyncio
 import contextlib
+import faulthandler
 import json
 import os
 import random
@@ -32,7 +33,7 @@ SEED = next((int(word) for word in sys.argv[1:] if word.isdigit()), random.randr
 GRACE_S = 3
 SUBMITTERS, PER_S, FOLLOWERS = 4, 40, 4
 # long enough to be interrupted by every stop
-LONG = dict(increments=400, refine=3)
+LONG = dict(increments=1200, refine=3)
 
 
 class Load:
@@ -183,7 +184,10 @@ async def stop_under_load(server, dice, stops, workers):
     await asyncio.wait_for(asyncio.gather(*clients), 300)
     await loop.run_in_executor(None, lambda: [thread.join(60) for thread in threads])
     check(load.failure is None, "gRPC: %r" % load.failure)
-    check(not any(thread.is_alive() for thread in threads), "a gRPC client that never ends")
+    if any(thread.is_alive() for thread in threads):
+        faulthandler.dump_traceback(all_threads=True)
+        check(False, "a gRPC client that never ends, after %d events; its jobs: %r" % (load.events, [
+            {key: server.job(job)[key] for key in ("status", "attempt")} for job in long]))
     return load, times
 
 

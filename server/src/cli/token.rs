@@ -100,7 +100,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                 scopes,
                 expires_in_s: expires_in,
             };
-            let (token, secret) = match place.open().await? {
+            let (token, secret) = match place.open(true).await? {
                 Door::Store(store) => {
                     let new = tokens::create(&store, &Caller::local(), request).await;
                     close(store).await;
@@ -129,7 +129,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             output::print(&format!("{secret}\n"))?;
         }
         Command::List { place } => {
-            let all = match place.open().await? {
+            let all = match place.open(false).await? {
                 Door::Store(store) => {
                     let all = tokens::list(&store, &Caller::local());
                     close(store).await;
@@ -143,7 +143,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             output::print(&table(&all))?;
         }
         Command::Revoke { id, place } => {
-            let token = match place.open().await? {
+            let token = match place.open(false).await? {
                 Door::Store(store) => {
                     let revoked = tokens::revoke(&store, &Caller::local(), &id).await;
                     close(store).await;
@@ -158,7 +158,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             eprintln!("{}", told(&token));
         }
         Command::Rotate { id, place } => {
-            let (token, secret) = match place.open().await? {
+            let (token, secret) = match place.open(false).await? {
                 Door::Store(store) => {
                     let new = tokens::rotate(&store, &Caller::local(), &id).await;
                     close(store).await;
@@ -199,8 +199,18 @@ struct Remote {
 }
 
 impl Place {
-    async fn open(&self) -> anyhow::Result<Door> {
+    /// `create`: a store may be made for it.
+    async fn open(&self, create: bool) -> anyhow::Result<Door> {
         let Some(url) = &self.url else {
+            if !self.data.exists() {
+                match create {
+                    true => eprintln!("a new store is made in {}", self.data.display()),
+                    false => bail!(StoreError::Folder(format!(
+                        "there is no store in {}",
+                        self.data.display()
+                    ))),
+                }
+            }
             let store = Store::open(&self.data).await;
             return match store {
                 Err(StoreError::Locked(text)) => Err(StoreError::Locked(format!(
@@ -245,7 +255,7 @@ impl Remote {
 }
 
 async fn close(store: Arc<Store>) {
-    store.close().await;
+    store.close_as_found().await;
 }
 
 fn told(token: &Token) -> String {

@@ -17,12 +17,12 @@ use super::{
     while_valid::while_valid,
 };
 use crate::{
-    caller::{Access, Caller, Peer},
+    caller::{Access, Caller, Peer, Scope},
     error::ApiError,
     token::Presented,
     verbs::{
         Service,
-        identify::{Credentials, Identified, identify},
+        identify::{By, Credentials, Identified, identify},
     },
 };
 
@@ -34,13 +34,10 @@ pub(super) async fn authenticate(
     next: Next,
 ) -> Response {
     match admit(&service, &request) {
-        Ok(Identified { caller, token }) => {
+        Ok(Identified { caller, by }) => {
             request.extensions_mut().insert(caller);
             let answer = next.run(request).await;
-            match token {
-                Some(token) => while_valid(answer, service.store.clone(), token),
-                None => answer,
-            }
+            while_valid(answer, service.store.clone(), by)
         }
         Err(error) => {
             let path = request.uri().path().to_owned();
@@ -59,7 +56,7 @@ fn admit(service: &Service, request: &Request) -> Result<Identified, ApiError> {
         // also with a token that is no longer valid, as a monitor may have it
         Err(_) if access == Access::Open => Identified {
             caller: Caller::anonymous(),
-            token: None,
+            by: By::Anyone,
         },
         Err(error) => return Err(error),
     };
@@ -68,7 +65,7 @@ fn admit(service: &Service, request: &Request) -> Result<Identified, ApiError> {
         Access::Needs(scope) if !caller.may(scope) => {
             let scope: &str = scope.into();
             Err(ApiError::Forbidden(format!(
-                "this needs the scope {scope}, which {} does not have here",
+                "this needs the scope {scope}, which the token of {} does not have",
                 caller.owner()
             )))
         }
@@ -101,16 +98,24 @@ fn access(request: &Request) -> Access {
     if path.starts_with("/grpc.reflection.") {
         return operations::DESCRIPTION;
     }
-    let Some(route) = request.extensions().get::<MatchedPath>() else {
+    if path.starts_with("/grpc.health.v1.Health/") {
         return Access::Open;
+    }
+    let Some(route) = request.extensions().get::<MatchedPath>() else {
+        return Access::Open; // 404
     };
     let method = match request.method() {
         // answered by the handler of GET
         method if *method == Method::HEAD => "GET",
         method => method.as_str(),
     };
-    let found = OPERATIONS.get(&(method, route.as_str()));
-    found.copied().unwrap_or(Access::Open)
+    match OPERATIONS.get(&(method, route.as_str())) {
+        Some(access) => *access,
+        // 405
+        None if OPERATIONS.keys().any(|(_, known)| *known == route.as_str()) => Access::Open,
+        // a route that somebody has added beside the list
+        None => Access::Needs(Scope::Admin),
+    }
 }
 
 /// What a request shows of its caller: a token as bearer, or as the password that a browser asks for.

@@ -356,16 +356,12 @@ pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
 
 /// A body `{name, owner, scopes, expires_in_s}`. What is missing is empty, which the verb refuses.
 pub(super) fn token(text: &str) -> Result<TokenRequest, ApiError> {
-    /// One more than there are: the verb reports the excess as repeated or unknown.
-    const MOST: usize = 16;
     let mut body = Object::open(text, "an object with name, owner and scopes")?;
     let scopes = body.take::<Vec<String>>("scopes", "a list of read, submit, cancel and admin");
-    let mut scopes = scopes.unwrap_or_default();
-    scopes.truncate(MOST);
     let request = TokenRequest {
         name: body.take("name", "a string").unwrap_or_default(),
         owner: body.take("owner", "a string").unwrap_or_default(),
-        scopes,
+        scopes: scopes.unwrap_or_default(),
         expires_in_s: body.take("expires_in_s", "a number of seconds"),
     };
     let known = "name, owner, scopes, expires_in_s";

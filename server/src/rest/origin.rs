@@ -19,7 +19,13 @@ use crate::{config::Web, error::ApiError};
 /// An error if the request names no host or a foreign one, or comes from a page of another site.
 pub(super) fn check(request: &Request, web: &Web) -> Result<(), ApiError> {
     let Some(host) = host_of(request)? else {
-        return Ok(()); // HTTP/1.0: no browser
+        // HTTP/1.0: no browser, which would name both
+        return match request.headers().contains_key(header::ORIGIN) {
+            true => Err(ApiError::Forbidden(
+                "the request names an origin and no host".into(),
+            )),
+            false => Ok(()),
+        };
     };
     if !is_own_host(&host, web) {
         return Err(ApiError::Forbidden(format!(

@@ -1,4 +1,4 @@
-//! Answers that end with the token of their request: a stream of events may stay open for days.
+//! Answers that end with what identified their caller, a token for instance: a stream of events may stay open for days.
 
 use std::{
     pin::Pin,
@@ -12,20 +12,21 @@ use axum::{
     response::Response,
 };
 use http_body::{Frame, SizeHint};
-use tokio::time::{Interval, MissedTickBehavior, interval};
+use tokio::time::{Instant, Interval, MissedTickBehavior, interval};
 
-use crate::{store::Store, time::Time};
+use crate::{store::Store, verbs::identify::By};
 
-/// How often a token is looked at while an answer waits for more.
+/// How often it is looked whether the caller is still who they were.
 const INTERVAL: Duration = Duration::from_secs(1);
 
-/// The answer, which is cut when the token with this id is no longer valid.
-pub(super) fn while_valid(answer: Response, store: Arc<Store>, token: String) -> Response {
+/// The answer, which is cut when what identified its caller is no longer valid.
+pub(super) fn while_valid(answer: Response, store: Arc<Store>, by: By) -> Response {
     answer.map(|body| {
         Body::new(WhileValid {
             body,
             store,
-            token,
+            by,
+            looked: Instant::now(),
             ticks: None,
         })
     })
@@ -34,9 +35,21 @@ pub(super) fn while_valid(answer: Response, store: Arc<Store>, token: String) ->
 struct WhileValid {
     body: Body,
     store: Arc<Store>,
-    token: String,
+    by: By,
+    /// When it was last looked.
+    looked: Instant,
     /// Since the answer had to wait for the first time: most never do.
     ticks: Option<Interval>,
+}
+
+impl WhileValid {
+    fn is_valid(&mut self) -> bool {
+        let due = self.looked.elapsed() >= INTERVAL;
+        if due {
+            self.looked = Instant::now();
+        }
+        !due || self.by.is_valid(&self.store)
+    }
 }
 
 impl HttpBody for WhileValid {
@@ -47,29 +60,25 @@ impl HttpBody for WhileValid {
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        if let Poll::Ready(frame) = Pin::new(&mut self.body).poll_frame(context) {
-            return Poll::Ready(frame);
-        }
-        let WhileValid {
-            store,
-            token,
-            ticks,
-            ..
-        } = &mut *self;
-        let ticks = ticks.get_or_insert_with(|| {
-            let mut ticks = interval(INTERVAL);
-            ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-            ticks
-        });
-        // until it is pending, so that the next tick wakes this task
-        while ticks.poll_tick(context).is_ready() {
-            if !store.is_valid_token(token, Time::now()) {
+        loop {
+            if !self.is_valid() {
                 // an error, not an end: the client must not take what it has for all there is
                 let cause = "the token was revoked or has expired";
                 return Poll::Ready(Some(Err(axum::Error::new(cause))));
             }
+            if let Poll::Ready(frame) = Pin::new(&mut self.body).poll_frame(context) {
+                return Poll::Ready(frame);
+            }
+            let ticks = self.ticks.get_or_insert_with(|| {
+                let mut ticks = interval(INTERVAL);
+                ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+                ticks
+            });
+            // until it is pending, so that the next tick wakes this task
+            if ticks.poll_tick(context).is_pending() {
+                return Poll::Pending;
+            }
         }
-        Poll::Pending
     }
 
     fn is_end_stream(&self) -> bool {

@@ -1,7 +1,10 @@
 //! One transaction of the single writer, and its effects once it is committed: changes to the waiting jobs that are
 //! kept in memory, and jobs whose watchers are to be notified.
 
-use std::{collections::BTreeSet, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use sqlx::SqliteConnection;
 use tokio::sync::MutexGuard;
@@ -13,7 +16,7 @@ use super::{
     intact::{self, WHOLE},
     problems::{self, StoredProblem},
     rows,
-    waiting::Move,
+    waiting::{Move, Owner},
 };
 use crate::{
     job::{Job, JobId, Reason, Status},
@@ -26,6 +29,8 @@ pub(super) struct Change<'a> {
     store: &'a Store,
     tx: Writing,
     moves: Vec<Move>,
+    /// How many more jobs of each owner wait by these moves.
+    more: BTreeMap<Owner, isize>,
     /// Jobs that have changed, for their watchers.
     changed: Vec<i64>,
     /// Rows of jobs that need a new checksum.
@@ -70,6 +75,7 @@ impl Store {
             store: self,
             tx: self.begin_control().await?,
             moves: vec![],
+            more: BTreeMap::new(),
             changed: vec![],
             touched: BTreeSet::new(),
             log_lines: vec![],
@@ -90,7 +96,20 @@ impl Change<'_> {
 
     /// Changes the waiting jobs in memory, once this is committed.
     pub(super) fn move_job(&mut self, change: Move) {
+        self.count(&change, 1);
         self.moves.push(change);
+    }
+
+    /// Counts a move, or takes it back: looking at all moves for every job of a large submission would take minutes.
+    fn count(&mut self, change: &Move, sign: isize) {
+        let (owner, more) = match change {
+            Move::Enter(place) => (&place.owner, 1),
+            Move::Attach(owner) => (owner, 1),
+            Move::Leave(place) => (&place.owner, -1),
+            Move::Detach(owner) => (owner, -1),
+            Move::Start(_) | Move::Stop(_) | Move::Turn { .. } => return,
+        };
+        *self.more.entry(owner.clone()).or_default() += sign * more;
     }
 
     /// Records that this job has changed.
@@ -185,8 +204,9 @@ impl Change<'_> {
 
     /// How many jobs of this owner wait, with the changes of this transaction.
     pub(super) fn waiting_of(&self, owner: &str) -> usize {
-        let mut waiting = self.store.waiting_jobs();
-        waiting.with(&self.moves, |waiting| waiting.len_of(owner))
+        let more = self.more.get(owner).copied().unwrap_or_default();
+        let waiting = self.store.waiting_jobs().len_of(owner);
+        waiting.saturating_add_signed(more)
     }
 
     /// The next job that waits, with the changes of this transaction, and its owner's turn.
@@ -198,17 +218,8 @@ impl Change<'_> {
 
     /// How many jobs wait, with the changes of this transaction.
     pub(super) fn waiting(&self) -> usize {
-        let difference = |change: &Move| match change {
-            Move::Enter(_) | Move::Attach(_) => 1,
-            Move::Leave(_) | Move::Detach(_) => -1,
-            Move::Start(_) | Move::Stop(_) | Move::Turn { .. } => 0,
-        };
-        let change: isize = self.moves.iter().map(difference).sum();
-        self.store
-            .waiting_jobs()
-            .len()
-            .checked_add_signed(change)
-            .unwrap_or(0)
+        let more: isize = self.more.values().sum();
+        self.store.waiting_jobs().len().saturating_add_signed(more)
     }
 
     /// Sets a point to roll back to. There is one at a time: it is released or rolled back to before the next is set.
@@ -237,7 +248,9 @@ impl Change<'_> {
             .execute(self.sql())
             .await?;
         self.release().await?;
-        self.moves.truncate(savepoint.moves);
+        for change in self.moves.split_off(savepoint.moves) {
+            self.count(&change, -1);
+        }
         self.changed.truncate(savepoint.changed);
         self.log_lines.truncate(savepoint.log_lines);
         Ok(())

@@ -5,6 +5,8 @@
 //! the end concerns the primary alone (if it was canceled, for example), the first of the jobs coalesced into it
 //! takes its place.
 
+use std::collections::BTreeMap;
+
 use super::{
     change::Change,
     database::Store,
@@ -29,7 +31,7 @@ pub(super) const EARLIER_RESULT: &str = "select * from job indexed by job_answer
 
 pub(super) const PRIMARY: &str = "select id from job indexed by job_under_way
      where input_hash = ? and status in ('queued', 'running') and coalesced_into is null and cache <> 'off'
-           and cancel_requested = 0 and (status = 'running' or priority >= ?)
+           and cancel_requested = 0 and (status = 'running' or (priority >= ? and owner = ?))
      order by id limit 1";
 
 /// A priority above that of any job: as the lowest priority of a waiting primary it excludes all but running ones.
@@ -77,12 +79,17 @@ impl Store {
     }
 }
 
-/// The job that a new one may be coalesced into. One that waits with a lower priority, or that is about to be
-/// canceled, would delay the new one.
-pub(super) async fn primary_for(change: &mut Change<'_>, new: &NewJob) -> Result<Option<i64>> {
+/// The job that a new one of this owner may be coalesced into. One that waits with a lower priority or for another owner's
+/// turn, or that is about to be canceled, would delay the new one.
+pub(super) async fn primary_for(
+    change: &mut Change<'_>,
+    owner: &str,
+    new: &NewJob,
+) -> Result<Option<i64>> {
     let primary: Option<i64> = sqlx::query_scalar(PRIMARY)
         .bind(&new.input_hash)
         .bind(new.priority)
+        .bind(owner)
         .fetch_optional(change.sql())
         .await?;
     Ok(match primary {
@@ -104,6 +111,7 @@ pub(super) async fn coalesce_into_running(change: &mut Change<'_>, job: &Job) ->
     let primary: Option<i64> = sqlx::query_scalar(PRIMARY)
         .bind(&job.input_hash)
         .bind(ONLY_RUNNING)
+        .bind(&job.owner)
         .fetch_optional(change.sql())
         .await?;
     let Some(primary) = primary else {
@@ -166,11 +174,22 @@ pub(super) async fn replace_if_outranked(
     }
 }
 
-/// Lets a job wait for a worker in place of its primary, and coalesces the other jobs of that primary into it.
+/// Lets a job wait for a worker in place of its primary, and the first of every other owner in their own turn, each with the
+/// other jobs of that primary and of the same owner coalesced into it.
 async fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
     detach(change, job, job.priority).await?;
     let others = coalesced_jobs(change, primary).await?;
-    coalesce(change, others.iter(), job.key).await
+    let mut first_of = BTreeMap::from([(job.owner.clone(), job.key)]);
+    for other in &others {
+        match first_of.get(&other.owner) {
+            Some(first) => coalesce(change, [other].into_iter(), *first).await?,
+            None => {
+                first_of.insert(other.owner.clone(), other.key);
+                detach(change, other, other.priority).await?;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Coalesces these jobs, which are not damaged, into this primary.

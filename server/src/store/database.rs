@@ -200,6 +200,15 @@ impl Store {
 
     /// Closes every connection, and with the last one the write-ahead log. Another server may use the folder then.
     pub async fn close(&self) {
+        self.close_as(true).await;
+    }
+
+    /// The same by a command that is not the service: whether the service has stopped or died, its next start still knows.
+    pub async fn close_as_found(&self) {
+        self.close_as(self.was_stopped).await;
+    }
+
+    async fn close_as(&self, stopped: bool) {
         self.lists.close().await;
         self.reader.close().await;
         // SQLite does this with the last connection only, which may be one for reading whose thread ends late
@@ -208,7 +217,7 @@ impl Store {
             tracing::warn!(%error, "the write-ahead log stays and is read at the next start: {error}");
         }
         self.writer.close().await;
-        if let Err(error) = self.progress.stop() {
+        if stopped && let Err(error) = self.progress.stop() {
             tracing::warn!(%error, "{}: {error}", progress::FILE);
         }
         self.folder.unlock();

@@ -25,8 +25,8 @@ pub enum StoreError {
     /// The queue holds as many jobs as it may.
     #[error("the queue is full")]
     QueueFull,
-    /// As many jobs of this owner wait as may.
-    #[error("as many jobs of this owner wait as may")]
+    /// This owner already has the maximum number of waiting jobs.
+    #[error("this owner already has the maximum number of waiting jobs")]
     OwnerQueueFull,
     /// The key was used for another request.
     #[error("the key was used for another request")]

@@ -239,7 +239,8 @@ impl Report {
                     }
                     let owners = "select * from mesh_owner where hash = ?";
                     let owners = sqlx::query(owners).bind(&hash).fetch_all(&mut *source);
-                    for owner in owners.await? {
+                    // without them it is an administrator's
+                    for owner in owners.await.unwrap_or_default() {
                         insert(&mut tx, "mesh_owner", &owner).await?;
                     }
                     tx.commit().await?;

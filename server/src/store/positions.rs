@@ -19,15 +19,20 @@ pub(super) const WAITING: &str = "select priority, owner, id from job indexed by
 impl Store {
     /// Reads the waiting jobs, when the store is opened.
     pub(super) async fn read_waiting_jobs(&self) -> Result<()> {
-        let waiting: Vec<(i32, String, i64)> =
-            sqlx::query_as(WAITING).fetch_all(&self.reader).await?;
+        let waiting = match sqlx::query_as(WAITING).fetch_all(&self.reader).await {
+            Ok(waiting) => waiting,
+            // a page or a name that cannot be read: the others go on
+            Err(_) => self.waiting_one_by_one().await?,
+        };
         let owners_of = |statement| sqlx::query_scalar::<_, String>(statement);
         let coalesced = owners_of("select owner from job where coalesced_into is not null")
             .fetch_all(&self.reader)
-            .await?;
+            .await
+            .unwrap_or_default(); // what cannot be read counts for nobody
         let running = owners_of("select owner from job where status = 'running'")
             .fetch_all(&self.reader)
-            .await?;
+            .await
+            .unwrap_or_default();
         let mut mirror = self.waiting_jobs();
         let mut names: BTreeSet<Owner> = BTreeSet::new();
         // one text for all jobs of an owner
@@ -54,6 +59,29 @@ impl Store {
             mirror.apply(Move::Start(named(owner)));
         }
         Ok(())
+    }
+
+    /// The same as `WAITING`, without jobs that cannot be read.
+    async fn waiting_one_by_one(&self) -> Result<Vec<(i32, String, i64)>> {
+        let keys: Vec<(i32, i64)> = sqlx::query_as(
+            "select priority, id from job indexed by job_queue
+             where status = 'queued' and coalesced_into is null order by priority desc, id",
+        )
+        .fetch_all(&self.reader)
+        .await?;
+        let mut found = vec![];
+        for (priority, key) in keys {
+            let owner = sqlx::query_scalar::<_, String>("select owner from job where id = ?")
+                .bind(key)
+                .fetch_one(&self.reader);
+            match owner.await {
+                Ok(owner) => found.push((priority, owner, key)),
+                Err(error) => {
+                    tracing::error!(job.key = key, %error, "a waiting job cannot be read, and is not started: {error}");
+                }
+            }
+        }
+        Ok(found)
     }
 
     /// How many jobs of this owner wait, and how many run.

@@ -9,6 +9,7 @@ use super::{
     database::{Store, Writing, with_advice},
     error::{Result, StoreError},
     rows::seal,
+    tokens,
 };
 use crate::job::{Job, ResultAvailable};
 
@@ -95,13 +96,25 @@ pub(super) async fn copy_the_rest(
     for (table, statement) in [
         ("deleted_job", "select * from deleted_job"),
         ("setting", "select * from setting"),
-        // a damaged one identifies nobody, and still tells that a token is needed
-        ("token", "select * from token"),
     ] {
         let rows = sqlx::query(statement).fetch_all(&mut *source).await;
         for row in rows.unwrap_or_default() {
             insert(&mut tx, table, &row).await?;
         }
+    }
+    // one that is damaged identifies nobody; if they cannot be read, nobody is to be let in for that
+    match sqlx::query("select * from token")
+        .fetch_all(&mut *source)
+        .await
+    {
+        Ok(rows) => {
+            for row in &rows {
+                if insert(&mut tx, "token", row).await.is_err() {
+                    tokens::require_tokens(&mut tx).await?;
+                }
+            }
+        }
+        Err(_) => tokens::require_tokens(&mut tx).await?,
     }
     // a job waits by itself if the one that it waited for was not copied; the next one like it coalesces them again
     let detached = "update job set coalesced_into = null, checksum = null

@@ -184,7 +184,7 @@ pub(super) async fn insert(
     };
     let coalesced_into = match (&answer, new.cache) {
         (Some(source), _) => Some(source.key), // until it is answered below
-        (None, Cache::Use) => coalescing::primary_for(change, new).await?,
+        (None, Cache::Use) => coalescing::primary_for(change, owner, new).await?,
         (None, _) => None,
     };
     if answer.is_none() && change.waiting() >= limits.queued as usize {

@@ -17,6 +17,11 @@ use crate::{
 impl Store {
     /// Reads the tokens, when the store is opened. One that is damaged identifies nobody.
     pub(super) async fn read_tokens(&self) -> Result<()> {
+        let marked: bool = sqlx::query_scalar(
+            "select exists (select 1 from setting where name = 'tokens_required')",
+        )
+        .fetch_one(&self.reader)
+        .await?;
         let rows = sqlx::query("select * from token")
             .fetch_all(&self.reader)
             .await?;
@@ -30,7 +35,7 @@ impl Store {
                 Err(error) => return Err(error),
             }
         }
-        self.any_tokens.store(!rows.is_empty(), Relaxed);
+        self.any_tokens.store(marked || !rows.is_empty(), Relaxed);
         *self.tokens_mut() = tokens;
         Ok(())
     }
@@ -47,10 +52,12 @@ impl Store {
         (*hash == presented.hash && token.is_valid(now)).then(|| token.clone())
     }
 
-    /// Whether the token with this id is still valid.
-    pub fn is_valid_token(&self, id: &str, now: Time) -> bool {
+    /// Whether the token with this id is still valid, and has this secret, if one is given.
+    pub fn is_valid_token(&self, id: &str, secret: Option<SecretHash>, now: Time) -> bool {
         let tokens = self.tokens_in_memory();
-        tokens.get(id).is_some_and(|(token, _)| token.is_valid(now))
+        tokens.get(id).is_some_and(|(token, hash)| {
+            token.is_valid(now) && secret.is_none_or(|secret| secret == *hash)
+        })
     }
 
     /// All tokens, the oldest first.
@@ -81,9 +88,17 @@ impl Store {
         .await
     }
 
-    /// Gives a token another secret; the old one is refused from then on.
-    pub async fn rotate_token(&self, id: &str, new: SecretHash) -> Result<Option<Token>> {
-        self.change_token(id, |_, hash| *hash = new).await
+    /// Gives a valid token another secret; the old one is refused from then on.
+    pub async fn rotate_token(
+        &self,
+        id: &str,
+        new: SecretHash,
+        now: Time,
+    ) -> Result<Option<Token>> {
+        match self.is_valid_token(id, None, now) {
+            true => self.change_token(id, |_, hash| *hash = new).await,
+            false => Ok(None),
+        }
     }
 
     async fn change_token(
@@ -128,6 +143,7 @@ impl Store {
             .execute(&mut *tx)
             .await?;
         seal(&mut tx, &token.id).await?;
+        require_tokens(&mut tx).await?;
         tx.commit().await
     }
 
@@ -138,6 +154,14 @@ impl Store {
     fn tokens_mut(&self) -> RwLockWriteGuard<'_, Tokens> {
         self.tokens.write().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// From now on every request needs a token, also if all of them are lost.
+pub(super) async fn require_tokens(tx: &mut SqliteConnection) -> Result<()> {
+    sqlx::query("insert into setting (name, value) values ('tokens_required', 'true') on conflict do nothing")
+        .execute(tx)
+        .await?;
+    Ok(())
 }
 
 /// Sets the checksum of a row that was written.

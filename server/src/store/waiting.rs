@@ -23,6 +23,8 @@ pub(super) type Owner = Arc<str>;
 pub(super) struct WaitingJobs {
     /// For each priority, the highest first: the jobs of each owner, in order of arrival.
     rows: [BTreeMap<Owner, Vec<i64>>; PRIORITIES],
+    /// How many there are.
+    count: usize,
     /// Jobs coalesced into others: they wait, but will not be started.
     coalesced: usize,
     /// What each owner has beside the jobs that wait for a worker.
@@ -70,11 +72,11 @@ pub(super) enum Move {
     Leave(Place),
     /// A job of this owner is coalesced into another.
     Attach(Owner),
-    /// It is so no longer.
+    /// A coalesced job of this owner was detached, or has ended.
     Detach(Owner),
-    /// A job of this owner runs.
+    /// A job of this owner starts.
     Start(Owner),
-    /// It does so no longer.
+    /// A running job of this owner has ended, or waits again.
     Stop(Owner),
     /// This owner has had a turn, after the turn `before`.
     Turn { owner: Owner, before: u64, now: u64 },
@@ -112,6 +114,7 @@ impl WaitingJobs {
                 let place = row.binary_search(&key);
                 if let Err(index) = place {
                     row.insert(index, key);
+                    self.count += 1;
                 }
                 place.is_err()
             }
@@ -127,6 +130,7 @@ impl WaitingJobs {
                 let place = row.binary_search(&key);
                 if let Ok(index) = place {
                     row.remove(index);
+                    self.count -= 1;
                 }
                 if row.is_empty() {
                     rows.remove(&owner);
@@ -216,8 +220,7 @@ impl WaitingJobs {
 
     /// How many wait, those that are coalesced among them.
     pub(super) fn len(&self) -> usize {
-        let waiting = self.rows.iter().flat_map(BTreeMap::values);
-        self.coalesced + waiting.map(Vec::len).sum::<usize>()
+        self.coalesced + self.count
     }
 
     /// The same of one owner.

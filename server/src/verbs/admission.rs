@@ -173,7 +173,7 @@ pub(super) async fn enqueue_sweep(
     may_have_priorities(caller, jobs.iter().map(|job| job.priority))?;
     let limit = service.max_queued;
     let asked = jobs.len() as u64;
-    let most_of_owner = service.max_queued_of(caller);
+    let most_of_owner = service.max_queued_of_owner();
     let hash = jobs.iter().find_map(|job| job.mesh.clone());
     let submission = Submission {
         owner: caller.owner().to_owned(),

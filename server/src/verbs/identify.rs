@@ -18,13 +18,37 @@ pub struct Credentials {
     pub users: Vec<String>,
 }
 
-/// A caller, and the id of the token that identified them.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A caller, and what identified them.
+#[derive(Clone, Debug)]
 pub struct Identified {
     /// The caller.
     pub caller: Caller,
-    /// Their token.
-    pub token: Option<String>,
+    /// By what.
+    pub by: By,
+}
+
+/// What identifies a caller.
+#[derive(Clone, Debug)]
+pub enum By {
+    /// A token.
+    Token(Presented),
+    /// The header of a trusted proxy.
+    Proxy,
+    /// Nothing, since the service needs no token.
+    Nothing,
+    /// Nothing, since the operation is open to everyone.
+    Anyone,
+}
+
+impl By {
+    /// Whether it still allows what it has allowed.
+    pub fn is_valid(&self, store: &Store) -> bool {
+        match self {
+            By::Token(Presented { id, hash }) => store.is_valid_token(id, Some(*hash), Time::now()),
+            By::Nothing => !store.has_tokens(),
+            By::Proxy | By::Anyone => true,
+        }
+    }
 }
 
 /// The caller of a request from `peer`, or why there is none.
@@ -40,16 +64,17 @@ pub fn identify(
         let token = token.ok_or(ApiError::Unauthenticated(UNKNOWN))?;
         return Ok(Identified {
             caller: token.caller(),
-            token: Some(token.id),
+            by: By::Token(presented.clone()),
         });
     }
-    let known = |caller| Identified {
-        caller,
-        token: None,
-    };
     if peer.is_some_and(|Peer(address)| trust.includes(address)) {
         match &credentials.users[..] {
-            [user] if is_owner(user) => return Ok(known(trust.caller(user))),
+            [user] if is_owner(user) => {
+                return Ok(Identified {
+                    caller: trust.caller(user),
+                    by: By::Proxy,
+                });
+            }
             [] => {}
             [..] => {
                 return Err(ApiError::Unauthenticated(
@@ -66,6 +91,9 @@ pub fn identify(
         true => Err(ApiError::Unauthenticated(
             "this service needs a token: send it as `Authorization: Bearer TOKEN`",
         )),
-        false => Ok(known(Caller::local())),
+        false => Ok(Identified {
+            caller: Caller::local(),
+            by: By::Nothing,
+        }),
     }
 }

@@ -80,16 +80,16 @@ pub struct Me {
 /// How much of something an owner has, and may have.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Share {
-    /// As much as they have.
+    /// Counted now.
     pub used: u64,
-    /// As much as they may have.
+    /// The most that is allowed.
     pub limit: u64,
 }
 
 /// Who the caller is.
 pub fn me(service: &Service, caller: &Caller) -> Me {
     let (queued, running) = service.store.load_of(caller.owner());
-    let queued_limit = service.max_queued_of(caller).unwrap_or(service.max_queued);
+    let queued_limit = service.max_queued_of_owner().unwrap_or(service.max_queued);
     let workers = service.queue.state().workers;
     let running_limit = service.max_running_per_owner.unwrap_or(workers);
     Me {

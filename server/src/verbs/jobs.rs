@@ -106,7 +106,11 @@ pub async fn update(
     violations
         .into_result(())
         .map_err(ApiError::InvalidProblem)?;
-    may_have_priorities(caller, edit.priority.into_iter())?;
+    if let Some(priority) = edit.priority.filter(|priority| *priority > 0)
+        && get(service, caller, id).await?.priority != priority
+    {
+        may_have_priorities(caller, [priority].into_iter())?;
+    }
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
         let (owners, versions) = (caller.visible_owners(), versions.as_deref());

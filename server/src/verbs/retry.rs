@@ -71,7 +71,11 @@ pub async fn retry(
         let envelope = Envelope {
             name,
             labels,
-            priority: changes.priority.unwrap_or(priority),
+            // one that an administrator has raised is not inherited by others
+            priority: changes.priority.unwrap_or(match caller.is_admin() {
+                true => priority,
+                false => priority.min(0),
+            }),
             limits: Limits {
                 timeout_s: changes.timeout_s.unwrap_or(limits.timeout_s),
                 queue_ttl_s: changes.queue_ttl_s.unwrap_or(limits.queue_ttl_s),

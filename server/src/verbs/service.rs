@@ -5,7 +5,6 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::{sync::Semaphore, time::timeout};
 
 use crate::{
-    caller::Caller,
     config::{Config, Isolation, ProxyTrust, Web},
     error::ApiError,
     queue::Queue,
@@ -75,10 +74,11 @@ impl Service {
         }
     }
 
-    /// How many jobs of this caller may wait; `None`: as many as of all. The only user of a service without authentication
+    /// How many jobs of one owner may wait; `None`: as many as of all. The only user of a service without authentication
     /// shares it with nobody.
-    pub(super) fn max_queued_of(&self, caller: &Caller) -> Option<u32> {
-        (*caller != Caller::local()).then_some(self.max_queued_per_owner)
+    pub(super) fn max_queued_of_owner(&self) -> Option<u32> {
+        let shared = self.store.has_tokens() || self.trust.is_on();
+        shared.then_some(self.max_queued_per_owner)
     }
 
     /// An error once the service is about to stop.

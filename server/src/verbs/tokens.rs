@@ -1,6 +1,6 @@
 //! Tokens: made, listed, revoked, and given another secret, by administrators.
 
-use std::{collections::BTreeSet, sync::Arc};
+use std::{collections::BTreeSet, fmt, sync::Arc};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -69,12 +69,19 @@ pub struct TokenRequest {
 }
 
 /// A token whose secret is shown, this once.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[derive(Clone, Serialize, JsonSchema)]
 pub struct NewToken {
     /// The token.
     pub token: Token,
     /// What clients send, as `Authorization: Bearer SECRET`. It is not stored, and cannot be shown again.
     pub secret: String,
+}
+
+impl fmt::Debug for NewToken {
+    /// Without the secret.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "NewToken({:?})", self.token)
+    }
 }
 
 /// The checked content of a request, or all that is wrong with it. `first`: there is no token yet.
@@ -215,8 +222,9 @@ pub async fn rotate(store: &Arc<Store>, caller: &Caller, id: &str) -> Result<New
     let (store, by, id) = (store.clone(), caller.owner().to_owned(), id.to_owned());
     let (secret, hash) = Secret::new(&id).map_err(ApiError::internal)?;
     detached(async move {
-        let rotated = store.rotate_token(&id, hash).await?;
-        let token = rotated.ok_or_else(|| unknown(&id))?;
+        let rotated = store.rotate_token(&id, hash, Time::now()).await?;
+        let token =
+            rotated.ok_or_else(|| ApiError::NotFound(format!("there is no valid token {id}")))?;
         info!(token.id = id, by, "token {id} has a new secret, by {by}");
         Ok(NewToken {
             token,
