@@ -14,9 +14,11 @@ mod inline;
 mod schema;
 mod source;
 
-// Out: tables (those that are text in `table`), fields, figures.
+// Out: tables (those that are text in `table`), fields (`columns`: as they are stored), figures.
 pub mod arrow;
+pub mod columns;
 pub mod fields;
+pub mod fields_json;
 pub mod npz;
 pub mod plot;
 pub mod stress;

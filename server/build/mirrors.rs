@@ -147,6 +147,10 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("QueueState", "queue::QueueState").answer(),
     fields("Caller", "info::Me").answer(),
     fields("Share", "info::Share").answer(),
+    fields("Kept", "info::Kept").answer(),
+    fields("Rate", "info::Rate").answer(),
+    fields("Disk", "info::Disk").answer(),
+    fields("OwnerUse", "info::OwnerUse").answer(),
     fields("Token", "token::Token").answer(),
     fields("NewToken", "tokens::NewToken").answer(),
 

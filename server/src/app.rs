@@ -20,7 +20,7 @@ use crate::{
     memory::Budget,
     queue::{Processes, Queue, Solver},
     rest,
-    store::{self, Store, StoreError},
+    store::{self, Retention, Store, StoreError},
     verbs::Service,
 };
 
@@ -70,6 +70,21 @@ async fn clean_up(store: &Store) -> store::Result<()> {
         );
     }
     Ok(())
+}
+
+/// How long and how much is kept; 0 is without limit.
+fn retention(config: &Config) -> Retention {
+    let limits = &config.retention;
+    let seconds = |days: f64| (days > 0.0).then_some(days * 86_400.0);
+    let count = |count: u64| (count > 0).then_some(count);
+    Retention {
+        age_s: seconds(limits.retain_days),
+        fields_age_s: seconds(limits.retain_fields_days),
+        jobs: count(limits.retain_jobs),
+        bytes: count(limits.retain_bytes),
+        jobs_of_owner: count(limits.retain_jobs_per_owner),
+        bytes_of_owner: count(limits.retain_bytes_per_owner),
+    }
 }
 
 /// The service would listen to other machines, and everyone there could do everything.
@@ -123,6 +138,10 @@ impl App {
         let closing = CancellationToken::new();
         let server = tokio::spawn(listener.serve(router, closing.clone()));
         queue.start();
+        tokio::spawn(store::keep_within(
+            Arc::downgrade(&store),
+            retention(config),
+        ));
         let (version, data) = (env!("CARGO_PKG_VERSION"), config.data.display());
         let (isolation, budget) = (config.isolation, size(config.memory.bytes()));
         let workers = number_of(config.workers.into(), "worker");

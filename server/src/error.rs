@@ -1,6 +1,8 @@
 //! Why a request failed, with the details of the case; `catalog` has, for each kind, what clients may rely on. Here
 //! an error becomes the HTTP document, and the gRPC status with its details.
 
+use std::fmt;
+
 use axum::http::StatusCode;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -84,6 +86,11 @@ pub enum ApiError {
     /// The job ended without a result.
     #[error("the job ended without a result (status {0})")]
     NoResult(JobStatus),
+    /// The fields of a job were deleted by themselves.
+    #[error(
+        "the fields of {0} were deleted, by themselves or by retention; its summary, history and profiles are still there"
+    )]
+    FieldsDeleted(JobId),
     /// The path does not have this method.
     #[error("this path does not have this method; the Allow header lists those it has")]
     MethodNotAllowed,
@@ -201,22 +208,62 @@ pub enum ApiError {
 }
 
 /// What an owner has as much of as they may.
-#[derive(Clone, Debug, Serialize, thiserror::Error)]
-#[error(
-    "{owner} has {used} jobs in the queue of at most {limit}, and this request would add {asked}{}",
-    if asked > limit { ": submit it in parts" } else { "" }
-)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Quota {
     /// Whose.
     pub owner: String,
-    /// What: `queued`.
-    pub of: &'static str,
+    /// Of what.
+    pub of: QuotaOf,
     /// As much as they may have.
     pub limit: u64,
     /// As much as they have.
     pub used: u64,
     /// What the request would add.
     pub asked: u64,
+}
+
+/// What an owner has a share of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum QuotaOf {
+    /// Jobs in the queue.
+    Queued,
+    /// Bytes that are kept.
+    StoredBytes,
+    /// Jobs submitted in a minute.
+    Submissions,
+}
+
+impl fmt::Display for Quota {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Quota {
+            owner,
+            of,
+            limit,
+            used,
+            asked,
+        } = self;
+        let in_parts = match asked > limit {
+            true => ": submit it in parts",
+            false => "",
+        };
+        match of {
+            QuotaOf::Queued => write!(
+                f,
+                "{owner} has {used} jobs in the queue of at most {limit}, and this request would add {asked}{in_parts}"
+            ),
+            QuotaOf::StoredBytes => write!(
+                f,
+                "{owner} keeps {} of at most {}, jobs and meshes: delete some of them, or the fields of some",
+                size(*used),
+                size(*limit)
+            ),
+            QuotaOf::Submissions => write!(
+                f,
+                "{owner} may submit {limit} jobs in a minute, has submitted {used}, and this request would add {asked}{in_parts}"
+            ),
+        }
+    }
 }
 
 impl ApiError {
@@ -244,7 +291,7 @@ impl ApiError {
             ApiError::Forbidden(_) => Code::Forbidden,
             ApiError::NotFound(_) => Code::NotFound,
             ApiError::Deleted(_) | ApiError::SweepDeleted(_) => Code::Deleted,
-            ApiError::NoResult(_) => Code::NoResult,
+            ApiError::NoResult(_) | ApiError::FieldsDeleted(_) => Code::NoResult,
             ApiError::MethodNotAllowed => Code::MethodNotAllowed,
             ApiError::NotAcceptable { .. } => Code::NotAcceptable,
             ApiError::UnsupportedMedia(_) => Code::UnsupportedMedia,
@@ -261,7 +308,10 @@ impl ApiError {
             | ApiError::AnswerTooLarge { .. } => Code::PayloadTooLarge,
             ApiError::ProblemTooLarge { .. } => Code::ProblemTooLarge,
             ApiError::InvalidProblem(_) => Code::InvalidProblem,
-            ApiError::QuotaExceeded(_) => Code::QuotaExceeded,
+            ApiError::QuotaExceeded(quota) => match quota.of {
+                QuotaOf::Queued | QuotaOf::StoredBytes => Code::QuotaExceeded,
+                QuotaOf::Submissions => Code::RateLimited,
+            },
             ApiError::RateLimited => Code::RateLimited,
             ApiError::Internal { .. } => Code::Internal,
             ApiError::QueueFull { .. } => Code::QueueFull,

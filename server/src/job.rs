@@ -90,6 +90,9 @@ pub struct Job {
     pub failure: Option<Failure>,
     /// Whether there is a result to fetch.
     pub result_available: ResultAvailable,
+    /// Bytes that it keeps in the store, once it has ended: its result, unless that is another job's, and its events.
+    #[serde(default)]
+    pub stored_bytes: Option<u64>,
     /// Addresses of what belongs to it.
     pub links: BTreeMap<String, String>,
 }

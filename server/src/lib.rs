@@ -21,6 +21,7 @@ pub mod config;
 pub mod error;
 pub mod pace;
 pub mod parameters;
+pub mod rates;
 pub mod transfer;
 pub mod violations;
 

@@ -63,6 +63,7 @@ const POLICY: &[(&str, &[&str])] = &[
         &[
             "CancelJob",
             "CancelJobs",
+            "DeleteFields",
             "DeleteJob",
             "DeleteJobs",
             "DeleteMesh",
@@ -75,6 +76,7 @@ const POLICY: &[(&str, &[&str])] = &[
         &[
             "PauseQueue",
             "ResumeQueue",
+            "ListOwners",
             "CreateToken",
             "ListTokens",
             "RevokeToken",

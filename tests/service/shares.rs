@@ -222,3 +222,162 @@ async fn a_priority_above_0_is_for_administrators() {
         (403, 200, 200)
     );
 }
+
+/// Waits until the job has ended, as this user.
+async fn ended(server: &Server, user: &str, job: &Value) -> Value {
+    let path = format!(
+        "/v1/jobs/{}?wait=30&until=terminal",
+        job["id"].as_str().unwrap()
+    );
+    get(server, user, &path).await
+}
+
+async fn delete(server: &Server, user: &str, path: &str) -> (StatusCode, String) {
+    let request = server.delete(path).header("x-remote-user", user);
+    let response = request.send().await.unwrap();
+    (response.status(), response.text().await.unwrap())
+}
+
+/// Operations: DeleteFields, ListOwners, GetCaller, GetServerInfo
+#[tokio::test]
+async fn what_each_owner_keeps_is_told_and_limited_and_fields_can_be_deleted_alone() {
+    let server = shared(&["--max-bytes-per-owner", "300000"]).await;
+    let (_, first) = batch(&server, "ada", 1).await;
+    let job = ended(&server, "ada", &first["jobs"][0]).await;
+    let kept = job["stored_bytes"].as_u64().unwrap();
+    assert!(kept > 5000, "{job}");
+    let me = get(&server, "ada", "/v1/me").await;
+    assert_eq!(me["stored_bytes"], json!({"used": kept, "limit": 300000}));
+    let info = get(&server, "ada", "/v1/info").await;
+    for part in ["used_bytes", "free_bytes"] {
+        assert!(info["disk"][part].as_u64().unwrap() > 10_000, "{info}");
+    }
+    let path = format!("/v1/jobs/{}", job["id"].as_str().unwrap());
+    let fields = format!("{path}/fields");
+    assert_eq!(
+        delete(&server, "bob", &fields).await.0,
+        StatusCode::NOT_FOUND
+    );
+    for _ in 0..2 {
+        assert_eq!(
+            delete(&server, "ada", &fields).await.0,
+            StatusCode::NO_CONTENT
+        );
+    }
+    for (part, code) in [
+        ("/fields", "no-result"),
+        ("/fields?format=json", "no-result"),
+        ("/plots/deformed.svg", "no-result"),
+    ] {
+        let answer = get(&server, "ada", &format!("{path}{part}")).await;
+        assert_eq!(answer["code"], code, "{answer}");
+        assert!(
+            answer["detail"].as_str().unwrap().contains("deleted"),
+            "{answer}"
+        );
+    }
+    for part in ["/result", "/history", "/profiles/top"] {
+        let request = server
+            .get(&format!("{path}{part}"))
+            .header("x-remote-user", "ada");
+        assert_eq!(
+            request.send().await.unwrap().status(),
+            StatusCode::OK,
+            "{part}"
+        );
+    }
+    let less = get(&server, "ada", &path).await["stored_bytes"]
+        .as_u64()
+        .unwrap();
+    assert!(less < kept, "{less} of {kept}");
+
+    // more than allowed: nothing until some is deleted
+    loop {
+        let (status, answer) = batch(&server, "ada", 1).await;
+        if status == StatusCode::TOO_MANY_REQUESTS {
+            assert_eq!(answer["quota"]["of"], "stored_bytes", "{answer}");
+            assert_eq!(answer["quota"]["limit"], 300000);
+            break;
+        }
+        ended(&server, "ada", &answer["jobs"][0]).await;
+    }
+    assert_eq!(batch(&server, "bob", 1).await.0, StatusCode::ACCEPTED);
+    let owners = get(&server, "root", "/v1/owners").await;
+    assert_eq!(owners["owners"][0]["owner"], "ada", "{owners}");
+    assert_eq!(get(&server, "ada", "/v1/owners").await["code"], "forbidden");
+    let mut client = JobServiceClient::connect(server.url.clone()).await.unwrap();
+    let as_user = |user: &'static str| {
+        let mut request = Request::new(pb::ListOwnersRequest {});
+        request
+            .metadata_mut()
+            .insert("x-remote-user", user.parse().unwrap());
+        request
+    };
+    let listed = client
+        .list_owners(as_user("root"))
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(
+        listed.owners[0].job_bytes,
+        owners["owners"][0]["job_bytes"].as_u64().unwrap()
+    );
+    assert_eq!(
+        client.list_owners(as_user("ada")).await.unwrap_err().code(),
+        Code::PermissionDenied
+    );
+    let mut request = Request::new(pb::DeleteFieldsRequest {
+        id: job["id"].as_str().unwrap().into(),
+    });
+    request
+        .metadata_mut()
+        .insert("x-remote-user", "ada".parse().unwrap());
+    client.delete_fields(request).await.unwrap();
+    assert_eq!(
+        delete(&server, "ada", "/v1/jobs?status=succeeded").await.0,
+        StatusCode::OK
+    );
+    assert_eq!(batch(&server, "ada", 1).await.0, StatusCode::ACCEPTED);
+}
+
+/// Operations: CreateJob
+#[tokio::test]
+async fn an_owner_submits_no_more_jobs_in_a_minute_than_allowed() {
+    let server = shared(&["--max-submissions-per-owner-per-minute", "5"]).await;
+    assert_eq!(batch(&server, "ada", 4).await.0, StatusCode::ACCEPTED);
+    let (status, answer) = batch(&server, "ada", 3).await;
+    assert_eq!(
+        (status, &answer["code"]),
+        (StatusCode::TOO_MANY_REQUESTS, &json!("rate-limited"))
+    );
+    assert_eq!(answer["quota"]["of"], "submissions", "{answer}");
+    let (_, answer) = batch(&server, "bob", 6).await;
+    assert!(
+        answer["detail"].as_str().unwrap().contains("in parts"),
+        "{answer}"
+    );
+    let me = get(&server, "ada", "/v1/me").await;
+    assert_eq!(me["submissions"], json!({"per_minute": 5, "left": 1}));
+}
+
+/// Operations: DeleteJob
+#[tokio::test]
+async fn what_is_too_old_is_removed_by_itself() {
+    // some two seconds, in days
+    let server = Server::start(SIGNORINI, &["--retain-days", "0.00002"]).await;
+    let id = server.submit(&example_json("sheet")).await;
+    server.until_done(&id).await;
+    for _ in 0..60 {
+        let status = server
+            .get(&format!("/v1/jobs/{id}"))
+            .send()
+            .await
+            .unwrap()
+            .status();
+        if status == StatusCode::GONE {
+            return;
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(500)).await;
+    }
+    panic!("it is still there");
+}

@@ -14,7 +14,7 @@ use tonic::transport::Channel;
 use super::{examples, exit::Exit, output, report};
 use crate::{
     app::App,
-    config::{Config, Isolation, MemoryBudget, ProxyTrust, Web},
+    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Web},
     event::{Event, Payload},
     job::{Job, Status},
     pb::{self, job_service_client::JobServiceClient},
@@ -38,6 +38,9 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         max_queued: 100,
         max_queued_per_owner: 100,
         max_running_per_owner: None,
+        max_bytes_per_owner: None,
+        max_submissions_per_owner_per_minute: None,
+        retention: RetentionLimits::default(),
         memory: MemoryBudget::default(),
         body_cache_bytes: None,
         max_body_bytes: 16 << 20,

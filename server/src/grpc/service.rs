@@ -358,6 +358,15 @@ impl JobService for Grpc {
         Ok(Response::new(pb::DeleteJobResponse {}))
     }
 
+    async fn delete_fields(
+        &self,
+        request: Request<pb::DeleteFieldsRequest>,
+    ) -> Reply<pb::DeleteFieldsResponse> {
+        let (caller, request) = caller_and_message(request)?;
+        jobs::delete_fields(&self.service, &caller, ID.read(&request.id)?).await?;
+        Ok(Response::new(pb::DeleteFieldsResponse {}))
+    }
+
     async fn delete_jobs(
         &self,
         request: Request<pb::DeleteJobsRequest>,
@@ -373,12 +382,26 @@ impl JobService for Grpc {
         request: Request<pb::GetServerInfoRequest>,
     ) -> Reply<pb::ServerInfo> {
         let (caller, _) = caller_and_message(request)?;
-        Ok(Response::new(info::info(&self.service, &caller).into()))
+        Ok(Response::new(
+            info::info(&self.service, &caller).await?.into(),
+        ))
     }
 
     async fn get_caller(&self, request: Request<pb::GetCallerRequest>) -> Reply<pb::Caller> {
         let (caller, _) = caller_and_message(request)?;
-        Ok(Response::new(info::me(&self.service, &caller).into()))
+        Ok(Response::new(
+            info::me(&self.service, &caller).await?.into(),
+        ))
+    }
+
+    async fn list_owners(
+        &self,
+        request: Request<pb::ListOwnersRequest>,
+    ) -> Reply<pb::ListOwnersResponse> {
+        let (caller, _) = caller_and_message(request)?;
+        let owners = info::owners(&self.service, &caller).await?;
+        let owners = owners.into_iter().map(Into::into).collect();
+        Ok(Response::new(pb::ListOwnersResponse { owners }))
     }
 
     async fn create_token(&self, request: Request<pb::CreateTokenRequest>) -> Reply<pb::NewToken> {

@@ -1,6 +1,6 @@
 //! `/v1/jobs/{id}/result`, `/history`, `/profiles/{boundary}` and `/fields`.
 
-use axum::{Json, body::Body, response::Response};
+use axum::{Json, body::Body, http::StatusCode, response::Response};
 
 use super::{
     call::Call,
@@ -11,7 +11,7 @@ use crate::{
     formats::{self, Format},
     job::JobId,
     verbs::{
-        fields as stored, history as rows,
+        fields as stored, history as rows, jobs,
         profiles::{self, Points},
         results::{self, JobResult},
     },
@@ -55,6 +55,11 @@ pub(super) async fn profile(
     data::whole(&part, format, format!("{id}.profile.{boundary}"), bytes)
 }
 
+pub(super) async fn delete_fields(call: Call, id: JobId) -> Result<StatusCode, ApiError> {
+    jobs::delete_fields(&call.service, &call.caller, id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
 pub(super) async fn fields(
     call: Call,
     id: JobId,
@@ -69,7 +74,7 @@ pub(super) async fn fields(
         let bytes = stored::converted_fields(service, caller, id, format).await?;
         return data::whole(&part, format, name, bytes);
     }
-    // JSON is the stored form, and is sent unchanged
+    // JSON may be large, and is sent in pieces
     let fields = stored::fields(service, caller, id).await?;
     let file = data::File {
         format,

@@ -5,6 +5,8 @@ use axum::{
     http::header,
     response::{IntoResponse, Response},
 };
+use schemars::JsonSchema;
+use serde::Serialize;
 use serde_json::Value;
 
 use super::{accept::prefers, call::Call};
@@ -13,7 +15,7 @@ use crate::{
     error::ApiError,
     parameters::{Variable, Words},
     verbs::{
-        info::{self as about, Info, Me},
+        info::{self as about, Info, Me, OwnerUse},
         queue::{self as verbs, QueueState},
     },
 };
@@ -31,11 +33,23 @@ pub(super) async fn resume(call: Call) -> Result<Json<QueueState>, ApiError> {
 }
 
 pub(super) async fn info(call: Call) -> Result<Json<Info>, ApiError> {
-    Ok(Json(about::info(&call.service, &call.caller)))
+    Ok(Json(about::info(&call.service, &call.caller).await?))
 }
 
 pub(super) async fn me(call: Call) -> Result<Json<Me>, ApiError> {
-    Ok(Json(about::me(&call.service, &call.caller)))
+    Ok(Json(about::me(&call.service, &call.caller).await?))
+}
+
+/// What the owners have.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Owners {
+    /// Who keeps most first.
+    owners: Vec<OwnerUse>,
+}
+
+pub(super) async fn owners(call: Call) -> Result<Json<Owners>, ApiError> {
+    let owners = about::owners(&call.service, &call.caller).await?;
+    Ok(Json(Owners { owners }))
 }
 
 /// A kind of error in a path.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use files::columns::Law;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use solver::{
@@ -32,6 +33,9 @@ pub struct Document {
     pub steps: Vec<Step>,
     /// Displacements and stresses at all nodes.
     pub fields: Fields,
+    /// By which stresses follow from displacements: fields are stored compactly with it.
+    #[serde(skip)]
+    pub law: Law,
 }
 
 /// The end of one load step.
@@ -116,6 +120,7 @@ impl Document {
             friction_profiles,
             steps: steps.into_iter().map(step).collect(),
             fields,
+            law: Law::of(problem),
         })
     }
 }

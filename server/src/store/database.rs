@@ -13,7 +13,10 @@ use std::{
 
 use sqlx::{
     ConnectOptions, Connection, Sqlite, SqliteConnection, SqlitePool, Transaction,
-    sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
+    sqlite::{
+        SqliteAutoVacuum, SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions,
+        SqliteSynchronous,
+    },
 };
 use tokio::sync::mpsc;
 
@@ -25,6 +28,7 @@ use super::{
     migrations,
     progress::{self, Known, LastCommit, Progress},
     reserve::Reserve,
+    space,
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
@@ -77,7 +81,7 @@ pub struct Store {
     pub(super) full_commits: Arc<std::sync::atomic::AtomicU32>,
     // last: SQLite's files are closed before
     pub(super) identity: Identity,
-    folder: Folder,
+    pub(super) folder: Folder,
 }
 
 /// A transaction of the single writer; unless it is committed it is rolled back.
@@ -136,6 +140,7 @@ impl Store {
         let identity = Identity::of(&folder)?;
         let writing = options
             .clone()
+            .auto_vacuum(SqliteAutoVacuum::Incremental)
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full);
         // Two kinds of connections are replaced by new ones. A full disk makes SQLite end a transaction by itself, which
@@ -151,6 +156,7 @@ impl Store {
             .connect_with(writing)
             .await?;
         migrations::run(&writer).await?;
+        space::enable_giving_back(&mut *writer.acquire().await?).await?;
         let record = progress::in_database(&mut *writer.acquire().await?).await?;
         let record = record.ok_or_else(|| StoreError::Unexpected("no progress".into()))?;
         let progress = Progress::start(path, record).map_err(|error| {

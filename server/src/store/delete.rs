@@ -91,6 +91,7 @@ pub(super) async fn delete(
     for statement in [
         "delete from event where job_id = ?",
         "delete from job_label where job_id = ?",
+        "delete from job_size where job_id = ?",
         "delete from job where id = ?",
     ] {
         sqlx::query(statement).bind(key).execute(&mut *tx).await?;

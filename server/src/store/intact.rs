@@ -5,27 +5,21 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use sha2::{Digest, Sha256};
 use sqlx::SqliteConnection;
 
 use super::{
     checksum::Checksum,
+    encoding::{Content, Encoding, PartInfo, decoded, info_of_json},
     error::{Record, Result},
 };
-
-/// Size and hash of a part.
-#[derive(Clone, Debug)]
-pub struct PartInfo {
-    /// Its size.
-    pub bytes: u64,
-    /// Its SHA-256.
-    pub digest: Vec<u8>,
-}
 
 /// Results, or parts of them, that were read whole and found as they were written, since the store was opened: what
 /// answers another job is checked once. Keys are never used again. The older half is forgotten when there are many.
 #[derive(Debug, Default)]
 pub(super) struct Intact(Mutex<[HashSet<(i64, &'static str)>; 2]>);
+
+/// Up to this size of its JSON a part is decoded where it is read: that takes a millisecond or two.
+const INLINE_BYTES: u64 = 256 << 10;
 
 /// In place of the name of a part: all of them.
 pub(super) const WHOLE: &str = "";
@@ -54,34 +48,60 @@ pub(super) fn part_of(key: i64, name: &str) -> Record {
     Record::of_job(key, format!("result part {name}"))
 }
 
-/// Size and hash of a part; `None` if there is no such part, or if it was written by a version that did not store
-/// them. The second value: whether the row has a checksum, hence all others of this result.
+/// What is stored about a part beside its pieces.
+pub(super) struct StoredInfo {
+    pub(super) info: PartInfo,
+    encoding: Encoding,
+    /// The row has a checksum, hence all others of this result.
+    has_checksum: bool,
+}
+
+/// Bytes, digest, checksum and encoding.
+type InfoColumns = (i64, Vec<u8>, Option<i64>, Option<i64>);
+
+/// What is stored about a part; `None` if there is no such part, or if it was written by a version that did not store it.
 pub(super) async fn part_info(
     connection: &mut SqliteConnection,
     key: i64,
     name: &str,
-) -> Result<Option<(PartInfo, bool)>> {
-    let found: Option<(i64, Vec<u8>, Option<i64>)> = sqlx::query_as(
-        "select bytes, digest, checksum from result_info where job_id = ? and name = ?",
+) -> Result<Option<StoredInfo>> {
+    let found: Option<InfoColumns> = sqlx::query_as(
+        "select bytes, digest, checksum, encoding from result_info where job_id = ? and name = ?",
     )
     .bind(key)
     .bind(name)
     .fetch_optional(connection)
     .await?;
-    let Some((bytes, digest, checksum)) = found else {
+    let Some((bytes, digest, checksum, encoding)) = found else {
         return Ok(None);
     };
-    info_checksum(key, name, bytes, &digest).verify(checksum, || part_of(key, name))?;
+    let record = || part_of(key, name);
+    info_checksum(key, name, bytes, &digest, encoding).verify(checksum, record)?;
+    let unknown = || record().damaged("it is stored in a way that this program does not know");
     let info = PartInfo {
         bytes: bytes as u64,
         digest,
     };
-    Ok(Some((info, checksum.is_some())))
+    Ok(Some(StoredInfo {
+        info,
+        encoding: Encoding::from_stored(encoding).ok_or_else(unknown)?,
+        has_checksum: checksum.is_some(),
+    }))
 }
 
 /// The checksum of a row of `result_info`.
-pub(super) fn info_checksum(key: i64, name: &str, bytes: i64, digest: &[u8]) -> Checksum {
-    Checksum::new().int(key).text(name).int(bytes).bytes(digest)
+pub(super) fn info_checksum(
+    key: i64,
+    name: &str,
+    bytes: i64,
+    digest: &[u8],
+    encoding: Option<i64>,
+) -> Checksum {
+    let sum = Checksum::new().int(key).text(name).int(bytes).bytes(digest);
+    match encoding {
+        Some(encoding) => sum.int(encoding),
+        None => sum,
+    }
 }
 
 /// The checksum of a row of `result_part`.
@@ -89,8 +109,8 @@ pub(super) fn piece_checksum(key: i64, name: &str, piece: i64, body: &[u8]) -> C
     Checksum::new().int(key).text(name).int(piece).bytes(body)
 }
 
-/// One piece of a part, from 0; `None` after the last.
-pub(super) async fn piece(
+/// One stored piece of a part, from 0; `None` after the last.
+async fn piece(
     connection: &mut SqliteConnection,
     key: i64,
     name: &str,
@@ -111,34 +131,41 @@ pub(super) async fn piece(
     Ok(Some(body))
 }
 
-/// Reads a part piece by piece, and compares the whole with its size and hash; `None` if there is no such part.
+/// A part, compared with its size and hash; `None` if there is no such part.
 pub(super) async fn read_part(
     connection: &mut SqliteConnection,
     key: i64,
     name: &str,
-    mut take: impl FnMut(Vec<u8>),
-) -> Result<Option<PartInfo>> {
-    let info = part_info(connection, key, name).await?;
-    let (mut bytes, mut hash, mut number) = (0, Sha256::new(), 0);
-    while let Some(body) = piece(connection, key, name, number).await? {
-        bytes += body.len() as u64;
-        hash.update(&body);
-        take(body);
-        number += 1;
+) -> Result<Option<(PartInfo, Content)>> {
+    let known = part_info(connection, key, name).await?;
+    let (mut stored, mut pieces) = (vec![], 0);
+    while let Some(body) = piece(connection, key, name, pieces).await? {
+        stored.extend_from_slice(&body);
+        pieces += 1;
     }
-    let found = PartInfo {
-        bytes,
-        digest: hash.finalize().to_vec(),
-    };
-    match info {
+    let Some(known) = known else {
         // written by a version that did not store size and hash
-        None => Ok((number > 0).then_some(found)),
+        return Ok((pieces > 0).then(|| (info_of_json(&stored), Content::Json(stored))));
+    };
+    if !known.has_checksum && pieces == 0 {
         // a version without checksums kept them of a history that it had removed
-        Some((_, false)) if number == 0 => Ok(None),
-        Some((info, _)) if (info.bytes, &info.digest) == (found.bytes, &found.digest) => {
-            Ok(Some(found))
-        }
-        Some((info, _)) => Err(part_of(key, name).damaged(format!(
+        return Ok(None);
+    }
+    let StoredInfo { info, encoding, .. } = known;
+    let expected = info.clone();
+    let decode = move || decoded(stored, encoding, &expected);
+    // a large one takes a second, in which its thread would answer nobody
+    let decoded = match info.bytes > INLINE_BYTES {
+        true => tokio::task::spawn_blocking(decode)
+            .await
+            .unwrap_or_else(|panic| Err(panic.to_string())),
+        false => decode(),
+    };
+    let damaged = |cause: String| part_of(key, name).damaged(cause);
+    let (found, content) = decoded.map_err(damaged)?;
+    match found == info {
+        true => Ok(Some((found, content))),
+        false => Err(damaged(format!(
             "{} bytes of another hash in place of {}",
             found.bytes, info.bytes
         ))),
@@ -157,7 +184,7 @@ pub(super) async fn check_result(connection: &mut SqliteConnection, key: i64) ->
         return Err(part_of(key, "summary").damaged("it is missing"));
     }
     for name in names {
-        read_part(connection, key, &name, |_| ()).await?;
+        read_part(connection, key, &name).await?;
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ use super::{
     error::{Damage, Result, StoreError},
     events, results,
     rows::{partial_key, read},
+    sizes,
     waiting::{Move, Place},
 };
 use crate::{
@@ -113,6 +114,7 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
         job: Box::new(read(change.sql(), job.key).await?),
     };
     events::append(change.sql(), job.key, job.attempt, &[(now, done)]).await?;
+    sizes::count(change.sql(), job.key).await?;
     change.changed(job.key);
     let failure = ending.failure.as_ref();
     let detail = failure.map_or_else(String::new, |failure| failure.detail.clone());

@@ -12,6 +12,7 @@ use super::{
     error::Result,
     filter::{Cursor, Filter, GroupBy, Order, OrderBy},
     rows::from_row,
+    sizes,
 };
 use crate::{
     caller::Owners,
@@ -59,6 +60,7 @@ impl Store {
             let rows = query.build().fetch_all(&mut *connection).await?;
             let mut jobs = rows.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
             self.add_queue_positions(&mut connection, &mut jobs).await?;
+            sizes::add_sizes(&mut connection, &mut jobs).await?;
             self.damages.indexes_are_intact()?;
             Ok(jobs)
         };

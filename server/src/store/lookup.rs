@@ -5,6 +5,7 @@ use super::{
     error::Result,
     problems,
     rows::{find, with_id},
+    sizes,
 };
 use crate::{
     caller::Owners,
@@ -20,8 +21,9 @@ impl Store {
                 self.damages.indexes_are_intact()?;
                 return Ok(None);
             };
-            self.add_queue_positions(&mut connection, std::slice::from_mut(&mut job))
-                .await?;
+            let one = std::slice::from_mut(&mut job);
+            self.add_queue_positions(&mut connection, one).await?;
+            sizes::add_sizes(&mut connection, one).await?;
             Ok(Some(job))
         };
         self.damages.noting(read).await

@@ -14,6 +14,7 @@
 
 // Input and output types, and errors.
 mod checksum;
+mod encoding;
 mod error;
 mod filter;
 mod parts;
@@ -39,6 +40,7 @@ mod labels;
 mod problems;
 mod results;
 mod rows;
+mod sizes;
 
 // Its lifecycle: attempts and end; coalesced with others of the same input; claimed, ended, requeued.
 mod claim;
@@ -54,7 +56,9 @@ mod sweeps;
 mod bulk;
 mod delete;
 mod edit;
+mod fields;
 mod keys;
+mod retention;
 mod submit;
 mod trial;
 
@@ -68,6 +72,7 @@ mod snapshot;
 // What is not a job.
 mod meshes;
 mod settings;
+mod space;
 mod tokens;
 
 // A store that no server has open.
@@ -84,18 +89,21 @@ pub use self::{
     database::with_advice,
     delete::Deletion,
     edit::Edit,
+    encoding::PartInfo,
     end::CancelOutcome,
     error::{Damage, Record, Result, StoreError},
     events::FinalBatch,
     filter::{Cursor, Filter, GroupBy, Order, OrderBy},
     health::Health,
     inspect::{Report, inspect},
-    intact::PartInfo,
     lifecycle::Ending,
     meshes::{Removal, StoredMesh},
-    parts::{PIECE_BYTES, PIECES_PER_COMMIT, Parts, ProfilePoints},
+    parts::{PIECE_BYTES, PIECES_PER_COMMIT, Part, Parts, ProfilePoints},
     progress::accept,
+    retention::{Retention, Retired, keep_within},
+    sizes::OwnerSize,
     snapshot::Snapshot,
+    space::Space,
     submission::{Accepted, Claim, NewJob, NewSweep, QueueLimits, RequestKey, Submission},
     sweeps::{MemberEvents, MembersTask},
 };

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use files::columns;
+use serde::{Deserialize, Serialize};
 use serde_json::json;
-use sha2::{Digest, Sha256};
-use solver::solution::ContactProfile;
+use solver::solution::{ContactProfile, Fields};
 
+use super::encoding::{Encoding, PartInfo, deflated, info_of_fields, info_of_json};
 use crate::run::Document;
 
 /// Bytes of one piece of a stored result or mesh: larger rows make SQLite chain pages, and readers need more memory.
@@ -14,83 +16,113 @@ pub const PIECE_BYTES: usize = 256 << 10;
 /// cancel or a submission during the write of a large result is still answered at once.
 pub const PIECES_PER_COMMIT: usize = 4;
 
-/// The stored form of a document: name, JSON and SHA-256 of each part.
-#[derive(Debug)]
+/// The stored form of a document.
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Parts(pub(super) Vec<Part>);
 
-#[derive(Debug)]
-pub(super) struct Part {
+/// A part of a result.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Part {
     pub(super) name: String,
-    pub(super) body: Vec<u8>,
-    pub(super) digest: Vec<u8>,
+    /// How `body` holds it.
+    pub(super) encoding: Encoding,
+    /// The bytes that are stored. Between processes they follow the message.
+    #[serde(skip)]
+    pub body: Vec<u8>,
+    pub(super) info: PartInfo,
 }
 
 impl Part {
-    pub(super) fn new(name: String, body: Vec<u8>) -> Part {
-        let digest = Sha256::digest(&body).to_vec();
-        Part { name, body, digest }
+    /// Its name: `summary`, `fields`, …
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its JSON, for tests.
+    #[cfg(test)]
+    pub(crate) fn json(self) -> Vec<u8> {
+        match super::encoding::decoded(self.body, self.encoding, &self.info) {
+            Ok((_, super::encoding::Content::Json(json))) => json,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// A part from its JSON.
+    pub(super) fn new(name: String, json: &[u8]) -> Part {
+        Part {
+            name,
+            encoding: Encoding::Deflated,
+            info: info_of_json(json),
+            body: deflated(json),
+        }
+    }
+
+    /// Fields, whose JSON is never in memory as a whole.
+    pub(super) fn of_fields(fields: &Fields, law: &columns::Law) -> serde_json::Result<Part> {
+        let info = info_of_fields(fields)?;
+        let body = columns::encode(fields, law)
+            .map_err(<serde_json::Error as serde::ser::Error>::custom)?;
+        Ok(Part {
+            name: "fields".into(),
+            encoding: Encoding::Columns,
+            body,
+            info,
+        })
     }
 }
 
 impl Parts {
     /// Divides a document into the parts that can be requested.
     pub fn of(document: &Document) -> serde_json::Result<Parts> {
-        let mut parts = vec![
-            (
-                "summary".to_string(),
-                serde_json::to_vec(&document.summary)?,
-            ),
-            (
-                "history".to_string(),
-                serde_json::to_vec(&document.history)?,
-            ),
-        ];
+        let mut parts = vec![];
+        let mut add = |name: String, json: serde_json::Result<Vec<u8>>| {
+            parts.push(Part::new(name, &json?));
+            Ok::<_, serde_json::Error>(())
+        };
+        add("summary".into(), serde_json::to_vec(&document.summary))?;
+        add("history".into(), serde_json::to_vec(&document.history))?;
         // the iterations of a step are part of the history; its profiles are requested one by one
         let steps: Vec<_> = document
             .steps
             .iter()
             .map(|step| json!({"name": step.name, "summary": step.summary}))
             .collect();
-        parts.push(("steps".to_string(), serde_json::to_vec(&steps)?));
-        let mut add = |points, step, profiles: &BTreeMap<String, ContactProfile>| {
-            for (boundary, profile) in profiles {
+        add("steps".into(), serde_json::to_vec(&steps))?;
+        let mut add_all = |points, step, profiles: &BTreeMap<String, ContactProfile>| {
+            profiles.iter().try_for_each(|(boundary, profile)| {
                 let name = profile_part(boundary, points, step);
-                parts.push((name, serde_json::to_vec(profile)?));
-            }
-            Ok::<_, serde_json::Error>(())
+                add(name, serde_json::to_vec(profile))
+            })
         };
         for (number, step) in document.steps.iter().enumerate() {
-            add(ProfilePoints::All, Some(number), &step.profiles)?;
-            add(ProfilePoints::Nodes, Some(number), &step.node_profiles)?;
-            add(
+            add_all(ProfilePoints::All, Some(number), &step.profiles)?;
+            add_all(ProfilePoints::Nodes, Some(number), &step.node_profiles)?;
+            add_all(
                 ProfilePoints::Friction,
                 Some(number),
                 &step.friction_profiles,
             )?;
         }
-        add(ProfilePoints::All, None, &document.profiles)?;
-        add(ProfilePoints::Nodes, None, &document.node_profiles)?;
-        add(ProfilePoints::Friction, None, &document.friction_profiles)?;
+        add_all(ProfilePoints::All, None, &document.profiles)?;
+        add_all(ProfilePoints::Nodes, None, &document.node_profiles)?;
+        add_all(ProfilePoints::Friction, None, &document.friction_profiles)?;
         if !document.fields.x.is_empty() {
-            parts.push(("fields".to_string(), serde_json::to_vec(&document.fields)?));
+            parts.push(Part::of_fields(&document.fields, &document.law)?);
         }
-        let hashed = |(name, body)| Part::new(name, body);
-        Ok(Parts(parts.into_iter().map(hashed).collect()))
+        Ok(Parts(parts))
     }
 
-    /// Name, JSON and SHA-256 of each part.
-    pub fn into_parts(self) -> impl Iterator<Item = (String, Vec<u8>, Vec<u8>)> {
-        let part = |Part { name, body, digest }| (name, body, digest);
-        self.0.into_iter().map(part)
+    /// One after the other, for another process.
+    pub fn into_parts(self) -> impl Iterator<Item = Part> {
+        self.0.into_iter()
     }
 
-    /// From name, JSON and SHA-256 of each part.
-    pub fn from_parts(parts: Vec<(String, Vec<u8>, Vec<u8>)>) -> Parts {
-        let part = |(name, body, digest)| Part { name, body, digest };
-        Parts(parts.into_iter().map(part).collect())
+    /// From those of another process.
+    pub fn from_parts(parts: Vec<Part>) -> Parts {
+        Parts(parts)
     }
 
-    /// The size of all parts together.
+    /// The stored size of all parts together.
     pub fn bytes(&self) -> usize {
         self.0.iter().map(|part| part.body.len()).sum()
     }

@@ -8,6 +8,7 @@ use sqlx::SqliteConnection;
 
 use super::{
     database::Store,
+    encoding::Content,
     error::Result,
     intact,
     parts::{Part, Parts, Piece},
@@ -90,12 +91,10 @@ pub(super) async fn keep_partial(tx: &mut SqliteConnection, key: i64) -> Result<
             .await?;
     // a checksum includes the key, so the rows are written anew; partial results are small
     for name in names.into_iter().filter(|name| name != "history") {
-        let mut body = vec![];
-        let read = intact::read_part(tx, partial_key(key), &name, |piece| {
-            body.extend_from_slice(&piece);
-        });
-        if read.await?.is_some() {
-            let parts = Parts(vec![Part::new(name, body)]);
+        // partial results have no fields
+        let read = intact::read_part(tx, partial_key(key), &name).await?;
+        if let Some((_, Content::Json(json))) = read {
+            let parts = Parts(vec![Part::new(name, &json)]);
             for group in parts.groups() {
                 insert(tx, key, &group).await?;
             }
@@ -137,16 +136,17 @@ async fn insert(tx: &mut SqliteConnection, key: i64, group: &[Piece<'_>]) -> Res
 /// Writes the size and hash of each part.
 async fn write_info(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
     for part in &parts.0 {
-        let bytes = part.body.len() as i64;
-        let checksum = intact::info_checksum(key, &part.name, bytes, &part.digest).stored();
+        let (bytes, encoding) = (part.info.bytes as i64, part.encoding.stored());
+        let checksum = intact::info_checksum(key, &part.name, bytes, &part.info.digest, encoding);
         sqlx::query(
-            "insert or replace into result_info (job_id, name, bytes, digest, checksum) values (?, ?, ?, ?, ?)",
+            "insert or replace into result_info (job_id, name, bytes, digest, checksum, encoding) values (?, ?, ?, ?, ?, ?)",
         )
         .bind(key)
         .bind(&part.name)
         .bind(bytes)
-        .bind(&part.digest)
-        .bind(checksum)
+        .bind(&part.info.digest)
+        .bind(checksum.stored())
+        .bind(encoding)
         .execute(&mut *tx)
         .await?;
     }

@@ -149,6 +149,7 @@ fn parse(row: &SqliteRow) -> Result<Job> {
         },
         failure: failure.map(serde_json::from_str).transpose()?,
         result_available: word("result_available", row.try_get("result_available")?)?,
+        stored_bytes: None,
         links: links(id),
     })
 }

@@ -9,7 +9,7 @@ use super::{
     database::{Store, Writing, with_advice},
     error::{Result, StoreError},
     rows::seal,
-    tokens,
+    sizes, tokens,
 };
 use crate::job::{Job, ResultAvailable};
 
@@ -72,7 +72,7 @@ pub(super) async fn copy_job(
         .await?;
     }
     if job.result_available == ResultAvailable::None {
-        return Ok(());
+        return sizes::count(tx, job.key).await;
     }
     for (table, statement) in [
         ("result_info", "select * from result_info where job_id = ?"),
@@ -83,7 +83,7 @@ pub(super) async fn copy_job(
             insert(tx, table, &row).await?;
         }
     }
-    Ok(())
+    sizes::count(tx, job.key).await
 }
 
 /// Copies what can be read of the rest, and sets right what refers to jobs that were not copied.

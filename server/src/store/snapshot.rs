@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
+use solver::solution::Fields;
 use sqlx::{Sqlite, Transaction};
 
 use super::{
     damage::Damages,
     database::Store,
+    encoding::{Content, PartInfo},
     error::Result,
-    intact::{self, Intact, PartInfo},
+    intact,
     parts::{ProfilePoints, profile_part},
     rows::with_id,
 };
@@ -17,7 +19,64 @@ use crate::{
     job::{Job, JobId},
 };
 
+/// The name of the part that is served in pieces and in other formats.
+const FIELDS: &str = "fields";
+
 impl Store {
+    /// Size and hash of the JSON of the fields under this key, if they were read whole and found intact before.
+    pub async fn fields_info(&self, key: i64) -> Result<Option<PartInfo>> {
+        if !self.intact.contains(key, FIELDS) {
+            return Ok(None);
+        }
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            let known = intact::part_info(&mut connection, key, FIELDS).await?;
+            Ok(known.map(|known| known.info))
+        };
+        self.damages.noting(read).await
+    }
+
+    /// About the memory that the fields under this key take, in bytes; `None` if there are none.
+    pub async fn fields_memory(&self, key: i64) -> Result<Option<usize>> {
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            if let Some(known) = intact::part_info(&mut connection, key, FIELDS).await? {
+                // a number has some seventeen digits, and eight bytes
+                return Ok(Some((known.info.bytes / 2) as usize));
+            }
+            let stored = "select sum(length(body)) from result_part where job_id = ? and name = ?";
+            let stored: Option<i64> = sqlx::query_scalar(stored)
+                .bind(key)
+                .bind(FIELDS)
+                .fetch_one(&mut *connection)
+                .await?;
+            Ok(stored.map(|bytes| bytes as usize))
+        };
+        self.damages.noting(read).await
+    }
+
+    /// The fields under this key, with size and hash of their JSON.
+    pub async fn fields(&self, key: i64) -> Result<Option<(PartInfo, Fields)>> {
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            let Some((info, content)) = intact::read_part(&mut connection, key, FIELDS).await?
+            else {
+                return Ok(None);
+            };
+            let fields = match content {
+                Content::Fields(fields) => *fields,
+                Content::Json(json) => serde_json::from_slice(&json)
+                    .map_err(|error| intact::part_of(key, FIELDS).damaged(error))?,
+            };
+            Ok(Some((info, fields)))
+        };
+        let found = self.damages.noting(read).await?;
+        if found.is_some() {
+            self.intact.insert(key, FIELDS);
+        }
+        Ok(found)
+    }
+
     /// A job and its result at one moment: the parts may be replaced while the job runs, and are removed when it is
     /// deleted.
     pub async fn snapshot(&self, owners: Owners<'_>, id: JobId) -> Result<Option<Snapshot>> {
@@ -31,17 +90,7 @@ impl Store {
                 job,
                 tx,
                 damages: self.damages.clone(),
-                intact: self.intact.clone(),
             }))
-        };
-        self.damages.noting(read).await
-    }
-
-    /// One piece of a part, from 0; `None` after the last.
-    pub async fn piece(&self, key: i64, part: &str, piece: i64) -> Result<Option<Vec<u8>>> {
-        let read = async {
-            let mut connection = self.reader.acquire().await?;
-            intact::piece(&mut connection, key, part, piece).await
         };
         self.damages.noting(read).await
     }
@@ -53,37 +102,18 @@ pub struct Snapshot {
     pub job: Job,
     tx: Transaction<'static, Sqlite>,
     damages: Arc<Damages>,
-    intact: Arc<Intact>,
 }
 
 impl Snapshot {
-    /// Size and hash of a part that is served in pieces. The whole is read before, so that damage is found before the
-    /// first byte is sent; of the result of a job that has ended, once.
-    pub async fn checked_part_info(&mut self, part: &'static str) -> Result<Option<PartInfo>> {
-        let (key, tx) = (self.job.result_key, &mut self.tx);
-        let intact = self.intact.contains(key, part);
-        let read = async {
-            if intact && let Some((info, _)) = intact::part_info(tx, key, part).await? {
-                return Ok(Some(info));
-            }
-            intact::read_part(tx, key, part, |_| ()).await
-        };
-        let info = self.damages.noting(read).await?;
-        // that of a running job is replaced
-        if info.is_some() && self.job.status.is_terminal() {
-            self.intact.insert(key, part);
-        }
-        Ok(info)
-    }
-
-    /// A whole part.
+    /// The JSON of a part.
     pub async fn part(&mut self, part: &str) -> Result<Option<Vec<u8>>> {
-        let mut whole = vec![];
-        let read = intact::read_part(&mut self.tx, self.job.result_key, part, |piece| {
-            whole.extend_from_slice(&piece);
-        });
+        let read = intact::read_part(&mut self.tx, self.job.result_key, part);
         let found = self.damages.noting(read).await?;
-        Ok(found.map(|_| whole))
+        Ok(match found {
+            Some((_, Content::Json(json))) => Some(json),
+            Some((_, Content::Fields(fields))) => Some(serde_json::to_vec(&fields)?),
+            None => None,
+        })
     }
 
     /// The profile of a boundary, at the end or at the end of a load step (from 0).

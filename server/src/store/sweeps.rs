@@ -289,31 +289,11 @@ impl Store {
 
     async fn try_to_delete_sweep(&self, key: i64) -> Result<bool> {
         let mut change = self.control_change().await?;
-        let now = change.now().micros();
-        let tx = change.sql();
-        let left: bool = sqlx::query_scalar(
-            "select exists (select 1 from job join sweep on sweep.uuid = job.sweep where sweep.id = ?)",
-        )
-        .bind(key)
-        .fetch_one(&mut *tx)
-        .await?;
-        if left {
-            return Ok(false);
+        let deleted = delete(&mut change, key).await?;
+        if deleted {
+            change.commit().await?;
         }
-        sqlx::query("insert into deleted_sweep select uuid, owner, ? from sweep where id = ?")
-            .bind(now)
-            .bind(key)
-            .execute(&mut *tx)
-            .await?;
-        for statement in [
-            "delete from sweep_member where sweep = ?",
-            "delete from sweep_definition where sweep = ?",
-            "delete from sweep where id = ?",
-        ] {
-            sqlx::query(statement).bind(key).execute(&mut *tx).await?;
-        }
-        change.commit().await?;
-        Ok(true)
+        Ok(deleted)
     }
 }
 
@@ -361,6 +341,46 @@ pub(super) async fn insert_members(
             .bind(sum(sweep, number, job, None).stored())
             .execute(&mut *tx)
             .await?;
+    }
+    Ok(())
+}
+
+/// Deletes a sweep; false if it has jobs.
+async fn delete(change: &mut Change<'_>, key: i64) -> Result<bool> {
+    let now = change.now().micros();
+    let tx = change.sql();
+    let left: bool = sqlx::query_scalar(
+        "select exists (select 1 from job join sweep on sweep.uuid = job.sweep where sweep.id = ?)",
+    )
+    .bind(key)
+    .fetch_one(&mut *tx)
+    .await?;
+    if left {
+        return Ok(false);
+    }
+    sqlx::query("insert into deleted_sweep select uuid, owner, ? from sweep where id = ?")
+        .bind(now)
+        .bind(key)
+        .execute(&mut *tx)
+        .await?;
+    for statement in [
+        "delete from sweep_member where sweep = ?",
+        "delete from sweep_definition where sweep = ?",
+        "delete from sweep where id = ?",
+    ] {
+        sqlx::query(statement).bind(key).execute(&mut *tx).await?;
+    }
+    Ok(true)
+}
+
+/// Deletes a sweep with the last of its jobs.
+pub(super) async fn remove_without_jobs(change: &mut Change<'_>, id: SweepId) -> Result<()> {
+    let key: Option<i64> = sqlx::query_scalar("select id from sweep where uuid = ?")
+        .bind(id.0.to_string())
+        .fetch_optional(change.sql())
+        .await?;
+    if let Some(key) = key {
+        delete(change, key).await?;
     }
     Ok(())
 }

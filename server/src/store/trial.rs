@@ -44,7 +44,7 @@ impl Store {
             key: id.to_string(),
             payload: String::new(),
         };
-        let result = Parts(vec![Part::new("summary".into(), b"{}".to_vec())]);
+        let result = Parts(vec![Part::new("summary".into(), b"{}")]);
         let ending = Ending {
             result: ResultAvailable::Partial,
             ..Ending::failed(Reason::Internal, "")

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     caller::Caller,
     digest,
-    error::{ApiError, Quota},
+    error::{ApiError, Quota, QuotaOf},
     job::{Job, JobId},
     store::{Accepted, NewJob, NewSweep, QueueLimits, RequestKey, StoreError, Submission},
 };
@@ -173,6 +173,19 @@ pub(super) async fn enqueue_sweep(
     may_have_priorities(caller, jobs.iter().map(|job| job.priority))?;
     let limit = service.max_queued;
     let asked = jobs.len() as u64;
+    service.may_keep_more(caller.owner()).await?;
+    if let Some(rates) = service.rates()
+        && let Err(left) = rates.take(caller.owner(), asked)
+    {
+        let limit = rates.per_minute.unwrap_or_default().into();
+        return Err(ApiError::QuotaExceeded(Quota {
+            owner: caller.owner().to_owned(),
+            of: QuotaOf::Submissions,
+            limit,
+            used: limit.saturating_sub(left),
+            asked,
+        }));
+    }
     let most_of_owner = service.max_queued_of_owner();
     let hash = jobs.iter().find_map(|job| job.mesh.clone());
     let submission = Submission {
@@ -193,7 +206,7 @@ pub(super) async fn enqueue_sweep(
         },
         StoreError::OwnerQueueFull => ApiError::QuotaExceeded(Quota {
             owner: caller.owner().to_owned(),
-            of: "queued",
+            of: QuotaOf::Queued,
             limit: most_of_owner.unwrap_or(limit).into(),
             used: service.store.load_of(caller.owner()).0 as u64,
             asked,

@@ -1,8 +1,12 @@
-//! Mesh, displacements and stresses: in their stored form, or in another format.
+//! Mesh, displacements and stresses: as JSON in pieces, or in another format.
 
-use std::sync::Arc;
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, PoisonError, Weak},
+};
 
 use async_stream::try_stream;
+use files::fields_json::FieldsJson;
 use futures_util::Stream;
 use solver::solution::Fields;
 
@@ -14,39 +18,123 @@ use crate::{
     caller::Caller,
     error::ApiError,
     formats::{self, Format},
-    job::JobId,
-    store::{PIECE_BYTES, PartInfo},
+    job::{Job, JobId, ResultAvailable},
+    store::PartInfo,
+    transfer::Share,
 };
 
-/// The stored fields of a job: JSON of known length and fingerprint, in pieces.
+/// The fields of a job: JSON of known length and fingerprint, in pieces.
 #[derive(Debug)]
 pub struct StoredFields {
     /// Length and fingerprint.
     pub info: PartInfo,
     id: JobId,
     result_key: i64,
+    /// If they had to be read to know that they are intact.
+    loaded: Option<Arc<Loaded>>,
 }
 
-/// The fields at all nodes in their stored form.
+/// Fields in memory, with their share of the limit on answers.
+#[derive(Debug)]
+struct Loaded {
+    info: PartInfo,
+    fields: Fields,
+    _share: Share,
+}
+
+/// The fields that are being sent, by the key of their result: who asks for the same ones shares them.
+#[derive(Debug, Default)]
+pub struct FieldsInMemory(Mutex<HashMap<i64, Weak<Loaded>>>);
+
+impl FieldsInMemory {
+    fn find(&self, key: i64) -> Option<Arc<Loaded>> {
+        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.get(&key)?.upgrade()
+    }
+
+    fn insert(&self, key: i64, loaded: &Arc<Loaded>) {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|_, loaded| loaded.strong_count() > 0);
+        all.insert(key, Arc::downgrade(loaded));
+    }
+}
+
+/// The fields at all nodes as JSON.
 pub async fn fields(
     service: &Service,
     caller: &Caller,
     id: JobId,
 ) -> Result<StoredFields, ApiError> {
-    let mut found = with_result(service, caller, id).await?;
-    let result_key = found.job.result_key;
-    match found.checked_part_info("fields").await? {
-        Some(info) => Ok(StoredFields {
-            info,
-            id,
-            result_key,
-        }),
-        None => Err(no_result(&found.job)),
+    let found = with_result(service, caller, id).await?;
+    let job = found.job.clone();
+    drop(found);
+    let result_key = job.result_key;
+    are_kept(service, &job).await?;
+    let (info, loaded) = match service.store.fields_info(result_key).await? {
+        Some(info) => (info, None),
+        None => {
+            let loaded = load(service, result_key).await?;
+            let loaded = loaded.ok_or_else(|| no_result(&job))?;
+            (loaded.info.clone(), Some(loaded))
+        }
+    };
+    Ok(StoredFields {
+        info,
+        id,
+        result_key,
+        loaded,
+    })
+}
+
+/// An error if the fields of a job that has ended were deleted.
+pub(super) async fn are_kept(service: &Service, job: &Job) -> Result<(), ApiError> {
+    let lost = job.status.is_terminal()
+        && job.result_available == ResultAvailable::Final
+        && !service.store.has_fields(job.key).await?;
+    match lost {
+        true => Err(ApiError::FieldsDeleted(job.id)),
+        false => Ok(()),
+    }
+}
+
+/// Fields in memory, once there is room for them; `None` if there are none.
+async fn load(service: &Service, key: i64) -> Result<Option<Arc<Loaded>>, ApiError> {
+    if let Some(loaded) = service.fields_in_memory.find(key) {
+        return Ok(Some(loaded));
+    }
+    let Some(bytes) = service.store.fields_memory(key).await? else {
+        return Ok(None);
+    };
+    let share = service.sent.wait_for(bytes).await?;
+    if let Some(loaded) = service.fields_in_memory.find(key) {
+        return Ok(Some(loaded)); // read by another meanwhile
+    }
+    let Some((info, fields)) = service.store.fields(key).await? else {
+        return Ok(None);
+    };
+    let loaded = Arc::new(Loaded {
+        info,
+        fields,
+        _share: share,
+    });
+    service.fields_in_memory.insert(key, &loaded);
+    Ok(Some(loaded))
+}
+
+/// Shared fields as their JSON is written of them.
+struct Shared(Arc<Loaded>);
+
+impl std::ops::Deref for Shared {
+    type Target = Fields;
+
+    fn deref(&self) -> &Fields {
+        &self.0.fields
     }
 }
 
 impl StoredFields {
-    /// The bytes from `start` to before `end`, in pieces, since there may be many.
+    /// The bytes from `start` to before `end`, in pieces, since there may be many. What comes before is written and left out:
+    /// a millisecond for each megabyte.
     pub fn bytes(
         &self,
         service: &Arc<Service>,
@@ -54,22 +142,28 @@ impl StoredFields {
         end: u64,
     ) -> impl Stream<Item = Result<Vec<u8>, ApiError>> + Send + use<> {
         let (service, id, key) = (service.clone(), self.id, self.result_key);
-        const PIECE: u64 = PIECE_BYTES as u64;
+        let loaded = self.loaded.clone();
         try_stream! {
-            for piece in start / PIECE..end.div_ceil(PIECE) {
-                // in a task of its own: a client that does not read may stop this stream at any point
-                let service = service.clone();
-                let read = detached(async move {
-                    let share = service.sent.wait_for(PIECE_BYTES).await?;
-                    let found = service.store.piece(key, "fields", piece as i64).await?;
-                    Ok((share, found.ok_or(ApiError::Deleted(id))?))
-                });
-                let (share, mut bytes) = read.await?;
-                let first = piece * PIECE;
-                bytes.truncate(end.saturating_sub(first) as usize);
-                let skipped = start.saturating_sub(first) as usize;
-                yield bytes.split_off(skipped.min(bytes.len()));
-                drop(share); // the next piece is asked for: this one is on its way
+            let loaded = match loaded {
+                Some(loaded) => loaded,
+                None => {
+                    // in a task of its own: a client that does not read may stop this stream at any point
+                    let load = detached(async move { load(&service, key).await });
+                    load.await?.ok_or(ApiError::Deleted(id))?
+                }
+            };
+            let (mut json, mut place) = (FieldsJson::new(Shared(loaded)), 0);
+            while place < end {
+                let next = move || (json.piece(), json);
+                let (piece, rest) = tokio::task::spawn_blocking(next).await.map_err(ApiError::internal)?;
+                json = rest;
+                let Some(mut piece) = piece.map_err(ApiError::internal)? else { break };
+                let first = place;
+                place += piece.len() as u64;
+                if place > start {
+                    piece.truncate(end.saturating_sub(first).min(piece.len() as u64) as usize);
+                    yield piece.split_off(start.saturating_sub(first) as usize);
+                }
             }
         }
     }
@@ -82,15 +176,14 @@ pub async fn converted_fields(
     id: JobId,
     format: Format,
 ) -> Result<Vec<u8>, ApiError> {
-    let load = async {
-        let mut found = with_result(service, caller, id).await?;
-        let fields = found.part("fields").await?;
-        fields.ok_or_else(|| no_result(&found.job))
+    let read = async {
+        let found = with_result(service, caller, id).await?;
+        let job = found.job.clone();
+        drop(found);
+        are_kept(service, &job).await?;
+        let loaded = load(service, job.result_key).await?;
+        loaded.ok_or_else(|| no_result(&job))
     };
-    let written = service.work_on(load, move |stored| {
-        let fields: Fields = serde_json::from_slice(&stored).map_err(|error| error.to_string())?;
-        drop(stored); // they may be large
-        formats::fields(&fields, format)
-    });
+    let written = service.work_on(read, move |loaded| formats::fields(&loaded.fields, format));
     written.await?.map_err(ApiError::internal)
 }

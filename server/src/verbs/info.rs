@@ -15,7 +15,10 @@ use crate::{
     bodies::BodyCache,
     caller::{Caller, Scope},
     config::Isolation,
+    error::ApiError,
     formats::Format,
+    rates::Rates,
+    store::OwnerSize,
 };
 
 /// Version and limits of a service.
@@ -35,10 +38,23 @@ pub struct Info {
     pub limits: ServiceLimits,
     /// Condensed bodies that are kept for later jobs; all 0 with isolation `process`.
     pub body_cache: BodyCache,
+    /// The disk.
+    pub disk: Disk,
     /// Formats of rows (profiles, history), the default first.
     pub table_formats: Vec<String>,
     /// Formats of fields, the default first.
     pub field_formats: Vec<String>,
+}
+
+/// The disk.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct Disk {
+    /// Bytes of the database and its write-ahead log.
+    pub used_bytes: u64,
+    /// Bytes of it without content, for what comes next; more than some are given back to the file system.
+    pub unused_bytes: u64,
+    /// Bytes that the file system has left.
+    pub free_bytes: u64,
 }
 
 /// Limits of the service.
@@ -75,6 +91,46 @@ pub struct Me {
     pub queued: Share,
     /// Jobs that run.
     pub running: Share,
+    /// Bytes of jobs that have ended, and of meshes.
+    pub stored_bytes: Kept,
+    /// Jobs submitted; absent: as many as they like.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub submissions: Option<Rate>,
+}
+
+/// What an owner keeps.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct Kept {
+    /// Counted now.
+    pub used: u64,
+    /// The most that is allowed; `null`: there is no limit.
+    pub limit: Option<u64>,
+}
+
+/// How often something may be done.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct Rate {
+    /// In a minute.
+    pub per_minute: u64,
+    /// At once, now.
+    pub left: u64,
+}
+
+/// What an owner has in the service.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct OwnerUse {
+    /// Their name.
+    pub owner: String,
+    /// Jobs that have ended.
+    pub jobs: u64,
+    /// Bytes of these: results and events.
+    pub job_bytes: u64,
+    /// Bytes of uploaded meshes.
+    pub mesh_bytes: u64,
+    /// Jobs that wait.
+    pub queued: u64,
+    /// Jobs that run.
+    pub running: u64,
 }
 
 /// How much of something an owner has, and may have.
@@ -87,12 +143,19 @@ pub struct Share {
 }
 
 /// Who the caller is.
-pub fn me(service: &Service, caller: &Caller) -> Me {
+pub async fn me(service: &Service, caller: &Caller) -> Result<Me, ApiError> {
+    let size = service.store.size_of_owner(caller.owner()).await?;
+    let rate = |rates: &Rates| {
+        Some(Rate {
+            per_minute: rates.per_minute?.into(),
+            left: rates.left(caller.owner())?,
+        })
+    };
     let (queued, running) = service.store.load_of(caller.owner());
     let queued_limit = service.max_queued_of_owner().unwrap_or(service.max_queued);
     let workers = service.queue.state().workers;
     let running_limit = service.max_running_per_owner.unwrap_or(workers);
-    Me {
+    Ok(Me {
         owner: caller.owner().to_owned(),
         scopes: caller.scopes().collect(),
         queued: Share {
@@ -103,14 +166,39 @@ pub fn me(service: &Service, caller: &Caller) -> Me {
             used: running as u64,
             limit: running_limit.min(workers).into(),
         },
-    }
+        stored_bytes: Kept {
+            used: size.bytes(),
+            limit: service.max_bytes_of_owner(),
+        },
+        submissions: service.rates().and_then(rate),
+    })
+}
+
+/// What the owners have in the service, who keeps most first: a thousand of them at most. Those whose jobs have not ended yet and
+/// who have no meshes are not among them.
+pub async fn owners(service: &Service, _caller: &Caller) -> Result<Vec<OwnerUse>, ApiError> {
+    const MOST: i64 = 1000;
+    let sizes = service.store.sizes_of_owners(MOST).await?;
+    let with_load = |size: OwnerSize| {
+        let (queued, running) = service.store.load_of(&size.owner);
+        OwnerUse {
+            queued: queued as u64,
+            running: running as u64,
+            jobs: size.jobs,
+            job_bytes: size.job_bytes,
+            mesh_bytes: size.mesh_bytes,
+            owner: size.owner,
+        }
+    };
+    Ok(sizes.into_iter().map(with_load).collect())
 }
 
 /// Version and limits.
-pub fn info(service: &Service, _caller: &Caller) -> Info {
+pub async fn info(service: &Service, _caller: &Caller) -> Result<Info, ApiError> {
+    let space = service.store.space().await?;
     let budget = service.store.budget();
     let names = |formats: &[Format]| formats.iter().map(|f| f.name().to_owned()).collect();
-    Info {
+    Ok(Info {
         name: "signorini".into(),
         version: env!("CARGO_PKG_VERSION").into(),
         api_version: "v1".into(),
@@ -128,7 +216,12 @@ pub fn info(service: &Service, _caller: &Caller) -> Info {
             max_wait_s: MAX_WAIT_S,
         },
         body_cache: budget.body_cache(),
+        disk: Disk {
+            used_bytes: space.used,
+            unused_bytes: space.unused,
+            free_bytes: space.free,
+        },
         table_formats: names(Format::OF_TABLES),
         field_formats: names(Format::OF_FIELDS),
-    }
+    })
 }

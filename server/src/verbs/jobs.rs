@@ -162,18 +162,43 @@ pub async fn delete(service: &Arc<Service>, caller: &Caller, id: JobId) -> Resul
     let job = get(service, caller, id).await?;
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
-        match service
+        let deletion = service
             .store
             .delete(caller.visible_owners(), job.key)
-            .await?
-        {
-            Deletion::Deleted => {
-                service.queue.announce(&[job.key]);
-                Ok(())
-            }
-            Deletion::Active => Err(ApiError::JobActive(job.status)),
-            Deletion::Unknown => Err(not_found(&service, &caller, id).await?),
-        }
+            .await?;
+        answer(&service, &caller, &job, deletion).await?;
+        service.queue.announce(&[job.key]);
+        Ok(())
     })
     .await
+}
+
+/// Deletes mesh, displacements and stresses of a job that has ended; summary, history and profiles stay.
+pub async fn delete_fields(
+    service: &Arc<Service>,
+    caller: &Caller,
+    id: JobId,
+) -> Result<(), ApiError> {
+    let job = get(service, caller, id).await?;
+    let (service, caller) = (service.clone(), caller.clone());
+    detached(async move {
+        let owners = caller.visible_owners();
+        let deletion = service.store.delete_fields(owners, job.key).await?;
+        answer(&service, &caller, &job, deletion).await
+    })
+    .await
+}
+
+/// An error if a job was not deleted.
+async fn answer(
+    service: &Service,
+    caller: &Caller,
+    job: &Job,
+    deletion: Deletion,
+) -> Result<(), ApiError> {
+    match deletion {
+        Deletion::Deleted => Ok(()),
+        Deletion::Active => Err(ApiError::JobActive(job.status)),
+        Deletion::Unknown => Err(not_found(service, caller, job.id).await?),
+    }
 }

@@ -10,6 +10,7 @@ use solver::{
 };
 
 use super::{
+    fields,
     history::StoredHistory,
     jobs, profiles,
     results::{self, read},
@@ -87,12 +88,16 @@ pub async fn plot(
             Plot::Convergence => Some(StoredHistory::load(service, &mut found).await?),
             _ => None,
         };
-        let fields = match plot {
-            Plot::Mesh | Plot::Deformed => found.part("fields").await?,
-            _ => None,
-        };
         let job = found.job.clone();
         drop(found);
+        if plot == Plot::Deformed {
+            fields::are_kept(service, &job).await?;
+        }
+        let fields = match plot {
+            Plot::Mesh | Plot::Deformed => service.store.fields(job.result_key).await?,
+            _ => None,
+        };
+        let fields = fields.map(|(_, fields)| fields);
         if plot == Plot::Deformed && fields.is_none() {
             return Err(results::no_result(&job));
         }
@@ -128,7 +133,7 @@ pub async fn plot(
         if plot == Plot::Convergence && history.is_empty() {
             return Err(results::no_result(&job));
         }
-        let fields = fields.map_or(Ok(Fields::default()), |bytes| read(&bytes))?;
+        let fields = fields.unwrap_or_default();
         let stored: Option<Mesh> = stored
             .map(|bytes| postcard::from_bytes(&bytes).map_err(ApiError::internal))
             .transpose()?;
@@ -146,14 +151,14 @@ pub async fn plot(
     service.work_on(load, draw).await?
 }
 
-/// Job, problem, profiles, summary, history, fields and stored mesh, in their stored form; the parts that a figure does not
-/// need are absent.
+/// Job, problem, profiles, summary, history, fields and stored mesh, most in their stored form; the parts that a figure does
+/// not need are absent.
 type Loaded = (
     Job,
     Problem,
     Vec<(String, Vec<u8>)>,
     Option<Vec<u8>>,
     Option<StoredHistory>,
-    Option<Vec<u8>>,
+    Option<Fields>,
     Option<Vec<u8>>,
 );

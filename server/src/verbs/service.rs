@@ -4,10 +4,12 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{sync::Semaphore, time::timeout};
 
+use super::fields::FieldsInMemory;
 use crate::{
     config::{Config, Isolation, ProxyTrust, Web},
-    error::ApiError,
+    error::{ApiError, Quota, QuotaOf},
     queue::Queue,
+    rates::Rates,
     store::{Health, Store, StoreError},
     transfer::Limit,
 };
@@ -33,6 +35,10 @@ pub struct Service {
     max_queued_per_owner: u32,
     /// Maximum number of running jobs of one owner.
     pub(super) max_running_per_owner: Option<u16>,
+    /// Maximum number of bytes that one owner keeps.
+    max_bytes_per_owner: Option<u64>,
+    /// How many jobs each owner submits.
+    rates: Rates,
     /// Memory that one job may need, by the estimate.
     pub(super) memory_budget_bytes: u64,
     pub(super) isolation: Isolation,
@@ -44,6 +50,8 @@ pub struct Service {
     pub received: Limit,
     /// Bytes of answers in memory, over all requests.
     pub sent: Limit,
+    /// Fields that are being sent.
+    pub(super) fields_in_memory: FieldsInMemory,
     /// The proxies that identify users.
     pub trust: ProxyTrust,
     /// What requests from browsers may name.
@@ -62,12 +70,15 @@ impl Service {
             max_queued: config.max_queued,
             max_queued_per_owner: config.max_queued_per_owner,
             max_running_per_owner: config.max_running_per_owner,
+            max_bytes_per_owner: config.max_bytes_per_owner,
+            rates: Rates::new(config.max_submissions_per_owner_per_minute),
             memory_budget_bytes: config.memory.bytes(),
             isolation: config.isolation,
             max_body_bytes: config.max_body_bytes,
             max_mesh_bytes: config.max_mesh_bytes,
             received: Limit::new(config.max_received_bytes),
             sent: Limit::new(config.max_sent_bytes),
+            fields_in_memory: FieldsInMemory::default(),
             trust: config.trust.clone(),
             web: config.web.clone(),
             data: config.data.clone(),
@@ -77,8 +88,39 @@ impl Service {
     /// How many jobs of one owner may wait; `None`: as many as of all. The only user of a service without authentication
     /// shares it with nobody.
     pub(super) fn max_queued_of_owner(&self) -> Option<u32> {
-        let shared = self.store.has_tokens() || self.trust.is_on();
-        shared.then_some(self.max_queued_per_owner)
+        self.is_shared().then_some(self.max_queued_per_owner)
+    }
+
+    /// Whether it tells owners apart.
+    fn is_shared(&self) -> bool {
+        self.store.has_tokens() || self.trust.is_on()
+    }
+
+    /// How many bytes one owner may keep.
+    pub(super) fn max_bytes_of_owner(&self) -> Option<u64> {
+        self.max_bytes_per_owner.filter(|_| self.is_shared())
+    }
+
+    /// How many jobs each owner may submit.
+    pub(super) fn rates(&self) -> Option<&Rates> {
+        Some(&self.rates).filter(|rates| rates.per_minute.is_some() && self.is_shared())
+    }
+
+    /// An error if the owner keeps as much as they may.
+    pub(super) async fn may_keep_more(&self, owner: &str) -> Result<(), ApiError> {
+        let Some(limit) = self.max_bytes_of_owner() else {
+            return Ok(());
+        };
+        match self.store.size_of_owner(owner).await?.bytes() {
+            used if used >= limit => Err(ApiError::QuotaExceeded(Quota {
+                owner: owner.to_owned(),
+                of: QuotaOf::StoredBytes,
+                limit,
+                used,
+                asked: 0,
+            })),
+            _ => Ok(()),
+        }
     }
 
     /// An error once the service is about to stop.

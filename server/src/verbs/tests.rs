@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     caller::{Caller, Scope},
-    config::{Config, Isolation, MemoryBudget, ProxyTrust, Web},
+    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Web},
     error::ApiError,
     fake,
     formats::Format,
@@ -46,6 +46,9 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
         max_queued: 10,
         max_queued_per_owner: 10,
         max_running_per_owner: None,
+        max_bytes_per_owner: None,
+        max_submissions_per_owner_per_minute: None,
+        retention: RetentionLimits::default(),
         memory: MemoryBudget::default(),
         body_cache_bytes: None,
         max_body_bytes: 1 << 20,

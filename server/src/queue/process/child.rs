@@ -136,8 +136,9 @@ fn pass_on(told: Told, service: &mut UnixStream) -> io::Result<()> {
 }
 
 fn send_parts(parts: Parts, service: &mut UnixStream) -> io::Result<()> {
-    for (name, body, digest) in parts.into_parts() {
-        send(service, &Reply::Part { name, digest }, &body)?;
+    for mut part in parts.into_parts() {
+        let body = std::mem::take(&mut part.body);
+        send(service, &Reply::Part(part), &body)?;
     }
     Ok(())
 }

@@ -16,7 +16,7 @@ use super::ending::NoSolution;
 use crate::{
     event::Payload,
     memory::Outgrown,
-    store::{Ending, MembersTask},
+    store::{Ending, MembersTask, Part},
     sweep::MemberRow,
 };
 
@@ -61,7 +61,7 @@ enum Reply {
     /// It needs more memory than its share, and stops.
     OutOfMemory(Outgrown),
     /// A part of a result: its content follows.
-    Part { name: String, digest: Vec<u8> },
+    Part(Part),
     /// The parts so far are a partial result.
     Partial,
     /// The parts so far are the result.
@@ -122,12 +122,14 @@ fn take<T: DeserializeOwned>(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::store::Parts;
 
     #[test]
     fn a_message_is_received_as_it_was_sent_also_byte_by_byte() {
         let mut sent = vec![];
-        let (name, digest) = ("fields".to_string(), vec![1, 2]);
-        send(&mut sent, &Reply::Part { name, digest }, b"content").unwrap();
+        let mut part = Parts::of_a_summary().into_parts().next().unwrap();
+        let body = std::mem::take(&mut part.body);
+        send(&mut sent, &Reply::Part(part), &body).unwrap();
         send(&mut sent, &Reply::OneLevel, b"").unwrap();
         let (mut received, mut messages) = (vec![], vec![]);
         for byte in sent {
@@ -135,17 +137,11 @@ mod tests {
             messages.extend(take::<Reply>(&mut received, 1000).unwrap());
         }
         assert!(received.is_empty());
-        let [
-            (Reply::Part { name, digest }, content),
-            (Reply::OneLevel, nothing),
-        ] = &messages[..]
-        else {
+        let [(Reply::Part(part), content), (Reply::OneLevel, nothing)] = &messages[..] else {
             panic!("{messages:?}")
         };
-        assert_eq!(
-            (&**name, &**digest, &**content),
-            ("fields", &[1, 2][..], &b"content"[..])
-        );
+        let name = part.name();
+        assert_eq!((name, &**content), ("summary", &body[..]));
         assert!(nothing.is_empty());
     }
 

@@ -210,8 +210,9 @@ impl Process {
                     Reply::Member(row) => Told::Report(Report::Member(Time::now(), row)),
                     Reply::OneLevel => Told::Report(Report::OneLevel),
                     Reply::OutOfMemory(outgrown) => Told::OutOfMemory(outgrown),
-                    Reply::Part { name, digest } => {
-                        parts.push((name, content, digest));
+                    Reply::Part(mut part) => {
+                        part.body = content;
+                        parts.push(part);
                         continue;
                     }
                     Reply::Partial => {

@@ -16,7 +16,7 @@ async fn a_job_runs_to_its_end_and_its_result_is_stored() {
     );
     assert!(
         rig.store
-            .piece(job.key, "fields", 0)
+            .json_of(job.key, "fields")
             .await
             .unwrap()
             .is_some()
@@ -131,7 +131,7 @@ async fn a_canceled_running_job_keeps_its_last_state() {
     );
     assert!(
         rig.store
-            .piece(job.key, "fields", 0)
+            .json_of(job.key, "fields")
             .await
             .unwrap()
             .is_none(),
@@ -192,7 +192,7 @@ async fn a_job_that_is_stopped_while_it_verifies_keeps_its_solution() {
         assert_eq!((done.status, done.reason), (ends.0, Some(ends.1)));
         assert_eq!(done.result_available, ResultAvailable::Partial);
         assert_eq!(done.progress.unwrap().stage, "verify");
-        let fields = rig.store.piece(job.key, "fields", 0).await.unwrap();
+        let fields = rig.store.json_of(job.key, "fields").await.unwrap();
         assert!(fields.is_some(), "{ends:?}");
     }
 }
@@ -229,7 +229,7 @@ async fn a_job_whose_forces_do_not_balance_fails_and_keeps_its_result() {
     assert!(failure.detail.contains("5.000e-1"), "{}", failure.detail);
     assert!(
         rig.store
-            .piece(job.key, "fields", 0)
+            .json_of(job.key, "fields")
             .await
             .unwrap()
             .is_some()

@@ -200,8 +200,8 @@ fn solved(problem: &Value, budget: Option<&Budget>) -> Result<Summary, String> {
     );
     let solved = solved.map_err(|error| format!("{error:?}"))?;
     let mut parts = solved.parts.into_parts();
-    let (_, summary, _) = parts.find(|(name, ..)| name == "summary").unwrap();
-    Ok(serde_json::from_slice(&summary).unwrap())
+    let summary = parts.find(|part| part.name() == "summary").unwrap();
+    Ok(serde_json::from_slice(&summary.json()).unwrap())
 }
 
 #[test]

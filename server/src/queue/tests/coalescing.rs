@@ -16,7 +16,7 @@ async fn an_earlier_result_answers_at_once_and_outlives_its_job() {
     let events = rig.store.events_after(cached.key, 0, 100).await.unwrap();
     let kinds: Vec<_> = events.iter().map(|event| event.payload.kind()).collect();
     assert_eq!(kinds, ["status", "status", "done"]);
-    let part = |key| rig.store.piece(key, "fields", 0);
+    let part = |key| rig.store.json_of(key, "fields");
     let bytes = part(primary.key).await.unwrap().unwrap();
     assert_eq!(cached.result_key, primary.key);
     rig.store.delete(Owners::All, primary.key).await.unwrap();

@@ -109,8 +109,8 @@ async fn a_process_solves_as_a_thread_does_and_is_kept() {
     let same = threads.submit_as(poison("harmless")).await;
     threads.until_done(&same).await;
     for part in ["steps", "profile/top", "fields"] {
-        let piece = rig.store.piece(job.key, part, 0).await.unwrap();
-        assert_eq!(piece, threads.store.piece(same.key, part, 0).await.unwrap());
+        let piece = rig.store.json_of(job.key, part).await.unwrap();
+        assert_eq!(piece, threads.store.json_of(same.key, part).await.unwrap());
         assert!(piece.is_some(), "{part}");
     }
 }

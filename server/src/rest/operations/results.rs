@@ -4,7 +4,7 @@ use solver::solution::{ContactProfile, Fields};
 
 use super::{
     content::{bytes, data, json, nothing},
-    operation::{Content, Operation, READ, get},
+    operation::{CANCEL, Content, Operation, READ, delete, get},
 };
 use crate::{
     catalog::Code,
@@ -63,6 +63,11 @@ pub(super) fn operations() -> Vec<Operation> {
         .summary("Returns mesh, displacements and stresses")
         .file("The fields", data::<Fields>(Format::OF_FIELDS))
         .fails(NO_RESULT),
+        delete(CANCEL, "/v1/jobs/{id}/fields", (ID,), results::delete_fields)
+            .rpcs(&["DeleteFields"])
+            .summary("Deletes mesh, displacements and stresses of a job that has ended, most of what it keeps; summary, history and profiles stay")
+            .answers(204, "Deleted", nothing())
+            .fails(&[Code::Deleted, Code::JobActive]),
         get(
             READ,
             "/v1/jobs/{id}/plots/{plot}",

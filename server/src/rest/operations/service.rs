@@ -50,6 +50,10 @@ pub(super) fn operations() -> Vec<Operation> {
             .rpcs(&["GetCaller"])
             .summary("Returns the caller: their owner name, scopes, and share of the queue")
             .answers(200, "The caller", json::<Me>()),
+        get(ADMIN, "/v1/owners", (), service::owners)
+            .rpcs(&["ListOwners"])
+            .summary("Returns what every owner has in the service: jobs, bytes, and what waits and runs")
+            .answers(200, "The owners, who keeps most first", json::<service::Owners>()),
         get(OPEN, "/v1/errors/{code}", (CODE,), service::error)
             .rest_only("GetError")
             .summary("Explains a kind of error and what to do, for programs or as a page")

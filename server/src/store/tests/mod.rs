@@ -5,6 +5,7 @@ mod damage;
 mod owners;
 mod plans;
 mod simulation;
+mod space;
 mod starts;
 mod sweeps;
 mod upgrades;
@@ -36,10 +37,34 @@ impl Store {
     }
 }
 
+impl Store {
+    /// The JSON of a part of a result; `None` if there is no such part.
+    pub(crate) async fn json_of(&self, key: i64, part: &str) -> Result<Option<Vec<u8>>> {
+        let mut connection = self.reader.acquire().await?;
+        let found = intact::read_part(&mut connection, key, part).await?;
+        Ok(found.map(|(_, content)| match content {
+            encoding::Content::Json(json) => json,
+            encoding::Content::Fields(fields) => serde_json::to_vec(&fields).unwrap(),
+        }))
+    }
+}
+
+impl parts::Part {
+    /// A part that is stored as it is, however well it could be compressed.
+    fn plain(body: Vec<u8>) -> parts::Part {
+        parts::Part {
+            name: "fields".into(),
+            encoding: encoding::Encoding::Plain,
+            info: encoding::info_of_json(&body),
+            body,
+        }
+    }
+}
+
 impl Parts {
     /// Those of a result that is nothing but a summary.
     pub(crate) fn of_a_summary() -> Parts {
-        Parts(vec![parts::Part::new("summary".into(), b"{}".to_vec())])
+        Parts(vec![parts::Part::new("summary".into(), b"{}")])
     }
 }
 
@@ -131,7 +156,7 @@ async fn a_job_that_another_answers_keeps_no_piece_of_its_interrupted_attempt() 
         accepted.unwrap().claim.unwrap().job
     };
     let first = submit(0, Cache::Use).await;
-    let large = Parts(vec![parts::Part::new("fields".into(), vec![b' '; 3 << 20])]);
+    let large = Parts(vec![parts::Part::plain(vec![b' '; 3 << 20])]);
     let written = store.write_before_end(first.key, first.attempt, &large);
     assert!(written.await.unwrap());
     store

@@ -228,11 +228,7 @@ impl World {
         for job in self.listed().await {
             assert!(job.status.is_terminal(), "{job:?}");
             if job.result_available == ResultAvailable::Final {
-                let found = self
-                    .store
-                    .piece(job.result_key, "summary", 0)
-                    .await
-                    .unwrap();
+                let found = self.store.json_of(job.result_key, "summary").await.unwrap();
                 let text = String::from_utf8(found.expect("a result")).unwrap();
                 assert!(text.contains(&job.input_hash), "{text}");
             }

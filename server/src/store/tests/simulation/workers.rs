@@ -115,12 +115,12 @@ impl World {
         let mut parts = vec![
             parts::Part::new(
                 "summary".into(),
-                format!("{{\"input\":\"{input}\"}}").into(),
+                format!("{{\"input\":\"{input}\"}}").as_bytes(),
             ),
-            parts::Part::new("history".into(), b"[]".to_vec()),
+            parts::Part::new("history".into(), b"[]"),
         ];
         if self.once_in(40) {
-            parts.push(parts::Part::new("fields".into(), vec![b' '; LARGE]));
+            parts.push(parts::Part::plain(vec![b' '; LARGE]));
         }
         Parts(parts)
     }

@@ -1,0 +1,397 @@
+//! Columns of numbers as differences from predictions, byte plane by byte plane.
+//!
+//! The first plane has the lowest byte of every difference, and so on. Planes that look random are kept as they are, the
+//! others are deflated, all in one stream: small results have many short columns.
+
+use std::io::{Read, Write};
+
+use flate2::{Compression, read::DeflateDecoder, write::DeflateEncoder};
+
+use super::{damaged, order::NodeOrder};
+
+/// What a plane consists of.
+const ZEROS: u8 = 0;
+const RANDOM: u8 = 1;
+const DEFLATED: u8 = 2;
+
+/// How the values of a column were predicted.
+const AS_PREDICTED: u8 = 0;
+const AS_BEFORE: u8 = 1;
+
+/// From this many bits of information in a byte on a plane is kept as it is: deflating it gains less than a tenth.
+const RANDOM_BITS: f64 = 7.2;
+
+/// Above this size speed counts more than the last per cent.
+const LARGE: usize = 1 << 20;
+
+/// Columns as bytes.
+pub(super) struct Writer {
+    version: u8,
+    random: Vec<u8>,
+    /// To be deflated: sizes, numbers, marks of planes, and planes.
+    stream: Vec<u8>,
+}
+
+impl Writer {
+    pub(super) fn new(version: u8) -> Writer {
+        Writer {
+            version,
+            random: Vec::new(),
+            stream: Vec::new(),
+        }
+    }
+
+    /// A size, seven bits in each byte.
+    pub(super) fn size(&mut self, size: usize) {
+        put_size(&mut self.stream, size);
+    }
+
+    /// A number as it is.
+    pub(super) fn number(&mut self, number: f64) {
+        self.stream.extend(number.to_le_bytes());
+    }
+
+    /// Whole numbers, each predicted by the one before.
+    pub(super) fn whole(&mut self, values: impl Iterator<Item = i64> + Clone) {
+        let before = std::iter::once(0).chain(values.clone());
+        let differences: Vec<u64> = values
+            .zip(before)
+            .map(|(value, before)| folded(value.wrapping_sub(before)))
+            .collect();
+        self.planes(&differences);
+    }
+
+    /// Numbers, each predicted by the one before.
+    pub(super) fn sequence(&mut self, values: &[f64]) {
+        let differences = differences_in_sequence(values);
+        self.planes(&differences);
+    }
+
+    /// Numbers at nodes.
+    pub(super) fn nodal(&mut self, values: &[f64], order: &NodeOrder) {
+        let difference =
+            |place| difference(values[order.node(place)], order.predict(place, values));
+        let differences: Vec<u64> = (0..order.len()).map(difference).collect();
+        self.planes(&differences);
+    }
+
+    /// Numbers that were predicted; each by the one before, if those are nearer.
+    pub(super) fn predicted(&mut self, values: &[f64], predicted: &[f64]) {
+        let pairs = values.iter().zip(predicted);
+        let own: Vec<u64> = pairs.map(|(v, p)| difference(*v, *p)).collect();
+        let in_sequence = differences_in_sequence(values);
+        let bits = |differences: &[u64]| -> u64 {
+            let bits = |difference: &u64| u64::from(64 - difference.leading_zeros());
+            differences.iter().map(bits).sum()
+        };
+        let (kind, nearer) = match bits(&own) <= bits(&in_sequence) {
+            true => (AS_PREDICTED, own),
+            false => (AS_BEFORE, in_sequence),
+        };
+        self.stream.push(kind);
+        self.planes(&nearer);
+    }
+
+    fn planes(&mut self, differences: &[u64]) {
+        for byte in 0..8 {
+            let plane = differences.iter().map(|d| (d >> (8 * byte)) as u8);
+            let mut counts = [0u32; 256];
+            plane
+                .clone()
+                .for_each(|byte| counts[usize::from(byte)] += 1);
+            let (kind, to) = match bits_of_information(&counts, differences.len()) {
+                _ if counts[0] as usize == differences.len() => (ZEROS, None),
+                bits if bits > RANDOM_BITS.min(most_bits(differences.len())) => {
+                    (RANDOM, Some(&mut self.random))
+                }
+                _ => (DEFLATED, None),
+            };
+            self.stream.push(kind);
+            match (kind, to) {
+                (ZEROS, _) => {}
+                (_, Some(random)) => random.extend(plane),
+                (_, None) => self.stream.extend(plane),
+            }
+        }
+    }
+
+    /// The bytes.
+    pub(super) fn finish(self) -> Vec<u8> {
+        let mut out = vec![self.version];
+        put_size(&mut out, self.random.len());
+        out.extend(&self.random);
+        let level = match self.stream.len() > LARGE {
+            true => Compression::fast(),
+            false => Compression::best(),
+        };
+        put_size(&mut out, self.stream.len());
+        let mut deflate = DeflateEncoder::new(out, level);
+        // writing to memory does not fail
+        let _ = deflate.write_all(&self.stream);
+        deflate.finish().unwrap_or_default()
+    }
+}
+
+/// Columns from bytes.
+pub(super) struct Reader {
+    random: Vec<u8>,
+    stream: Vec<u8>,
+    at_random: usize,
+    at: usize,
+}
+
+impl Reader {
+    pub(super) fn new(bytes: &[u8], version: u8, limit: usize) -> Result<Reader, String> {
+        let (found, mut rest) = bytes.split_first().ok_or_else(|| damaged("no bytes"))?;
+        if *found != version {
+            return Err(format!(
+                "stored fields are of version {found}, and this program reads version {version}"
+            ));
+        }
+        let random = take_size(&mut rest)?;
+        let (random, mut rest) = rest
+            .split_at_checked(random)
+            .ok_or_else(|| damaged("length"))?;
+        let size = take_size(&mut rest)?;
+        if size.saturating_add(random.len()) > limit {
+            return Err(damaged("larger than its content"));
+        }
+        let mut stream = Vec::with_capacity(size);
+        let inflated = DeflateDecoder::new(rest)
+            .take(size as u64)
+            .read_to_end(&mut stream);
+        match inflated {
+            Ok(all) if all == size => Ok(Reader {
+                random: random.to_vec(),
+                stream,
+                at_random: 0,
+                at: 0,
+            }),
+            Ok(_) => Err(damaged("some of it is missing")),
+            Err(error) => Err(damaged(&error.to_string())),
+        }
+    }
+
+    fn take(&mut self, count: usize) -> Result<&[u8], String> {
+        take(&self.stream, &mut self.at, count)
+    }
+
+    pub(super) fn size(&mut self) -> Result<usize, String> {
+        let mut rest = self.stream.get(self.at..).unwrap_or_default();
+        let before = rest.len();
+        let size = take_size(&mut rest)?;
+        self.at += before - rest.len();
+        Ok(size)
+    }
+
+    pub(super) fn number(&mut self) -> Result<f64, String> {
+        let mut bytes = [0; 8];
+        bytes.copy_from_slice(self.take(8)?);
+        Ok(f64::from_le_bytes(bytes))
+    }
+
+    pub(super) fn whole<T: TryFrom<i64>>(&mut self, count: usize) -> Result<Vec<T>, String> {
+        let mut before = 0i64;
+        let value = |difference| {
+            before = before.wrapping_add(unfolded(difference));
+            T::try_from(before).map_err(|_| damaged("a whole number"))
+        };
+        self.planes(count)?.into_iter().map(value).collect()
+    }
+
+    pub(super) fn sequence(&mut self, count: usize) -> Result<Vec<f64>, String> {
+        let mut before = 0.0;
+        let value = |difference| {
+            before = moved(before, difference);
+            before
+        };
+        Ok(self.planes(count)?.into_iter().map(value).collect())
+    }
+
+    pub(super) fn nodal(&mut self, order: &NodeOrder) -> Result<Vec<f64>, String> {
+        let differences = self.planes(order.len())?;
+        let mut values = vec![0.0; order.len()];
+        for (place, difference) in differences.into_iter().enumerate() {
+            values[order.node(place)] = moved(order.predict(place, &values), difference);
+        }
+        Ok(values)
+    }
+
+    pub(super) fn predicted(&mut self, mut predicted: Vec<f64>) -> Result<Vec<f64>, String> {
+        match self.take(1)?[0] {
+            AS_PREDICTED => {
+                let differences = self.planes(predicted.len())?;
+                for (value, difference) in predicted.iter_mut().zip(differences) {
+                    *value = moved(*value, difference);
+                }
+                Ok(predicted)
+            }
+            AS_BEFORE => self.sequence(predicted.len()),
+            _ => Err(damaged("an unknown prediction")),
+        }
+    }
+
+    fn planes(&mut self, count: usize) -> Result<Vec<u64>, String> {
+        // a hostile count must not take memory: each plane that is not zero has its bytes here
+        let mut differences: Vec<u64> = Vec::new();
+        let Reader {
+            random,
+            stream,
+            at_random,
+            at,
+        } = self;
+        for byte in 0..8 {
+            let plane = match take(stream, at, 1)?[0] {
+                ZEROS => continue,
+                RANDOM => take(random, at_random, count)?,
+                DEFLATED => take(stream, at, count)?,
+                _ => return Err(damaged("an unknown plane")),
+            };
+            differences.resize(count, 0);
+            for (difference, part) in differences.iter_mut().zip(plane) {
+                *difference |= u64::from(*part) << (8 * byte);
+            }
+        }
+        differences
+            .try_reserve_exact(count.saturating_sub(differences.len()))
+            .map_err(|_| damaged("its size"))?;
+        differences.resize(count, 0);
+        Ok(differences)
+    }
+
+    /// An error unless all was read.
+    pub(super) fn finish(self) -> Result<(), String> {
+        match (self.at, self.at_random) == (self.stream.len(), self.random.len()) {
+            true => Ok(()),
+            false => Err(damaged("there is more than fields")),
+        }
+    }
+}
+
+fn take<'a>(from: &'a [u8], at: &mut usize, count: usize) -> Result<&'a [u8], String> {
+    let end = at.saturating_add(count);
+    let taken = from.get(*at..end).ok_or_else(|| damaged("it ends early"))?;
+    *at = end;
+    Ok(taken)
+}
+
+fn put_size(to: &mut Vec<u8>, mut size: usize) {
+    while size >= 0x80 {
+        to.push(size as u8 | 0x80);
+        size >>= 7;
+    }
+    to.push(size as u8);
+}
+
+fn take_size(from: &mut &[u8]) -> Result<usize, String> {
+    let mut size = 0usize;
+    for shift in (0..63).step_by(7) {
+        let (byte, rest) = from.split_first().ok_or_else(|| damaged("it ends early"))?;
+        *from = rest;
+        size |= usize::from(byte & 0x7f) << shift;
+        if byte & 0x80 == 0 {
+            return Ok(size);
+        }
+    }
+    Err(damaged("a size"))
+}
+
+fn differences_in_sequence(values: &[f64]) -> Vec<u64> {
+    let before = std::iter::once(&0.0).chain(values);
+    let pairs = values.iter().zip(before);
+    pairs
+        .map(|(value, before)| difference(*value, *before))
+        .collect()
+}
+
+/// How many numbers lie between two, with its sign.
+fn difference(value: f64, predicted: f64) -> u64 {
+    folded(rank(value).wrapping_sub(rank(finite(predicted))))
+}
+
+/// The number so far from a prediction.
+fn moved(predicted: f64, difference: u64) -> f64 {
+    ranked(rank(finite(predicted)).wrapping_add(unfolded(difference)))
+}
+
+/// The bits of a computed NaN are not the same on every machine.
+fn finite(predicted: f64) -> f64 {
+    if predicted.is_nan() { 0.0 } else { predicted }
+}
+
+/// The place of a number among all, in their order.
+fn rank(value: f64) -> i64 {
+    let bits = value.to_bits() as i64;
+    bits ^ (((bits >> 63) as u64) >> 1) as i64
+}
+
+fn ranked(rank: i64) -> f64 {
+    f64::from_bits((rank ^ (((rank >> 63) as u64) >> 1) as i64) as u64)
+}
+
+/// Small numbers of both signs as small numbers without sign.
+fn folded(value: i64) -> u64 {
+    ((value << 1) ^ (value >> 63)) as u64
+}
+
+fn unfolded(value: u64) -> i64 {
+    (value >> 1) as i64 ^ -((value & 1) as i64)
+}
+
+/// Mean bits of information in one of `total` bytes.
+fn bits_of_information(counts: &[u32; 256], total: usize) -> f64 {
+    let total = total as f64;
+    let bits = |count: &u32| match f64::from(*count) / total {
+        part if part > 0.0 => -part * part.log2(),
+        _ => 0.0,
+    };
+    counts.iter().map(bits).sum()
+}
+
+/// Nearly the bits of information that so few random bytes have.
+fn most_bits(count: usize) -> f64 {
+    0.9 * (count as f64).log2()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_order_as_ranks_and_come_back_whatever_they_are() {
+        let numbers = [
+            f64::NEG_INFINITY,
+            -1e300,
+            -1.0,
+            -5e-324,
+            -0.0,
+            0.0,
+            5e-324,
+            1.0,
+            1e300,
+            f64::INFINITY,
+        ];
+        for pair in numbers.windows(2) {
+            assert!(rank(pair[0]) < rank(pair[1]), "{pair:?}");
+        }
+        for value in numbers.into_iter().chain([f64::NAN, -f64::NAN]) {
+            for predicted in numbers.into_iter().chain([f64::NAN]) {
+                let back = moved(predicted, difference(value, predicted));
+                assert_eq!(back.to_bits(), value.to_bits());
+            }
+        }
+    }
+
+    #[test]
+    fn sizes_and_differences_of_any_value_come_back() {
+        for size in [0, 1, 127, 128, 1 << 40, usize::MAX >> 1] {
+            let mut bytes = Vec::new();
+            put_size(&mut bytes, size);
+            assert_eq!(take_size(&mut bytes.as_slice()), Ok(size));
+        }
+        assert!(take_size(&mut [0xff; 20].as_slice()).is_err());
+        for value in [0, 1, -1, i64::MAX, i64::MIN] {
+            assert_eq!(unfolded(folded(value)), value);
+        }
+    }
+}

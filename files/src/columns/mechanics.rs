@@ -1,0 +1,261 @@
+//! Stresses from displacements by Hooke's law, as a prediction: thesis 2.2, and formulation 3.
+//!
+//! It repeats what the solver does for ordinary elements, in the same order of operations, but shares no code with it that may
+//! change: what is stored must be readable by every later version. Of nearly incompressible elements it is a poor
+//! prediction, which costs space and nothing else.
+
+use solver::{
+    elasticity::{COMPONENTS, Moduli},
+    element::{AtNodes, Element, Family, Tabulated},
+    solution::Fields,
+};
+
+use super::{Known, Law};
+
+/// What is predicted.
+pub(super) struct Stresses {
+    /// Integration points along x and y.
+    pub(super) points: [Vec<f64>; 2],
+    /// Stresses there.
+    pub(super) at_points: [Vec<f64>; COMPONENTS],
+    /// Stresses at nodes, averaged over their elements.
+    pub(super) at_nodes: [Vec<f64>; COMPONENTS],
+}
+
+/// Elements whose nodes have the same places relative to the first one, to this part of their distances, have the same strains.
+const SAME_SHAPE: f64 = 1e-11;
+
+/// The strains at one place of an element are linear in its displacements.
+struct Strains {
+    dx: AtNodes<f64>,
+    dy: AtNodes<f64>,
+    hoop: AtNodes<f64>,
+}
+
+impl Strains {
+    fn new(place: &Tabulated, nodes: &AtNodes<[f64; 2]>, axisymmetric: bool) -> Strains {
+        let mapped = place.map(nodes);
+        Strains {
+            dx: mapped.gradient.map(|[x, _]| x),
+            dy: mapped.gradient.map(|[_, y]| y),
+            hoop: match axisymmetric {
+                true => mapped.shape.map(|h| h / mapped.x),
+                false => [0.0; 8],
+            },
+        }
+    }
+
+    fn stress(&self, moduli: &Moduli, ux: &AtNodes<f64>, uy: &AtNodes<f64>) -> [f64; COMPONENTS] {
+        let mut strain = [0.0; COMPONENTS];
+        for i in 0..8 {
+            strain[0] += self.dx[i] * ux[i];
+            strain[1] += self.dy[i] * uy[i];
+            strain[2] += self.dy[i] * ux[i] + self.dx[i] * uy[i];
+            strain[3] += self.hoop[i] * ux[i];
+        }
+        moduli.map(|row| (0..COMPONENTS).fold(0.0, |sum, k| sum + row[k] * strain[k]))
+    }
+}
+
+/// The places of a family of elements.
+struct Master {
+    rule: Vec<Tabulated>,
+    shapes: Vec<AtNodes<f64>>,
+    stress: Vec<Tabulated>,
+    to_nodes: AtNodes<[f64; 4]>,
+}
+
+impl Master {
+    fn new(family: Family, order: u32) -> Master {
+        let rule = family.rule(order);
+        let mut to_nodes = [[0.0; 4]; 8];
+        for (weights, place) in to_nodes.iter_mut().zip(family.places()) {
+            *weights = family.from_stress_points(*place);
+        }
+        let tabulate = |points: &[solver::element::GaussPoint]| {
+            points
+                .iter()
+                .map(|point| family.tabulate(point.place))
+                .collect()
+        };
+        Master {
+            rule: tabulate(rule),
+            shapes: rule.iter().map(|point| family.shape(point.place)).collect(),
+            stress: tabulate(family.stress_points()),
+            to_nodes,
+        }
+    }
+}
+
+/// The strains of the element that was looked at last, for those of the same shape after it.
+struct Shape {
+    family: Family,
+    nodes: AtNodes<[f64; 2]>,
+    at_points: Vec<Strains>,
+    at_stress_points: Vec<Strains>,
+}
+
+impl Shape {
+    fn new(
+        family: Family,
+        nodes: AtNodes<[f64; 2]>,
+        masters: &[Master; 2],
+        axisymmetric: bool,
+    ) -> Shape {
+        let master = &masters[family as usize];
+        let strains = |places: &[Tabulated]| {
+            let strains = |place| Strains::new(place, &nodes, axisymmetric);
+            places.iter().map(strains).collect()
+        };
+        Shape {
+            family,
+            at_points: strains(&master.rule),
+            at_stress_points: strains(&master.stress),
+            nodes,
+        }
+    }
+
+    fn is(&self, family: Family, nodes: &AtNodes<[f64; 2]>) -> bool {
+        let pairs = || self.nodes.iter().flatten().zip(nodes.iter().flatten());
+        let size = self
+            .nodes
+            .iter()
+            .flatten()
+            .fold(0.0, |most: f64, c| most.max(c.abs()));
+        self.family == family && pairs().all(|(a, b)| (a - b).abs() <= SAME_SHAPE * size)
+    }
+}
+
+/// The elements of a mesh one after the other, each with its strains.
+struct Walk<'a> {
+    known: &'a Known<'a>,
+    axisymmetric: bool,
+    masters: [Master; 2],
+    last: Option<Shape>,
+}
+
+impl<'a> Walk<'a> {
+    fn new(known: &'a Known<'a>, law: &Law) -> Walk<'a> {
+        Walk {
+            known,
+            axisymmetric: law.axisymmetric,
+            masters: [Family::Quad, Family::Triangle]
+                .map(|family| Master::new(family, known.order)),
+            last: None,
+        }
+    }
+
+    /// Positions of its nodes.
+    fn nodes(&self, element: &Element) -> AtNodes<[f64; 2]> {
+        element.gather(|n| [self.known.x[n as usize], self.known.y[n as usize]])
+    }
+
+    /// Displacements of its nodes.
+    fn displacements(&self, element: &Element) -> (AtNodes<f64>, AtNodes<f64>) {
+        (
+            element.gather(|n| self.known.ux[n as usize]),
+            element.gather(|n| self.known.uy[n as usize]),
+        )
+    }
+
+    fn shape(&mut self, element: &Element) -> &Shape {
+        let (family, mut nodes) = (element.family(), self.nodes(element));
+        let [x, y] = nodes[0];
+        let x = if self.axisymmetric { 0.0 } else { x };
+        let own = nodes.iter_mut().take(family.nodes());
+        own.for_each(|node| *node = [node[0] - x, node[1] - y]);
+        let last = self.last.take().filter(|last| last.is(family, &nodes));
+        let shape =
+            last.unwrap_or_else(|| Shape::new(family, nodes, &self.masters, self.axisymmetric));
+        self.last.insert(shape)
+    }
+}
+
+/// The material of each element, by which its stresses are predicted best: known only to who has the stresses.
+pub(super) fn materials_by_element(fields: &Fields, law: &Law) -> Vec<u8> {
+    if law.moduli.len() < 2 {
+        return vec![0; fields.elements.len()];
+    }
+    let known = Known::of(fields);
+    let mut walk = Walk::new(&known, law);
+    let mut point = 0;
+    let mut material = |element: &Element| {
+        let (ux, uy) = walk.displacements(element);
+        let actual = super::at_points(&fields.gauss).map(|column| column[point]);
+        let strains = &walk.shape(element).at_points;
+        let error = |moduli: &Moduli| -> f64 {
+            let predicted = strains[0].stress(moduli, &ux, &uy);
+            predicted
+                .iter()
+                .zip(&actual)
+                .map(|(p, a)| (p - a).abs())
+                .sum()
+        };
+        let errors: Vec<f64> = law.moduli.iter().map(error).collect();
+        point += strains.len();
+        let best = (0u8..).zip(&errors).min_by(|(_, a), (_, b)| a.total_cmp(b));
+        best.map_or(0, |(material, _)| material)
+    };
+    fields.elements.iter().map(&mut material).collect()
+}
+
+/// The predicted stresses; zero where an element has an unknown material.
+pub(super) fn predicted_stresses(known: &Known<'_>, law: &Law, materials: &[u8]) -> Stresses {
+    let mut walk = Walk::new(known, law);
+    let nodes = known.x.len();
+    let points = known
+        .elements
+        .iter()
+        .map(|e| e.family().rule(known.order).len())
+        .sum();
+    let column = || Vec::with_capacity(points);
+    let mut found = Stresses {
+        points: [column(), column()],
+        at_points: std::array::from_fn(|_| column()),
+        at_nodes: std::array::from_fn(|_| vec![0.0; nodes]),
+    };
+    let mut count = vec![0u32; nodes];
+    let none = Moduli::default();
+    for (element, material) in known.elements.iter().zip(materials) {
+        let moduli = law.moduli.get(usize::from(*material)).unwrap_or(&none);
+        let (positions, (ux, uy)) = (walk.nodes(element), walk.displacements(element));
+        for shape in &walk.masters[element.family() as usize].shapes {
+            for (axis, column) in found.points.iter_mut().enumerate() {
+                column.push((0..8).fold(0.0, |sum, i| sum + shape[i] * positions[i][axis]));
+            }
+        }
+        let to_nodes = walk.masters[element.family() as usize].to_nodes;
+        let shape = walk.shape(element);
+        for strains in &shape.at_points {
+            let stress = strains.stress(moduli, &ux, &uy);
+            found
+                .at_points
+                .iter_mut()
+                .zip(stress)
+                .for_each(|(column, s)| column.push(s));
+        }
+        let mut stresses = [[0.0; COMPONENTS]; 4];
+        for (own, strains) in stresses.iter_mut().zip(&shape.at_stress_points) {
+            *own = strains.stress(moduli, &ux, &uy);
+        }
+        for (&node, weights) in element.iter().zip(&to_nodes) {
+            let node = node as usize;
+            count[node] += 1;
+            let mut own = [0.0; COMPONENTS];
+            for (weight, stress) in weights.iter().zip(&stresses) {
+                (0..COMPONENTS).for_each(|c| own[c] += weight * stress[c]);
+            }
+            found
+                .at_nodes
+                .iter_mut()
+                .zip(own)
+                .for_each(|(column, s)| column[node] += s);
+        }
+    }
+    for column in &mut found.at_nodes {
+        for (sum, count) in column.iter_mut().zip(&count) {
+            *sum /= f64::from((*count).max(1));
+        }
+    }
+    found
+}

@@ -1,0 +1,241 @@
+//! Fields as columns, compressed without loss: how results are stored.
+//!
+//! A field is nearly all stresses, and stresses follow from displacements. What is stored of each column is how far it is
+//! from a prediction that a reader can repeat: of stresses Hooke's law, of midside nodes the mean of the corners, of the rest the
+//! value before. Differences are those of the bits, so that every number comes back as it was, whatever the prediction is
+//! worth; most of them are zero or a few roundings, and take a byte in place of eight.
+//!
+//! The predictions are a part of the format: a change of one of them, by a single rounding, needs another version.
+
+mod differences;
+mod mechanics;
+mod order;
+
+use solver::{
+    elasticity::{Moduli, isotropic, orthotropic},
+    element::Element,
+    problem::{Analysis, Elasticity, Problem},
+    solution::{Fields, GaussFields},
+};
+
+use self::{
+    differences::{Reader, Writer},
+    mechanics::{Stresses, predicted_stresses},
+    order::NodeOrder,
+};
+
+/// The version of the format.
+const VERSION: u8 = 1;
+
+/// What stresses are predicted with.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Law {
+    /// There is a hoop strain u_r / r.
+    pub axisymmetric: bool,
+    /// Of each material of the problem (stress).
+    pub moduli: Vec<Moduli>,
+}
+
+impl Law {
+    /// That of a problem.
+    pub fn of(problem: &Problem) -> Law {
+        let analysis = &problem.analysis;
+        let moduli = |elasticity: &Elasticity| match elasticity {
+            Elasticity::Isotropic {
+                youngs_modulus,
+                poissons_ratio,
+            } => Some(isotropic(analysis, *youngs_modulus, *poissons_ratio)),
+            Elasticity::Orthotropic(material) => orthotropic(analysis, material),
+        };
+        let materials = problem.materials.iter();
+        Law {
+            axisymmetric: matches!(analysis, Analysis::Axisymmetric {}),
+            // a solved problem has few
+            moduli: materials
+                .filter_map(|material| moduli(&material.elasticity))
+                .take(usize::from(u8::MAX))
+                .collect(),
+        }
+    }
+}
+
+/// Fields as bytes. `Err`: columns of different lengths, or elements with nodes that do not exist.
+pub fn encode(fields: &Fields, law: &Law) -> Result<Vec<u8>, String> {
+    crate::fields::check(fields)?;
+    let mut out = Writer::new(VERSION);
+    for size in [fields.x.len(), fields.elements.len()] {
+        out.size(size);
+    }
+    out.size(fields.gauss.order as usize);
+    out.size(usize::from(law.axisymmetric));
+    out.size(law.moduli.len());
+    for entry in law.moduli.iter().flatten().flatten() {
+        out.number(*entry);
+    }
+    write_elements(&mut out, &fields.elements);
+    let order = NodeOrder::new(&fields.elements, fields.x.len());
+    for column in [&fields.x, &fields.y, &fields.ux, &fields.uy] {
+        out.nodal(column, &order);
+    }
+    let states = fields.contact_state.iter().map(|state| i64::from(*state));
+    out.whole(states);
+    out.sequence(&fields.element_error);
+    let materials = mechanics::materials_by_element(fields, law);
+    out.whole(materials.iter().map(|material| i64::from(*material)));
+    let predicted = predicted_stresses(&Known::of(fields), law, &materials);
+    for (column, predicted) in [&fields.gauss.x, &fields.gauss.y]
+        .into_iter()
+        .zip(&predicted.points)
+    {
+        out.predicted(column, predicted);
+    }
+    for (column, predicted) in at_points(&fields.gauss)
+        .into_iter()
+        .zip(&predicted.at_points)
+    {
+        out.predicted(column, predicted);
+    }
+    for (column, predicted) in at_nodes(fields).into_iter().zip(&predicted.at_nodes) {
+        out.predicted(column, predicted);
+    }
+    Ok(out.finish())
+}
+
+/// Fields as they were encoded. `limit`: bytes that their columns may have together; `Err`: these bytes are not those of fields, or larger.
+pub fn decode(bytes: &[u8], limit: usize) -> Result<Fields, String> {
+    let mut from = Reader::new(bytes, VERSION, limit)?;
+    let (nodes, count) = (from.size()?, from.size()?);
+    if nodes.max(count) > limit {
+        return Err(damaged("larger than its content"));
+    }
+    let order = from.size()?;
+    let axisymmetric = from.size()? != 0;
+    let mut law = Law {
+        axisymmetric,
+        moduli: Vec::new(),
+    };
+    for _ in 0..from.size()? {
+        let mut moduli = Moduli::default();
+        for entry in moduli.iter_mut().flatten() {
+            *entry = from.number()?;
+        }
+        law.moduli.push(moduli);
+    }
+    let elements = read_elements(&mut from, count, nodes)?;
+    let node_order = NodeOrder::new(&elements, nodes);
+    let mut nodal = || from.nodal(&node_order);
+    let (x, y, ux, uy) = (nodal()?, nodal()?, nodal()?, nodal()?);
+    let contact_state = from.whole(nodes)?;
+    let element_error = from.sequence(count)?;
+    let materials: Vec<u8> = from.whole(count)?;
+    let mut fields = Fields {
+        x,
+        y,
+        ux,
+        uy,
+        contact_state,
+        elements,
+        element_error,
+        gauss: GaussFields {
+            order: u32::try_from(order).map_err(|_| damaged("order"))?,
+            ..GaussFields::default()
+        },
+        ..Fields::default()
+    };
+    let Stresses {
+        points: [points_x, points_y],
+        at_points: [xx, yy, xy, zz],
+        at_nodes: [nodal_xx, nodal_yy, nodal_xy, nodal_zz],
+    } = predicted_stresses(&Known::of(&fields), &law, &materials);
+    let mut actual = |predicted| from.predicted(predicted);
+    let gauss = &mut fields.gauss;
+    (gauss.x, gauss.y) = (actual(points_x)?, actual(points_y)?);
+    (gauss.stress_xx, gauss.stress_yy) = (actual(xx)?, actual(yy)?);
+    (gauss.stress_xy, gauss.stress_zz) = (actual(xy)?, actual(zz)?);
+    (fields.stress_xx, fields.stress_yy) = (actual(nodal_xx)?, actual(nodal_yy)?);
+    (fields.stress_xy, fields.stress_zz) = (actual(nodal_xy)?, actual(nodal_zz)?);
+    from.finish()?;
+    Ok(fields)
+}
+
+/// What is known when stresses are predicted.
+struct Known<'a> {
+    x: &'a [f64],
+    y: &'a [f64],
+    ux: &'a [f64],
+    uy: &'a [f64],
+    elements: &'a [Element],
+    order: u32,
+}
+
+impl<'a> Known<'a> {
+    fn of(fields: &'a Fields) -> Known<'a> {
+        Known {
+            x: &fields.x,
+            y: &fields.y,
+            ux: &fields.ux,
+            uy: &fields.uy,
+            elements: &fields.elements,
+            order: fields.gauss.order,
+        }
+    }
+}
+
+fn at_points(gauss: &GaussFields) -> [&Vec<f64>; 4] {
+    [
+        &gauss.stress_xx,
+        &gauss.stress_yy,
+        &gauss.stress_xy,
+        &gauss.stress_zz,
+    ]
+}
+
+fn at_nodes(fields: &Fields) -> [&Vec<f64>; 4] {
+    [
+        &fields.stress_xx,
+        &fields.stress_yy,
+        &fields.stress_xy,
+        &fields.stress_zz,
+    ]
+}
+
+/// The number of nodes of each element, then their nodes: the first of all, the second of all…
+fn write_elements(out: &mut Writer, elements: &[Element]) {
+    out.whole(elements.iter().map(|element| element.len() as i64));
+    for place in 0..8 {
+        let nodes = elements
+            .iter()
+            .map(|e| e.get(place).map_or(0, |n| i64::from(*n)));
+        out.whole(nodes);
+    }
+}
+
+fn read_elements(from: &mut Reader, count: usize, nodes: usize) -> Result<Vec<Element>, String> {
+    let lengths: Vec<u8> = from.whole(count)?;
+    let mut places = Vec::with_capacity(8);
+    for _ in 0..8 {
+        places.push(from.whole::<u32>(count)?);
+    }
+    let element = |(e, length): (usize, &u8)| {
+        let mut own = [0; 8];
+        for (slot, place) in own.iter_mut().zip(&places) {
+            *slot = place[e];
+        }
+        let own = own
+            .get(..usize::from(*length))
+            .ok_or_else(|| damaged("elements"))?;
+        match own.iter().all(|node| (*node as usize) < nodes) {
+            true => Element::try_from(own),
+            false => Err(damaged("nodes of elements")),
+        }
+    };
+    lengths.iter().enumerate().map(element).collect()
+}
+
+/// Bytes that are not those of fields.
+fn damaged(what: &str) -> String {
+    format!("stored fields are damaged: {what}")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,57 @@
+//! Nodes in the order in which their values are predicted: corners of elements first, then midsides between them.
+
+use solver::element::Element;
+
+/// In place of corners: the node before it in the order.
+const NONE: u32 = u32::MAX;
+
+/// The order of nodes.
+pub(super) struct NodeOrder {
+    /// Each node, with the corners of its side if it lies on the middle of one.
+    nodes: Vec<(u32, [u32; 2])>,
+}
+
+impl NodeOrder {
+    /// That of a mesh with so many nodes; all nodes of the elements are among them.
+    pub(super) fn new(elements: &[Element], nodes: usize) -> NodeOrder {
+        let mut between = vec![[NONE; 2]; nodes];
+        for [a, b, middle] in elements.iter().flat_map(Element::sides) {
+            between[middle as usize] = [a, b];
+        }
+        // a corner of one element is none of its own sides' midsides, but may be that of a badly made neighbour
+        for element in elements {
+            let corners = element.family().corners();
+            element
+                .iter()
+                .take(corners)
+                .for_each(|node| between[*node as usize] = [NONE; 2]);
+        }
+        let of_kind = |corner: bool| {
+            let all = (0u32..).zip(&between);
+            all.filter(move |(_, between)| (between[0] == NONE) == corner)
+                .map(|(node, between)| (node, *between))
+        };
+        NodeOrder {
+            nodes: of_kind(true).chain(of_kind(false)).collect(),
+        }
+    }
+
+    /// How many.
+    pub(super) fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// The node at this place of the order.
+    pub(super) fn node(&self, place: usize) -> usize {
+        self.nodes[place].0 as usize
+    }
+
+    /// The value at a node, from those before it in the order.
+    pub(super) fn predict(&self, place: usize, values: &[f64]) -> f64 {
+        match (self.nodes[place].1, place) {
+            ([NONE, _], 0) => 0.0,
+            ([NONE, _], _) => values[self.node(place - 1)],
+            ([a, b], _) => 0.5 * (values[a as usize] + values[b as usize]),
+        }
+    }
+}

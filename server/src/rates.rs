@@ -1,0 +1,89 @@
+//! How many jobs each owner submits in a minute.
+
+use std::{
+    collections::HashMap,
+    sync::{Mutex, PoisonError},
+    time::Instant,
+};
+
+/// Owners that are remembered; beyond that those who have used nothing lately are forgotten.
+const MOST_OWNERS: usize = 10_000;
+
+/// A limit on what each owner submits: as much as the limit at once, and the rest evenly over time.
+#[derive(Debug)]
+pub struct Rates {
+    /// Jobs in a minute; `None` without limit.
+    pub per_minute: Option<u32>,
+    /// By owner: what is left, and when that was so.
+    left: Mutex<HashMap<String, (f64, Instant)>>,
+}
+
+impl Rates {
+    /// Nothing used yet.
+    pub fn new(per_minute: Option<u32>) -> Rates {
+        Rates {
+            per_minute,
+            left: Mutex::default(),
+        }
+    }
+
+    /// Takes a number of jobs from what the owner has left; `Err`: how many they have left, too few.
+    pub fn take(&self, owner: &str, jobs: u64) -> Result<(), u64> {
+        self.take_at(owner, jobs, Instant::now())
+    }
+
+    /// How many jobs the owner may submit at once; `None` without limit.
+    pub fn left(&self, owner: &str) -> Option<u64> {
+        let per_minute = self.per_minute?;
+        let all = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = all.get(owner).copied();
+        Some(refilled(known, per_minute, Instant::now()) as u64)
+    }
+
+    fn take_at(&self, owner: &str, jobs: u64, now: Instant) -> Result<(), u64> {
+        let Some(per_minute) = self.per_minute else {
+            return Ok(());
+        };
+        let mut all = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        if all.len() >= MOST_OWNERS && !all.contains_key(owner) {
+            all.retain(|_, known| refilled(Some(*known), per_minute, now) < f64::from(per_minute));
+        }
+        let left = refilled(all.get(owner).copied(), per_minute, now);
+        if left < jobs as f64 {
+            return Err(left as u64);
+        }
+        all.insert(owner.to_owned(), (left - jobs as f64, now));
+        Ok(())
+    }
+}
+
+/// What an owner has left now.
+fn refilled(known: Option<(f64, Instant)>, per_minute: u32, now: Instant) -> f64 {
+    let most = f64::from(per_minute);
+    known.map_or(most, |(left, then)| {
+        let since = now.saturating_duration_since(then).as_secs_f64();
+        (left + most * since / 60.0).min(most)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn what_is_used_comes_back_evenly_and_of_each_owner_by_itself() {
+        let (rates, start) = (Rates::new(Some(60)), Instant::now());
+        let at = |owner, jobs, seconds| {
+            rates.take_at(owner, jobs, start + Duration::from_millis(seconds))
+        };
+        assert_eq!(at("ada", 60, 0), Ok(()));
+        assert_eq!(at("ada", 1, 500), Err(0));
+        assert_eq!(at("bob", 59, 500), Ok(()));
+        assert_eq!(at("ada", 10, 10_000), Ok(()));
+        assert_eq!(at("ada", 3, 12_001), Err(2));
+        assert_eq!(at("ada", 61, 600_000), Err(60), "never more than the limit");
+        assert_eq!(Rates::new(None).take("ada", u64::MAX), Ok(()));
+    }
+}

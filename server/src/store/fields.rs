@@ -1,0 +1,57 @@
+//! The fields of a job, which are most of its result, deleted by themselves.
+
+use super::{change::Change, database::Store, delete::Deletion, error::Result, rows::find};
+use crate::{caller::Owners, job::Job};
+
+impl Store {
+    /// Deletes the fields of a job that has ended: its summary, history and profiles stay.
+    pub async fn delete_fields(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
+        self.control(|| self.try_to_delete_fields(owners, key))
+            .await
+    }
+
+    async fn try_to_delete_fields(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
+        let mut change = self.control_change().await?;
+        let job = find(change.sql(), key).await?;
+        let Some(job) = job.filter(|job| owners.include(&job.owner)) else {
+            return Ok(Deletion::Unknown);
+        };
+        if !job.status.is_terminal() {
+            return Ok(Deletion::Active);
+        }
+        remove_fields(&mut change, &job).await?;
+        change.commit().await?;
+        Ok(Deletion::Deleted)
+    }
+}
+
+/// Deletes the fields of a job that has ended, unless another job with the same result still has them.
+pub(super) async fn remove_fields(change: &mut Change<'_>, job: &Job) -> Result<()> {
+    let tx = change.sql();
+    sqlx::query("update job_size set has_fields = 0 where job_id = ?")
+        .bind(job.key)
+        .execute(&mut *tx)
+        .await?;
+    let needed: bool = sqlx::query_scalar(
+        "select exists (select 1 from job_size where job_id = ?1 and has_fields = 1)
+             or exists (select 1 from job join job_size on job_id = id where result_job = ?1 and has_fields = 1)",
+    )
+    .bind(job.result_key)
+    .fetch_one(&mut *tx)
+    .await?;
+    if needed {
+        return Ok(());
+    }
+    for statement in [
+        "update job_size set bytes = bytes - (select coalesce(sum(length(body)), 0) from result_part
+                                              where job_id = ?1 and name = 'fields') where job_id = ?1",
+        "delete from result_part where job_id = ? and name = 'fields'",
+        "delete from result_info where job_id = ? and name = 'fields'",
+    ] {
+        sqlx::query(statement)
+            .bind(job.result_key)
+            .execute(&mut *tx)
+            .await?;
+    }
+    Ok(())
+}

@@ -1,0 +1,106 @@
+//! What jobs and owners keep, in bytes.
+
+use sqlx::SqliteConnection;
+
+use super::{database::Store, error::Result};
+use crate::job::Job;
+
+/// What an owner keeps.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct OwnerSize {
+    /// Their name.
+    pub owner: String,
+    /// Jobs that have ended.
+    pub jobs: u64,
+    /// Bytes of these: results, events, members of sweeps.
+    pub job_bytes: u64,
+    /// Bytes of the meshes that they have uploaded.
+    pub mesh_bytes: u64,
+}
+
+impl OwnerSize {
+    /// All bytes.
+    pub fn bytes(&self) -> u64 {
+        self.job_bytes + self.mesh_bytes
+    }
+}
+
+/// The columns of an owner's size.
+type Columns = (String, i64, i64, i64);
+
+fn size((owner, jobs, job_bytes, mesh_bytes): Columns) -> OwnerSize {
+    let count = |count: i64| u64::try_from(count).unwrap_or(0);
+    OwnerSize {
+        owner,
+        jobs: count(jobs),
+        job_bytes: count(job_bytes),
+        mesh_bytes: count(mesh_bytes),
+    }
+}
+
+impl Store {
+    /// What an owner keeps.
+    pub async fn size_of_owner(&self, owner: &str) -> Result<OwnerSize> {
+        let row: Option<Columns> = sqlx::query_as(
+            "select owner, jobs, job_bytes, mesh_bytes from owner_size where owner = ?",
+        )
+        .bind(owner)
+        .fetch_optional(&self.reader)
+        .await?;
+        let nothing = || OwnerSize {
+            owner: owner.to_owned(),
+            ..OwnerSize::default()
+        };
+        Ok(row.map_or_else(nothing, size))
+    }
+
+    /// What every owner keeps, who keeps most first: at most `limit` of them.
+    pub async fn sizes_of_owners(&self, limit: i64) -> Result<Vec<OwnerSize>> {
+        let rows: Vec<Columns> = sqlx::query_as(
+            "select owner, jobs, job_bytes, mesh_bytes from owner_size
+             order by job_bytes + mesh_bytes desc, owner limit ?",
+        )
+        .bind(limit)
+        .fetch_all(&self.reader)
+        .await?;
+        Ok(rows.into_iter().map(size).collect())
+    }
+
+    /// Whether the fields of this job are served: they were stored, and not deleted by themselves.
+    pub async fn has_fields(&self, key: i64) -> Result<bool> {
+        let found = sqlx::query_scalar(
+            "select exists (select 1 from job_size where job_id = ? and has_fields = 1)",
+        );
+        Ok(found.bind(key).fetch_one(&self.reader).await?)
+    }
+}
+
+/// Counts what a job keeps that has just ended.
+pub(super) async fn count(tx: &mut SqliteConnection, key: i64) -> Result<()> {
+    sqlx::query(
+        "insert into job_size (job_id, owner, bytes, finished_at, has_fields)
+         select id, owner,
+                (select coalesce(sum(length(body)), 0) from result_part where job_id = job.id)
+                + (select coalesce(sum(length(body)), 0) from event where job_id = job.id)
+                + (select coalesce(sum(length(body)), 0) from sweep_member where job = job.id),
+                finished_at,
+                exists (select 1 from result_part where job_id = coalesce(job.result_job, job.id) and name = 'fields')
+         from job where id = ? and finished_at is not null",
+    )
+    .bind(key)
+    .execute(tx)
+    .await?;
+    Ok(())
+}
+
+/// Fills in what jobs keep.
+pub(super) async fn add_sizes(connection: &mut SqliteConnection, jobs: &mut [Job]) -> Result<()> {
+    for job in jobs.iter_mut().filter(|job| job.status.is_terminal()) {
+        let bytes: Option<i64> = sqlx::query_scalar("select bytes from job_size where job_id = ?")
+            .bind(job.key)
+            .fetch_optional(&mut *connection)
+            .await?;
+        job.stored_bytes = bytes.and_then(|bytes| u64::try_from(bytes).ok());
+    }
+    Ok(())
+}

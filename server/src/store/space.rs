@@ -1,0 +1,116 @@
+//! The space of the database on the disk: how much it is, and what is free in it given back to the file system.
+
+use sqlx::{Connection, SqliteConnection};
+
+use super::{database::Store, error::Result};
+
+/// Free pages that stay in the file, since new rows fill them soon: 4 MiB.
+const KEPT_PAGES: i64 = 1024;
+
+/// A database without the means to give space back is rebuilt when it is opened, if it is not larger than this: some seconds.
+const REBUILT_BYTES: i64 = 256 << 20;
+
+/// The space of a store, in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Space {
+    /// Of the database and its write-ahead log.
+    pub used: u64,
+    /// Of it without content, for what comes next.
+    pub unused: u64,
+    /// What the file system has left.
+    pub free: u64,
+}
+
+impl Store {
+    /// The space of the store.
+    pub async fn space(&self) -> Result<Space> {
+        let mut connection = self.reader.acquire().await?;
+        let bytes = async |connection: &mut SqliteConnection, of: &'static str| -> Result<u64> {
+            let pages: i64 = sqlx::query_scalar(of).fetch_one(&mut *connection).await?;
+            let page: i64 = sqlx::query_scalar("pragma page_size")
+                .fetch_one(connection)
+                .await?;
+            Ok(u64::try_from(pages.saturating_mul(page)).unwrap_or(0))
+        };
+        let used = bytes(&mut connection, "pragma page_count").await?;
+        let unused = bytes(&mut connection, "pragma freelist_count").await?;
+        let folder = self.folder.path();
+        let log = std::fs::metadata(folder.join(super::folder::LOG)).map_or(0, |log| log.len());
+        let free = rustix::fs::statvfs(folder).map_or(0, |free| free.f_bavail * free.f_frsize);
+        Ok(Space {
+            used: used + log,
+            unused,
+            free,
+        })
+    }
+
+    /// Gives free pages back to the file system, some at a time, as long as there are many; how many were.
+    pub async fn give_space_back(&self) -> Result<i64> {
+        let mut given = 0;
+        loop {
+            let free = self.free_pages().await?;
+            if free <= KEPT_PAGES {
+                return Ok(given);
+            }
+            let give = async {
+                let mut tx = self.begin_control().await?;
+                // 1 MiB; it takes a step for each page
+                sqlx::query("pragma incremental_vacuum(256)")
+                    .fetch_all(&mut *tx)
+                    .await?;
+                tx.commit().await
+            };
+            self.writing(give).await?;
+            let left = self.free_pages().await?;
+            if left >= free {
+                return Ok(given); // a database that cannot
+            }
+            given += free - left;
+            tokio::task::yield_now().await;
+        }
+    }
+
+    async fn free_pages(&self) -> Result<i64> {
+        let free = sqlx::query_scalar("pragma freelist_count");
+        Ok(free.fetch_one(&self.reader).await?)
+    }
+}
+
+/// Rebuilds a database of an earlier version, which cannot give space back, unless that takes long. What `doctor --compact`
+/// does for large ones.
+pub(super) async fn enable_giving_back(connection: &mut SqliteConnection) -> Result<()> {
+    let mode: i64 = sqlx::query_scalar("pragma auto_vacuum")
+        .fetch_one(&mut *connection)
+        .await?;
+    if mode != 0 {
+        return Ok(());
+    }
+    let bytes: i64 = sqlx::query_scalar(
+        "select page_count * page_size from pragma_page_count(), pragma_page_size()",
+    )
+    .fetch_one(&mut *connection)
+    .await?;
+    if bytes > REBUILT_BYTES {
+        tracing::warn!(
+            "the database is of an earlier version and keeps the space of what is deleted for itself; to have it given back to the \
+             file system, stop the service and run `signorini doctor --compact`, which takes as much space again for a while"
+        );
+        return Ok(());
+    }
+    compact(connection).await
+}
+
+/// Rebuilds a database without free pages, and so that it can give space back later.
+pub(super) async fn compact(connection: &mut SqliteConnection) -> Result<()> {
+    // the mode of an existing database changes when it is rebuilt, and not in a write-ahead log
+    for statement in [
+        "pragma journal_mode = delete",
+        "pragma auto_vacuum = incremental",
+        "vacuum",
+        "pragma journal_mode = wal",
+    ] {
+        sqlx::query(statement).fetch_all(&mut *connection).await?;
+    }
+    connection.ping().await?;
+    Ok(())
+}

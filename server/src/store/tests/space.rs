@@ -1,0 +1,243 @@
+//! What jobs and owners keep, what is removed, and the space that this gives back.
+
+use files::columns::Law;
+use solver::solution::Fields;
+
+use super::*;
+use crate::{job::ResultAvailable, store::parts::Part, time::Time};
+
+/// Solves a job of this owner; its result has fields that cannot be compressed.
+async fn solved(store: &Store, owner: &str, input: &str, bytes: usize) -> Job {
+    let job = NewJob {
+        cache: Cache::Use,
+        ..new(input)
+    };
+    store
+        .submit(by(owner, vec![job], None), false)
+        .await
+        .unwrap();
+    let Some(claim) = store.claim_next().await.unwrap().0 else {
+        return jobs(store).await.remove(0); // answered at once
+    };
+    let ending = Ending {
+        status: Status::Succeeded,
+        reason: None,
+        failure: None,
+        result: ResultAvailable::Final,
+    };
+    let body = (0u64..).map(|n| (n.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 56) as u8);
+    let parts = Parts(vec![
+        Part::new("summary".into(), b"{}"),
+        Part::plain(body.take(bytes).collect()),
+    ]);
+    let last = FinalBatch::default();
+    let finished = store.finish(claim.job.key, 1, &ending, last, Some(&parts));
+    finished.await.unwrap().unwrap();
+    store.job(Owners::All, claim.job.id).await.unwrap().unwrap()
+}
+
+/// A moment when nothing is young any more.
+fn later() -> Time {
+    Time::now().after_s(3600.0)
+}
+
+/// All jobs, newest first.
+async fn jobs(store: &Store) -> Vec<Job> {
+    let (all, order) = (Filter::default(), Order::NEWEST_FIRST);
+    store
+        .jobs(Owners::All, &all, order, None, 100)
+        .await
+        .unwrap()
+}
+
+async fn left(store: &Store) -> Vec<i64> {
+    let mut keys: Vec<i64> = jobs(store).await.iter().map(|job| job.key).collect();
+    keys.sort_unstable();
+    keys
+}
+
+#[tokio::test]
+async fn what_jobs_and_meshes_take_is_counted_for_their_owners() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let job = solved(&store, "ada", "1", 10_000).await;
+    let own = job.stored_bytes.unwrap();
+    assert!((10_000..13_000).contains(&own), "{own}");
+    let again = solved(&store, "bob", "1", 10_000).await;
+    assert_eq!(again.result_key, job.result_key, "answered by the other");
+    assert!(
+        again.stored_bytes.unwrap() < 3000,
+        "{:?}",
+        again.stored_bytes
+    );
+    let mesh: crate::mesh::MeshInfo = serde_json::from_value(serde_json::json!({
+        "hash": "sha256:mesh", "format": "gmsh", "bytes": 1, "nodes": 8, "quadrilaterals": 1, "triangles": 0,
+        "dofs": 16, "extent": [[0, 1], [0, 1]], "boundaries": {}, "groups": {}, "node_sets": {}, "warnings": [],
+        "quality": { "least_jacobian_ratio": 1, "worst_element": 0 }, "created_at": "2023-11-14T22:13:20Z"
+    }))
+    .unwrap();
+    store
+        .write_mesh_pieces(&mesh.hash, 0, &[vec![1; 500]])
+        .await
+        .unwrap();
+    store.insert_mesh("bob", &mesh, 1).await.unwrap().unwrap();
+    let of = async |owner| store.size_of_owner(owner).await.unwrap();
+    assert_eq!((of("ada").await.jobs, of("ada").await.bytes()), (1, own));
+    assert_eq!(of("bob").await.mesh_bytes, 500);
+    assert_eq!(of("eve").await.bytes(), 0);
+    let all = store.sizes_of_owners(10).await.unwrap();
+    assert_eq!(
+        all.iter().map(|size| &*size.owner).collect::<Vec<_>>(),
+        ["ada", "bob"]
+    );
+    store.remove_mesh(Owners::All, &mesh.hash).await.unwrap();
+    store.delete(Owners::All, job.key).await.unwrap();
+    assert_eq!((of("ada").await.jobs, of("ada").await.bytes()), (0, 0));
+    assert_eq!(of("bob").await.mesh_bytes, 0);
+}
+
+#[tokio::test]
+async fn fields_are_deleted_by_themselves_and_with_the_last_job_that_has_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let first = solved(&store, "ada", "1", 10_000).await;
+    let second = solved(&store, "bob", "1", 10_000).await;
+    let fields = async || store.json_of(first.key, "fields").await.unwrap();
+    let unknown = store
+        .delete_fields(Owners::Only("eve"), first.key)
+        .await
+        .unwrap();
+    assert_eq!(unknown, Deletion::Unknown);
+    store
+        .delete_fields(Owners::Only("ada"), first.key)
+        .await
+        .unwrap();
+    assert!(!store.has_fields(first.key).await.unwrap());
+    assert!(store.has_fields(second.key).await.unwrap() && fields().await.is_some());
+    store.delete_fields(Owners::All, second.key).await.unwrap();
+    assert!(fields().await.is_none());
+    assert!(store.json_of(first.key, "summary").await.unwrap().is_some());
+    assert!(store.size_of_owner("ada").await.unwrap().bytes() < 3000);
+    // what has lost its fields answers nobody
+    let third = solved(&store, "ada", "1", 10_000).await;
+    assert_eq!((third.cached_from, third.result_key), (None, third.key));
+    store.close().await;
+    drop(store);
+    let report = crate::store::inspect(folder.path(), None).await.unwrap();
+    assert!(report.findings.is_empty(), "{report:?}");
+}
+
+#[tokio::test]
+async fn the_oldest_are_removed_when_they_are_old_or_too_many_and_pinned_ones_never() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for (owner, input) in [
+        ("ada", "1"),
+        ("bob", "2"),
+        ("ada", "3"),
+        ("ada", "4"),
+        ("bob", "5"),
+    ] {
+        solved(&store, owner, input, 10_000).await;
+    }
+    let edit = Edit {
+        pinned: Some(true),
+        ..Edit::default()
+    };
+    let first = jobs(&store).await.pop().unwrap();
+    assert_eq!(first.key, 1);
+    store
+        .edit(Owners::All, first.id, &edit, None)
+        .await
+        .unwrap();
+    let retire = async |retention: Retention, now| store.retire(&retention, now).await.unwrap();
+    let nothing = Retired::default();
+    let three = Retention {
+        jobs: Some(3),
+        ..Retention::default()
+    };
+    assert_eq!(retire(three, Time::now()).await, nothing, "all are young");
+    let month = Retention {
+        age_s: Some(30.0 * 86_400.0),
+        ..Retention::default()
+    };
+    assert_eq!(retire(month, later()).await, nothing);
+    let of_ada = Retention {
+        jobs_of_owner: Some(2),
+        ..Retention::default()
+    };
+    assert_eq!(retire(of_ada, later()).await.jobs, 1);
+    assert_eq!(
+        left(&store).await,
+        [1, 2, 4, 5],
+        "her oldest that is not pinned"
+    );
+    let bytes = Retention {
+        bytes: Some(35_000),
+        ..Retention::default()
+    };
+    assert_eq!(retire(bytes, later()).await.jobs, 1);
+    assert_eq!(left(&store).await, [1, 4, 5]);
+    let fields = Retention {
+        fields_age_s: Some(60.0),
+        ..Retention::default()
+    };
+    assert_eq!(
+        retire(fields, later()).await,
+        Retired { jobs: 0, fields: 2 }
+    );
+    assert!(store.has_fields(1).await.unwrap() && !store.has_fields(4).await.unwrap());
+    let hour = Retention {
+        age_s: Some(600.0),
+        ..Retention::default()
+    };
+    assert_eq!(retire(hour, later()).await.jobs, 2);
+    assert_eq!(left(&store).await, [1]);
+    assert_eq!(store.size_of_owner("bob").await.unwrap().bytes(), 0);
+}
+
+#[tokio::test]
+async fn the_space_of_what_is_removed_is_given_back_to_the_file_system() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for input in 0..8 {
+        solved(&store, "ada", &input.to_string(), 2 << 20).await;
+    }
+    let before = store.space().await.unwrap();
+    assert!(before.used > 16 << 20 && before.free > 0, "{before:?}");
+    let all = Retention {
+        age_s: Some(1.0),
+        ..Retention::default()
+    };
+    assert_eq!(store.retire(&all, later()).await.unwrap().jobs, 8);
+    assert!(store.give_space_back().await.unwrap() > 2000);
+    store.close().await;
+    let left = std::fs::metadata(folder.path().join("signorini.db"))
+        .unwrap()
+        .len();
+    assert!(left < 6 << 20, "{left} bytes");
+}
+
+#[test]
+fn fields_are_stored_as_columns_and_everything_else_deflated() {
+    let mut fields = Fields::default();
+    fields.gauss.order = 3;
+    fields.x = vec![0.0; 1000];
+    for column in [
+        &mut fields.y,
+        &mut fields.ux,
+        &mut fields.uy,
+        &mut fields.stress_xx,
+        &mut fields.stress_yy,
+        &mut fields.stress_xy,
+        &mut fields.stress_zz,
+    ] {
+        *column = vec![1.5; 1000];
+    }
+    fields.contact_state = vec![-1; 1000];
+    let part = Part::of_fields(&fields, &Law::default()).unwrap();
+    assert!(part.body.len() < 500, "{}", part.body.len());
+    let (info, content) = encoding::decoded(part.body, part.encoding, &part.info).unwrap();
+    assert_eq!(info, part.info);
+    assert!(matches!(content, encoding::Content::Fields(found) if *found == fields));
+}
