@@ -11,10 +11,10 @@ create table job_size (
     owner       text    not null,
     bytes       integer not null,
     finished_at integer not null,
-    -- Whether its fields are served. They can be deleted by themselves, and those of another job with the same result stay.
-    has_fields  integer not null
+    -- Its fields: 0 none, 1 kept, 2 deleted by themselves. Those of another job with the same result stay.
+    fields      integer not null
 ) strict;
-create index job_size_with_fields on job_size (finished_at, job_id) where has_fields = 1;
+create index job_size_with_fields on job_size (finished_at, job_id) where fields = 1;
 
 -- The same by owner, and the meshes that they have uploaded: a submission does not add it up.
 create table owner_size (
@@ -44,7 +44,7 @@ create trigger mesh_owner_removed before delete on mesh_owner begin
         where owner = old.owner;
 end;
 
-insert into job_size (job_id, owner, bytes, finished_at, has_fields)
+insert into job_size (job_id, owner, bytes, finished_at, fields)
     select id, owner,
            (select coalesce(sum(length(body)), 0) from result_part where job_id = job.id)
            + (select coalesce(sum(length(body)), 0) from event where job_id = job.id)

@@ -7,7 +7,7 @@ use std::io::{Read, Write};
 
 use flate2::{Compression, read::DeflateDecoder, write::DeflateEncoder};
 
-use super::{damaged, order::NodeOrder};
+use super::order::NodeOrder;
 
 /// What a plane consists of.
 const ZEROS: u8 = 0;
@@ -302,6 +302,11 @@ fn differences_in_sequence(values: &[f64]) -> Vec<u64> {
     pairs
         .map(|(value, before)| difference(*value, *before))
         .collect()
+}
+
+/// Bytes that are not those of fields.
+pub(super) fn damaged(what: &str) -> String {
+    format!("stored fields are damaged: {what}")
 }
 
 /// How many numbers lie between two, with its sign.

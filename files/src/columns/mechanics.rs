@@ -5,12 +5,76 @@
 //! prediction, which costs space and nothing else.
 
 use solver::{
-    elasticity::{COMPONENTS, Moduli},
+    elasticity::{COMPONENTS, Moduli, isotropic, orthotropic},
     element::{AtNodes, Element, Family, Tabulated},
-    solution::Fields,
+    problem::{Analysis, Elasticity, Problem},
+    solution::{Fields, GaussFields},
 };
 
-use super::{Known, Law};
+/// What stresses are predicted with.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Law {
+    /// There is a hoop strain u_r / r.
+    pub axisymmetric: bool,
+    /// Of each material of the problem (stress).
+    pub moduli: Vec<Moduli>,
+}
+
+impl Law {
+    /// That of a problem.
+    pub fn of(problem: &Problem) -> Law {
+        let analysis = &problem.analysis;
+        let moduli = |elasticity: &Elasticity| match elasticity {
+            Elasticity::Isotropic {
+                youngs_modulus,
+                poissons_ratio,
+            } => Some(isotropic(analysis, *youngs_modulus, *poissons_ratio)),
+            Elasticity::Orthotropic(material) => orthotropic(analysis, material),
+        };
+        let materials = problem.materials.iter();
+        Law {
+            axisymmetric: matches!(analysis, Analysis::Axisymmetric {}),
+            // a solved problem has few
+            moduli: materials
+                .filter_map(|material| moduli(&material.elasticity))
+                .take(usize::from(u8::MAX))
+                .collect(),
+        }
+    }
+}
+
+/// What is known when stresses are predicted.
+pub(super) struct Known<'a> {
+    x: &'a [f64],
+    y: &'a [f64],
+    ux: &'a [f64],
+    uy: &'a [f64],
+    elements: &'a [Element],
+    order: u32,
+}
+
+impl<'a> Known<'a> {
+    pub(super) fn of(fields: &'a Fields) -> Known<'a> {
+        Known {
+            x: &fields.x,
+            y: &fields.y,
+            ux: &fields.ux,
+            uy: &fields.uy,
+            elements: &fields.elements,
+            order: fields.gauss.order,
+        }
+    }
+}
+
+/// The stresses at integration points.
+pub(super) fn at_points(gauss: &GaussFields) -> [&Vec<f64>; 4] {
+    [
+        &gauss.stress_xx,
+        &gauss.stress_yy,
+        &gauss.stress_xy,
+        &gauss.stress_zz,
+    ]
+}
 
 /// What is predicted.
 pub(super) struct Stresses {
@@ -181,7 +245,7 @@ pub(super) fn materials_by_element(fields: &Fields, law: &Law) -> Vec<u8> {
     let mut point = 0;
     let mut material = |element: &Element| {
         let (ux, uy) = walk.displacements(element);
-        let actual = super::at_points(&fields.gauss).map(|column| column[point]);
+        let actual = at_points(&fields.gauss).map(|column| column[point]);
         let strains = &walk.shape(element).at_points;
         let error = |moduli: &Moduli| -> f64 {
             let predicted = strains[0].stress(moduli, &ux, &uy);

@@ -12,52 +12,20 @@ mod mechanics;
 mod order;
 
 use solver::{
-    elasticity::{Moduli, isotropic, orthotropic},
+    elasticity::Moduli,
     element::Element,
-    problem::{Analysis, Elasticity, Problem},
     solution::{Fields, GaussFields},
 };
 
+pub use self::mechanics::Law;
 use self::{
-    differences::{Reader, Writer},
-    mechanics::{Stresses, predicted_stresses},
+    differences::{Reader, Writer, damaged},
+    mechanics::{Known, Stresses, at_points, predicted_stresses},
     order::NodeOrder,
 };
 
 /// The version of the format.
 const VERSION: u8 = 1;
-
-/// What stresses are predicted with.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Law {
-    /// There is a hoop strain u_r / r.
-    pub axisymmetric: bool,
-    /// Of each material of the problem (stress).
-    pub moduli: Vec<Moduli>,
-}
-
-impl Law {
-    /// That of a problem.
-    pub fn of(problem: &Problem) -> Law {
-        let analysis = &problem.analysis;
-        let moduli = |elasticity: &Elasticity| match elasticity {
-            Elasticity::Isotropic {
-                youngs_modulus,
-                poissons_ratio,
-            } => Some(isotropic(analysis, *youngs_modulus, *poissons_ratio)),
-            Elasticity::Orthotropic(material) => orthotropic(analysis, material),
-        };
-        let materials = problem.materials.iter();
-        Law {
-            axisymmetric: matches!(analysis, Analysis::Axisymmetric {}),
-            // a solved problem has few
-            moduli: materials
-                .filter_map(|material| moduli(&material.elasticity))
-                .take(usize::from(u8::MAX))
-                .collect(),
-        }
-    }
-}
 
 /// Fields as bytes. `Err`: columns of different lengths, or elements with nodes that do not exist.
 pub fn encode(fields: &Fields, law: &Law) -> Result<Vec<u8>, String> {
@@ -158,38 +126,6 @@ pub fn decode(bytes: &[u8], limit: usize) -> Result<Fields, String> {
     Ok(fields)
 }
 
-/// What is known when stresses are predicted.
-struct Known<'a> {
-    x: &'a [f64],
-    y: &'a [f64],
-    ux: &'a [f64],
-    uy: &'a [f64],
-    elements: &'a [Element],
-    order: u32,
-}
-
-impl<'a> Known<'a> {
-    fn of(fields: &'a Fields) -> Known<'a> {
-        Known {
-            x: &fields.x,
-            y: &fields.y,
-            ux: &fields.ux,
-            uy: &fields.uy,
-            elements: &fields.elements,
-            order: fields.gauss.order,
-        }
-    }
-}
-
-fn at_points(gauss: &GaussFields) -> [&Vec<f64>; 4] {
-    [
-        &gauss.stress_xx,
-        &gauss.stress_yy,
-        &gauss.stress_xy,
-        &gauss.stress_zz,
-    ]
-}
-
 fn at_nodes(fields: &Fields) -> [&Vec<f64>; 4] {
     [
         &fields.stress_xx,
@@ -230,11 +166,6 @@ fn read_elements(from: &mut Reader, count: usize, nodes: usize) -> Result<Vec<El
         }
     };
     lengths.iter().enumerate().map(element).collect()
-}
-
-/// Bytes that are not those of fields.
-fn damaged(what: &str) -> String {
-    format!("stored fields are damaged: {what}")
 }
 
 #[cfg(test)]

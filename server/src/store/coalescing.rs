@@ -15,6 +15,7 @@ use super::{
     lifecycle::{self, Ending},
     results,
     rows::{from_row, read},
+    sizes,
     submission::NewJob,
     waiting::{Move, Place},
 };
@@ -50,21 +51,14 @@ pub(super) async fn earlier_result(
     for row in &rows {
         // a damaged one answers nobody
         if let Some(job) = change.unless_damaged(from_row(row)).await?
-            && has_fields(change, &job).await?
+            // what has lost its fields answers nobody
+            && !sizes::lost_fields(change.sql(), job.key).await?
             && change.has_intact_result(&job).await?
         {
             return Ok(Some(job));
         }
     }
     Ok(None)
-}
-
-/// Whether the fields of a result are there: one whose fields were deleted answers nobody.
-async fn has_fields(change: &mut Change<'_>, job: &Job) -> Result<bool> {
-    let found = sqlx::query_scalar(
-        "select exists (select 1 from result_part where job_id = ? and name = 'fields')",
-    );
-    Ok(found.bind(job.result_key).fetch_one(change.sql()).await?)
 }
 
 impl Store {

@@ -21,6 +21,7 @@ use sqlx::{
 use tokio::sync::mpsc;
 
 use super::{
+    compact,
     damage::Damages,
     error::{Result, StoreError},
     folder::{Folder, Identity, JOURNAL, LOG},
@@ -28,7 +29,6 @@ use super::{
     migrations,
     progress::{self, Known, LastCommit, Progress},
     reserve::Reserve,
-    space,
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
@@ -156,7 +156,7 @@ impl Store {
             .connect_with(writing)
             .await?;
         migrations::run(&writer).await?;
-        space::enable_giving_back(&mut *writer.acquire().await?).await?;
+        compact::enable_giving_back(&mut *writer.acquire().await?).await?;
         let record = progress::in_database(&mut *writer.acquire().await?).await?;
         let record = record.ok_or_else(|| StoreError::Unexpected("no progress".into()))?;
         let progress = Progress::start(path, record).map_err(|error| {

@@ -28,13 +28,13 @@ impl Store {
 /// Deletes the fields of a job that has ended, unless another job with the same result still has them.
 pub(super) async fn remove_fields(change: &mut Change<'_>, job: &Job) -> Result<()> {
     let tx = change.sql();
-    sqlx::query("update job_size set has_fields = 0 where job_id = ?")
+    sqlx::query("update job_size set fields = 2 where job_id = ? and fields = 1")
         .bind(job.key)
         .execute(&mut *tx)
         .await?;
     let needed: bool = sqlx::query_scalar(
-        "select exists (select 1 from job_size where job_id = ?1 and has_fields = 1)
-             or exists (select 1 from job join job_size on job_id = id where result_job = ?1 and has_fields = 1)",
+        "select exists (select 1 from job_size where job_id = ?1 and fields = 1)
+             or exists (select 1 from job join job_size on job_id = id where result_job = ?1 and fields = 1)",
     )
     .bind(job.result_key)
     .fetch_one(&mut *tx)

@@ -30,6 +30,7 @@ mod reserve;
 // The database; one transaction of its single writer; the waiting jobs, mirrored in memory.
 mod change;
 mod clock;
+mod compact;
 mod database;
 mod migrations;
 mod waiting;

@@ -101,7 +101,7 @@ impl Store {
             let before = now.after_s(-age_s).micros();
             let old = sqlx::query_scalar(
                 "select job_id from job_size indexed by job_size_with_fields join job on job.id = job_id
-                 where has_fields = 1 and job_size.finished_at < ? and pinned = 0
+                 where fields = 1 and job_size.finished_at < ? and pinned = 0
                  order by job_size.finished_at limit ?",
             );
             let old = old.bind(before).bind((AT_ONCE + left_alone.len()) as i64);

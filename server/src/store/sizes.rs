@@ -66,19 +66,26 @@ impl Store {
         Ok(rows.into_iter().map(size).collect())
     }
 
-    /// Whether the fields of this job are served: they were stored, and not deleted by themselves.
-    pub async fn has_fields(&self, key: i64) -> Result<bool> {
-        let found = sqlx::query_scalar(
-            "select exists (select 1 from job_size where job_id = ? and has_fields = 1)",
-        );
-        Ok(found.bind(key).fetch_one(&self.reader).await?)
+    /// Whether the fields of this job were deleted by themselves.
+    pub async fn lost_fields(&self, key: i64) -> Result<bool> {
+        let mut connection = self.reader.acquire().await?;
+        lost_fields(&mut connection, key).await
     }
+}
+
+/// Whether the fields of a job were deleted by themselves.
+pub(super) async fn lost_fields(connection: &mut SqliteConnection, key: i64) -> Result<bool> {
+    let lost = "select exists (select 1 from job_size where job_id = ? and fields = 2)";
+    Ok(sqlx::query_scalar(lost)
+        .bind(key)
+        .fetch_one(connection)
+        .await?)
 }
 
 /// Counts what a job keeps that has just ended.
 pub(super) async fn count(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     sqlx::query(
-        "insert into job_size (job_id, owner, bytes, finished_at, has_fields)
+        "insert into job_size (job_id, owner, bytes, finished_at, fields)
          select id, owner,
                 (select coalesce(sum(length(body)), 0) from result_part where job_id = job.id)
                 + (select coalesce(sum(length(body)), 0) from event where job_id = job.id)

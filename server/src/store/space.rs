@@ -1,14 +1,11 @@
 //! The space of the database on the disk: how much it is, and what is free in it given back to the file system.
 
-use sqlx::{Connection, SqliteConnection};
+use sqlx::SqliteConnection;
 
 use super::{database::Store, error::Result};
 
 /// Free pages that stay in the file, since new rows fill them soon: 4 MiB.
 const KEPT_PAGES: i64 = 1024;
-
-/// A database without the means to give space back is rebuilt when it is opened, if it is not larger than this: some seconds.
-const REBUILT_BYTES: i64 = 256 << 20;
 
 /// The space of a store, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,43 +71,4 @@ impl Store {
         let free = sqlx::query_scalar("pragma freelist_count");
         Ok(free.fetch_one(&self.reader).await?)
     }
-}
-
-/// Rebuilds a database of an earlier version, which cannot give space back, unless that takes long. What `doctor --compact`
-/// does for large ones.
-pub(super) async fn enable_giving_back(connection: &mut SqliteConnection) -> Result<()> {
-    let mode: i64 = sqlx::query_scalar("pragma auto_vacuum")
-        .fetch_one(&mut *connection)
-        .await?;
-    if mode != 0 {
-        return Ok(());
-    }
-    let bytes: i64 = sqlx::query_scalar(
-        "select page_count * page_size from pragma_page_count(), pragma_page_size()",
-    )
-    .fetch_one(&mut *connection)
-    .await?;
-    if bytes > REBUILT_BYTES {
-        tracing::warn!(
-            "the database is of an earlier version and keeps the space of what is deleted for itself; to have it given back to the \
-             file system, stop the service and run `signorini doctor --compact`, which takes as much space again for a while"
-        );
-        return Ok(());
-    }
-    compact(connection).await
-}
-
-/// Rebuilds a database without free pages, and so that it can give space back later.
-pub(super) async fn compact(connection: &mut SqliteConnection) -> Result<()> {
-    // the mode of an existing database changes when it is rebuilt, and not in a write-ahead log
-    for statement in [
-        "pragma journal_mode = delete",
-        "pragma auto_vacuum = incremental",
-        "vacuum",
-        "pragma journal_mode = wal",
-    ] {
-        sqlx::query(statement).fetch_all(&mut *connection).await?;
-    }
-    connection.ping().await?;
-    Ok(())
 }

@@ -1,16 +1,13 @@
 //! Mesh, displacements and stresses: as JSON in pieces, or in another format.
 
-use std::{
-    collections::HashMap,
-    sync::{Arc, Mutex, PoisonError, Weak},
-};
+use std::sync::Arc;
 
 use async_stream::try_stream;
 use files::fields_json::FieldsJson;
 use futures_util::Stream;
-use solver::solution::Fields;
 
 use super::{
+    loaded::{Loaded, Shared},
     results::{no_result, with_result},
     service::{Service, detached},
 };
@@ -18,9 +15,8 @@ use crate::{
     caller::Caller,
     error::ApiError,
     formats::{self, Format},
-    job::{Job, JobId, ResultAvailable},
+    job::{Job, JobId},
     store::PartInfo,
-    transfer::Share,
 };
 
 /// The fields of a job: JSON of known length and fingerprint, in pieces.
@@ -32,31 +28,6 @@ pub struct StoredFields {
     result_key: i64,
     /// If they had to be read to know that they are intact.
     loaded: Option<Arc<Loaded>>,
-}
-
-/// Fields in memory, with their share of the limit on answers.
-#[derive(Debug)]
-struct Loaded {
-    info: PartInfo,
-    fields: Fields,
-    _share: Share,
-}
-
-/// The fields that are being sent, by the key of their result: who asks for the same ones shares them.
-#[derive(Debug, Default)]
-pub struct FieldsInMemory(Mutex<HashMap<i64, Weak<Loaded>>>);
-
-impl FieldsInMemory {
-    fn find(&self, key: i64) -> Option<Arc<Loaded>> {
-        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        all.get(&key)?.upgrade()
-    }
-
-    fn insert(&self, key: i64, loaded: &Arc<Loaded>) {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        all.retain(|_, loaded| loaded.strong_count() > 0);
-        all.insert(key, Arc::downgrade(loaded));
-    }
 }
 
 /// The fields at all nodes as JSON.
@@ -88,9 +59,7 @@ pub async fn fields(
 
 /// An error if the fields of a job that has ended were deleted.
 pub(super) async fn are_kept(service: &Service, job: &Job) -> Result<(), ApiError> {
-    let lost = job.status.is_terminal()
-        && job.result_available == ResultAvailable::Final
-        && !service.store.has_fields(job.key).await?;
+    let lost = job.status.is_terminal() && service.store.lost_fields(job.key).await?;
     match lost {
         true => Err(ApiError::FieldsDeleted(job.id)),
         false => Ok(()),
@@ -119,17 +88,6 @@ async fn load(service: &Service, key: i64) -> Result<Option<Arc<Loaded>>, ApiErr
     });
     service.fields_in_memory.insert(key, &loaded);
     Ok(Some(loaded))
-}
-
-/// Shared fields as their JSON is written of them.
-struct Shared(Arc<Loaded>);
-
-impl std::ops::Deref for Shared {
-    type Target = Fields;
-
-    fn deref(&self) -> &Fields {
-        &self.0.fields
-    }
 }
 
 impl StoredFields {

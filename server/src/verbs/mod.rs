@@ -21,6 +21,7 @@ mod admission;
 pub mod bulk;
 pub mod jobs;
 pub mod lists;
+mod loaded;
 pub mod retry;
 pub mod submit;
 pub mod watch;

@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{sync::Semaphore, time::timeout};
 
-use super::fields::FieldsInMemory;
+use super::loaded::FieldsInMemory;
 use crate::{
     config::{Config, Isolation, ProxyTrust, Web},
     error::{ApiError, Quota, QuotaOf},

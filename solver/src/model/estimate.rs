@@ -275,8 +275,8 @@ impl Size {
     }
 }
 
-/// What even the smallest problem takes (bytes).
-const FLOOR: f64 = 65_536.0;
+/// What even the smallest problem takes, most of it to compress its result (bytes).
+const FLOOR: f64 = 393_216.0;
 
 /// Numbers along contacts.
 #[derive(Clone, Copy, Debug, Default)]

@@ -30,6 +30,12 @@ async fn solved(store: &Store, owner: &str, input: &str, bytes: usize) -> Job {
         Part::new("summary".into(), b"{}"),
         Part::plain(body.take(bytes).collect()),
     ]);
+    assert!(
+        store
+            .write_before_end(claim.job.key, 1, &parts)
+            .await
+            .unwrap()
+    );
     let last = FinalBatch::default();
     let finished = store.finish(claim.job.key, 1, &ending, last, Some(&parts));
     finished.await.unwrap().unwrap();
@@ -112,8 +118,8 @@ async fn fields_are_deleted_by_themselves_and_with_the_last_job_that_has_them() 
         .delete_fields(Owners::Only("ada"), first.key)
         .await
         .unwrap();
-    assert!(!store.has_fields(first.key).await.unwrap());
-    assert!(store.has_fields(second.key).await.unwrap() && fields().await.is_some());
+    assert!(store.lost_fields(first.key).await.unwrap());
+    assert!(!store.lost_fields(second.key).await.unwrap() && fields().await.is_some());
     store.delete_fields(Owners::All, second.key).await.unwrap();
     assert!(fields().await.is_none());
     assert!(store.json_of(first.key, "summary").await.unwrap().is_some());
@@ -186,7 +192,7 @@ async fn the_oldest_are_removed_when_they_are_old_or_too_many_and_pinned_ones_ne
         retire(fields, later()).await,
         Retired { jobs: 0, fields: 2 }
     );
-    assert!(store.has_fields(1).await.unwrap() && !store.has_fields(4).await.unwrap());
+    assert!(!store.lost_fields(1).await.unwrap() && store.lost_fields(4).await.unwrap());
     let hour = Retention {
         age_s: Some(600.0),
         ..Retention::default()

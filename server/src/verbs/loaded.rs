@@ -1,0 +1,48 @@
+//! Fields in memory while they are sent.
+
+use std::{
+    collections::HashMap,
+    ops::Deref,
+    sync::{Arc, Mutex, PoisonError, Weak},
+};
+
+use solver::solution::Fields;
+
+use crate::{store::PartInfo, transfer::Share};
+
+/// Fields in memory, with their share of the limit on answers.
+#[derive(Debug)]
+pub(super) struct Loaded {
+    /// Size and hash of their JSON.
+    pub(super) info: PartInfo,
+    pub(super) fields: Fields,
+    pub(super) _share: Share,
+}
+
+/// The fields that are being sent, by the key of their result: who asks for the same ones shares them.
+#[derive(Debug, Default)]
+pub struct FieldsInMemory(Mutex<HashMap<i64, Weak<Loaded>>>);
+
+impl FieldsInMemory {
+    pub(super) fn find(&self, key: i64) -> Option<Arc<Loaded>> {
+        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.get(&key)?.upgrade()
+    }
+
+    pub(super) fn insert(&self, key: i64, loaded: &Arc<Loaded>) {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|_, loaded| loaded.strong_count() > 0);
+        all.insert(key, Arc::downgrade(loaded));
+    }
+}
+
+/// Shared fields as their JSON is written of them.
+pub(super) struct Shared(pub(super) Arc<Loaded>);
+
+impl Deref for Shared {
+    type Target = Fields;
+
+    fn deref(&self) -> &Fields {
+        &self.0.fields
+    }
+}
