@@ -1,5 +1,6 @@
 //! The commands, one file each.
 
+mod backup;
 mod demo;
 mod doctor;
 pub mod examples;
@@ -8,6 +9,7 @@ mod explain;
 mod log;
 mod output;
 mod report;
+mod restore;
 mod serve;
 mod solve;
 mod sweep;
@@ -39,6 +41,13 @@ enum Command {
     /// used, 5 a server uses it, 6 its tables are of another program or version, 7 something is missing or damaged, 2 an
     /// invalid option, 1 anything else
     Doctor(doctor::Arguments),
+    /// Write a backup of the store to a new folder, while a server uses it or not. Exit code: 0 done, 4 a folder cannot be
+    /// used, 6 the tables are of another program or a later version, 7 something is missing or damaged (if the store can be
+    /// read, the backup is made all the same), 2 an invalid option, 1 anything else
+    Backup(backup::Arguments),
+    /// Make a backup the store in a folder, for `serve`. Exit code: 0 done, 4 a folder cannot be used, 5 a server uses it, 6
+    /// the backup is of a later version, 7 the backup is damaged, 2 an invalid option, 1 anything else
+    Restore(restore::Arguments),
     /// Create, list, revoke and rotate tokens, by which clients are identified. Exit code: 0 done, 4 the folder cannot be used,
     /// 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else
     Token(token::Arguments),
@@ -76,6 +85,14 @@ pub fn main() -> ExitCode {
         Command::Doctor(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
             with_runtime(doctor::run(arguments))
+        }
+        Command::Backup(arguments) => {
+            let _lines = log::start(LevelFilter::WARN);
+            with_runtime(backup::run(arguments))
+        }
+        Command::Restore(arguments) => {
+            let _lines = log::start(LevelFilter::WARN);
+            with_runtime(restore::run(arguments))
         }
         Command::Token(arguments) => {
             let _lines = log::start(LevelFilter::WARN);

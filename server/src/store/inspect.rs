@@ -90,8 +90,23 @@ pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
     Ok(report)
 }
 
+/// Checks the database of a backup that is being made, which has no log. If its tables are of an earlier version, only
+/// whether it can be read: what they contain is not known here.
+pub(super) async fn check_copy(folder: &Path) -> Result<Vec<String>> {
+    let options = SqliteConnectOptions::new().filename(folder.join(DATABASE));
+    let mut copy = options.read_only(true).connect().await?;
+    let mut report = Report::default();
+    match migrations::are_current(&mut copy).await {
+        Ok(()) => report.inspect(&mut copy, None).await?,
+        Err(StoreError::Schema(_)) => report.check_pages(&mut copy).await,
+        Err(error) => return Err(error),
+    }
+    copy.close().await?;
+    Ok(report.findings)
+}
+
 /// Why there is nothing to inspect.
-fn absent(folder: &Path) -> String {
+pub(super) fn absent(folder: &Path) -> String {
     match progress::read(folder) {
         Ok(Known::Missing) => format!("there is no {DATABASE} in it"),
         _ => format!(
@@ -127,16 +142,7 @@ impl Report {
             self.finding("database", &error.into());
             return Ok(());
         }
-        let complaints = sqlx::query_scalar("pragma integrity_check(20)");
-        let complaints: sqlx::Result<Vec<String>> = complaints.fetch_all(&mut *source).await;
-        match complaints {
-            Ok(lines) => {
-                let lines = lines.iter().filter(|line| *line != "ok");
-                self.findings
-                    .extend(lines.map(|line| format!("database: {line}")));
-            }
-            Err(error) => self.finding("database", &error.into()),
-        }
+        self.check_pages(source).await;
         let mut last = last_key(source).await;
         let listed = keys_after(source, MOST_NUMBERS).await;
         let listed = listed.unwrap_or_else(|error| {
@@ -170,6 +176,20 @@ impl Report {
         match target {
             Some(target) => copy_the_rest(source, target, last).await,
             None => Ok(()),
+        }
+    }
+
+    /// Checks the tables and indexes as such.
+    async fn check_pages(&mut self, source: &mut SqliteConnection) {
+        let complaints = sqlx::query_scalar("pragma integrity_check(20)");
+        let complaints: sqlx::Result<Vec<String>> = complaints.fetch_all(&mut *source).await;
+        match complaints {
+            Ok(lines) => {
+                let lines = lines.iter().filter(|line| *line != "ok");
+                self.findings
+                    .extend(lines.map(|line| format!("database: {line}")));
+            }
+            Err(error) => self.finding("database", &error.into()),
         }
     }
 

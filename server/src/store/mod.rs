@@ -70,8 +70,10 @@ mod meshes;
 mod settings;
 mod tokens;
 
-// A store that no server has open.
+// A store that no server has open; backups, also of one that a server has.
+mod backup;
 mod inspect;
+mod restore;
 mod salvage;
 
 #[cfg(test)]
@@ -80,6 +82,7 @@ mod tests;
 use std::{path::Path, sync::Arc};
 
 pub use self::{
+    backup::{Backup, Manifest, back_up},
     database::Store,
     database::with_advice,
     delete::Deletion,
@@ -95,6 +98,7 @@ pub use self::{
     meshes::{Removal, StoredMesh},
     parts::{PIECE_BYTES, PIECES_PER_COMMIT, Parts, ProfilePoints},
     progress::accept,
+    restore::{Restored, restore},
     snapshot::Snapshot,
     submission::{Accepted, Claim, NewJob, NewSweep, QueueLimits, RequestKey, Submission},
     sweeps::{MemberEvents, MembersTask},
