@@ -6,7 +6,9 @@ mod doctor;
 pub mod examples;
 mod exit;
 mod explain;
+mod health;
 mod log;
+mod notify;
 mod output;
 mod report;
 mod restore;
@@ -48,6 +50,9 @@ enum Command {
     /// Make a backup the store in a folder, for `serve`. Exit code: 0 done, 4 a folder cannot be used, 5 a server uses it, 6
     /// the backup is of a later version, 7 the backup is damaged, 2 an invalid option, 1 anything else
     Restore(restore::Arguments),
+    /// Ask a running service whether it is ready, and print what it says. Exit code: 0 it is, 2 an invalid option, 1 it is
+    /// not, or does not answer within five seconds
+    Health(health::Arguments),
     /// Create, list, revoke and rotate tokens, by which clients are identified. Exit code: 0 done, 4 the folder cannot be used,
     /// 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else
     Token(token::Arguments),
@@ -93,6 +98,10 @@ pub fn main() -> ExitCode {
         Command::Restore(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
             with_runtime(restore::run(arguments))
+        }
+        Command::Health(arguments) => {
+            let _lines = log::start(LevelFilter::WARN);
+            with_runtime(health::run(arguments))
         }
         Command::Token(arguments) => {
             let _lines = log::start(LevelFilter::WARN);

@@ -19,7 +19,7 @@ use super::{
     progress::{self, Known},
     rows::find,
     salvage::{copy_job, copy_the_rest, insert, new_store},
-    sweeps,
+    sweeps, tokens,
 };
 use crate::{
     event::Payload,
@@ -173,10 +173,57 @@ impl Report {
         self.check_meshes(source, target).await?;
         self.check_request_keys(source, target).await?;
         self.check_sweeps(source, target).await?;
+        self.check_tokens(source, target).await?;
         match target {
             Some(target) => copy_the_rest(source, target, last).await,
             None => Ok(()),
         }
+    }
+
+    /// Checks who may use the service. If anything of that is damaged, the new store lets nobody in without a token: it may
+    /// have been the last one.
+    async fn check_tokens(
+        &mut self,
+        source: &mut SqliteConnection,
+        target: Option<&Store>,
+    ) -> Result<()> {
+        let rows = sqlx::query("select * from token").fetch_all(&mut *source);
+        let rows = rows.await.map_err(StoreError::from);
+        let settings = sqlx::query("select * from setting").fetch_all(&mut *source);
+        let settings = settings.await.map_err(StoreError::from);
+        let mut whole = true;
+        for (what, error) in [
+            ("tokens", rows.as_ref().err()),
+            ("settings", settings.as_ref().err()),
+        ] {
+            if let Some(error) = error {
+                self.finding(what, error);
+                whole = false;
+            }
+        }
+        let mut intact = vec![];
+        for row in rows.iter().flatten() {
+            match tokens::read(row) {
+                Ok(_) => intact.push(row),
+                Err(error) => {
+                    self.finding("token", &error);
+                    whole = false;
+                }
+            }
+        }
+        let Some(target) = target else { return Ok(()) };
+        let mut tx = target.begin().await?;
+        for row in intact {
+            insert(&mut tx, "token", row).await?;
+        }
+        for row in settings.iter().flatten() {
+            // one that cannot be decoded may have been the one that requires tokens
+            whole &= insert(&mut tx, "setting", row).await.is_ok();
+        }
+        if !whole {
+            tokens::require_tokens(&mut tx).await?;
+        }
+        tx.commit().await
     }
 
     /// Checks the tables and indexes as such.
@@ -259,9 +306,14 @@ impl Report {
                     }
                     let owners = "select * from mesh_owner where hash = ?";
                     let owners = sqlx::query(owners).bind(&hash).fetch_all(&mut *source);
-                    // without them it is an administrator's
-                    for owner in owners.await.unwrap_or_default() {
-                        insert(&mut tx, "mesh_owner", &owner).await?;
+                    match owners.await.map_err(StoreError::from) {
+                        Ok(owners) => {
+                            for owner in owners {
+                                insert(&mut tx, "mesh_owner", &owner).await?;
+                            }
+                        }
+                        // it becomes an administrator's
+                        Err(error) => self.finding("owners of meshes", &error),
                     }
                     tx.commit().await?;
                 }
