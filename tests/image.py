@@ -134,7 +134,7 @@ def services(address):
     for place in pathlib.Path("/proc").glob("[0-9]*"):
         try:
             words = (place / "cmdline").read_bytes().split(b"\0")
-            if words[:2] == [b"signorini", b"serve"] and b"SIGNORINI_LISTEN=" + address.encode() in (place / "environ").read_bytes().split(b"\0"):
+            if words[0].endswith(b"/signorini") and words[1:2] == [b"serve"] and b"SIGNORINI_LISTEN=" + address.encode() in (place / "environ").read_bytes().split(b"\0"):
                 yield int(place.name)
         except OSError:
             pass

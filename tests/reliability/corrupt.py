@@ -84,7 +84,7 @@ def served(address, jobs):
     return found
 
 
-def command(*words):
+def signorini(*words):
     done = subprocess.run([BINARY, *words], capture_output=True, text=True, timeout=60)
     equal(done.returncode, 0, "signorini %s: %s" % (words, done.stderr))
     return done.stdout.strip()
@@ -93,8 +93,8 @@ def command(*words):
 def create_tokens(data):
     """Of each owner, the first an administrator's; one of them is revoked."""
     for who, (owner, scopes) in OWNERS.items():
-        tokens[who] = command("token", "create", "--data", data, "--name", who, "--owner", owner, "--scope", scopes)
-    command("token", "revoke", tokens["revoked"].split("_")[1], "--data", data)
+        tokens[who] = signorini("token", "create", "--data", data, "--name", who, "--owner", owner, "--scope", scopes)
+    signorini("token", "revoke", tokens["revoked"].split("_")[1], "--data", data)
 
 
 def start(server):
@@ -225,7 +225,7 @@ def salvaged(server, jobs, before, intact, owned, what, counts):
     shutil.rmtree(server.data)
     new.rename(server.data)
     # as an operator does who has lost the last one
-    known, tokens["admin"] = tokens["admin"], command(
+    known, tokens["admin"] = tokens["admin"], signorini(
         "token", "create", "--data", server.data, "--name", "new", "--owner", "root", "--scope", "admin")
     equal(start(server), None, "%s: the saved store" % what)
     after = served(server.address, jobs)

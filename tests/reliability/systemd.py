@@ -90,7 +90,7 @@ def unit():
         # with a program and a user that are there
         copy = pathlib.Path(folder) / "signorini.service"
         text = UNIT.read_text().replace("/usr/local/bin/signorini", str(BINARY))
-        copy.write_text(text.replace("User=signorini", "User=nobody").replace("Group=signorini", "Group=nogroup"))
+        copy.write_text(text.replace("User=signorini", "User=daemon").replace("Group=signorini", "Group=daemon"))
         done = subprocess.run([analyze, "verify", "--man=no", copy], capture_output=True, text=True)
         told = [line for line in (done.stdout + done.stderr).splitlines() if "signorini" in line]
         equal((done.returncode, told), (0, []), "systemd-analyze verify")
