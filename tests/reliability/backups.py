@@ -226,8 +226,37 @@ def broken_off(folder):
             check(n > STEP, "no call of the backup failed")
             run("restore", target, "--data", folder / ("after %d" % error))
             run("doctor", "--data", folder / ("after %d" % error))
+            tried += restores_broken_off(server, environment, target, folder)
             shutil.rmtree(target)
         server.start()  # it was not touched
+    return tried
+
+
+def restores_broken_off(server, environment, backup, folder):
+    """A restore to an empty folder, and in the place of a store, that is killed at every n-th write and sync: until it is
+    complete, the service does not start on it, and it is done again."""
+    tried = 0
+    for replace in ((), ("--replace",)):
+        n = 0
+        while True:
+            n += 1
+            new = folder / ("restored %d" % n)
+            shutil.rmtree(new, ignore_errors=True)
+            if replace:
+                run("restore", backup, "--data", new)
+            server.fail(n, DIE)
+            words = [BINARY, "restore", backup, "--data", new, *replace]
+            subprocess.run(words, capture_output=True, env={**environment, "FAULTS_FOLDER": str(new)})
+            if not server.heal():
+                break
+            tried += 1
+            if (new / "signorini.db.restoring").exists():
+                done = run("serve", "--listen", "127.0.0.1:0", "--data", new, code=FOLDER)
+                check("was not completed" in done.stderr, done.stderr)
+            if replace or not (new / "signorini.db").exists():
+                run("restore", backup, "--data", new, *replace)
+            equal(run("doctor", "--data", new).stdout, "1 of 1 jobs are intact\n", "the doctor")
+        check(n > 3, "no call of the restore failed")
     return tried
 
 
@@ -257,7 +286,7 @@ def main():
         tried = broken_off(folder)
         closed(folder)
     print("figure: %d backups under load, each in at most %.1f s; %d restored jobs equal the original ones by digest, %d of them "
-          "solved after the restore; %d backups broken off by a kill or a full disk, none of which looked whole" % (
+          "solved after the restore; %d backups and restores broken off by a kill or a full disk, none of which looked whole" % (
               ROUNDS, took, jobs, requeued, tried))
 
 

@@ -51,6 +51,11 @@ class Notified(Server):
         return [when for when, lines in self.told(seconds) if "WATCHDOG=1" in lines]
 
 
+def health(url):
+    done = subprocess.run([BINARY, "health", "--url", url], capture_output=True, text=True, timeout=10)
+    return done.returncode, done.stdout
+
+
 def live():
     longest = 0.0
     with Notified() as server:
@@ -74,9 +79,11 @@ def live():
         connection.close()
         check(len(server.beats(2 * WATCHDOG_S)) >= 2, "no beats after the lock was given back")
         equal(server.finished(server.submit(example(), cache="refresh"))["status"], "succeeded", "a job after that")
+        equal(health(server.url), (0, "ok\n"), "signorini health")
 
         server.stop()
         check(any("STOPPING=1" in lines for _, lines in server.told(0.5)), "no STOPPING")
+        equal(health(server.url), (1, ""), "signorini health of a service that has stopped")
     return longest
 
 

@@ -5,7 +5,7 @@
 A store is filled by the service: jobs of each kind of end, one that waits, labels, keys, a mesh, a sweep, a deletion. For
 each earlier version of its tables, a store is made by the migrations up to that one, and gets what that version would
 have stored of all this. The service starts on it, and what was stored is served as before, byte by byte where that
-version stored it; the waiting job is solved. Then the upgrade is killed before its n-th write or sync, and started again.
+version stored it; the waiting job is solved. On the way it is backed up and restored as it is. Then the upgrade is killed before its n-th write or sync, and started again.
 A store of a later version is refused.
 """
 
@@ -129,6 +129,11 @@ def older(source, folder, version):
     store.close()
 
 
+def command(*words):
+    done = subprocess.run([BINARY, *words], capture_output=True, text=True, timeout=60)
+    equal(done.returncode, 0, "signorini %s: %s" % (words, done.stderr))
+
+
 def compare(server, version, known, before):
     jobs, mesh, sweep, gone, canceled, waiting = known
     after = everything(server, jobs, mesh if version >= 2 else None, sweep if version >= 8 else None)
@@ -158,9 +163,9 @@ def killed(make, known, before, dice):
                 shutil.rmtree(server.data)
                 make(server.data, version)
                 server.fail(n, DIE)
-                command = [*server.wrapper, BINARY, "serve", "--listen", "127.0.0.1:0", "--data", server.data]
+                serve = [*server.wrapper, BINARY, "serve", "--listen", "127.0.0.1:0", "--data", server.data]
                 with server.open_log() as log:
-                    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log)
+                    process = subprocess.Popen(serve, stdout=subprocess.PIPE, stderr=log)
                 line = process.stdout.readline()
                 if line:
                     process.kill()
@@ -194,8 +199,11 @@ def main():
             older(folder / "new.db", data, version)
 
         for version in range(1, len(STEPS) + 1):
-            server = Server()
-            make(server.data, version)
+            server, kept = Server(), folder / ("version %d" % version)
+            make(kept, version)
+            # by way of a backup, which this version makes of it as it is
+            command("backup", "--data", kept, folder / ("backup %d" % version))
+            command("restore", folder / ("backup %d" % version), "--data", server.data)
             with server:
                 compare(server, version, known, before)
                 server.stop()

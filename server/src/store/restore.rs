@@ -147,8 +147,7 @@ async fn copy(
 
 /// Moves the store in this folder to a folder within it, whose name is returned.
 fn put_aside(data: &Path) -> io::Result<PathBuf> {
-    let seconds = Time::now().micros() / 1_000_000;
-    let aside = data.join(format!("replaced-{seconds}"));
+    let aside = data.join(format!("replaced-{}", Time::now().micros()));
     DirBuilder::new().mode(0o700).create(&aside)?;
     for name in FILES {
         match fs::rename(data.join(name), aside.join(name)) {
