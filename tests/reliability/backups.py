@@ -107,7 +107,7 @@ def under_load(folder):
         for n in range(ROUNDS):
             time.sleep(0.7)
             # two that run meanwhile
-            load.acknowledged += [server.submit(talkative(40, refine=2)) for _ in range(2)]
+            load.acknowledged += [server.submit(talkative(200, refine=2)) for _ in range(2)]
             time.sleep(0.1)
             acknowledged = list(load.acknowledged)
             target = folder / ("backup %d" % n)

@@ -62,7 +62,7 @@ def live():
         # `start` has read the first line of output, and has been answered
         (_, first), = [(when, lines) for when, lines in server.told(0.5) if "READY=1" in lines]
         check(any(line.startswith("STATUS=http://") for line in first), "READY with %r" % first)
-        beats = server.beats(3 * WATCHDOG_S)
+        beats = server.beats(2 * WATCHDOG_S)
         longest = max(after - before for before, after in zip(beats, beats[1:]))
         check(longest < WATCHDOG_S, "%.2f s between two beats" % longest)
         server.submit(example())
@@ -73,7 +73,7 @@ def live():
         connection = sqlite3.connect(server.data / "signorini.db", isolation_level=None)
         connection.execute("begin immediate")
         began = time.monotonic()
-        late = [when - began for when in server.beats(4) if when - began > 1]
+        late = [when - began for when in server.beats(3) if when - began > 1]
         equal(late, [], "beats while the store cannot write")
         connection.execute("rollback")
         connection.close()

@@ -124,6 +124,9 @@ def older(source, folder, version):
     if version >= 6:
         (count,), = store.execute("select commits from new.progress")
         store.execute("update main.progress set commits = ?", (count,))
+        (name,), = store.execute("select store from main.progress")
+        line = "signorini %s %020d stopped" % (name, count)
+        (folder / "signorini.progress").write_text("%s %08x\n" % (line, zlib.crc32(line.encode())))
     store.execute("commit")
     equal(store.execute("pragma foreign_key_check").fetchall(), [], "the store of version %d" % version)
     store.close()
