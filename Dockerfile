@@ -1,19 +1,27 @@
+# The image that compiles; any with Rust 1.94 or later, and a libc that is not newer than that of the second stage.
+ARG BUILDER=rust:1.95-slim-bookworm
+ARG BASE=debian:bookworm-slim
+
 # Build: the whole workspace, since Cargo wants every manifest; only the binary goes on.
-FROM rust:1.95-slim-bookworm AS build
-RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev && rm -rf /var/lib/apt/lists/*
+FROM ${BUILDER} AS build
+RUN command -v cc >/dev/null && command -v strip >/dev/null || \
+    { apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev binutils && rm -rf /var/lib/apt/lists/*; }
 WORKDIR /signorini
 COPY . .
-RUN cargo build --release --locked --bin signorini
+# the names of functions stay, for the backtrace of a panic
+RUN cargo build --release --locked --bin signorini && strip --strip-debug target/release/signorini
 
 # Run: glibc and the binary, nothing else; not as root.
-FROM debian:bookworm-slim
+FROM ${BASE}
 RUN useradd --system --home-dir /data --create-home signorini
 COPY --from=build /signorini/target/release/signorini /usr/local/bin/signorini
 USER signorini
 VOLUME /data
 EXPOSE 8080
-# A container's own loopback reaches nobody: listen on all its interfaces, publish with -p.
+# A container's own loopback reaches nobody: listen on all its interfaces, publish with -p. It starts only with a token in
+# /data, a trusted proxy or --allow-unauthenticated.
 ENV SIGNORINI_LISTEN=0.0.0.0:8080 SIGNORINI_DATA=/data
+HEALTHCHECK --interval=30s --timeout=6s --start-period=60s --retries=3 CMD ["signorini", "health"]
 # exec form, so that SIGTERM reaches the server and it stops gracefully
 ENTRYPOINT ["signorini"]
 CMD ["serve"]

@@ -18,7 +18,7 @@ use crate::{
     grpc,
     listener::{self, Listener},
     memory::Budget,
-    queue::{Processes, Queue, Solver},
+    queue::{self, Processes, Queue, Solver},
     rest,
     store::{self, Retention, Store, StoreError},
     verbs::Service,
@@ -35,6 +35,35 @@ pub struct App {
     closing: CancellationToken,
     server: JoinHandle<()>,
     grace: Duration,
+}
+
+/// Shows whether the service is alive.
+#[derive(Clone, Debug)]
+pub struct Pulse {
+    store: Arc<Store>,
+    queue: Arc<Queue>,
+}
+
+impl Pulse {
+    /// Returns when the store has answered; false if it will not.
+    pub async fn is_felt(&self) -> bool {
+        self.store.answers().await
+    }
+
+    /// What the service is doing, in a few words.
+    pub fn status(&self) -> String {
+        let queue::State {
+            paused,
+            queued,
+            running,
+            ..
+        } = self.queue.state();
+        let paused = if paused { ", the queue is paused" } else { "" };
+        format!(
+            "{} running, {queued} waiting{paused}",
+            number_of(running, "job")
+        )
+    }
 }
 
 /// The service cannot listen at this address.
@@ -162,6 +191,14 @@ impl App {
             server,
             grace: Duration::from_secs(config.grace_s),
         })
+    }
+
+    /// What shows whether it is alive.
+    pub fn pulse(&self) -> Pulse {
+        Pulse {
+            store: self.store.clone(),
+            queue: self.queue.clone(),
+        }
     }
 
     /// The address of the service.

@@ -5,6 +5,9 @@
 A store of finished jobs is copied, harmed at random (mostly one bit; a sector of zeros, a page of noise, the end cut
 off), and served. Every answer is as it was before, or an error that says so; an answer from the cache is as right.
 Then `doctor --salvage` saves it: every job that was still served whole is in the new store, and served as before.
+
+The store has tokens, and a mesh of one owner: in the harmed store and in the saved one nobody gets in without a token or
+with one that was revoked, and the mesh is its owner's. Who had a token that was served is still known in the saved store.
 """
 
 import hashlib
@@ -27,18 +30,26 @@ TRIALS, SEED = 200 if SOAK else 20, NUMBERS[0] if NUMBERS else random.randrange(
 EXAMPLES = ("rectangular_punch", "cylinder", "annular_punch", "cylinder_on_end", "sheet")
 JOBS = 10
 LEAST_SAVED = 0.95
+MESH = (outside.TOP / "tests/data/gmsh/fillet-mixed-msh41-binary.msh").read_bytes()
+OWNERS = {"admin": ("root", "admin"), "ada": ("ada", "read,submit"), "bob": ("bob", "read"), "revoked": ("eve", "admin")}
+# never let in
+OUTSIDERS = ("nobody", "revoked")
+tokens, mesh = {}, []
 
 
 class Reader:
     """Requests on one connection."""
 
-    def __init__(self, address):
+    def __init__(self, address, who="admin"):
+        self.token = tokens.get(who)
         self.connection = http.client.HTTPConnection(address, timeout=60)
 
     def call(self, method, path, body=None, **headers):
         headers = {name.replace("_", "-"): value for name, value in headers.items()}
+        if self.token:
+            headers["authorization"] = "Bearer " + self.token
         if body is not None:
-            headers["content-type"] = "application/json"
+            headers.setdefault("content-type", "application/json")
         try:
             self.connection.request(method, path, body, headers)
             response = self.connection.getresponse()
@@ -67,7 +78,23 @@ def served(address, jobs):
                 # a stream that stops without `done` is no answer: it is followed again, and then an error
                 stopped = path.endswith("/events") and b"event: done" not in body
                 found[path] = 0 if stopped else status, hashlib.sha256(body).hexdigest()
+    for who in (*OWNERS, "nobody"):
+        status, body = Reader(address, who).call("GET", "/v1/meshes/" + mesh[0])
+        found[who] = status, b"corrupt-data" if b'"corrupt-data"' in body else body[:300]
     return found
+
+
+def signorini(*words):
+    done = subprocess.run([BINARY, *words], capture_output=True, text=True, timeout=60)
+    equal(done.returncode, 0, "signorini %s: %s" % (words, done.stderr))
+    return done.stdout.strip()
+
+
+def create_tokens(data):
+    """Of each owner, the first an administrator's; one of them is revoked."""
+    for who, (owner, scopes) in OWNERS.items():
+        tokens[who] = signorini("token", "create", "--data", data, "--name", who, "--owner", owner, "--scope", scopes)
+    signorini("token", "revoke", tokens["revoked"].split("_")[1], "--data", data)
 
 
 def start(server):
@@ -120,8 +147,15 @@ def main():
                 equal(server.finished(job)["status"], "succeeded", "the job")
                 jobs[job] = problem["contacts"][0]["boundary"]
                 problems[job] = problem
+            server.stop()
+            create_tokens(server.data)
+            server.start()
+            upload = Reader(server.address, "ada").call("POST", "/v1/meshes", MESH, content_type="application/octet-stream")
+            equal(upload[0], 201, "upload")
+            mesh.append(outside.json.loads(upload[1])["hash"])
             before = served(server.address, jobs)
-            check(all(status == 200 for status, _ in before.values()), "before: %r" % before)
+            expected = dict(bob=404, nobody=401, revoked=401)
+            check(all(status == expected.get(path, 200) for path, (status, _) in before.items()), "before: %r" % before)
             server.stop()
             shutil.copytree(server.data, base)
         for trial in range(TRIALS):
@@ -133,7 +167,7 @@ def main():
         told, counts["wrong"], counts["saved"], counts["intact"]))
     equal(counts["wrong"], 0, "stores that served something changed")
     check(share >= LEAST_SAVED, "only %.1f %% of the intact jobs were saved" % (100 * share))
-    print("figure: %d random corruptions: 0 wrong answers, 0 panics, %.1f %% of intact jobs saved (%s; seed %d)" % (
+    print("figure: %d random corruptions: 0 wrong answers, 0 panics, %.1f %% of intact jobs saved, nobody let in without a valid token (%s; seed %d)" % (
         TRIALS, 100 * share, told, SEED))
 
 
@@ -143,7 +177,7 @@ def one_trial(base, jobs, before, problems, dice, counts):
     what = harm(server.data / "signorini.db", dice)
     wrong = []
     refused = start(server)
-    intact = set()
+    intact, owned = set(), False
     if refused:
         code, text = refused
         check(code in (6, 7), "%s: exit code %d, %s" % (what, code, text))
@@ -154,11 +188,13 @@ def one_trial(base, jobs, before, problems, dice, counts):
         for path, (status, body) in after.items():
             if (status, body) == before[path]:
                 continue
-            if (status, body) == (500, b"corrupt-data") or status == 0:
+            # a damaged token identifies nobody
+            if (status, body) == (500, b"corrupt-data") or status == 0 or (status == 401 and path not in OUTSIDERS):
                 counts["told"] += 1
             else:
                 wrong.append((path, status, body))
         intact = {job for job, boundary in jobs.items() if all(after[p] == before[p] for p in paths(job, boundary))}
+        owned = after["ada"] == before["ada"]
         # from the cache, or solved anew: the same bits
         job = dice.choice(list(jobs))
         reader = Reader(server.address)
@@ -175,11 +211,11 @@ def one_trial(base, jobs, before, problems, dice, counts):
     if wrong:
         counts["wrong"] += 1
         print("%s: %r" % (what, wrong[:3]))
-    salvaged(server, jobs, before, intact, what, counts)
+    salvaged(server, jobs, before, intact, owned, what, counts)
     server.folder.cleanup()
 
 
-def salvaged(server, jobs, before, intact, what, counts):
+def salvaged(server, jobs, before, intact, owned, what, counts):
     """Saves the intact jobs to a new store, and compares what is served from there."""
     new = server.data.parent / "new"
     command = [BINARY, "doctor", "--data", server.data, "--salvage", new]
@@ -188,9 +224,18 @@ def salvaged(server, jobs, before, intact, what, counts):
     equal(done.returncode == 0, len(done.stdout.splitlines()) == 1, "%s: findings, and exit code" % what)
     shutil.rmtree(server.data)
     new.rename(server.data)
+    # as an operator does who has lost the last one
+    known, tokens["admin"] = tokens["admin"], signorini(
+        "token", "create", "--data", server.data, "--name", "new", "--owner", "root", "--scope", "admin")
     equal(start(server), None, "%s: the saved store" % what)
     after = served(server.address, jobs)
+    tokens["admin"] = known
     server.kill()
+    for who in OUTSIDERS:
+        equal(after[who][0], 401, "%s: %s asks the saved store" % (what, who))
+    equal(after["bob"][0] in (401, 404), True, "%s: a mesh of another's in the saved store" % what)
+    if owned:
+        equal(after["ada"], before["ada"], "%s: the mesh and the token of its owner" % what)
     for job, boundary in jobs.items():
         states = [after[path] == before[path] for path in paths(job, boundary)]
         check(all(states) or after["/v1/jobs/" + job][0] == 404, "%s: %s was saved in part" % (what, job))

@@ -157,7 +157,7 @@ fn the_help_lists_every_exit_code() {
         ["0", "1", "2", "3", "4", "5", "6", "7", "9"],
         "{all}"
     );
-    for command in ["solve", "serve", "doctor"] {
+    for command in ["solve", "serve", "doctor", "backup", "restore"] {
         let own = help(&["help", command]);
         let codes = own.lines().find(|line| line.contains("Exit code")).unwrap();
         assert!(

@@ -46,10 +46,14 @@ impl Exit {
                 "invalid or too large: the problem, an option, a token, or the code to be explained"
             }
             Exit::Listen => "serve: cannot listen at the address",
-            Exit::Folder => "serve, doctor, token: the folder cannot be used",
-            Exit::Locked => "serve, doctor, token: another server uses the folder",
-            Exit::Schema => "serve, doctor, token: the tables are of another program or version",
-            Exit::Damaged => "serve, doctor, token: stored data is missing or damaged",
+            Exit::Folder => "serve, doctor, backup, restore, token: the folder cannot be used",
+            Exit::Locked => "serve, doctor, restore, token: another server uses the folder",
+            Exit::Schema => {
+                "serve, doctor, backup, restore, token: the tables are of another program or version"
+            }
+            Exit::Damaged => {
+                "serve, doctor, backup, restore, token: stored data is missing or damaged"
+            }
             Exit::NotConverged => {
                 "solve: not converged; sweep: some members failed; the result is written all the same"
             }

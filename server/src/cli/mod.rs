@@ -1,13 +1,17 @@
 //! The commands, one file each.
 
+mod backup;
 mod demo;
 mod doctor;
 pub mod examples;
 mod exit;
 mod explain;
+mod health;
 mod log;
+mod notify;
 mod output;
 mod report;
+mod restore;
 mod serve;
 mod solve;
 mod sweep;
@@ -39,6 +43,16 @@ enum Command {
     /// used, 5 a server uses it, 6 its tables are of another program or version, 7 something is missing or damaged, 2 an
     /// invalid option, 1 anything else
     Doctor(doctor::Arguments),
+    /// Write a backup of the store to a new folder, while a server uses it or not. Exit code: 0 done, 4 a folder cannot be
+    /// used, 6 the tables are of another program or a later version, 7 something is missing or damaged (if the store can be
+    /// read, the backup is made all the same), 2 an invalid option, 1 anything else
+    Backup(backup::Arguments),
+    /// Make a backup the store in a folder, for `serve`. Exit code: 0 done, 4 a folder cannot be used, 5 a server uses it, 6
+    /// the backup is of a later version, 7 the backup is damaged, 2 an invalid option, 1 anything else
+    Restore(restore::Arguments),
+    /// Ask a running service whether it is ready, and print what it says. Exit code: 0 it is, 2 an invalid option, 1 it is
+    /// not, or does not answer within five seconds
+    Health(health::Arguments),
     /// Create, list, revoke and rotate tokens, by which clients are identified. Exit code: 0 done, 4 the folder cannot be used,
     /// 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else
     Token(token::Arguments),
@@ -76,6 +90,18 @@ pub fn main() -> ExitCode {
         Command::Doctor(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
             with_runtime(doctor::run(arguments))
+        }
+        Command::Backup(arguments) => {
+            let _lines = log::start(LevelFilter::WARN);
+            with_runtime(backup::run(arguments))
+        }
+        Command::Restore(arguments) => {
+            let _lines = log::start(LevelFilter::WARN);
+            with_runtime(restore::run(arguments))
+        }
+        Command::Health(arguments) => {
+            let _lines = log::start(LevelFilter::WARN);
+            with_runtime(health::run(arguments))
         }
         Command::Token(arguments) => {
             let _lines = log::start(LevelFilter::WARN);

@@ -8,7 +8,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tracing::{info, warn};
 use tracing_appender::non_blocking::ErrorCounter;
 
-use super::{exit::Exit, log};
+use super::{exit::Exit, log, notify};
 use crate::{app::App, config::Config, queue};
 
 /// Serves until SIGTERM or SIGINT. `lost` counts the lines of the log that were lost.
@@ -24,10 +24,13 @@ pub(super) async fn run(config: Config, lost: ErrorCounter) -> anyhow::Result<Ex
     tokio::spawn(log::report_lost_lines(lost));
     let app = App::start(&config).await?;
     announce(&app.url())?;
+    notify::ready(&app.url());
+    tokio::spawn(notify::keep_alive(app.url(), app.pulse()));
     tokio::select! {
         _ = terminate.recv() => info!("SIGTERM: stopping"),
         _ = interrupt.recv() => info!("SIGINT: stopping"),
     }
+    notify::stopping();
     app.stop().await;
     Ok(Exit::Ok)
 }

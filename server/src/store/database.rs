@@ -125,6 +125,7 @@ impl Store {
     /// returns the receiver of submissions. The data kept in memory is not read yet.
     pub(super) async fn connect(path: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
         let folder = Folder::lock(path)?;
+        folder.is_complete()?;
         let known = progress::read(path)?;
         let database = folder.database();
         let options = SqliteConnectOptions::new()

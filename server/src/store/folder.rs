@@ -19,8 +19,10 @@ pub(super) const DATABASE: &str = "signorini.db";
 pub(super) const LOG: &str = "signorini.db-wal";
 /// Beside a database that is being created, before it has a write-ahead log.
 pub(super) const JOURNAL: &str = "signorini.db-journal";
+/// What becomes the database when a restore is complete. Where it is, one was interrupted.
+pub(super) const RESTORING: &str = "signorini.db.restoring";
 /// Every file of a store.
-const FILES: [&str; 7] = [
+pub(super) const FILES: [&str; 7] = [
     DATABASE,
     LOG,
     "signorini.db-shm",
@@ -89,6 +91,18 @@ impl Folder {
     /// Its path.
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// An error if a restore to this folder was interrupted: its store is none, or another.
+    pub(super) fn is_complete(&self) -> Result<()> {
+        match self.path.join(RESTORING).exists() {
+            false => Ok(()),
+            true => Err(StoreError::Folder(format!(
+                "a restore to the folder {} was not completed: run `signorini restore` again, or remove {RESTORING} to go on \
+                 with what else is in it",
+                self.path.display()
+            ))),
+        }
     }
 
     /// Where the database is.

@@ -87,6 +87,20 @@ impl Store {
 }
 
 impl Store {
+    /// Returns when the single writer and a reader have answered, and be it with an error: neither a full disk nor a damaged
+    /// database gets better by a restart. False if a connection is not given back.
+    pub async fn answers(&self) -> bool {
+        let writer = match self.writer.begin_with("begin immediate").await {
+            Ok(tx) => tx.rollback().await,
+            Err(error) => Err(error),
+        };
+        let read = sqlx::query("select 1 from job limit 1").fetch_optional(&self.reader);
+        let read = read.await.map(drop);
+        ![writer, read]
+            .iter()
+            .any(|answer| matches!(answer, Err(sqlx::Error::PoolTimedOut)))
+    }
+
     /// An error if the disk is full but for what control needs; for what is written beside the database.
     pub fn has_room(&self) -> Result<()> {
         self.reserve.has_room()

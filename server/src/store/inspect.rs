@@ -19,7 +19,7 @@ use super::{
     progress::{self, Known},
     rows::find,
     salvage::{copy_job, copy_the_rest, insert, new_store},
-    sweeps,
+    sweeps, tokens,
 };
 use crate::{
     event::Payload,
@@ -90,8 +90,23 @@ pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
     Ok(report)
 }
 
+/// Checks the database of a backup that is being made, which has no log. If its tables are of an earlier version, only
+/// whether it can be read: what they contain is not known here.
+pub(super) async fn check_copy(folder: &Path) -> Result<Vec<String>> {
+    let options = SqliteConnectOptions::new().filename(folder.join(DATABASE));
+    let mut copy = options.read_only(true).connect().await?;
+    let mut report = Report::default();
+    match migrations::are_current(&mut copy).await {
+        Ok(()) => report.inspect(&mut copy, None).await?,
+        Err(StoreError::Schema(_)) => report.check_pages(&mut copy).await,
+        Err(error) => return Err(error),
+    }
+    copy.close().await?;
+    Ok(report.findings)
+}
+
 /// Why there is nothing to inspect.
-fn absent(folder: &Path) -> String {
+pub(super) fn absent(folder: &Path) -> String {
     match progress::read(folder) {
         Ok(Known::Missing) => format!("there is no {DATABASE} in it"),
         _ => format!(
@@ -127,16 +142,7 @@ impl Report {
             self.finding("database", &error.into());
             return Ok(());
         }
-        let complaints = sqlx::query_scalar("pragma integrity_check(20)");
-        let complaints: sqlx::Result<Vec<String>> = complaints.fetch_all(&mut *source).await;
-        match complaints {
-            Ok(lines) => {
-                let lines = lines.iter().filter(|line| *line != "ok");
-                self.findings
-                    .extend(lines.map(|line| format!("database: {line}")));
-            }
-            Err(error) => self.finding("database", &error.into()),
-        }
+        self.check_pages(source).await;
         let mut last = last_key(source).await;
         let listed = keys_after(source, MOST_NUMBERS).await;
         let listed = listed.unwrap_or_else(|error| {
@@ -167,9 +173,70 @@ impl Report {
         self.check_meshes(source, target).await?;
         self.check_request_keys(source, target).await?;
         self.check_sweeps(source, target).await?;
+        self.check_tokens(source, target).await?;
         match target {
             Some(target) => copy_the_rest(source, target, last).await,
             None => Ok(()),
+        }
+    }
+
+    /// Checks who may use the service. If anything of that is damaged, the new store lets nobody in without a token: it may
+    /// have been the last one.
+    async fn check_tokens(
+        &mut self,
+        source: &mut SqliteConnection,
+        target: Option<&Store>,
+    ) -> Result<()> {
+        let rows = sqlx::query("select * from token").fetch_all(&mut *source);
+        let rows = rows.await.map_err(StoreError::from);
+        let settings = sqlx::query("select * from setting").fetch_all(&mut *source);
+        let settings = settings.await.map_err(StoreError::from);
+        let mut whole = true;
+        for (what, error) in [
+            ("tokens", rows.as_ref().err()),
+            ("settings", settings.as_ref().err()),
+        ] {
+            if let Some(error) = error {
+                self.finding(what, error);
+                whole = false;
+            }
+        }
+        let mut intact = vec![];
+        for row in rows.iter().flatten() {
+            match tokens::read(row) {
+                Ok(_) => intact.push(row),
+                Err(error) => {
+                    self.finding("token", &error);
+                    whole = false;
+                }
+            }
+        }
+        let Some(target) = target else { return Ok(()) };
+        let mut tx = target.begin().await?;
+        for row in intact {
+            insert(&mut tx, "token", row).await?;
+        }
+        for row in settings.iter().flatten() {
+            // one that cannot be decoded may have been the one that requires tokens
+            whole &= insert(&mut tx, "setting", row).await.is_ok();
+        }
+        if !whole {
+            tokens::require_tokens(&mut tx).await?;
+        }
+        tx.commit().await
+    }
+
+    /// Checks the tables and indexes as such.
+    async fn check_pages(&mut self, source: &mut SqliteConnection) {
+        let complaints = sqlx::query_scalar("pragma integrity_check(20)");
+        let complaints: sqlx::Result<Vec<String>> = complaints.fetch_all(&mut *source).await;
+        match complaints {
+            Ok(lines) => {
+                let lines = lines.iter().filter(|line| *line != "ok");
+                self.findings
+                    .extend(lines.map(|line| format!("database: {line}")));
+            }
+            Err(error) => self.finding("database", &error.into()),
         }
     }
 
@@ -239,9 +306,14 @@ impl Report {
                     }
                     let owners = "select * from mesh_owner where hash = ?";
                     let owners = sqlx::query(owners).bind(&hash).fetch_all(&mut *source);
-                    // without them it is an administrator's
-                    for owner in owners.await.unwrap_or_default() {
-                        insert(&mut tx, "mesh_owner", &owner).await?;
+                    match owners.await.map_err(StoreError::from) {
+                        Ok(owners) => {
+                            for owner in owners {
+                                insert(&mut tx, "mesh_owner", &owner).await?;
+                            }
+                        }
+                        // it becomes an administrator's
+                        Err(error) => self.finding("owners of meshes", &error),
                     }
                     tx.commit().await?;
                 }

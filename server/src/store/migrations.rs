@@ -60,6 +60,11 @@ const STEPS: [(i64, &str, &str); 10] = [
     ),
 ];
 
+/// The version of the tables of this program.
+pub(super) fn last_step() -> i64 {
+    STEPS.len() as i64
+}
+
 /// Brings the tables up to date, and checks that they are those of this version.
 pub(super) async fn run(database: &SqlitePool) -> Result<()> {
     migrator().run(database).await?;
@@ -130,7 +135,7 @@ pub(super) async fn are_current(connection: &mut SqliteConnection) -> Result<()>
     let steps: i64 = sqlx::query_scalar("select count(*) from _sqlx_migrations")
         .fetch_one(connection)
         .await?;
-    match steps == STEPS.len() as i64 {
+    match steps == last_step() {
         true => Ok(()),
         false => Err(StoreError::Schema(
             "the store is of an earlier version of this program: start the service on it once, which brings it up to date".into(),

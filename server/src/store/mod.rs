@@ -76,8 +76,10 @@ mod settings;
 mod space;
 mod tokens;
 
-// A store that no server has open.
+// A store that no server has open; backups, also of one that a server has.
+mod backup;
 mod inspect;
+mod restore;
 mod salvage;
 
 #[cfg(test)]
@@ -86,6 +88,7 @@ mod tests;
 use std::{path::Path, sync::Arc};
 
 pub use self::{
+    backup::{Backup, Manifest, back_up},
     database::Store,
     database::with_advice,
     delete::Deletion,
@@ -103,6 +106,7 @@ pub use self::{
     progress::accept,
     retention::{Retention, Retired, keep_within},
     sizes::OwnerSize,
+    restore::{Restored, restore},
     snapshot::Snapshot,
     space::Space,
     submission::{Accepted, Claim, NewJob, NewSweep, QueueLimits, RequestKey, Submission},

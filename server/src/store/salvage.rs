@@ -93,28 +93,9 @@ pub(super) async fn copy_the_rest(
     last: i64,
 ) -> Result<()> {
     let mut tx = target.begin().await?;
-    for (table, statement) in [
-        ("deleted_job", "select * from deleted_job"),
-        ("setting", "select * from setting"),
-    ] {
-        let rows = sqlx::query(statement).fetch_all(&mut *source).await;
-        for row in rows.unwrap_or_default() {
-            insert(&mut tx, table, &row).await?;
-        }
-    }
-    // one that is damaged identifies nobody; if they cannot be read, nobody is to be let in for that
-    match sqlx::query("select * from token")
-        .fetch_all(&mut *source)
-        .await
-    {
-        Ok(rows) => {
-            for row in &rows {
-                if insert(&mut tx, "token", row).await.is_err() {
-                    tokens::require_tokens(&mut tx).await?;
-                }
-            }
-        }
-        Err(_) => tokens::require_tokens(&mut tx).await?,
+    let deleted = sqlx::query("select * from deleted_job").fetch_all(source);
+    for row in deleted.await.unwrap_or_default() {
+        insert(&mut tx, "deleted_job", &row).await?;
     }
     // a job waits by itself if the one that it waited for was not copied; the next one like it coalesces them again
     let detached = "update job set coalesced_into = null, checksum = null

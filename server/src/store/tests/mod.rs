@@ -1,6 +1,7 @@
 //! The store alone.
 #![allow(clippy::unwrap_used)]
 
+mod backups;
 mod damage;
 mod owners;
 mod plans;

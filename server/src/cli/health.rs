@@ -1,0 +1,81 @@
+//! `signorini health`.
+
+use std::{
+    net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
+    time::Duration,
+};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use reqwest::Client;
+
+use super::{exit::Exit, output};
+
+/// The service itself takes two seconds at most.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// More is no answer of this program.
+const MOST_CHARS: usize = 2000;
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Address of the service, as http://127.0.0.1:8080 [default: where `serve` listens on this machine]
+    #[arg(long, env = "SIGNORINI_URL", value_name = "URL")]
+    url: Option<String>,
+
+    /// What `serve` was told to listen on, if no --url is given
+    #[arg(
+        long,
+        env = "SIGNORINI_LISTEN",
+        default_value = "127.0.0.1:8080",
+        value_name = "ADDRESS"
+    )]
+    listen: SocketAddr,
+}
+
+/// Prints what `/readyz` answers.
+pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
+    let url = match arguments.url {
+        Some(url) => url,
+        None => format!("http://{}", reachable(arguments.listen)),
+    };
+    let url = format!("{}/readyz", url.trim_end_matches('/'));
+    // a proxy in the environment is for other machines
+    let client = Client::builder().timeout(PATIENCE).no_proxy().build()?;
+    let unanswered = || format!("{url} does not answer");
+    let answer = client.get(&url).send().await.with_context(unanswered)?;
+    let status = answer.status();
+    let text = answer.text().await.with_context(unanswered)?;
+    let text: String = text.chars().take(MOST_CHARS).collect();
+    match status.is_success() {
+        true => output::print(&text)?,
+        false => bail!("{url}: {status}: {}", text.trim_end()),
+    }
+    Ok(Exit::Ok)
+}
+
+/// Where a service that listens on this address is reached from its own machine.
+fn reachable(mut address: SocketAddr) -> SocketAddr {
+    match address.ip() {
+        IpAddr::V4(ip) if ip.is_unspecified() => address.set_ip(Ipv4Addr::LOCALHOST.into()),
+        IpAddr::V6(ip) if ip.is_unspecified() => address.set_ip(Ipv6Addr::LOCALHOST.into()),
+        _ => {}
+    }
+    address
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn all_interfaces_are_reached_by_the_own_one() {
+        for (listen, reached) in [
+            ("0.0.0.0:80", "127.0.0.1:80"),
+            ("[::]:80", "[::1]:80"),
+            ("10.0.0.1:80", "10.0.0.1:80"),
+        ] {
+            assert_eq!(reachable(listen.parse().unwrap()).to_string(), reached);
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! What systemd is told of a service with `Type=notify`: that it is ready, alive, or stops. Nothing, where nobody asks
+//! (no `NOTIFY_SOCKET`).
+
+use std::time::Duration;
+
+use sd_notify::NotifyState;
+use tokio::time::{sleep, timeout};
+
+use crate::app::Pulse;
+
+/// How often the status is told, at least.
+const STATUS_PERIOD: Duration = Duration::from_secs(10);
+
+/// The service answers at its address.
+pub(super) fn ready(url: &str) {
+    tell(&[NotifyState::Ready, NotifyState::Status(url)]);
+}
+
+/// It was asked to stop.
+pub(super) fn stopping() {
+    let status = "stopping: running jobs are requeued";
+    tell(&[NotifyState::Stopping, NotifyState::Status(status)]);
+}
+
+/// Tells that the service is alive, as often as the watchdog expects (`WatchdogSec=`), each time only when its store has
+/// answered; and what it is doing.
+pub(super) async fn keep_alive(url: String, pulse: Pulse) {
+    let watchdog = sd_notify::watchdog_enabled();
+    // three in the time that the watchdog allows, of which one may be late
+    let period = watchdog.map_or(STATUS_PERIOD, |longest| (longest / 3).min(STATUS_PERIOD));
+    let (mut told, mut was_alive) = (String::new(), true);
+    loop {
+        sleep(period).await;
+        let alive = timeout(period, pulse.is_felt()).await.unwrap_or(false);
+        if alive && watchdog.is_some() {
+            tell(&[NotifyState::Watchdog]);
+        }
+        if !alive && was_alive {
+            tracing::warn!("the store has not answered for {period:?}");
+        }
+        was_alive = alive;
+        let status = format!("{url}: {}", pulse.status());
+        if status != told && alive {
+            tell(&[NotifyState::Status(&status)]);
+            told = status;
+        }
+    }
+}
+
+fn tell(state: &[NotifyState]) {
+    if let Err(error) = sd_notify::notify(state) {
+        tracing::warn!(%error, "systemd cannot be told {state:?}: {error}");
+    }
+}

@@ -1,0 +1,47 @@
+//! `signorini restore`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{backup::summed_up, exit::Exit, output};
+use crate::store;
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// The folder that `signorini backup` has written. It is not changed
+    backup: PathBuf,
+
+    /// Folder of the new store, which must be empty or missing
+    #[arg(
+        long,
+        env = "SIGNORINI_DATA",
+        default_value = "./signorini-data",
+        value_name = "FOLDER"
+    )]
+    data: PathBuf,
+
+    /// Replace the store in that folder, which is kept in a folder `replaced-…` within it
+    #[arg(long)]
+    replace: bool,
+}
+
+pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
+    let Arguments {
+        backup,
+        data,
+        replace,
+    } = arguments;
+    let restored = store::restore(&backup, &data, replace).await?;
+    let mut text = String::new();
+    if let Some(replaced) = &restored.replaced {
+        text += &format!("the store that was there is in {}\n", replaced.display());
+    }
+    text += &format!("{}: {}\n", data.display(), summed_up(&restored.manifest));
+    output::print(&text)?;
+    eprintln!(
+        "Unfinished jobs are solved when the service starts. Tokens are as they were then: one that was revoked since is \
+         valid again"
+    );
+    Ok(Exit::Ok)
+}

@@ -1,0 +1,228 @@
+"""Stores of every earlier version, brought up to date by starting this one on them (R30).
+
+    upgrades.py [--soak] [SEED]
+
+A store is filled by the service: jobs of each kind of end, one that waits, labels, keys, a mesh, a sweep, a deletion. For
+each earlier version of its tables, a store is made by the migrations up to that one, and gets what that version would
+have stored of all this. The service starts on it, and what was stored is served as before, byte by byte where that
+version stored it; the waiting job is solved. On the way it is backed up and restored as it is. Then the upgrade is killed before its n-th write or sync, and started again.
+A store of a later version is refused.
+"""
+
+import hashlib
+import pathlib
+import random
+import shutil
+import sqlite3
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import zlib
+
+from attack import SOAK, check, equal, example
+from faults import DIE, Faulty, check_database
+from outside import BINARY, TOP, Server, submission, talkative
+
+SEED = next((int(word) for word in sys.argv[1:] if word.isdigit()), random.randrange(1 << 32))
+STEPS = sorted((TOP / "migrations").glob("*.sql"))
+EXAMPLES = ("rectangular_punch", "cylinder", "annular_punch", "cylinder_on_end", "sheet")
+MESH = (TOP / "tests/data/gmsh/fillet-mixed-msh41-binary.msh").read_bytes()
+SCHEMA = 6
+KILLS = 400 if SOAK else 5
+# columns and tables under the names that they had
+OLD_NAMES = {("job", "twin_of"): "coalesced_into"}
+# what a table has that was filled from another one, or belongs to the new store alone
+NOT_COPIED = ("_sqlx_migrations", "sqlite_sequence", "progress")
+
+
+def everything(server, jobs, mesh, sweep):
+    """Digests of what is served, by path."""
+    paths = ["/v1/jobs/%s%s" % (job, part) for job in jobs
+             for part in ("/problem", "/result", "/history", "/fields", "/events")]
+    paths += ["/v1/jobs/%s/profiles/%s" % (job, boundary) for job, boundary in jobs.items()]
+    if sweep:
+        paths.append("/v1/sweeps/%s/results?format=csv" % sweep)
+    if mesh:
+        paths.append("/v1/meshes/" + mesh)
+    found = {}
+    for path in paths:
+        answer = server.call("GET", path)
+        found[path] = answer.status, hashlib.sha256(answer.body).hexdigest()
+    return found
+
+
+def fill(server):
+    """All kinds of content; what is known of it."""
+    jobs = {}
+    for number, name in enumerate(EXAMPLES):
+        problem = example(name)
+        job = server.submit(problem, name=name, labels={"n": str(number)}, cache="use")
+        equal(server.finished(job)["status"], "succeeded", name)
+        jobs[job] = problem["contacts"][0]["boundary"]
+    upload = server.call("POST", "/v1/meshes", MESH, content_type="application/octet-stream")
+    mesh = upload.json()["hash"]
+    sweep = {"base": example(), "axes": [{"path": "/contacts/0/friction/coefficient", "values": [0.1, 0.2, 0.3]}]}
+    answer = server.call("POST", "/v1/sweeps", sweep)
+    equal(answer.status // 100, 2, "the sweep, %r" % answer)
+    sweep = answer.json()["id"]
+    while server.json("/v1/sweeps/" + sweep)["status"] in ("queued", "running"):
+        time.sleep(0.05)
+    gone = server.submit(example(), cache="refresh")
+    server.finished(gone)
+    equal(server.call("DELETE", "/v1/jobs/" + gone).status // 100, 2, "deleting")
+    canceled = server.submit(talkative(400, refine=2))
+    server.call("POST", "/v1/jobs/%s/cancel" % canceled)
+    equal(server.finished(canceled)["status"], "canceled", "the canceled job")
+    equal(server.call("POST", "/v1/queue/pause").status, 200, "pausing")
+    answer = server.call("POST", "/v1/jobs", submission(example("sheet"), cache="refresh"), idempotency_key="waiting")
+    return jobs, mesh, sweep, gone, canceled, answer.json()["id"]
+
+
+def checksum(texts):
+    """Of a row of texts: CRC-32 of kind, place, length and bytes of each that is not null."""
+    pairs = [(place, text.encode()) for place, text in enumerate(texts) if text is not None]
+    return zlib.crc32(b"".join(struct.pack("<cIQ", b"t", place, len(text)) + text for place, text in pairs))
+
+
+def older(source, folder, version):
+    """The store as this version would have it."""
+    folder.mkdir(mode=0o700)
+    store = sqlite3.connect(folder / "signorini.db", isolation_level=None)
+    store.execute("attach ? as new", (str(source),))
+    # as the library writes it
+    (create,), = store.execute("select sql from new.sqlite_schema where name = '_sqlx_migrations'")
+    store.execute(create)
+    for step in STEPS[:version]:
+        text = step.read_bytes()
+        store.executescript(text.decode())
+        number, name = step.stem.split("_", 1)
+        store.execute("insert into _sqlx_migrations (version, description, success, checksum, execution_time) values (?, ?, 1, ?, 0)",
+                      (int(number), name.replace("_", " "), hashlib.sha384(text).digest()))
+    store.execute("begin")
+    tables = [name for name, in store.execute("select name from main.sqlite_schema where type = 'table'")]
+    # rows before those that refer to them
+    order = ("problem", "job", "mesh", "sweep")
+    for table in sorted(tables, key=lambda name: (name not in order, order.index(name) if name in order else name)):
+        if table in NOT_COPIED:
+            continue
+        ours = [column for _, column, *_ in store.execute("pragma main.table_info(%s)" % table)]
+        theirs = {column for _, column, *_ in store.execute("pragma new.table_info(%s)" % table)}
+        pairs = [(column, OLD_NAMES.get((table, column), column)) for column in ours]
+        pairs = [pair for pair in pairs if pair[1] in theirs]
+        # before sweeps, no job was one of them
+        where = " where sweep is null" if table == "job" and version < 8 else ""
+        if table in ("event", "result_part", "result_info", "job_label") and version < 8:
+            where = " where abs(job_id) in (select id from new.job where sweep is null)"
+        store.execute("insert into main.%s (%s) select %s from new.%s%s" % (
+            table, ", ".join(old for old, _ in pairs), ", ".join(new for _, new in pairs), table, where))
+    if version == 6:
+        # its checksum was that of the columns of the time
+        for row in store.execute("select input_hash, body, mesh from main.problem").fetchall():
+            store.execute("update main.problem set checksum = ? where input_hash = ?", (checksum(row), row[0]))
+    if version >= 6:
+        (count,), = store.execute("select commits from new.progress")
+        store.execute("update main.progress set commits = ?", (count,))
+        (name,), = store.execute("select store from main.progress")
+        line = "signorini %s %020d stopped" % (name, count)
+        (folder / "signorini.progress").write_text("%s %08x\n" % (line, zlib.crc32(line.encode())))
+    store.execute("commit")
+    equal(store.execute("pragma foreign_key_check").fetchall(), [], "the store of version %d" % version)
+    store.close()
+
+
+def command(*words):
+    done = subprocess.run([BINARY, *words], capture_output=True, text=True, timeout=60)
+    equal(done.returncode, 0, "signorini %s: %s" % (words, done.stderr))
+
+
+def compare(server, version, known, before):
+    jobs, mesh, sweep, gone, canceled, waiting = known
+    after = everything(server, jobs, mesh if version >= 2 else None, sweep if version >= 8 else None)
+    for path, found in after.items():
+        equal(found, before[path], "%s of a store of version %d" % (path, version))
+    for job in jobs:
+        equal(server.json("/v1/jobs/" + job)["status"], "succeeded", "a job of version %d" % version)
+    labeled = [job["name"] for job in server.every_job(**{"label.n": "3"})]
+    equal(labeled, [EXAMPLES[3]], "jobs with a label, from version %d" % version)
+    equal(server.json("/v1/jobs/" + canceled)["status"], "canceled", "the canceled job of version %d" % version)
+    equal(server.call("GET", "/v1/jobs/" + gone).status, 410 if version >= 3 else 404, "the deleted job of version %d" % version)
+    server.call("POST", "/v1/queue/resume")
+    equal(server.finished(waiting)["status"], "succeeded", "the waiting job of version %d" % version)
+    if version >= 3:
+        again = server.call("POST", "/v1/jobs", submission(example("sheet"), cache="refresh"), idempotency_key="waiting")
+        equal(again.json()["id"], waiting, "the repeated key, from version %d" % version)
+
+
+def killed(make, known, before, dice):
+    """The upgrade is killed before its n-th write or sync; then it is done, from what that left."""
+    kills = 0
+    for version in (1, 5, 8):
+        with Faulty() as server:
+            server.kill()
+            n = 1
+            for _ in range(KILLS):
+                shutil.rmtree(server.data)
+                make(server.data, version)
+                server.fail(n, DIE)
+                serve = [*server.wrapper, BINARY, "serve", "--listen", "127.0.0.1:0", "--data", server.data]
+                with server.open_log() as log:
+                    process = subprocess.Popen(serve, stdout=subprocess.PIPE, stderr=log)
+                line = process.stdout.readline()
+                if line:
+                    process.kill()
+                process.wait()
+                died = server.heal()
+                if line and not died:
+                    break
+                kills += 1
+                server.start()
+                compare(server, version, known, before)
+                server.kill()
+                check_database(server)
+                n += 1 if SOAK else dice.randrange(1, 12)
+            server.start()
+    return kills
+
+
+def main():
+    print("seed %d" % SEED)
+    dice = random.Random(SEED)
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        with Server() as server:
+            known = fill(server)
+            before = everything(server, known[0], known[1], known[2])
+            check(all(status == 200 for status, _ in before.values()), "before: %r" % before)
+            server.stop()
+            shutil.copy(server.data / "signorini.db", folder / "new.db")
+
+        def make(data, version):
+            older(folder / "new.db", data, version)
+
+        for version in range(1, len(STEPS) + 1):
+            server, kept = Server(), folder / ("version %d" % version)
+            make(kept, version)
+            # by way of a backup, which this version makes of it as it is
+            command("backup", "--data", kept, folder / ("backup %d" % version))
+            command("restore", folder / ("backup %d" % version), "--data", server.data)
+            with server:
+                compare(server, version, known, before)
+                server.stop()
+                server.start()
+                compare(server, version, known, before)
+        later = folder / "later"
+        make(later, len(STEPS))
+        with sqlite3.connect(later / "signorini.db") as store:
+            store.execute("insert into _sqlx_migrations (version, description, success, checksum, execution_time) values (99, '', 1, x'00', 0)")
+        store.close()
+        done = subprocess.run([BINARY, "serve", "--listen", "127.0.0.1:0", "--data", later], capture_output=True, text=True)
+        equal(done.returncode, SCHEMA, done.stderr)
+        check("a later version of this program" in done.stderr and "use that version" in done.stderr, done.stderr)
+        kills = killed(make, known, before, dice)
+    print("figure: stores of %d versions of the tables are brought up to date, with the same digest of every answer; upgrades "
+          "killed at %d writes and started again; a later version refused" % (len(STEPS), kills))
+
+
+main()
