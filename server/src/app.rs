@@ -16,7 +16,7 @@ use crate::{
     config::{Config, Isolation},
     error::{number_of, size},
     grpc,
-    listener::{self, Listener},
+    listener::{self, Listener, Tls},
     memory::Budget,
     queue::{Processes, Queue, Solver},
     rest,
@@ -35,6 +35,7 @@ pub struct App {
     closing: CancellationToken,
     server: JoinHandle<()>,
     grace: Duration,
+    tls: Option<Arc<Tls>>,
 }
 
 /// The service cannot listen at this address.
@@ -92,6 +93,7 @@ fn refuse_open(config: &Config, store: &Store) -> Result<(), OpenToAll> {
 impl App {
     /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
+        let tls = config.tls.files().map(Tls::read).transpose()?;
         let store = Store::open(&config.data).await?;
         // Before the listener opens: no client sees a job as running that no worker solves.
         match clean_up(&store).await {
@@ -117,8 +119,8 @@ impl App {
         let router = rest::router(service, grpc);
 
         let most = listener::most_connections(config.max_connections);
-        let listener =
-            Listener::bind(config.listen, most).with_context(|| CannotListen(config.listen))?;
+        let listener = Listener::bind(config.listen, most, tls.clone())
+            .with_context(|| CannotListen(config.listen))?;
         let address = listener.address()?;
         let closing = CancellationToken::new();
         let server = tokio::spawn(listener.serve(router, closing.clone()));
@@ -142,12 +144,19 @@ impl App {
             closing,
             server,
             grace: Duration::from_secs(config.grace_s),
+            tls,
         })
     }
 
     /// The address of the service.
     pub fn url(&self) -> String {
-        format!("http://{}", self.address)
+        let scheme = if self.tls.is_some() { "https" } else { "http" };
+        format!("{scheme}://{}", self.address)
+    }
+
+    /// The certificate that it shows, if it speaks TLS.
+    pub fn tls(&self) -> Option<Arc<Tls>> {
+        self.tls.clone()
     }
 
     /// Stops in the order that loses nothing: starts no more jobs, requeues the running ones, ends the streams,

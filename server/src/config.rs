@@ -38,6 +38,10 @@ pub struct Config {
 
     #[command(flatten)]
     #[allow(missing_docs)] // a doc comment here would become the help of the command
+    pub tls: Tls,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
     pub web: Web,
 
     #[command(flatten)]
@@ -135,6 +139,46 @@ impl Config {
             }
             Isolation::Process => 0,
         }
+    }
+}
+
+/// The certificate of the service.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Tls {
+    /// File of a certificate, and those of its issuers behind it, as PEM: the service speaks TLS, and nothing else. SIGHUP
+    /// reads it and the key again
+    #[arg(
+        long = "tls-cert",
+        env = "SIGNORINI_TLS_CERT",
+        value_name = "FILE",
+        requires = "key"
+    )]
+    cert: Option<PathBuf>,
+
+    /// File of the certificate's private key, as PEM and not encrypted
+    #[arg(
+        long = "tls-key",
+        env = "SIGNORINI_TLS_KEY",
+        value_name = "FILE",
+        requires = "cert"
+    )]
+    key: Option<PathBuf>,
+}
+
+/// Where a certificate and its key are.
+#[derive(Clone, Debug)]
+pub struct TlsFiles {
+    /// The certificate, and those of its issuers.
+    pub cert: PathBuf,
+    /// The private key.
+    pub key: PathBuf,
+}
+
+impl Tls {
+    /// Both files, or none.
+    pub fn files(&self) -> Option<TlsFiles> {
+        let (cert, key) = (self.cert.clone()?, self.key.clone()?);
+        Some(TlsFiles { cert, key })
     }
 }
 

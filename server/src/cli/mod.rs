@@ -1,5 +1,6 @@
 //! The commands, one file each.
 
+mod client;
 mod demo;
 mod doctor;
 pub mod examples;
@@ -34,7 +35,7 @@ enum Command {
     /// Start the service: REST and gRPC on one port. Exit code: 0 stopped, 3 cannot listen, 4 the folder cannot be used,
     /// 5 another server uses it, 6 its tables are of another program or version, 7 stored data is missing or damaged, 2 an
     /// invalid option, 1 anything else
-    Serve(Config),
+    Serve(Box<Config>),
     /// Check a store that no server is using, and save what is intact. Exit code: 0 all is intact, 4 the folder cannot be
     /// used, 5 a server uses it, 6 its tables are of another program or version, 7 something is missing or damaged, 2 an
     /// invalid option, 1 anything else
@@ -71,7 +72,7 @@ pub fn main() -> ExitCode {
     let exit = match command {
         Command::Serve(config) => {
             let lines = log::start(LevelFilter::INFO);
-            with_runtime(serve::run(config, lines.lost()))
+            with_runtime(serve::run(&config, lines.lost()))
         }
         Command::Doctor(arguments) => {
             let _lines = log::start(LevelFilter::WARN);

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     caller::{Caller, Scope},
-    config::{Config, Isolation, MemoryBudget, ProxyTrust, Web},
+    config::{Config, Isolation, MemoryBudget, ProxyTrust, Tls, Web},
     error::ApiError,
     fake,
     formats::Format,
@@ -38,6 +38,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
     let config = Config {
         listen: ([127, 0, 0, 1], 0).into(),
         data: folder.to_path_buf(),
+        tls: Tls::default(),
         web: Web::default(),
         trust: ProxyTrust::default(),
         allow_unauthenticated: false,
