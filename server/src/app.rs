@@ -13,6 +13,7 @@ use tonic_health::server::HealthReporter;
 use tracing::{info, warn};
 
 use crate::{
+    address,
     config::{Config, Isolation},
     error::{number_of, size},
     grpc,
@@ -93,6 +94,7 @@ fn refuse_open(config: &Config, store: &Store) -> Result<(), OpenToAll> {
 impl App {
     /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
+        address::set_prefix(&config.web.path_prefix);
         let tls = config.tls.files().map(Tls::read).transpose()?;
         let store = Store::open(&config.data).await?;
         // Before the listener opens: no client sees a job as running that no worker solves.

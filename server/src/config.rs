@@ -196,6 +196,12 @@ pub struct Web {
     )]
     pub allowed_hosts: Vec<String>,
 
+    /// Path below which clients reach this service, as /signorini, where a proxy shows it there: links begin with it. It is
+    /// served both below this path and without it, for proxies that remove it
+    #[arg(long, env = "SIGNORINI_PATH_PREFIX", value_name = "PATH", default_value = "",
+          hide_default_value = true, value_parser = path_prefix)]
+    pub path_prefix: String,
+
     /// An origin whose pages may use this service, as `https://dashboard.example`; can be repeated, or a list with commas.
     /// Requests from pages of all others but this service's own are refused
     #[arg(long = "allowed-origin", env = "SIGNORINI_ALLOWED_ORIGINS", value_name = "ORIGIN", value_delimiter = ',',
@@ -249,6 +255,16 @@ impl Default for ProxyTrust {
 }
 
 impl ProxyTrust {
+    /// These proxies, for tests.
+    #[cfg(test)]
+    pub fn of(proxies: &[&str]) -> ProxyTrust {
+        let proxies = proxies.iter().filter_map(|text| network(text).ok());
+        ProxyTrust {
+            proxies: proxies.collect(),
+            ..ProxyTrust::default()
+        }
+    }
+
     /// Whether any proxy is trusted.
     pub fn is_on(&self) -> bool {
         !self.proxies.is_empty()
@@ -280,6 +296,21 @@ fn network(text: &str) -> Result<IpNet, String> {
 fn scope(text: &str) -> Result<Scope, String> {
     text.parse()
         .map_err(|_| "expected read, submit, cancel or admin".into())
+}
+
+/// A path without a slash at its end; the root is empty.
+fn path_prefix(text: &str) -> Result<String, String> {
+    const MOST: usize = 200;
+    let path = text.strip_suffix('/').unwrap_or(text);
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-._~".contains(c);
+    let named = |part: &str| {
+        !part.is_empty() && part.chars().all(plain) && !part.trim_matches('.').is_empty()
+    };
+    match path.strip_prefix('/') {
+        _ if path.is_empty() => Ok(String::new()),
+        Some(rest) if path.len() <= MOST && rest.split('/').all(named) => Ok(path.to_owned()),
+        _ => Err("expected a path of letters, digits and - . _ ~, such as /signorini".into()),
+    }
 }
 
 /// Scheme, host and port, as a browser writes them.
@@ -391,6 +422,23 @@ mod tests {
         );
         assert_eq!(trust.caller("ada"), Caller::new("ada", [Scope::Read]));
         assert!(trust.caller("root").is_admin());
+    }
+
+    #[test]
+    fn a_prefix_is_a_plain_path() {
+        for (text, read) in [
+            ("", ""),
+            ("/", ""),
+            ("/a", "/a"),
+            ("/lab/signorini/", "/lab/signorini"),
+        ] {
+            assert_eq!(path_prefix(text), Ok(read.into()));
+        }
+        for wrong in [
+            "a", "//a", "/a//b", "/..", "/a/../b", "/a b", "/a?b", "http://a",
+        ] {
+            assert!(path_prefix(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::{borrow::Cow, collections::BTreeMap, fmt};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use solver::solution::{Outcome, Residuals};
+use solver::solution::{Outcome, Residuals, Warning};
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 use uuid::Uuid;
 
@@ -90,6 +90,10 @@ pub struct Job {
     pub failure: Option<Failure>,
     /// Whether there is a result to fetch.
     pub result_available: ResultAvailable,
+    /// Up to five warnings about its result, the worst first; all of them are in the summary of the result. A job that ended
+    /// under an earlier version has them only there.
+    #[serde(default)]
+    pub warnings: Vec<Warning>,
     /// Addresses of what belongs to it.
     pub links: BTreeMap<String, String>,
 }

@@ -7,6 +7,7 @@ mod bodies;
 mod body;
 mod call;
 mod filters;
+mod forwarded;
 mod headers;
 mod input;
 mod limits;

@@ -11,7 +11,7 @@ use super::error::{Result, StoreError};
 
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 9] = [
+const STEPS: [(i64, &str, &str); 10] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -52,6 +52,11 @@ const STEPS: [(i64, &str, &str); 9] = [
         9,
         "tokens",
         include_str!("../../../migrations/0009_tokens.sql"),
+    ),
+    (
+        12,
+        "warnings",
+        include_str!("../../../migrations/0012_warnings.sql"),
     ),
 ];
 
@@ -106,7 +111,7 @@ pub(super) async fn check(connection: &mut SqliteConnection) -> Result<()> {
                 return Err(StoreError::Schema(format!(
                     "the store was written by a later version of this program (its tables have step {version}, the last one known \
                      here is {}); use that version",
-                    STEPS.len()
+                    STEPS.last().map_or(0, |(version, ..)| *version)
                 )));
             }
             Some(step) if step.checksum[..] != checksum[..] => {

@@ -7,7 +7,7 @@ use futures_util::Stream;
 use solver::solution::Fields;
 
 use super::{
-    results::{no_result, with_result},
+    results::{Found, no_result, with_result},
     service::{Service, detached},
 };
 use crate::{
@@ -32,15 +32,18 @@ pub async fn fields(
     service: &Service,
     caller: &Caller,
     id: JobId,
-) -> Result<StoredFields, ApiError> {
+) -> Result<Found<StoredFields>, ApiError> {
     let mut found = with_result(service, caller, id).await?;
-    let result_key = found.job.result_key;
+    let (available, result_key) = (found.job.result_available, found.job.result_key);
     match found.checked_part_info("fields").await? {
-        Some(info) => Ok(StoredFields {
-            info,
-            id,
-            result_key,
-        }),
+        Some(info) => {
+            let content = StoredFields {
+                info,
+                id,
+                result_key,
+            };
+            Ok(Found { available, content })
+        }
         None => Err(no_result(&found.job)),
     }
 }
@@ -81,16 +84,20 @@ pub async fn converted_fields(
     caller: &Caller,
     id: JobId,
     format: Format,
-) -> Result<Vec<u8>, ApiError> {
+) -> Result<Found<Vec<u8>>, ApiError> {
     let load = async {
         let mut found = with_result(service, caller, id).await?;
         let fields = found.part("fields").await?;
-        fields.ok_or_else(|| no_result(&found.job))
+        let content = fields.ok_or_else(|| no_result(&found.job))?;
+        let available = found.job.result_available;
+        Ok(Found { available, content })
     };
     let written = service.work_on(load, move |stored| {
-        let fields: Fields = serde_json::from_slice(&stored).map_err(|error| error.to_string())?;
-        drop(stored); // they may be large
-        formats::fields(&fields, format)
+        let Found { available, content } = stored;
+        let fields: Fields = serde_json::from_slice(&content).map_err(|error| error.to_string())?;
+        drop(content); // they may be large
+        let content = formats::fields(&fields, format)?;
+        Ok::<_, String>(Found { available, content })
     });
     written.await?.map_err(ApiError::internal)
 }

@@ -12,7 +12,7 @@ use solver::{
 use super::{
     history::StoredHistory,
     jobs, profiles,
-    results::{self, read},
+    results::{self, Found, read},
     service::Service,
 };
 use crate::{
@@ -66,7 +66,7 @@ pub async fn plot(
     id: JobId,
     plot: Plot,
     style: Style,
-) -> Result<String, ApiError> {
+) -> Result<Found<String>, ApiError> {
     // loaded once there is a permit, so that waiting requests use no memory
     let load = async {
         let mut found = match plot {
@@ -139,8 +139,12 @@ pub async fn plot(
             fields: &fields,
             stored: stored.as_ref(),
         };
-        plot::draw(plot, style, &problem, &parts).map_err(|reason| {
+        let drawn = plot::draw(plot, style, &problem, &parts).map_err(|reason| {
             ApiError::NotFound(format!("{id} has no plot {}: {reason}", plot.as_str()))
+        });
+        Ok(Found {
+            available: job.result_available,
+            content: drawn?,
         })
     };
     service.work_on(load, draw).await?

@@ -121,7 +121,10 @@ async fn a_job_of_another_is_not_found_by_any_verb() {
         pinned: Some(true),
         ..Edit::default()
     };
-    unknown("update", jobs::update(service, bob, id, edit, None).await);
+    unknown(
+        "update",
+        jobs::update(service, bob, id, edit, jobs::LabelChanges::new(), None).await,
+    );
     unknown("cancel", jobs::cancel(service, bob, id).await);
     let again = retry::retry(service, bob, id, Default::default(), None);
     unknown("retry", again.await);
