@@ -15,6 +15,7 @@ mod object;
 mod origin;
 
 // Answers.
+mod compressed;
 mod data;
 mod refused;
 mod reply;

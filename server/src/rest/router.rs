@@ -10,7 +10,7 @@ use tower::{
 use tower_http::catch_panic::CatchPanicLayer;
 
 use super::{
-    authenticate::authenticate, call::AppState, forwarded, limits::limits,
+    authenticate::authenticate, call::AppState, compressed::compressed, forwarded, limits::limits,
     openapi::openapi, operations, origin, reply,
 };
 use crate::{error::ApiError, verbs::Service};
@@ -37,7 +37,9 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         // `body::json_text` has a limit of its own, and answers with an error document
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn_with_state(service, limits))
-        .layer(middleware::from_fn(reply::errors_as_documents));
+        .layer(middleware::from_fn(reply::errors_as_documents))
+        // outside of the limits: the bytes that are compressed are counted, and there are never more of the others
+        .layer(middleware::from_fn(compressed));
     match prefix.is_empty() {
         true => routes,
         // outside of the routes, which are found by the rest of the path
