@@ -22,7 +22,7 @@ import tempfile
 import time
 
 from attack import MIB, SOAK, check, equal, example
-from outside import Server, memory, submission, talkative
+from outside import BINARY, Server, memory, submission, talkative
 
 TOP = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(TOP / "tests/clients"))
@@ -223,10 +223,30 @@ def links(client, port):
     return job["id"]
 
 
+def policy():
+    """The path in front changes nothing of who may do what."""
+    with Server("--path-prefix", PREFIX) as server:
+        def token(scope):
+            command = [BINARY, "token", "create", "--name", scope, "--owner", "ada", "--scope", scope, "--url", server.url]
+            environment = {**os.environ, **({"SIGNORINI_TOKEN": made[0]} if made else {})}
+            return subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout.strip()
+
+        made = []
+        made.append(token("admin"))
+        reader = {"authorization": "Bearer " + token("read")}
+        for method, path, without, with_read in (
+            ("GET", "/v1/jobs", 401, 200), ("POST", "/v1/queue/pause", 401, 403), ("GET", "/openapi.json", 401, 200),
+            ("GET", "/livez", 200, 200), ("GET", PREFIX + "/v1/jobs", 404, 404),
+        ):
+            equal(server.call(method, PREFIX + path).status, without, "%s %s below the path, without a token" % (method, path))
+            equal(server.call(method, PREFIX + path, **reader).status, with_read, "%s %s below the path, to read" % (method, path))
+
+
 MESH = "fillet-quad8-msh41-ascii.msh"
 
 
 def main():
+    policy()
     told = []
     with tempfile.TemporaryDirectory() as text:
         folder = pathlib.Path(text)
