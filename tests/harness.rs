@@ -320,7 +320,10 @@ impl std::fmt::Debug for Events {
 
 /// A client that asks the server itself, whatever proxy the environment names.
 pub fn client() -> Client {
-    Client::builder().no_proxy().build().unwrap()
+    // reqwest wants a provider of cryptography even without TLS; an error says that there is one already
+    let _ = rustls::crypto::ring::default_provider().install_default();
+    let builder = Client::builder().no_proxy().tls_certs_only([]);
+    builder.build().unwrap()
 }
 
 /// The status of an answer, and its JSON.

@@ -11,6 +11,7 @@ import os
 import pathlib
 import re
 import signal
+import ssl
 import subprocess
 import sys
 import tempfile
@@ -125,8 +126,9 @@ def note(**figures):
 class Server:
     """The real binary on a free port with a store of its own, which outlives a kill."""
 
-    def __init__(self, *options, wrapper=()):
-        self.options, self.wrapper = options, wrapper
+    def __init__(self, *options, wrapper=(), ca=None):
+        """`ca`: the authority whose certificate it shows, if the options have it speak TLS."""
+        self.options, self.wrapper, self.ca = options, wrapper, ca
         self.folder = tempfile.TemporaryDirectory()
         self.data = pathlib.Path(self.folder.name) / "data"
         self.log = pathlib.Path(self.folder.name) / "log"
@@ -150,8 +152,9 @@ class Server:
         with self.open_log() as log:
             self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log)
         self.url = self.process.stdout.readline().decode().strip()
-        check(self.url.startswith("http://127.0.0.1:"), "serve began with %r, not with its URL" % self.url)
-        self.address = self.url[len("http://"):]
+        scheme = "https://" if self.ca else "http://"
+        check(self.url.startswith(scheme + "127.0.0.1:"), "serve began with %r, not with its URL" % self.url)
+        self.address = self.url[len(scheme):]
         while self.call("GET", "/readyz").status != 200:
             check(time.monotonic() < began + 60, "the server was not ready within a minute")
         return time.monotonic() - began
@@ -178,13 +181,20 @@ class Server:
         self.process.send_signal(signal.SIGTERM)
         equal(self.process.wait(timeout=30), 0, "exit code after SIGTERM")
 
+    def connection(self):
+        """A connection that lasts for several requests."""
+        if not self.ca:
+            return http.client.HTTPConnection(self.address, timeout=120)
+        trusted = ssl.create_default_context(cafile=self.ca)
+        return http.client.HTTPSConnection(self.address, timeout=120, context=trusted)
+
     def call(self, method, path, body=None, **headers):
         """One request on a connection of its own. `if_match` becomes the header If-Match."""
         headers = {name.replace("_", "-"): value for name, value in headers.items()}
         if body is not None:
             body = body if isinstance(body, bytes) else json.dumps(body).encode()
             headers.setdefault("content-type", "application/json")
-        connection = http.client.HTTPConnection(self.address, timeout=120)
+        connection = self.connection()
         try:
             connection.request(method, path, body, headers)
             response = connection.getresponse()

@@ -13,10 +13,11 @@ use tonic_health::server::HealthReporter;
 use tracing::{info, warn};
 
 use crate::{
+    address,
     config::{Config, Isolation},
     error::{number_of, size},
     grpc,
-    listener::{self, Listener},
+    listener::{self, Listener, Tls},
     memory::Budget,
     queue::{self, Processes, Queue, Solver},
     rest,
@@ -35,6 +36,7 @@ pub struct App {
     closing: CancellationToken,
     server: JoinHandle<()>,
     grace: Duration,
+    tls: Option<Arc<Tls>>,
 }
 
 /// Shows whether the service is alive.
@@ -136,6 +138,8 @@ fn refuse_open(config: &Config, store: &Store) -> Result<(), OpenToAll> {
 impl App {
     /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
+        address::set_prefix(&config.web.path_prefix);
+        let tls = config.tls.files().map(Tls::read).transpose()?;
         let store = Store::open(&config.data).await?;
         // Before the listener opens: no client sees a job as running that no worker solves.
         match clean_up(&store).await {
@@ -161,8 +165,8 @@ impl App {
         let router = rest::router(service, grpc);
 
         let most = listener::most_connections(config.max_connections);
-        let listener =
-            Listener::bind(config.listen, most).with_context(|| CannotListen(config.listen))?;
+        let listener = Listener::bind(config.listen, most, tls.clone())
+            .with_context(|| CannotListen(config.listen))?;
         let address = listener.address()?;
         let closing = CancellationToken::new();
         let server = tokio::spawn(listener.serve(router, closing.clone()));
@@ -190,6 +194,7 @@ impl App {
             closing,
             server,
             grace: Duration::from_secs(config.grace_s),
+            tls,
         })
     }
 
@@ -203,7 +208,13 @@ impl App {
 
     /// The address of the service.
     pub fn url(&self) -> String {
-        format!("http://{}", self.address)
+        let scheme = if self.tls.is_some() { "https" } else { "http" };
+        format!("{scheme}://{}", self.address)
+    }
+
+    /// The certificate that it shows, if it speaks TLS.
+    pub fn tls(&self) -> Option<Arc<Tls>> {
+        self.tls.clone()
     }
 
     /// Stops in the order that loses nothing: starts no more jobs, requeues the running ones, ends the streams,

@@ -38,6 +38,10 @@ pub struct Config {
 
     #[command(flatten)]
     #[allow(missing_docs)] // a doc comment here would become the help of the command
+    pub tls: Tls,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
     pub web: Web,
 
     #[command(flatten)]
@@ -205,6 +209,46 @@ fn days(text: &str) -> Result<f64, String> {
     }
 }
 
+/// The certificate of the service.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Tls {
+    /// File of a certificate, and those of its issuers behind it, as PEM: the service speaks TLS, and nothing else. SIGHUP
+    /// reads it and the key again
+    #[arg(
+        long = "tls-cert",
+        env = "SIGNORINI_TLS_CERT",
+        value_name = "FILE",
+        requires = "key"
+    )]
+    cert: Option<PathBuf>,
+
+    /// File of the certificate's private key, as PEM and not encrypted
+    #[arg(
+        long = "tls-key",
+        env = "SIGNORINI_TLS_KEY",
+        value_name = "FILE",
+        requires = "cert"
+    )]
+    key: Option<PathBuf>,
+}
+
+/// Where a certificate and its key are.
+#[derive(Clone, Debug)]
+pub struct TlsFiles {
+    /// The certificate, and those of its issuers.
+    pub cert: PathBuf,
+    /// The private key.
+    pub key: PathBuf,
+}
+
+impl Tls {
+    /// Both files, or none.
+    pub fn files(&self) -> Option<TlsFiles> {
+        let (cert, key) = (self.cert.clone()?, self.key.clone()?);
+        Some(TlsFiles { cert, key })
+    }
+}
+
 /// What requests from browsers may name.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Web {
@@ -218,6 +262,12 @@ pub struct Web {
         value_delimiter = ','
     )]
     pub allowed_hosts: Vec<String>,
+
+    /// Path below which clients reach this service, as /signorini, where a proxy shows it there: links begin with it. It is
+    /// served both below this path and without it, for proxies that remove it
+    #[arg(long, env = "SIGNORINI_PATH_PREFIX", value_name = "PATH", default_value = "",
+          hide_default_value = true, value_parser = path_prefix)]
+    pub path_prefix: String,
 
     /// An origin whose pages may use this service, as `https://dashboard.example`; can be repeated, or a list with commas.
     /// Requests from pages of all others but this service's own are refused
@@ -272,6 +322,16 @@ impl Default for ProxyTrust {
 }
 
 impl ProxyTrust {
+    /// These proxies, for tests.
+    #[cfg(test)]
+    pub fn of(proxies: &[&str]) -> ProxyTrust {
+        let proxies = proxies.iter().filter_map(|text| network(text).ok());
+        ProxyTrust {
+            proxies: proxies.collect(),
+            ..ProxyTrust::default()
+        }
+    }
+
     /// Whether any proxy is trusted.
     pub fn is_on(&self) -> bool {
         !self.proxies.is_empty()
@@ -303,6 +363,21 @@ fn network(text: &str) -> Result<IpNet, String> {
 fn scope(text: &str) -> Result<Scope, String> {
     text.parse()
         .map_err(|_| "expected read, submit, cancel or admin".into())
+}
+
+/// A path without a slash at its end; the root is empty.
+fn path_prefix(text: &str) -> Result<String, String> {
+    const MOST: usize = 200;
+    let path = text.strip_suffix('/').unwrap_or(text);
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-._~".contains(c);
+    let named = |part: &str| {
+        !part.is_empty() && part.chars().all(plain) && !part.trim_matches('.').is_empty()
+    };
+    match path.strip_prefix('/') {
+        _ if path.is_empty() => Ok(String::new()),
+        Some(rest) if path.len() <= MOST && rest.split('/').all(named) => Ok(path.to_owned()),
+        _ => Err("expected a path of letters, digits and - . _ ~, such as /signorini".into()),
+    }
 }
 
 /// Scheme, host and port, as a browser writes them.
@@ -414,6 +489,23 @@ mod tests {
         );
         assert_eq!(trust.caller("ada"), Caller::new("ada", [Scope::Read]));
         assert!(trust.caller("root").is_admin());
+    }
+
+    #[test]
+    fn a_prefix_is_a_plain_path() {
+        for (text, read) in [
+            ("", ""),
+            ("/", ""),
+            ("/a", "/a"),
+            ("/lab/signorini/", "/lab/signorini"),
+        ] {
+            assert_eq!(path_prefix(text), Ok(read.into()));
+        }
+        for wrong in [
+            "a", "//a", "/a//b", "/..", "/a/../b", "/a b", "/a?b", "http://a",
+        ] {
+            assert!(path_prefix(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

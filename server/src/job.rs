@@ -4,7 +4,7 @@ use std::{borrow::Cow, collections::BTreeMap, fmt};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use solver::solution::{Outcome, Residuals};
+use solver::solution::{Outcome, Residuals, Warning};
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 use uuid::Uuid;
 
@@ -93,6 +93,10 @@ pub struct Job {
     /// Bytes that it keeps in the store, once it has ended: its result, unless that is another job's, and its events.
     #[serde(default)]
     pub stored_bytes: Option<u64>,
+    /// Up to five warnings about its result, the worst first; all of them are in the summary of the result. A job that ended
+    /// under an earlier version has them only there.
+    #[serde(default)]
+    pub warnings: Vec<Warning>,
     /// Addresses of what belongs to it.
     pub links: BTreeMap<String, String>,
 }

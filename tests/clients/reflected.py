@@ -14,8 +14,14 @@ SERVICE = "signorini.v1.JobService"
 class Client:
     """`client.GetJob(id=…)` calls the method of that name; fields are given as in the JSON of protobuf."""
 
-    def __init__(self, address):
-        self.channel = grpc.insecure_channel(address, options=[("grpc.enable_http_proxy", 0)])
+    def __init__(self, address, ca=None):
+        """`ca`: the certificate of an authority, for TLS."""
+        options = [("grpc.enable_http_proxy", 0)]
+        if ca:
+            trusted = grpc.ssl_channel_credentials(root_certificates=ca)
+            self.channel = grpc.secure_channel(address, trusted, options=options)
+        else:
+            self.channel = grpc.insecure_channel(address, options=options)
         self.database = ProtoReflectionDescriptorDatabase(self.channel)
         self.pool = descriptor_pool.DescriptorPool(self.database)
         self.service = self.pool.FindServiceByName(SERVICE)

@@ -4,20 +4,28 @@
 
 A server that may open 300 files (--soak: 1,700) is given three times as many idle connections; a bystander opens new ones meanwhile and is
 answered at once. Heads and bodies of requests that stop half-way are closed after 30 s and 60 s, idle connections after
-75 s. Clients that vanish in the middle of anything leave nothing behind, and cancel nothing.
+75 s; so are TLS handshakes that stop. Clients that vanish in the middle of anything leave nothing behind, and cancel nothing.
 """
 
+import pathlib
 import random
 import socket
+import sys
+import tempfile
 import time
 
 from attack import MIB, PREFACE, SOAK, Attacked, Bystander, check, equal, example, get, settings
 from outside import submission
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "clients"))
+from certificates import Authority
+
 FILES = 1700 if SOAK else 300
 HALF = 2000 if SOAK else 100
 VANISHING = 10000 if SOAK else 1000
 HEAD_S, BODY_S, IDLE_S = 30, 60, 75
+# a client's first message, of which the second half never comes
+HELLO = b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + bytes(200)
 HEAD = b"POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: 5000\r\n\r\n{\"pro"
 
 
@@ -47,8 +55,8 @@ def is_closed(connection):
         return True
 
 
-def half_requests(server):
-    """Connections of each kind that stop, and when the server closed the last of each."""
+def half_requests(server, encrypted):
+    """Connections of each kind that stop, to a server and one that speaks TLS, and when the server closed the last of each."""
     kinds = {
         "no byte": (b"", HEAD_S),
         "half a head": (b"GET /v1/jobs HTTP/1.1\r\nhost: localhost\r\nx-slow: ", HEAD_S),
@@ -64,11 +72,14 @@ def half_requests(server):
             "idle after an answer": (b"GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n", IDLE_S),
             "idle after an answer over HTTP/2": (PREFACE + settings() + get("/livez", 1), IDLE_S),
         })
+    stalled = {"TLS: no byte": (b"", HEAD_S), "TLS: half a handshake": (HELLO, HEAD_S)}
+    kinds.update(stalled)
     open_ones, times = {}, {}
     with Bystander(server):
         began = time.monotonic()
         for name, (sent, _) in kinds.items():
-            open_ones[name] = [server.socket() for _ in range(HALF // len(kinds))]
+            asked = encrypted if name in stalled else server
+            open_ones[name] = [asked.socket() for _ in range(HALF // len(kinds))]
             for one in open_ones[name]:
                 one.sendall(sent)
         while any(open_ones.values()):
@@ -141,7 +152,11 @@ def vanishing(server, job):
 
 
 figures = [crowded()]
-with Attacked() as server:
-    job = server.finished_job()
-    figures += [vanishing(server, job), half_requests(server)]
+with tempfile.TemporaryDirectory() as folder:
+    authority = Authority(folder)
+    options = authority.issue("service").options
+    with Attacked() as server, Attacked(*options, ca=authority.file) as encrypted:
+        job = server.finished_job()
+        figures += [vanishing(server, job), half_requests(server, encrypted)]
+        equal(encrypted.call("GET", "/livez").status, 200, "a request over TLS after the stalled ones")
 print("figure: " + "; ".join(figures))

@@ -54,6 +54,8 @@ ROWS = [
     Row("R14", "Requests that stop half-way are closed in time, and disturb nobody",
         "connections.py", "connections.py --soak",
         before="after 75 s none of 4,000 connections was closed"),
+    Row("R14a", "Behind nginx and Caddy as documented: events at once, streams resume, 512 MiB and long waits pass, links lead back",
+        "proxy.py", "proxy.py --soak"),
     Row("R15", "More connections than files: bystanders are answered, and it is over when they go",
         "connections.py", "connections.py --soak",
         before="1,000 idle connections kept everybody else out"),

@@ -2,6 +2,7 @@
 //! Tests do not sleep to wait: they follow events.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod answers;
 mod auth;
 mod bodies;
 mod by_name;

@@ -1,6 +1,8 @@
 #![allow(clippy::unwrap_used)]
 use std::ops::ControlFlow;
 
+use solver::problem::Problem;
+
 use super::*;
 use crate::fields::tests::mixed;
 

@@ -11,10 +11,10 @@ use serde_json::{Value, json};
 use solver::solution::{ContactProfile, Iteration};
 use tonic::transport::Channel;
 
-use super::{examples, exit::Exit, output, report};
+use super::{client, examples, exit::Exit, output, report};
 use crate::{
     app::App,
-    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Web},
+    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Tls, Web},
     event::{Event, Payload},
     job::{Job, Status},
     pb::{self, job_service_client::JobServiceClient},
@@ -30,6 +30,7 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
     let config = Config {
         listen: ([127, 0, 0, 1], 0).into(),
         data: folder.path().to_path_buf(),
+        tls: Tls::default(),
         web: Web::default(),
         trust: ProxyTrust::default(),
         allow_unauthenticated: false,
@@ -61,8 +62,7 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
         "Service at {url}, REST and gRPC on one port, its store in a temporary folder.\n\n"
     ))?;
     let rest = Rest {
-        // A local address, which a proxy from the environment could not reach.
-        client: Client::builder().no_proxy().build()?,
+        client: client::local()?,
         url: url.to_string(),
     };
     let mut grpc = JobServiceClient::connect(url.to_string()).await?;

@@ -5,6 +5,7 @@ use strum::VariantArray;
 use crate::{
     app::{CannotListen, OpenToAll},
     error::ApiError,
+    listener::BadCertificate,
     store::StoreError,
 };
 
@@ -43,7 +44,7 @@ impl Exit {
                 "anything else: a file that cannot be read or written, a body that its contacts do not hold in the end, no memory"
             }
             Exit::Invalid => {
-                "invalid or too large: the problem, an option, a token, or the code to be explained"
+                "invalid or too large: the problem, an option, a certificate, a token, or the code to be explained"
             }
             Exit::Listen => "serve: cannot listen at the address",
             Exit::Folder => "serve, doctor, backup, restore, token: the folder cannot be used",
@@ -77,7 +78,9 @@ impl Exit {
                 Exit::Damaged
             }
             _ if error.is::<CannotListen>() => Exit::Listen,
-            _ if error.is::<OpenToAll>() || is_invalid(error) => Exit::Invalid,
+            _ if error.is::<OpenToAll>() || error.is::<BadCertificate>() || is_invalid(error) => {
+                Exit::Invalid
+            }
             _ => Exit::Failed,
         }
     }

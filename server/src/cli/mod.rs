@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 mod backup;
+mod client;
 mod demo;
 mod doctor;
 pub mod examples;
@@ -85,7 +86,7 @@ pub fn main() -> ExitCode {
     let exit = match command {
         Command::Serve(config) => {
             let lines = log::start(LevelFilter::INFO);
-            with_runtime(serve::run(*config, lines.lost()))
+            with_runtime(serve::run(&config, lines.lost()))
         }
         Command::Doctor(arguments) => {
             let _lines = log::start(LevelFilter::WARN);

@@ -4,17 +4,17 @@ use std::{io::Write, time::Duration};
 
 use anyhow::Context;
 use rustix::process::Signal;
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::signal::unix::{Signal as Signals, SignalKind, signal};
 use tracing::{info, warn};
 use tracing_appender::non_blocking::ErrorCounter;
 
 use super::{exit::Exit, log, notify};
-use crate::{app::App, config::Config, queue};
+use crate::{app::App, config::Config, listener, queue};
 
 /// Serves until SIGTERM or SIGINT. `lost` counts the lines of the log that were lost.
-pub(super) async fn run(config: Config, lost: ErrorCounter) -> anyhow::Result<Exit> {
+pub(super) async fn run(config: &Config, lost: ErrorCounter) -> anyhow::Result<Exit> {
     // Installed first, so that no signal arrives before its handler.
-    survive(SignalKind::hangup(), "SIGHUP: there is nothing to reload")?;
+    let hangup = signal(SignalKind::hangup()).context("SIGHUP cannot be caught")?;
     survive(
         SignalKind::from_raw(Signal::XFSZ.as_raw()),
         "a file has reached the limit on file sizes of this process (ulimit -f); as on a full disk, nothing more can be stored",
@@ -22,7 +22,14 @@ pub(super) async fn run(config: Config, lost: ErrorCounter) -> anyhow::Result<Ex
     let mut terminate = signal(SignalKind::terminate()).context("SIGTERM cannot be caught")?;
     let mut interrupt = signal(SignalKind::interrupt()).context("SIGINT cannot be caught")?;
     tokio::spawn(log::report_lost_lines(lost));
-    let app = App::start(&config).await?;
+    let app = App::start(config).await?;
+    match app.tls() {
+        Some(tls) => {
+            tokio::spawn(listener::reload_on(hangup, tls.clone()));
+            tokio::spawn(async move { tls.watch_expiry().await });
+        }
+        None => log_signals(hangup, "SIGHUP: there is no certificate to read again"),
+    }
     announce(&app.url())?;
     notify::ready(&app.url());
     tokio::spawn(notify::keep_alive(app.url(), app.pulse()));
@@ -53,7 +60,11 @@ pub(super) async fn work() -> anyhow::Result<Exit> {
 
 /// Logs a signal that would end the process otherwise.
 fn survive(kind: SignalKind, text: &'static str) -> anyhow::Result<()> {
-    let mut signals = signal(kind).context("a signal cannot be caught")?;
+    log_signals(signal(kind).context("a signal cannot be caught")?, text);
+    Ok(())
+}
+
+fn log_signals(mut signals: Signals, text: &'static str) {
     tokio::spawn(async move {
         while signals.recv().await.is_some() {
             warn!("{text}");
@@ -61,7 +72,6 @@ fn survive(kind: SignalKind, text: &'static str) -> anyhow::Result<()> {
             tokio::time::sleep(Duration::from_secs(10)).await;
         }
     });
-    Ok(())
 }
 
 /// Prints the address as the first line of standard output; with port 0 it is not known beforehand.

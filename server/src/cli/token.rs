@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 use reqwest::{Client, Method};
 use serde_json::{Value, json};
 
-use super::{exit::Exit, output};
+use super::{client::Trust, exit::Exit, output};
 use crate::{
     caller::Caller,
     store::{Store, StoreError},
@@ -83,6 +83,9 @@ struct Place {
     /// Address of a running service, as http://127.0.0.1:8080. It is called with the token in SIGNORINI_TOKEN
     #[arg(long, env = "SIGNORINI_URL", value_name = "URL")]
     url: Option<String>,
+
+    #[command(flatten)]
+    trust: Trust,
 }
 
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
@@ -221,7 +224,7 @@ impl Place {
             };
         };
         Ok(Door::Service(Remote {
-            client: Client::builder().build()?,
+            client: self.trust.client(url)?,
             url: url.trim_end_matches('/').to_owned(),
             token: std::env::var("SIGNORINI_TOKEN").ok(),
         }))

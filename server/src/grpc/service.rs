@@ -5,7 +5,7 @@ use std::{pin::Pin, sync::Arc};
 use futures_util::{Stream, StreamExt};
 use prost::Message;
 use sha2::{Digest, Sha256};
-use tonic::{Request, Response, Status, Streaming};
+use tonic::{Request, Response, Status, Streaming, metadata::MetadataValue};
 
 use super::messages::{
     MAX_ROWS, caller_and_message, check_offset, key, messages_that_fit, noting_replay, paging,
@@ -17,7 +17,7 @@ use crate::{
     error::ApiError,
     event::Event,
     formats::Format,
-    job::Job,
+    job::{Job, ResultAvailable},
     pb::{self, job_service_server::JobService},
     store::PIECE_BYTES,
     transfer::HasShare,
@@ -28,11 +28,12 @@ use crate::{
         fields,
         history::{self, MAX_POINTS},
         info,
-        jobs::{self, ID},
+        jobs::{self, ID, LabelChanges},
         lists::{self, GROUP_BY, ORDER_BY},
         meshes::{self, HASH},
         page::Paging,
-        problems, profiles, queue, results,
+        problems, profiles, queue,
+        results::{self, RESULT_AVAILABLE},
         retry::{self, Changes},
         submit::{self, Submitted},
         sweeps,
@@ -227,7 +228,8 @@ impl JobService for Grpc {
         let (id, boundary) = (ID.read(&request.id)?, &request.boundary);
         let (step, points) = (request.step.as_deref(), points(request.points.as_deref())?);
         let profile = profiles::profile(&self.service, &caller, id, boundary, step, points);
-        Ok(Response::new(profile.await?.into()))
+        let found = profile.await?;
+        Ok(marked(found.content.into(), found.available))
     }
 
     async fn list_iterations(
@@ -237,14 +239,16 @@ impl JobService for Grpc {
         let (caller, request) = caller_and_message(request)?;
         let max_points = request.max_points.map(|most| MAX_POINTS.check(most));
         let (id, most) = (ID.read(&request.id)?, max_points.transpose()?);
-        let mut rows = history::history(&self.service, &caller, id, most).await?;
+        let found = history::history(&self.service, &caller, id, most).await?;
+        let (available, mut rows) = (found.available, found.content);
         rows.retain(|timed| timed.row.k > request.after);
         let more = rows.len() > MAX_ROWS;
         rows.truncate(MAX_ROWS);
-        Ok(Response::new(pb::ListIterationsResponse {
+        let answer = pb::ListIterationsResponse {
             iterations: rows.into_iter().map(Into::into).collect(),
             more,
-        }))
+        };
+        Ok(marked(answer, available))
     }
 
     type StreamResultStream =
@@ -267,14 +271,16 @@ impl JobService for Grpc {
                 );
             }
         };
-        let (pieces, total_bytes, sha256) = if format == Format::Json {
-            let fields = fields::fields(&self.service, &caller, id).await?;
+        let (pieces, total_bytes, sha256, available) = if format == Format::Json {
+            let found = fields::fields(&self.service, &caller, id).await?;
+            let fields = found.content;
             let info = fields.info.clone();
             check_offset(offset, info.bytes)?;
             let pieces = fields.bytes(&self.service, offset, info.bytes).boxed();
-            (pieces, info.bytes, info.digest)
+            (pieces, info.bytes, info.digest, found.available)
         } else {
-            let bytes = fields::converted_fields(&self.service, &caller, id, format).await?;
+            let found = fields::converted_fields(&self.service, &caller, id, format).await?;
+            let bytes = found.content;
             let total = bytes.len() as u64;
             check_offset(offset, total)?;
             let digest = Sha256::digest(&bytes).to_vec();
@@ -285,7 +291,7 @@ impl JobService for Grpc {
                     yield Ok(piece.to_vec());
                 }
             };
-            (pieces.boxed(), total, digest)
+            (pieces.boxed(), total, digest, found.available)
         };
         let mut place = offset;
         let chunks = pieces.map(move |piece| {
@@ -299,7 +305,7 @@ impl JobService for Grpc {
                 sha256: sha256.clone(),
             })
         });
-        let mut response: Response<Self::StreamResultStream> = Response::new(chunks.boxed());
+        let mut response: Response<Self::StreamResultStream> = marked(chunks.boxed(), available);
         if format != Format::Json {
             response.extensions_mut().insert(HasShare);
         }
@@ -345,7 +351,8 @@ impl JobService for Grpc {
             ID.read(&request.id)?,
             request.version.map(|only| vec![only]),
         );
-        let job = jobs::update(&self.service, &caller, id, edit(request)?, versions).await?;
+        let (edit, none) = (edit(request)?, LabelChanges::new());
+        let job = jobs::update(&self.service, &caller, id, edit, none, versions).await?;
         Ok(Response::new(job.into()))
     }
 
@@ -644,6 +651,15 @@ impl JobService for Grpc {
 }
 
 type EventStream = Pin<Box<dyn Stream<Item = Result<pb::Event, Status>> + Send>>;
+
+/// An answer whose metadata says whether the result that it is from is all there will be.
+fn marked<T>(answer: T, available: ResultAvailable) -> Response<T> {
+    let mut response = Response::new(answer);
+    let words: &'static str = available.into();
+    let value = MetadataValue::from_static(words);
+    response.metadata_mut().insert(RESULT_AVAILABLE, value);
+    response
+}
 
 /// Events as messages; `None` becomes a stream that has ended.
 fn messages(

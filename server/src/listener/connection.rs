@@ -29,6 +29,7 @@ use super::{
     activity::{Activity, UnderWay},
     guarded::Guarded,
     places::Place,
+    tls::{Stream, Tls},
 };
 use crate::{caller::Peer, error::ApiError, rest};
 
@@ -46,11 +47,28 @@ const PING: Duration = Duration::from_secs(60);
 /// Serves a connection until it ends, is idle or stalled for too long, or its place is given to another one.
 pub(super) async fn serve(
     (stream, peer): (TcpStream, Peer),
+    tls: Option<Arc<Tls>>,
     router: Router,
     place: Place,
     closing: CancellationToken,
 ) {
     let activity = place.activity().clone();
+    let stream = match tls {
+        None => Stream::Plain(stream),
+        // until then no request is under way: the time for the head of the first one counts from the opening
+        Some(tls) => tokio::select! {
+            accepted = tls.accept(stream) => match accepted {
+                Ok(stream) => stream,
+                Err(error) => {
+                    debug!(%error, "a connection ended in its handshake: {error}");
+                    return;
+                }
+            },
+            () = activity.is_cut() => return,
+            () = activity.idle_too_long() => return,
+            () = closing.cancelled() => return,
+        },
+    };
     let io = TokioIo::new(Guarded::new(stream, activity.clone()));
     let service = service_fn(|request: Request<Incoming>| {
         let mut request = request.map(Body::new);

@@ -8,16 +8,13 @@ use std::{
 };
 
 use axum::body::Bytes;
-use tokio::{
-    io::{AsyncRead, AsyncWrite, ReadBuf},
-    net::TcpStream,
-};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
-use super::{activity::Activity, bare, control_frames::ControlFrames};
+use super::{activity::Activity, bare, control_frames::ControlFrames, tls::Stream};
 
 /// The stream of a connection.
 pub(super) struct Guarded {
-    stream: TcpStream,
+    stream: Stream,
     activity: Arc<Activity>,
     frames: ControlFrames,
     /// Written instead of what was given to be written.
@@ -25,7 +22,7 @@ pub(super) struct Guarded {
 }
 
 impl Guarded {
-    pub(super) fn new(stream: TcpStream, activity: Arc<Activity>) -> Guarded {
+    pub(super) fn new(stream: Stream, activity: Arc<Activity>) -> Guarded {
         Guarded {
             stream,
             activity,

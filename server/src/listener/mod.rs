@@ -10,6 +10,7 @@ mod control_frames;
 mod files;
 mod guarded;
 mod places;
+mod tls;
 
 use std::{
     io,
@@ -27,6 +28,7 @@ use self::places::Places;
 use crate::caller::Peer;
 
 pub use files::most_connections;
+pub use tls::{BadCertificate, Tls, reload_on};
 
 /// Connections that wait to be accepted.
 const BACKLOG: u32 = 1024;
@@ -40,11 +42,12 @@ const LOG_INTERVAL: Duration = Duration::from_secs(60);
 pub struct Listener {
     socket: TcpListener,
     places: Arc<Places>,
+    tls: Option<Arc<Tls>>,
 }
 
 impl Listener {
-    /// Listens at this address; at most `most` connections are open at the same time.
-    pub fn bind(address: SocketAddr, most: usize) -> io::Result<Listener> {
+    /// Listens at this address, with TLS if there is a certificate; at most `most` connections are open at the same time.
+    pub fn bind(address: SocketAddr, most: usize, tls: Option<Arc<Tls>>) -> io::Result<Listener> {
         let socket = match address {
             SocketAddr::V4(_) => TcpSocket::new_v4()?,
             SocketAddr::V6(_) => TcpSocket::new_v6()?,
@@ -56,6 +59,7 @@ impl Listener {
         Ok(Listener {
             socket: socket.listen(BACKLOG)?,
             places: Places::new(most),
+            tls,
         })
     }
 
@@ -121,7 +125,8 @@ impl Listener {
         if place.is_reserved() && is_due(logged) {
             info!("all connections are busy; further ones can only ask for the probes");
         }
-        let serving = connection::serve((stream, peer), router.clone(), place, closing.clone());
+        let (tls, router) = (self.tls.clone(), router.clone());
+        let serving = connection::serve((stream, peer), tls, router, place, closing.clone());
         connections.spawn(serving);
     }
 }

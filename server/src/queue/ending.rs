@@ -3,7 +3,10 @@
 use std::any::Any;
 
 use serde::{Deserialize, Serialize};
-use solver::{error::SolveError, solution::Outcome};
+use solver::{
+    error::{SolveError, shortened},
+    solution::{Outcome, Warning, WarningCode},
+};
 use tracing::{debug, error};
 use uuid::Uuid;
 
@@ -56,6 +59,50 @@ impl From<SolveError> for NoSolution {
     }
 }
 
+/// Warnings that a job has, and characters of their messages: it is read in lists of a thousand.
+const MOST_WARNINGS: usize = 5;
+const LONGEST_WARNING: usize = 400;
+
+/// The worst warnings, the worst first.
+fn worst(warnings: &[Warning]) -> Vec<Warning> {
+    let mut found: Vec<&Warning> = warnings.iter().collect();
+    found.sort_by_key(|warning| gravity(warning.code)); // stable: else in their order
+    let short = |warning: &Warning| Warning {
+        message: shortened(&warning.message, LONGEST_WARNING),
+        pointer: shortened(&warning.pointer, LONGEST_WARNING),
+        ..*warning
+    };
+    found.into_iter().take(MOST_WARNINGS).map(short).collect()
+}
+
+/// 0: the numbers are not those of the problem that was meant; 1: some are not, or may not be; 2: good to know.
+fn gravity(code: WarningCode) -> u8 {
+    use WarningCode::*;
+    match code {
+        NotConverged | FalseConvergence | ContactCycling | NoContact | SlidesAway
+        | OutOfBalance | NotUnique => 0,
+        LargeStrain
+        | LargeDisplacement
+        | LargeSlip
+        | CoincidentNodes
+        | ContactReachesObstacleEnd
+        | FrictionLostAtEnd
+        | ObstacleBetweenNodes
+        | SymmetricDrag
+        | BoundBeyondContact
+        | RefinementUnfinished
+        | IncrementsMatter
+        | UniquenessUnknown
+        | RoundingLimitsResidual
+        | MeshTooCoarseForContact
+        | MeshTooCoarseForRadius => 1,
+        LinesInside | CentreNodesDropped | ElementsReversed | RaisedToSecondOrder
+        | StripCutsPolyline | ObstacleCutsEdge | SmoothingFlattens | ContactTurns
+        | KinkInContact | RadiusExceedsContact | CohesionJumps | OscillatingStick
+        | SlowContraction => 2,
+    }
+}
+
 /// What the outcome of a solution means for its job.
 pub(super) fn ending_of_solution(document: &Document) -> Ending {
     let (summary, partial) = (&document.summary.solution, ResultAvailable::Partial);
@@ -64,6 +111,7 @@ pub(super) fn ending_of_solution(document: &Document) -> Ending {
         let detail = format!("{detail}; the last state and the history are kept");
         Ending {
             result: partial,
+            warnings: worst(&summary.warnings),
             ..Ending::failed(reason, detail)
         }
     };
@@ -73,6 +121,7 @@ pub(super) fn ending_of_solution(document: &Document) -> Ending {
             reason: None,
             failure: None,
             result: ResultAvailable::Final,
+            warnings: worst(&summary.warnings),
         },
         Outcome::NotConverged => failed(Reason::NotConverged),
         Outcome::ContactCycling => failed(Reason::ContactCycling),

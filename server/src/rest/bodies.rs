@@ -21,6 +21,7 @@ use crate::{
     store::Edit,
     verbs::{
         envelope::{Envelope, JobRequest, MAX_LABEL, MAX_LABELS, MAX_NAME, PRIORITIES},
+        jobs::LabelChanges,
         retry::Changes,
         submit::MAX_BATCH,
         sweeps::SweepRequest,
@@ -156,6 +157,25 @@ pub(super) struct Edits {
     #[schemars(default, range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
     priority: Option<i32>,
     /// Never deleted because of its age; it can still be deleted on request.
+    #[schemars(default)]
+    pinned: Option<bool>,
+}
+
+/// A body that changes a job, as a merge patch (RFC 7396): absent fields and labels stay unchanged; for its schema only.
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[allow(dead_code)]
+pub(super) struct MergePatch {
+    /// A name for people, at most 256 characters; null removes it.
+    #[schemars(default, length(max = MAX_NAME))]
+    name: Option<String>,
+    /// Labels that are set, or removed by null; null for all of them removes all.
+    #[schemars(default, extend("maxProperties" = 2 * MAX_LABELS))]
+    labels: Option<BTreeMap<Label, Option<Label>>>,
+    /// Jobs of higher priority run first; null is 0.
+    #[schemars(default, range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
+    priority: Option<i32>,
+    /// Never deleted because of its age; null is false.
     #[schemars(default)]
     pinned: Option<bool>,
 }
@@ -338,6 +358,32 @@ pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
         .map_err(ApiError::InvalidProblem)
 }
 
+/// The same as a merge patch (RFC 7396): labels that are absent stay, and null removes what it stands for, or resets it.
+pub(super) fn merge_patch(text: &str) -> Result<(Edit, LabelChanges), ApiError> {
+    let mut body = Object::open(text, "an object with what to change")?;
+    let resets = |name: &str| body.is_null(name);
+    let (unnamed, unlabeled) = (resets("name"), resets("labels"));
+    let (ordinary, unpinned) = (resets("priority"), resets("pinned"));
+    let name: Option<String> = body.take("name", "a string or null");
+    // twice as many as there may be: all old ones removed, and all set anew
+    let labels = body.take::<Texts<{ 2 * MAX_LABELS + 1 }, Option<String>>>(
+        "labels",
+        "an object of strings and nulls, or null",
+    );
+    let priority: Option<i32> = body.take("priority", &PRIORITIES.expected());
+    let pinned: Option<bool> = body.take("pinned", "true, false or null");
+    let edit = Edit {
+        name: (unnamed || name.is_some()).then_some(name),
+        labels: unlabeled.then(BTreeMap::new),
+        priority: priority.or(ordinary.then_some(0)),
+        pinned: pinned.or(unpinned.then_some(false)),
+    };
+    let changes = labels.map_or(LabelChanges::new(), |labels| labels.0);
+    let known = "name, labels, priority, pinned";
+    body.finish(known, Some((edit, changes)))
+        .map_err(ApiError::InvalidProblem)
+}
+
 /// A body `{limits, priority}`: absent fields stay unchanged.
 pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
     let mut body = Object::open(text, "an object with what to change")?;
@@ -446,6 +492,9 @@ mod tests {
         let ApiError::InvalidProblem(edits) = edit(OTHER).unwrap_err() else {
             unreachable!("it is well-formed");
         };
+        let ApiError::InvalidProblem(patched) = merge_patch(OTHER).unwrap_err() else {
+            unreachable!("it is well-formed");
+        };
         let ApiError::InvalidProblem(changes) = retry(OTHER).unwrap_err() else {
             unreachable!("it is well-formed");
         };
@@ -467,6 +516,7 @@ mod tests {
                 described::<BareProblem>(),
             ),
             (edits, described::<Edits>()),
+            (patched, described::<MergePatch>()),
             (changes, described::<Retry>()),
         ] {
             let mut known = known(found);
@@ -492,6 +542,24 @@ mod tests {
             pointers(text),
             ["/problem", "/name", "/labels", "/priority", "/wait"]
         );
+    }
+
+    #[test]
+    fn a_merge_patch_removes_and_resets_by_null() {
+        let (edit, labels) = merge_patch(r#"{"labels": {"a": null, "b": "2"}}"#).unwrap();
+        assert!(edit.name.is_none() && edit.labels.is_none() && edit.pinned.is_none());
+        assert_eq!(
+            labels,
+            [("a".into(), None), ("b".into(), Some("2".into()))].into()
+        );
+        let nulls = r#"{"name": null, "labels": null, "priority": null, "pinned": null}"#;
+        let (edit, labels) = merge_patch(nulls).unwrap();
+        assert_eq!(
+            (edit.name, edit.priority, edit.pinned),
+            (Some(None), Some(0), Some(false))
+        );
+        assert!(edit.labels.is_some_and(|all| all.is_empty()) && labels.is_empty());
+        assert!(merge_patch(r#"{"labels": {"a": {}}}"#).is_err());
     }
 
     #[test]

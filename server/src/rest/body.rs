@@ -13,23 +13,29 @@ use crate::{
     transfer::{self, Received},
 };
 
-/// The body as text, if it is declared as JSON and is not too large, alone and together with those of other requests.
-pub(super) async fn json_text(
-    headers: &HeaderMap,
-    body: Body,
-    limit_bytes: usize,
-    received: &Received,
-) -> Result<String, ApiError> {
-    let content_type = headers
-        .get(header::CONTENT_TYPE)
+/// What the headers declare the body to be.
+fn content_type(headers: &HeaderMap) -> &str {
+    let value = headers.get(header::CONTENT_TYPE);
+    value
         .and_then(|value| value.to_str().ok())
-        .unwrap_or("nothing");
-    let essence = content_type
-        .split(';')
-        .next()
-        .unwrap_or_default()
-        .trim()
-        .to_ascii_lowercase();
+        .unwrap_or("nothing")
+}
+
+/// The same without parameters.
+fn essence(content_type: &str) -> String {
+    let essence = content_type.split(';').next().unwrap_or_default();
+    essence.trim().to_ascii_lowercase()
+}
+
+/// Whether the body is declared as a merge patch (RFC 7396).
+pub(super) fn is_merge_patch(headers: &HeaderMap) -> bool {
+    essence(content_type(headers)) == "application/merge-patch+json"
+}
+
+/// The headers, if they declare the body as JSON.
+pub(super) fn is_json(headers: &HeaderMap) -> Result<&HeaderMap, ApiError> {
+    let content_type = content_type(headers);
+    let essence = essence(content_type);
     // a patch format has another meaning
     let json = essence.starts_with("application/")
         && essence.ends_with("+json")
@@ -37,6 +43,16 @@ pub(super) async fn json_text(
     if essence != "application/json" && !json {
         return Err(ApiError::UnsupportedMedia(content_type.into()));
     }
+    Ok(headers)
+}
+
+/// The body as text, if it is not too large, alone and together with those of other requests.
+pub(super) async fn json_text(
+    headers: &HeaderMap,
+    body: Body,
+    limit_bytes: usize,
+    received: &Received,
+) -> Result<String, ApiError> {
     is_not_encoded(headers)?;
     let mut pieces = body.into_data_stream();
     let length = declared_length(headers);

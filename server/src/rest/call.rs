@@ -41,12 +41,19 @@ impl Call {
     pub(super) async fn json(&mut self) -> Result<String, ApiError> {
         let body = std::mem::take(&mut self.body);
         body::json_text(
-            &self.headers,
+            body::is_json(&self.headers)?,
             body,
             self.service.max_body_bytes,
             &self.received,
         )
         .await
+    }
+
+    /// The same of a body that is declared as a merge patch.
+    pub(super) async fn merge_patch(&mut self) -> Result<String, ApiError> {
+        let body = std::mem::take(&mut self.body);
+        let limit_bytes = self.service.max_body_bytes;
+        body::json_text(&self.headers, body, limit_bytes, &self.received).await
     }
 
     /// Whether the request has a body.

@@ -14,7 +14,10 @@ use super::{
     headers::{Tags, header as described, recommended_pattern, text},
     input::{Input, RawInput},
 };
-use crate::{digest::hex, error::ApiError, formats::Format, parameters::Description};
+use crate::{
+    digest::hex, error::ApiError, formats::Format, job::ResultAvailable, parameters::Description,
+    verbs::results::RESULT_AVAILABLE,
+};
 
 /// The part of a file that is requested.
 pub(super) const PART: PartHeaders = PartHeaders;
@@ -156,6 +159,13 @@ pub(super) fn answer(
             (header::CONTENT_LENGTH, length.to_string()),
         ],
     ))
+}
+
+/// The answer with the header that says whether the result it is from is all there will be.
+pub(super) fn marked(response: impl IntoResponse, available: ResultAvailable) -> Response {
+    let words: &str = available.into();
+    let header = [(RESULT_AVAILABLE, words)];
+    (header, response).into_response()
 }
 
 fn with<const N: usize>(mut response: Response, headers: [(HeaderName, String); N]) -> Response {

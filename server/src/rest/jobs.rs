@@ -9,7 +9,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use solver::problem::Problem;
 
-use super::{bodies::edit, call::Call, headers::Tags};
+use super::{
+    bodies::{edit, merge_patch},
+    body::is_merge_patch,
+    call::Call,
+    headers::Tags,
+};
 use crate::{
     error::ApiError,
     job::{Job, JobId},
@@ -17,7 +22,7 @@ use crate::{
     store::{Filter, GroupBy, Order},
     verbs::{
         bulk::{self, BulkResult},
-        jobs::{self as verbs, Cancellation},
+        jobs::{self as verbs, Cancellation, LabelChanges},
         lists::{self, Count},
         page::Paging,
         watch::{self, UNTIL, Until, WAIT},
@@ -98,12 +103,15 @@ pub(super) async fn update(
     id: JobId,
     meant_for: Option<Tags>,
 ) -> Result<Response, ApiError> {
-    let edit = edit(&call.json().await?)?;
+    let (edit, labels) = match is_merge_patch(&call.headers) {
+        true => merge_patch(&call.merge_patch().await?)?,
+        false => (edit(&call.json().await?)?, LabelChanges::new()),
+    };
     let Call {
         service, caller, ..
     } = &call;
     let versions = meant_for.as_ref().and_then(Tags::versions);
-    let job = verbs::update(service, caller, id, edit, versions).await?;
+    let job = verbs::update(service, caller, id, edit, labels, versions).await?;
     Ok(job_response(&job))
 }
 

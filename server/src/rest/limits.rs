@@ -32,7 +32,7 @@ pub(super) async fn limits(
     next: Next,
 ) -> Response {
     let (grpc, path) = (is_grpc(&request), request.uri().path().to_owned());
-    if let Err(error) = origin::check(&request, &service.web) {
+    if let Err(error) = origin::check(&request, &service.web, &service.trust) {
         return refusal(grpc, &path, error);
     }
     // its answer would be refused when the work is done

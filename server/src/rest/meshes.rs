@@ -14,6 +14,7 @@ use super::{
     call::Call,
 };
 use crate::{
+    address::link,
     error::ApiError,
     mesh::MeshInfo,
     verbs::{meshes as verbs, page::Paging},
@@ -40,7 +41,7 @@ pub(super) async fn upload(call: Call) -> Result<Response, ApiError> {
     } else {
         StatusCode::OK
     };
-    let location = format!("/v1/meshes/{}", info.hash);
+    let location = link(&format!("/v1/meshes/{}", info.hash));
     Ok((status, [(header::LOCATION, location)], Json(info)).into_response())
 }
 

@@ -7,6 +7,7 @@ mod bodies;
 mod body;
 mod call;
 mod filters;
+mod forwarded;
 mod headers;
 mod input;
 mod limits;
@@ -14,6 +15,7 @@ mod object;
 mod origin;
 
 // Answers.
+mod compressed;
 mod data;
 mod refused;
 mod reply;

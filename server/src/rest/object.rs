@@ -1,6 +1,6 @@
 //! Reading a JSON object field by field, with all errors reported together.
 
-use std::{borrow::Cow, collections::BTreeMap, fmt};
+use std::{borrow::Cow, collections::BTreeMap, fmt, marker::PhantomData};
 
 use serde::{
     Deserialize, Deserializer,
@@ -221,14 +221,14 @@ impl<'de, const MOST: usize> Deserialize<'de> for First<'de, MOST> {
     }
 }
 
-/// An object of at most `MOST` texts; the others are left out.
-pub(super) struct Texts<const MOST: usize>(pub(super) BTreeMap<String, String>);
+/// An object of at most `MOST` texts, or of what else `T` is; the others are left out.
+pub(super) struct Texts<const MOST: usize, T = String>(pub(super) BTreeMap<String, T>);
 
-impl<'de, const MOST: usize> Deserialize<'de> for Texts<MOST> {
+impl<'de, const MOST: usize, T: Deserialize<'de>> Deserialize<'de> for Texts<MOST, T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Read<const MOST: usize>;
-        impl<'de, const MOST: usize> Visitor<'de> for Read<MOST> {
-            type Value = Texts<MOST>;
+        struct Read<const MOST: usize, T>(PhantomData<T>);
+        impl<'de, const MOST: usize, T: Deserialize<'de>> Visitor<'de> for Read<MOST, T> {
+            type Value = Texts<MOST, T>;
 
             fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
                 formatter.write_str("an object of strings")
@@ -236,15 +236,15 @@ impl<'de, const MOST: usize> Deserialize<'de> for Texts<MOST> {
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
                 let mut texts = BTreeMap::new();
-                while let Some((Name(name), Name(text))) = map.next_entry()? {
+                while let Some((Name(name), text)) = map.next_entry()? {
                     if texts.len() < MOST {
-                        texts.insert(name.into_owned(), text.into_owned());
+                        texts.insert(name.into_owned(), text);
                     }
                 }
                 Ok(Texts(texts))
             }
         }
-        deserializer.deserialize_map(Read)
+        deserializer.deserialize_map(Read(PhantomData))
     }
 }
 

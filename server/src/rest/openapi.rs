@@ -12,6 +12,7 @@ use solver::error::Violation;
 
 use super::operations::{self, Answer, Content, Operation};
 use crate::{
+    address::link,
     caller::Access,
     catalog::{Code, Kind},
     parameters::{Description, Location},
@@ -44,7 +45,7 @@ fn document() -> Value {
             "description": INTRODUCTION,
             "license": { "name": "MIT OR Apache-2.0", "identifier": "MIT OR Apache-2.0" },
         },
-        "servers": [{ "url": "/" }],
+        "servers": [{ "url": link("/") }],
         "tags": operations::GROUPS.map(|(name, meaning, _)| json!({ "name": name, "description": meaning })),
         "paths": paths,
         "components": {
@@ -57,8 +58,8 @@ fn document() -> Value {
 }
 
 const INTRODUCTION: &str = "The same operations, names and numbers as over gRPC \
-([/proto/signorini.proto](/proto/signorini.proto)), on one port. A problem by itself: \
-[/v1/schema/problem.json](/v1/schema/problem.json). \
+([/proto/signorini.proto](proto/signorini.proto)), on one port. A problem by itself: \
+[/v1/schema/problem.json](v1/schema/problem.json). \
 Units are chosen by the client and must be consistent; stresses are negative in compression; times are RFC 3339 in UTC. \
 Unknown names are refused, in bodies and in queries. Every error is a document of RFC 9457; its `code` \
 is stable, and its `type` is the address of an explanation.";

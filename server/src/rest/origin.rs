@@ -14,11 +14,17 @@ use axum::{
 };
 use tower_http::cors::CorsLayer;
 
-use crate::{config::Web, error::ApiError};
+use super::forwarded;
+use crate::{
+    config::{ProxyTrust, Web},
+    error::ApiError,
+};
 
 /// An error if the request names no host or a foreign one, or comes from a page of another site.
-pub(super) fn check(request: &Request, web: &Web) -> Result<(), ApiError> {
-    let Some(host) = host_of(request)? else {
+pub(super) fn check(request: &Request, web: &Web, trust: &ProxyTrust) -> Result<(), ApiError> {
+    // the one that is believed has talked to the browser: its account replaces the name that it calls us by
+    let named = host_of(request)?;
+    let Some(host) = forwarded::host(request, trust)?.or(named) else {
         // HTTP/1.0: no browser, which would name both
         return match request.headers().contains_key(header::ORIGIN) {
             true => Err(ApiError::Forbidden(
@@ -126,6 +132,7 @@ pub(super) fn cors(web: &Web) -> Option<CorsLayer> {
         "idempotency-replayed",
         "location",
         "preference-applied",
+        "result-available",
         "retry-after",
     ];
     (!origins.is_empty()).then(|| {
@@ -167,7 +174,12 @@ mod tests {
     fn a_request_has_one_host() {
         let check = |version: Version, address: &str, hosts: &[&str]| {
             let hosts: Vec<_> = hosts.iter().map(|host| ("host", *host)).collect();
-            check(&request(version, address, &hosts), &Web::default()).is_ok()
+            check(
+                &request(version, address, &hosts),
+                &Web::default(),
+                &ProxyTrust::default(),
+            )
+            .is_ok()
         };
         assert!(check(Version::HTTP_11, "/", &["localhost"]));
         assert!(!check(Version::HTTP_11, "/", &[]));
@@ -187,7 +199,7 @@ mod tests {
         };
         let allowed = |host: &str| {
             let request = request(Version::HTTP_11, "/", &[("host", host)]);
-            check(&request, &web).is_ok()
+            check(&request, &web, &ProxyTrust::default()).is_ok()
         };
         for own in [
             "127.0.0.1:8080",
@@ -221,7 +233,12 @@ mod tests {
         };
         let allowed = |origin: &str| {
             let headers = [("host", "127.0.0.1:8080"), ("origin", origin)];
-            check(&request(Version::HTTP_11, "/", &headers), &web).is_ok()
+            check(
+                &request(Version::HTTP_11, "/", &headers),
+                &web,
+                &ProxyTrust::default(),
+            )
+            .is_ok()
         };
         for own in [
             "http://127.0.0.1:8080",

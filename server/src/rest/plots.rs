@@ -6,7 +6,7 @@ use axum::{
 };
 use files::plot::{Plot, Stress, Style, Theme};
 
-use super::call::Call;
+use super::{call::Call, data::marked};
 use crate::{
     error::ApiError,
     job::JobId,
@@ -31,8 +31,8 @@ pub(super) async fn plot(
         theme: theme.unwrap_or_default(),
         stress: stress.unwrap_or_default(),
     };
-    let svg = verbs::plot(&call.service, &call.caller, id, plot, style).await?;
-    Ok((HEADERS, svg))
+    let found = verbs::plot(&call.service, &call.caller, id, plot, style).await?;
+    Ok(marked((HEADERS, found.content), found.available))
 }
 
 /// A figure may not run scripts or load anything: its texts come from clients.

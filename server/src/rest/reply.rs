@@ -11,7 +11,7 @@ use axum::{
 };
 
 use super::refused;
-use crate::error::ApiError;
+use crate::{address::link, error::ApiError};
 
 impl IntoResponse for ApiError {
     /// Only the status and the error itself; `errors_as_documents` writes the document, since it knows the path.
@@ -57,7 +57,7 @@ fn with_document(mut response: Response, path: &str) -> Response {
         return response;
     };
     refused::note(error.code().kind().code, path);
-    let document = error.document(path).to_string();
+    let document = error.document(&link(path)).to_string();
     let (mut parts, _) = response.into_parts();
     parts.headers.insert(
         header::CONTENT_TYPE,

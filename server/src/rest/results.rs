@@ -4,7 +4,7 @@ use axum::{Json, body::Body, http::StatusCode, response::Response};
 
 use super::{
     call::Call,
-    data::{self, Part},
+    data::{self, Part, marked},
 };
 use crate::{
     error::ApiError,
@@ -13,13 +13,14 @@ use crate::{
     verbs::{
         fields as stored, history as rows, jobs,
         profiles::{self, Points},
-        results::{self, JobResult},
+        results,
     },
 };
 
-pub(super) async fn result(call: Call, id: JobId) -> Result<Json<JobResult>, ApiError> {
+pub(super) async fn result(call: Call, id: JobId) -> Result<Response, ApiError> {
     let result = results::result(&call.service, &call.caller, id).await?;
-    Ok(Json(result))
+    let available = result.result_available;
+    Ok(marked(Json(result), available))
 }
 
 pub(super) async fn history(
@@ -29,10 +30,12 @@ pub(super) async fn history(
     max_points: Option<i64>,
     part: Part,
 ) -> Result<Response, ApiError> {
-    let rows = rows::history(&call.service, &call.caller, id, max_points).await?;
+    let found = rows::history(&call.service, &call.caller, id, max_points).await?;
+    let (available, rows) = (found.available, found.content);
     let bytes = call.service.work(move || formats::history(&rows, format));
     let bytes = bytes.await?.map_err(ApiError::internal)?;
-    data::whole(&part, format, format!("{id}.history"), bytes)
+    let whole = data::whole(&part, format, format!("{id}.history"), bytes)?;
+    Ok(marked(whole, available))
 }
 
 pub(super) async fn profile(
@@ -49,10 +52,12 @@ pub(super) async fn profile(
     } = &call;
     let points = points.unwrap_or_default();
     let profile = profiles::profile(service, caller, id, &boundary, step.as_deref(), points);
-    let profile = profile.await?;
+    let found = profile.await?;
+    let (available, profile) = (found.available, found.content);
     let bytes = service.work(move || formats::profile(&profile, format));
     let bytes = bytes.await?.map_err(ApiError::internal)?;
-    data::whole(&part, format, format!("{id}.profile.{boundary}"), bytes)
+    let whole = data::whole(&part, format, format!("{id}.profile.{boundary}"), bytes)?;
+    Ok(marked(whole, available))
 }
 
 pub(super) async fn delete_fields(call: Call, id: JobId) -> Result<StatusCode, ApiError> {
@@ -71,18 +76,21 @@ pub(super) async fn fields(
     } = &call;
     let name = format!("{id}.fields");
     if format != Format::Json {
-        let bytes = stored::converted_fields(service, caller, id, format).await?;
-        return data::whole(&part, format, name, bytes);
+        let found = stored::converted_fields(service, caller, id, format).await?;
+        let whole = data::whole(&part, format, name, found.content)?;
+        return Ok(marked(whole, found.available));
     }
     // JSON may be large, and is sent in pieces
-    let fields = stored::fields(service, caller, id).await?;
+    let found = stored::fields(service, caller, id).await?;
+    let (available, fields) = (found.available, found.content);
     let file = data::File {
         format,
         name,
         bytes: fields.info.bytes,
         digest: fields.info.digest.clone(),
     };
-    data::answer(&part, &file, |range| {
+    let answer = data::answer(&part, &file, |range| {
         Body::from_stream(fields.bytes(service, range.start, range.end))
-    })
+    })?;
+    Ok(marked(answer, available))
 }

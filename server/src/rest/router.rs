@@ -3,18 +3,22 @@
 use std::sync::Arc;
 
 use axum::{Router, extract::DefaultBodyLimit, middleware};
-use tower::util::option_layer;
+use tower::{
+    Layer,
+    util::{MapRequestLayer, option_layer},
+};
 use tower_http::catch_panic::CatchPanicLayer;
 
 use super::{
-    authenticate::authenticate, call::AppState, limits::limits, openapi::openapi, operations,
-    origin, reply,
+    authenticate::authenticate, call::AppState, compressed::compressed, forwarded, limits::limits,
+    openapi::openapi, operations, origin, reply,
 };
 use crate::{error::ApiError, verbs::Service};
 
 /// All routes, REST and gRPC. Unknown paths are answered by `reply::not_found`.
 pub fn router(service: Arc<Service>, grpc: Router) -> Router {
-    operations::routes()
+    let prefix = service.web.path_prefix.clone();
+    let routes = operations::routes()
         .method_not_allowed_fallback(async || ApiError::MethodNotAllowed)
         .with_state(AppState {
             service: service.clone(),
@@ -34,4 +38,14 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn_with_state(service, limits))
         .layer(middleware::from_fn(reply::errors_as_documents))
+        // outside of the limits: the bytes that are compressed are counted, and there are never more of the others
+        .layer(middleware::from_fn(compressed));
+    match prefix.is_empty() {
+        true => routes,
+        // outside of the routes, which are found by the rest of the path
+        false => {
+            let without = move |request| forwarded::without_prefix(request, &prefix);
+            Router::new().fallback_service(MapRequestLayer::new(without).layer(routes))
+        }
+    }
 }

@@ -15,6 +15,7 @@ use super::{
     jobs::{job_response, tag},
 };
 use crate::{
+    address::link,
     error::ApiError,
     job::{Job, JobId},
     verbs::{
@@ -126,7 +127,7 @@ pub(super) async fn answer(
 }
 
 fn location(job: &Job) -> String {
-    format!("/v1/jobs/{}", job.id)
+    link(&format!("/v1/jobs/{}", job.id))
 }
 
 fn note_replay(response: &mut Response, replayed: bool) {

@@ -17,6 +17,7 @@ use super::{
     submit,
 };
 use crate::{
+    address::link,
     error::ApiError,
     formats::{self, Format},
     job::SweepId,
@@ -41,7 +42,10 @@ pub(super) async fn create(mut call: Call, key: Option<Key>) -> Result<Response,
     let mut response = (StatusCode::ACCEPTED, sweep_response(&sweep)).into_response();
     let name = HeaderName::from_static("idempotency-replayed");
     let headers = [
-        (header::LOCATION, Some(format!("/v1/sweeps/{}", sweep.id))),
+        (
+            header::LOCATION,
+            Some(link(&format!("/v1/sweeps/{}", sweep.id))),
+        ),
         (header::RETRY_AFTER, Some(POLL_AFTER_S.to_string())),
         (name, submitted.replayed.then(|| "true".to_owned())),
     ];

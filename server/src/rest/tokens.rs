@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::{bodies, call::Call};
 use crate::{
+    address::link,
     error::ApiError,
     token::Token,
     verbs::tokens::{self as verbs, NewToken},
@@ -26,7 +27,7 @@ pub(super) struct List {
 pub(super) async fn create(mut call: Call) -> Result<Response, ApiError> {
     let request = bodies::token(&call.json().await?)?;
     let new = verbs::create(&call.service.store, &call.caller, request).await?;
-    let location = format!("/v1/tokens/{}", new.token.id);
+    let location = link(&format!("/v1/tokens/{}", new.token.id));
     let headers = [(header::LOCATION, location)];
     Ok((StatusCode::CREATED, headers, shown_once(new)).into_response())
 }

@@ -275,6 +275,7 @@ pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> 
         reason: source.reason,
         failure: source.failure.clone(),
         result: source.result_available,
+        warnings: source.warnings.clone(),
     };
     lifecycle::end_job(change, &job, &ending).await
 }

@@ -125,6 +125,7 @@ impl Store {
         // a client was told that it ends: what was found before the solver noticed that is a partial result
         let canceled = Ending {
             result: ending.result.min(ResultAvailable::Partial),
+            warnings: ending.warnings.clone(),
             ..Ending::canceled()
         };
         let ending = match self.is_asked_to_stop(&job) {

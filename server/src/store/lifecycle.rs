@@ -1,6 +1,7 @@
 //! The lifecycle of one job: its attempts start, and it ends. Every change of status goes through `set_status`.
 
 use serde::{Deserialize, Serialize};
+use solver::solution::Warning;
 
 use super::{
     change::Change,
@@ -26,6 +27,9 @@ pub struct Ending {
     pub failure: Option<Failure>,
     /// The result that is stored with it.
     pub result: ResultAvailable,
+    /// The worst warnings of that result.
+    #[serde(default)]
+    pub warnings: Vec<Warning>,
 }
 
 impl Ending {
@@ -37,6 +41,7 @@ impl Ending {
             reason,
             failure: None,
             result: ResultAvailable::None,
+            warnings: vec![],
         }
     }
 
@@ -53,6 +58,7 @@ impl Ending {
             reason: Some(reason),
             failure,
             result: ResultAvailable::None,
+            warnings: vec![],
         }
     }
 }
@@ -63,7 +69,7 @@ pub(super) async fn start_attempt(change: &mut Change<'_>, job: &Job) -> Result<
     set_status(change, job, Status::Running).await?;
     sqlx::query(
         "update job set attempt = attempt + 1, started_at = ?, progress = null, result_available = 'none',
-                        checksum = null where id = ?",
+                        warnings = null, checksum = null where id = ?",
     )
     .bind(now.micros())
     .bind(job.key)
@@ -86,16 +92,19 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
         .as_ref()
         .map(serde_json::to_string)
         .transpose()?;
+    let warnings = (!ending.warnings.is_empty()).then(|| serde_json::to_string(&ending.warnings));
+    let warnings = warnings.transpose()?;
     // the results of finished load steps are kept, whatever the status
     let result = ending.result.max(job.result_available);
     set_status(change, job, ending.status).await?;
     sqlx::query(
-        "update job set reason = ?, failure = ?, result_available = ?, finished_at = ?, coalesced_into = null,
+        "update job set reason = ?, failure = ?, result_available = ?, warnings = ?, finished_at = ?, coalesced_into = null,
                         solver_version = ?, checksum = null where id = ?",
     )
     .bind(ending.reason.map(<&str>::from))
     .bind(failure)
     .bind(<&str>::from(result))
+    .bind(warnings)
     .bind(now.micros())
     .bind(env!("CARGO_PKG_VERSION"))
     .bind(job.key)

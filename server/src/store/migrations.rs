@@ -11,7 +11,7 @@ use super::error::{Result, StoreError};
 
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 10] = [
+const STEPS: [(i64, &str, &str); 11] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -57,6 +57,11 @@ const STEPS: [(i64, &str, &str); 10] = [
         10,
         "space",
         include_str!("../../../migrations/0010_space.sql"),
+    ),
+    (
+        11,
+        "warnings",
+        include_str!("../../../migrations/0011_warnings.sql"),
     ),
 ];
 
@@ -116,7 +121,7 @@ pub(super) async fn check(connection: &mut SqliteConnection) -> Result<()> {
                 return Err(StoreError::Schema(format!(
                     "the store was written by a later version of this program (its tables have step {version}, the last one known \
                      here is {}); use that version",
-                    STEPS.len()
+                    STEPS.last().map_or(0, |(version, ..)| *version)
                 )));
             }
             Some(step) if step.checksum[..] != checksum[..] => {

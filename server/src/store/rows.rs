@@ -10,8 +10,9 @@ use super::{
     error::{Record, Result, StoreError},
 };
 use crate::{
+    address::link,
     caller::Owners,
-    job::{Job, JobId, Limits, Status, SweepId},
+    job::{Job, JobId, Limits, Reason, ResultAvailable, Status, SweepId},
     time::Time,
 };
 
@@ -102,6 +103,7 @@ fn parse(row: &SqliteRow) -> Result<Job> {
     let (started_at, finished_at) = (time("started_at")?, time("finished_at")?);
     let progress: Option<&str> = row.try_get("progress")?;
     let failure: Option<&str> = row.try_get("failure")?;
+    let warnings: Option<&str> = row.try_get("warnings")?;
     let other = |name: &str| -> Result<Option<JobId>> {
         let uuid: Option<&str> = row.try_get(name)?;
         let read = |text| Uuid::try_parse(text).map(JobId).map_err(|_| corrupt(name));
@@ -113,7 +115,7 @@ fn parse(row: &SqliteRow) -> Result<Job> {
         None if status.is_terminal() => key,
         None => partial_key(key),
     };
-    Ok(Job {
+    let mut job = Job {
         key,
         result_key,
         coalesced_into: row.try_get("coalesced_into")?,
@@ -149,9 +151,12 @@ fn parse(row: &SqliteRow) -> Result<Job> {
         },
         failure: failure.map(serde_json::from_str).transpose()?,
         result_available: word("result_available", row.try_get("result_available")?)?,
+        warnings: warnings.map_or(Ok(vec![]), serde_json::from_str)?,
         stored_bytes: None,
-        links: links(id),
-    })
+        links: BTreeMap::new(),
+    };
+    job.links = links(&job);
+    Ok(job)
 }
 
 /// The value of a word in this column.
@@ -163,17 +168,51 @@ fn corrupt(column: &str) -> StoreError {
     Record::named("record").damaged(format!("job.{column}"))
 }
 
-fn links(id: JobId) -> BTreeMap<String, String> {
+fn links(job: &Job) -> BTreeMap<String, String> {
+    let id = job.id;
+    let plots = plots(job).into_iter().map(|plot| {
+        (
+            format!("plot_{plot}"),
+            link(&format!("/v1/jobs/{id}/plots/{plot}.svg")),
+        )
+    });
     ["problem", "events", "history", "result", "fields", "cancel"]
         .into_iter()
-        .map(|verb| (verb.to_string(), format!("/v1/jobs/{id}/{verb}")))
+        .map(|verb| (verb.to_string(), link(&format!("/v1/jobs/{id}/{verb}"))))
         .chain([
-            ("self".to_string(), format!("/v1/jobs/{id}")),
+            ("self".to_string(), link(&format!("/v1/jobs/{id}"))),
             // a template: the boundaries are those of the problem
             (
                 "profiles".to_string(),
-                format!("/v1/jobs/{id}/profiles/{{boundary}}"),
+                link(&format!("/v1/jobs/{id}/profiles/{{boundary}}")),
             ),
         ])
+        .chain(plots)
         .collect()
+}
+
+/// The figures that can be drawn of a job, as far as its row says.
+fn plots(job: &Job) -> Vec<&'static str> {
+    // without contacts there are no iterations; a job that was answered by another one has counted none itself
+    let iterations = job.progress.as_ref().is_some_and(|made| made.iteration > 0);
+    let has_contacts = iterations || job.cached_from.is_some();
+    let has_result = job.result_available != ResultAvailable::None;
+    // fields are those of a solver that came to an end by itself
+    let solved = job.status == Status::Succeeded
+        || (job.status == Status::Failed
+            && job.reason.is_some_and(|reason| {
+                matches!(
+                    reason,
+                    Reason::NotConverged | Reason::ContactCycling | Reason::FalseConvergence
+                )
+            }));
+    [
+        ("mesh", true),
+        ("convergence", has_contacts),
+        ("profile", has_contacts && has_result),
+        ("deformed", solved && has_result),
+    ]
+    .into_iter()
+    .filter_map(|(plot, is_there)| is_there.then_some(plot))
+    .collect()
 }

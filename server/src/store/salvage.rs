@@ -9,7 +9,7 @@ use super::{
     database::{Store, Writing, with_advice},
     error::{Result, StoreError},
     rows::seal,
-    sizes, tokens,
+    sizes,
 };
 use crate::job::{Job, ResultAvailable};
 

@@ -15,6 +15,7 @@ use super::{
     submission::NewSweep,
 };
 use crate::{
+    address::link,
     caller::Owners,
     job::{Reason, Status, SweepId},
     sweep::{MemberCounts, MemberRow, Sweep},
@@ -614,10 +615,10 @@ async fn described(connection: &mut SqliteConnection, row: &SqliteRow) -> Result
 
 fn links(id: SweepId) -> BTreeMap<String, String> {
     let verbs = ["results", "events", "cancel"];
-    let below = verbs.map(|verb| (verb.to_owned(), format!("/v1/sweeps/{id}/{verb}")));
+    let below = verbs.map(|verb| (verb.to_owned(), link(&format!("/v1/sweeps/{id}/{verb}"))));
     let others = [
-        ("self".to_owned(), format!("/v1/sweeps/{id}")),
-        ("jobs".to_owned(), format!("/v1/jobs?sweep={id}")),
+        ("self".to_owned(), link(&format!("/v1/sweeps/{id}"))),
+        ("jobs".to_owned(), link(&format!("/v1/jobs?sweep={id}"))),
     ];
     below.into_iter().chain(others).collect()
 }

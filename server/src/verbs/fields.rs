@@ -8,7 +8,7 @@ use futures_util::Stream;
 
 use super::{
     loaded::{Loaded, Shared},
-    results::{no_result, with_result},
+    results::{Found, no_result, with_result},
     service::{Service, detached},
 };
 use crate::{
@@ -35,7 +35,7 @@ pub async fn fields(
     service: &Service,
     caller: &Caller,
     id: JobId,
-) -> Result<StoredFields, ApiError> {
+) -> Result<Found<StoredFields>, ApiError> {
     let found = with_result(service, caller, id).await?;
     let job = found.job.clone();
     drop(found);
@@ -49,11 +49,15 @@ pub async fn fields(
             (loaded.info.clone(), Some(loaded))
         }
     };
-    Ok(StoredFields {
+    let content = StoredFields {
         info,
         id,
         result_key,
         loaded,
+    };
+    Ok(Found {
+        available: job.result_available,
+        content,
     })
 }
 
@@ -133,15 +137,25 @@ pub async fn converted_fields(
     caller: &Caller,
     id: JobId,
     format: Format,
-) -> Result<Vec<u8>, ApiError> {
+) -> Result<Found<Vec<u8>>, ApiError> {
     let read = async {
         let found = with_result(service, caller, id).await?;
         let job = found.job.clone();
         drop(found);
         are_kept(service, &job).await?;
         let loaded = load(service, job.result_key).await?;
-        loaded.ok_or_else(|| no_result(&job))
+        let content = loaded.ok_or_else(|| no_result(&job))?;
+        Ok(Found {
+            available: job.result_available,
+            content,
+        })
     };
-    let written = service.work_on(read, move |loaded| formats::fields(&loaded.fields, format));
+    let written = service.work_on(read, move |found| {
+        let content = formats::fields(&found.content.fields, format)?;
+        Ok::<_, String>(Found {
+            available: found.available,
+            content,
+        })
+    });
     written.await?.map_err(ApiError::internal)
 }

@@ -1,6 +1,6 @@
 //! The iterations of a job, a row each.
 
-use super::{jobs, service::Service};
+use super::{jobs, results::Found, service::Service};
 use crate::{
     caller::Caller,
     error::ApiError,
@@ -24,14 +24,24 @@ pub async fn history(
     caller: &Caller,
     id: JobId,
     max_points: Option<i64>,
-) -> Result<Vec<TimedIteration>, ApiError> {
+) -> Result<Found<Vec<TimedIteration>>, ApiError> {
     let load = async {
         let mut found = jobs::snapshot(service, caller, id).await?;
-        StoredHistory::load(service, &mut found).await
+        let available = found.job.result_available;
+        let content = StoredHistory::load(service, &mut found).await?;
+        Ok(Found { available, content })
     };
-    let mut rows = service.work_on(load, StoredHistory::read).await??;
+    let read = |found: Found<StoredHistory>| {
+        let available = found.available;
+        let content = found.content.read()?;
+        Ok::<_, ApiError>(Found { available, content })
+    };
+    let mut rows = service.work_on(load, read).await??;
     if let Some(most) = max_points {
-        downsample(&mut rows, usize::try_from(most).unwrap_or(usize::MAX));
+        downsample(
+            &mut rows.content,
+            usize::try_from(most).unwrap_or(usize::MAX),
+        );
     }
     Ok(rows)
 }

@@ -1,6 +1,6 @@
 //! One job: get, edit, cancel, delete; and its problem.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use schemars::JsonSchema;
 use serde_json::json;
@@ -92,6 +92,50 @@ pub async fn problem(service: &Service, caller: &Caller, id: JobId) -> Result<Pr
 
 /// Changes the editable fields of a job, if it has one of these versions; `None`: whatever its version.
 pub async fn update(
+    service: &Arc<Service>,
+    caller: &Caller,
+    id: JobId,
+    edit: Edit,
+    labels: LabelChanges,
+    versions: Option<Vec<i64>>,
+) -> Result<Job, ApiError> {
+    if labels.is_empty() {
+        return replace(service, caller, id, edit, versions).await;
+    }
+    // Changed on what there is, which must not change meanwhile; a job changes its version a few times in its life.
+    const MOST_TRIES: u32 = 10;
+    let mut tries = 0;
+    loop {
+        let job = get(service, caller, id).await?;
+        if versions
+            .as_ref()
+            .is_some_and(|known| !known.contains(&job.version))
+        {
+            return Err(ApiError::StaleVersion(job.version));
+        }
+        let mut all = job.labels;
+        for (name, value) in &labels {
+            match value {
+                Some(text) => drop(all.insert(name.clone(), text.clone())),
+                None => drop(all.remove(name)),
+            }
+        }
+        let edit = Edit {
+            labels: Some(all),
+            ..edit.clone()
+        };
+        tries += 1;
+        match replace(service, caller, id, edit, Some(vec![job.version])).await {
+            Err(ApiError::StaleVersion(_)) if versions.is_none() && tries < MOST_TRIES => {}
+            other => return other,
+        }
+    }
+}
+
+/// Labels that are set, or removed.
+pub type LabelChanges = BTreeMap<String, Option<String>>;
+
+async fn replace(
     service: &Arc<Service>,
     caller: &Caller,
     id: JobId,

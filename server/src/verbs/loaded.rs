@@ -21,7 +21,7 @@ pub(super) struct Loaded {
 
 /// The fields that are being sent, by the key of their result: who asks for the same ones shares them.
 #[derive(Debug, Default)]
-pub struct FieldsInMemory(Mutex<HashMap<i64, Weak<Loaded>>>);
+pub(super) struct FieldsInMemory(Mutex<HashMap<i64, Weak<Loaded>>>);
 
 impl FieldsInMemory {
     pub(super) fn find(&self, key: i64) -> Option<Arc<Loaded>> {

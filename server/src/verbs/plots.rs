@@ -13,7 +13,7 @@ use super::{
     fields,
     history::StoredHistory,
     jobs, profiles,
-    results::{self, read},
+    results::{self, Found, read},
     service::Service,
 };
 use crate::{
@@ -67,7 +67,7 @@ pub async fn plot(
     id: JobId,
     plot: Plot,
     style: Style,
-) -> Result<String, ApiError> {
+) -> Result<Found<String>, ApiError> {
     // loaded once there is a permit, so that waiting requests use no memory
     let load = async {
         let mut found = match plot {
@@ -144,8 +144,12 @@ pub async fn plot(
             fields: &fields,
             stored: stored.as_ref(),
         };
-        plot::draw(plot, style, &problem, &parts).map_err(|reason| {
+        let drawn = plot::draw(plot, style, &problem, &parts).map_err(|reason| {
             ApiError::NotFound(format!("{id} has no plot {}: {reason}", plot.as_str()))
+        });
+        Ok(Found {
+            available: job.result_available,
+            content: drawn?,
         })
     };
     service.work_on(load, draw).await?

@@ -4,7 +4,7 @@ use serde_json::json;
 use solver::solution::{ContactProfile, sample};
 
 use super::{
-    results::{StepResult, read, with_result},
+    results::{Found, StepResult, read, with_result},
     service::Service,
 };
 use crate::{
@@ -95,8 +95,9 @@ pub async fn profile(
     boundary: &str,
     step: Option<&str>,
     points: Points,
-) -> Result<ContactProfile, ApiError> {
+) -> Result<Found<ContactProfile>, ApiError> {
     let mut found = with_result(service, caller, id).await?;
+    let available = found.job.result_available;
     let step = match step {
         None => None,
         Some(wanted) => Some(step_number(&steps(&mut found).await?, wanted, id)?),
@@ -133,14 +134,16 @@ pub async fn profile(
     };
     drop(found);
     let Points::Spaced(count) = points else {
-        return read(&bytes);
+        let content = read(&bytes)?;
+        return Ok(Found { available, content });
     };
     let sampling = service.work(move || {
         let nodes = read(&bytes)?;
         let friction = friction.map_or(Ok(ContactProfile::default()), |bytes| read(&bytes))?;
         Ok(sample(&nodes, &friction, count))
     });
-    sampling.await?
+    let content = sampling.await?;
+    content.map(|content| Found { available, content })
 }
 
 /// The stored profile at all points; in results of older versions, that at nodes.

@@ -34,6 +34,18 @@ pub struct JobResult {
     pub steps: Vec<StepResult>,
 }
 
+/// Something of a job's result, and whether that result is all there will be.
+#[derive(Debug)]
+pub struct Found<T> {
+    /// As in the job, at the time at which this was read.
+    pub available: ResultAvailable,
+    /// What was asked for.
+    pub content: T,
+}
+
+/// The header, and over gRPC the metadata, of answers with it.
+pub const RESULT_AVAILABLE: &str = "result-available";
+
 /// The scalars of a job that has a result.
 pub async fn result(service: &Service, caller: &Caller, id: JobId) -> Result<JobResult, ApiError> {
     let load = async {

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     caller::{Caller, Scope},
-    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Web},
+    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Tls, Web},
     error::ApiError,
     fake,
     formats::Format,
@@ -38,6 +38,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
     let config = Config {
         listen: ([127, 0, 0, 1], 0).into(),
         data: folder.to_path_buf(),
+        tls: Tls::default(),
         web: Web::default(),
         trust: ProxyTrust::default(),
         allow_unauthenticated: false,
@@ -123,7 +124,10 @@ async fn a_job_of_another_is_not_found_by_any_verb() {
         pinned: Some(true),
         ..Edit::default()
     };
-    unknown("update", jobs::update(service, bob, id, edit, None).await);
+    unknown(
+        "update",
+        jobs::update(service, bob, id, edit, jobs::LabelChanges::new(), None).await,
+    );
     unknown("cancel", jobs::cancel(service, bob, id).await);
     let again = retry::retry(service, bob, id, Default::default(), None);
     unknown("retry", again.await);

@@ -168,6 +168,7 @@ async fn a_job_answered_in_the_commit_of_another_submission_is_reported_as_chang
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
+        warnings: vec![],
     };
     let parts = Parts::of_a_summary();
     let finished = rig
@@ -275,6 +276,7 @@ async fn a_job_whose_turn_it_is_is_coalesced_into_one_that_runs_on_the_same_inpu
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
+        warnings: vec![],
     };
     let last = FinalBatch::default();
     rig.store

@@ -14,6 +14,14 @@ pub(super) fn json<T: JsonSchema>() -> Content {
     vec![("application/json", SchemaGenerator::subschema_for::<T>)]
 }
 
+/// A merge patch, RFC 7396.
+pub(super) fn merge_patch<T: JsonSchema>() -> Content {
+    vec![(
+        "application/merge-patch+json",
+        SchemaGenerator::subschema_for::<T>,
+    )]
+}
+
 pub(super) fn bytes(media: &'static str) -> Content {
     vec![(media, anything)]
 }

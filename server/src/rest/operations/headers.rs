@@ -17,6 +17,16 @@ pub(super) fn etag() -> Description {
     header("ETag", text(), "The job's version, as a strong entity tag")
 }
 
+/// Whether a result is final.
+pub(super) fn result_available() -> Description {
+    let words = json!({ "type": "string", "enum": ["none", "partial", "final"] });
+    header(
+        "Result-Available",
+        words,
+        "As in the job: partial if it has not ended or has not converged; none while only its iterations are there",
+    )
+}
+
 /// How long to wait before polling.
 pub(super) fn retry_after() -> Description {
     let seconds = json!({ "type": "integer", "minimum": 0, "maximum": u32::MAX });

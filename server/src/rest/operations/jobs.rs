@@ -1,7 +1,7 @@
 //! Jobs: submit, get, list, wait, watch, edit, cancel, delete.
 
 use super::{
-    content::{json, lines, nothing, stream, submission, the_problem},
+    content::{json, lines, merge_patch, nothing, stream, submission, the_problem},
     headers::{etag, location, preference_applied, replayed, retry_after},
     operation::{CANCEL, Operation, READ, SUBMIT, delete, get, patch, post, put},
 };
@@ -10,7 +10,7 @@ use crate::{
     event::Event,
     job::Job,
     rest::{
-        bodies::{Edits, Retry, Submission, Submissions},
+        bodies::{Edits, MergePatch, Retry, Submission, Submissions},
         events::{self, LAST_EVENT_ID},
         filters::FILTERS,
         headers::{Header, IF_MATCH, IF_NONE_MATCH, PREFER},
@@ -85,7 +85,7 @@ pub(super) fn operations() -> Vec<Operation> {
         patch(SUBMIT, "/v1/jobs/{id}", (ID, IF_MATCH), jobs::update)
             .rpcs(&["UpdateJob"])
             .summary("Changes the name, labels or priority of a job, or whether it is kept permanently")
-            .body(json::<Edits>())
+            .body([json::<Edits>(), merge_patch::<MergePatch>()].concat())
             .answers(200, "The changed job", json::<Job>())
             .with([etag()])
             .fails(&[Code::InvalidProblem, Code::StaleVersion, Code::StorageFull]),

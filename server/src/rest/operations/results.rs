@@ -4,6 +4,7 @@ use solver::solution::{ContactProfile, Fields};
 
 use super::{
     content::{bytes, data, json, nothing},
+    headers::result_available,
     operation::{CANCEL, Content, Operation, READ, delete, get},
 };
 use crate::{
@@ -33,6 +34,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .rpcs(&["GetResult"])
             .summary("Returns the summary of a job's result, and one for each load step")
             .answers(200, "The summary", json::<JobResult>())
+            .with([result_available()])
             .fails(NO_RESULT),
         get(
             READ,
@@ -77,6 +79,7 @@ pub(super) fn operations() -> Vec<Operation> {
         .rest_only("GetPlot")
         .summary("Draws a figure: mesh, deformed body, stresses along the contact, convergence")
         .answers(200, "The figure", bytes("image/svg+xml"))
+        .with([result_available()])
         .fails(NO_RESULT),
     ]
 }
@@ -97,11 +100,11 @@ impl Operation {
             "The part, and the size of the file",
         );
         self.answers(200, meaning, content)
-            .with([tag(), name(), whole_file])
+            .with([tag(), name(), whole_file, result_available()])
             .answers(206, "The requested part", parts)
-            .with([tag(), name(), part])
+            .with([tag(), name(), part, result_available()])
             .answers(304, "The file has not changed", nothing())
-            .with([tag()])
+            .with([tag(), result_available()])
             .fails(&[Code::NotAcceptable, Code::RangeNotSatisfiable])
     }
 }

@@ -32,6 +32,7 @@ async fn solved(store: &Store, new: NewJob) -> Job {
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
+        warnings: vec![],
     };
     let parts = result();
     assert!(store.write_before_end(key, attempt, &parts).await.unwrap());
@@ -475,6 +476,7 @@ async fn a_page_of_one_job_that_cannot_be_read_disturbs_no_other() {
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
+        warnings: vec![],
     };
     let large = format!("\"{}\"", "r".repeat(50_000)).into_bytes();
     let result = Parts(vec![

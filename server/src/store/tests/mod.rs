@@ -171,6 +171,7 @@ async fn a_job_that_another_answers_keeps_no_piece_of_its_interrupted_attempt() 
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
+        warnings: vec![],
     };
     let (parts, last) = (Parts::of_a_summary(), FinalBatch::default());
     let finished = store

@@ -49,6 +49,7 @@ async fn run_all(store: &Store) {
         reason: None,
         failure: None,
         result: crate::job::ResultAvailable::Final,
+        warnings: vec![],
     };
     while let Some(Claim { job, .. }) = store.claim_next().await.unwrap().0 {
         let (last, parts) = (FinalBatch::default(), Parts::of_a_summary());

@@ -24,6 +24,7 @@ async fn solved(store: &Store, owner: &str, input: &str, bytes: usize) -> Job {
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
+        warnings: vec![],
     };
     let body = (0u64..).map(|n| (n.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 56) as u8);
     let parts = Parts(vec![

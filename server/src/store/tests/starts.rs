@@ -276,6 +276,7 @@ async fn a_canceled_job_does_not_succeed_even_if_the_cancel_could_not_be_stored(
             reason: None,
             failure: None,
             result: ResultAvailable::Final,
+            warnings: vec![],
         };
         let parts = Parts(vec![]);
         let last = FinalBatch::default();

@@ -184,6 +184,7 @@ impl World {
             reason: None,
             failure: None,
             result: ResultAvailable::Final,
+            warnings: vec![],
         };
         self.end(key, attempt, ending, Some(parts)).await
     }

@@ -1,0 +1,283 @@
+//! What an answer says of itself: warnings on a job, partial results, links to plots, merge patches, compression.
+
+use reqwest::{Method, StatusCode, header};
+use serde_json::{Value, json};
+use service::pb::{self, job_service_client::JobServiceClient};
+use suite::{
+    example_json,
+    harness::{Server, answer, block},
+};
+
+use crate::server;
+
+/// A body that never touches the obstacle.
+fn untouched() -> Value {
+    let mut problem = block(4, 4);
+    problem["contacts"][0]["indentation"] = json!(-1);
+    problem
+}
+
+/// Operations: GetJob, ListJobs
+#[tokio::test]
+async fn a_job_has_the_warnings_of_its_result() {
+    let server = server().await;
+    let body = json!({ "problem": untouched(), "name": "first" });
+    let job = server.solve(&body).await;
+    assert_eq!(job["status"], "succeeded");
+    assert_eq!(job["warnings"][0]["code"], "no_contact", "{job:#}");
+    let id = job["id"].as_str().unwrap();
+    let result = server.json(&format!("/v1/jobs/{id}/result")).await;
+    let all = result["summary"]["warnings"].as_array().unwrap();
+    assert!(all.contains(&job["warnings"][0]));
+
+    // one that it answers, the list, and the other protocol
+    let again = server.solve(&body).await;
+    assert_eq!(again["cached_from"], job["id"]);
+    assert_eq!(again["warnings"], job["warnings"]);
+    let list = server.json("/v1/jobs?name=first").await;
+    assert_eq!(list["jobs"][0]["warnings"], job["warnings"]);
+    let mut grpc = JobServiceClient::connect(server.url.clone()).await.unwrap();
+    let request = pb::GetJobRequest { id: id.into() };
+    let by_grpc = grpc.get_job(request).await.unwrap().into_inner();
+    assert_eq!(by_grpc.warnings[0].code, "no_contact");
+
+    let body = json!({ "problem": example_json("rectangular_punch") });
+    let plain = server.solve(&body).await;
+    let codes: Vec<_> = plain["warnings"].as_array().unwrap().iter().collect();
+    assert!(
+        codes.iter().all(|one| one["code"] != "no_contact"),
+        "{codes:?}"
+    );
+}
+
+/// Operations: GetPlot
+#[tokio::test]
+async fn a_job_links_to_the_plots_that_there_are() {
+    let server = server().await;
+    let links = |job: &Value| -> Vec<(String, String)> {
+        let links = job["links"].as_object().unwrap();
+        let plots = links.iter().filter(|(name, _)| name.starts_with("plot_"));
+        plots
+            .map(|(name, link)| (name.clone(), link.as_str().unwrap().to_owned()))
+            .collect()
+    };
+    let mut elastic = block(4, 4);
+    elastic["contacts"] = json!([]);
+    elastic["loads"] = json!([{ "boundary": "top", "pressure": 1 }]);
+    let mut unfinished = example_json("rectangular_punch");
+    unfinished["solver"] = json!({ "max_iterations": 3 });
+    for (problem, count) in [(block(4, 4), 4), (elastic, 2), (unfinished, 4)] {
+        let job = server.solve(&json!({ "problem": problem })).await;
+        let found = links(&job);
+        assert_eq!(found.len(), count, "{found:?} of {job:#}");
+        for (name, link) in found {
+            let plot = server.get(&link).send().await.unwrap();
+            assert_eq!(plot.status(), StatusCode::OK, "{name}");
+            let whole = if job["status"] == "succeeded" {
+                "final"
+            } else {
+                "partial"
+            };
+            assert_eq!(plot.headers()["result-available"], whole, "{name}");
+        }
+    }
+    answer(server.post("/v1/queue/pause")).await;
+    let body = json!({ "problem": block(4, 4), "cache": "off" });
+    let waiting = server.create_job(&body).await;
+    assert_eq!(links(&waiting).len(), 1);
+}
+
+/// Operations: GetResult, ListIterations, GetProfile, StreamResult
+#[tokio::test]
+async fn a_partial_result_says_so_everywhere() {
+    let server = server().await;
+    let mut problem = example_json("rectangular_punch");
+    problem["solver"] = json!({ "max_iterations": 3 });
+    let job = server.solve(&json!({ "problem": problem })).await;
+    assert_eq!(job["reason"], "not_converged", "{job:#}");
+    let id = job["id"].as_str().unwrap();
+    for path in [
+        "result",
+        "history",
+        "profiles/top",
+        "fields",
+        "fields?format=json",
+        "plots/profile.svg",
+    ] {
+        let found = server
+            .get(&format!("/v1/jobs/{id}/{path}"))
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(found.status(), StatusCode::OK, "{path}");
+        assert_eq!(found.headers()["result-available"], "partial", "{path}");
+    }
+    let mut grpc = JobServiceClient::connect(server.url.clone()).await.unwrap();
+    let request = pb::GetProfileRequest {
+        id: id.into(),
+        boundary: "top".into(),
+        ..Default::default()
+    };
+    let profile = grpc.get_profile(request).await.unwrap();
+    assert_eq!(
+        profile.metadata().get("result-available").unwrap(),
+        "partial"
+    );
+    let request = pb::StreamResultRequest {
+        id: id.into(),
+        ..Default::default()
+    };
+    let stream = grpc.stream_result(request).await.unwrap();
+    assert_eq!(
+        stream.metadata().get("result-available").unwrap(),
+        "partial"
+    );
+    let request = pb::ListIterationsRequest {
+        id: id.into(),
+        ..Default::default()
+    };
+    let rows = grpc.list_iterations(request).await.unwrap();
+    assert_eq!(rows.metadata().get("result-available").unwrap(), "partial");
+}
+
+async fn patch(server: &Server, id: &str, body: &str) -> (StatusCode, Value) {
+    let request = server
+        .request(Method::PATCH, &format!("/v1/jobs/{id}"))
+        .header(header::CONTENT_TYPE, "application/merge-patch+json")
+        .body(body.to_owned());
+    answer(request).await
+}
+
+/// Operations: UpdateJob
+#[tokio::test]
+async fn a_merge_patch_changes_single_labels() {
+    let server = server().await;
+    let labels = json!({ "a": "1", "b": "2" });
+    let body = json!({ "problem": block(2, 2), "name": "n", "labels": labels, "priority": 3 });
+    let job = server.solve(&body).await;
+    let id = job["id"].as_str().unwrap();
+    let (status, job) = patch(&server, id, r#"{"labels": {"a": null, "c": "3"}}"#).await;
+    assert_eq!(
+        (status, &job["labels"]),
+        (StatusCode::OK, &json!({ "b": "2", "c": "3" }))
+    );
+    assert_eq!((&job["name"], &job["priority"]), (&json!("n"), &json!(3)));
+    let stale = server
+        .request(Method::PATCH, &format!("/v1/jobs/{id}"))
+        .header(header::CONTENT_TYPE, "application/merge-patch+json")
+        .header(header::IF_MATCH, "\"1\"")
+        .body(r#"{"labels": {"b": null}}"#);
+    assert_eq!(answer(stale).await.0, StatusCode::PRECONDITION_FAILED);
+    let nulls = r#"{"name": null, "labels": null, "priority": null, "pinned": null}"#;
+    let (_, job) = patch(&server, id, nulls).await;
+    assert_eq!(
+        (
+            &job["name"],
+            &job["labels"],
+            &job["priority"],
+            &job["pinned"]
+        ),
+        (&json!(null), &json!({}), &json!(0), &json!(false))
+    );
+    // at most 64 in the end, of which a patch may only add some
+    let many = |from: u32| -> String {
+        let labels: serde_json::Map<_, _> = (from..from + 40)
+            .map(|n| (n.to_string(), json!("x")))
+            .collect();
+        json!({ "labels": labels }).to_string()
+    };
+    assert_eq!(patch(&server, id, &many(0)).await.0, StatusCode::OK);
+    let (status, refused) = patch(&server, id, &many(40)).await;
+    assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{refused:#}");
+    let (status, _) = patch(&server, id, r#"{"labels": {"a": 1}}"#).await;
+    assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
+    // another patch format, and a merge patch where none is meant
+    for (method, path, kind) in [
+        (
+            Method::PATCH,
+            format!("/v1/jobs/{id}"),
+            "application/json-patch+json",
+        ),
+        (
+            Method::POST,
+            "/v1/jobs".to_owned(),
+            "application/merge-patch+json",
+        ),
+    ] {
+        let request = server
+            .request(method, &path)
+            .header(header::CONTENT_TYPE, kind);
+        assert_eq!(
+            answer(request.body("{}")).await.0,
+            StatusCode::UNSUPPORTED_MEDIA_TYPE
+        );
+    }
+}
+
+/// Operations: StreamResult, GetJob
+#[tokio::test]
+async fn large_answers_are_compressed_for_those_who_take_it() {
+    let server = server().await;
+    let job = server.solve(&json!({ "problem": block(20, 20) })).await;
+    let id = job["id"].as_str().unwrap();
+    for path in ["fields?format=json", "fields?format=vtu"] {
+        let path = format!("/v1/jobs/{id}/{path}");
+        let plain = server.get(&path).send().await.unwrap();
+        let (tag, vary) = (
+            plain.headers()["etag"].clone(),
+            plain.headers().get_all("vary"),
+        );
+        assert!(vary.iter().any(|value| value == "Accept-Encoding"));
+        assert!(!plain.headers().contains_key("content-encoding"));
+        let plain = plain.bytes().await.unwrap();
+
+        let asked = |name: &'static str, value: &str| {
+            server
+                .get(&path)
+                .header("Accept-Encoding", "gzip")
+                .header(name, value)
+                .send()
+        };
+        let packed = asked("accept", "*/*").await.unwrap();
+        let headers = packed.headers().clone();
+        assert_eq!(headers["content-encoding"], "gzip");
+        assert_eq!(headers["etag"], format!("W/{}", tag.to_str().unwrap()));
+        for gone in [
+            "content-length",
+            "content-digest",
+            "repr-digest",
+            "accept-ranges",
+        ] {
+            assert!(!headers.contains_key(gone), "{gone}");
+        }
+        let packed = packed.bytes().await.unwrap();
+        assert!(
+            packed.starts_with(b"\x1f\x8b") && packed.len() < plain.len() / 2,
+            "{}",
+            packed.len()
+        );
+        // gzip ends with the length of what it holds
+        let length = u32::from_le_bytes(packed[packed.len() - 4..].try_into().unwrap());
+        assert_eq!(length as usize, plain.len());
+
+        let known = asked("if-none-match", headers["etag"].to_str().unwrap());
+        assert_eq!(known.await.unwrap().status(), StatusCode::NOT_MODIFIED);
+        let part = asked("range", "bytes=0-99999").await.unwrap();
+        assert_eq!(part.status(), StatusCode::PARTIAL_CONTENT);
+        assert!(!part.headers().contains_key("content-encoding"));
+        assert_eq!(
+            part.bytes().await.unwrap()[..],
+            plain[..100_000.min(plain.len())]
+        );
+    }
+    // small ones keep their strong tag, and streams come as they are
+    for path in [format!("/v1/jobs/{id}"), format!("/v1/jobs/{id}/events")] {
+        let found = server
+            .get(&path)
+            .header("Accept-Encoding", "gzip")
+            .send()
+            .await
+            .unwrap();
+        assert!(!found.headers().contains_key("content-encoding"), "{path}");
+    }
+}
