@@ -2,7 +2,12 @@
 //! and stops in reverse order.
 
 use std::{
-    env, net::SocketAddr, os::unix::process::CommandExt, path::Path, process::Command, sync::Arc,
+    env,
+    net::SocketAddr,
+    os::unix::process::CommandExt,
+    path::Path,
+    process::Command,
+    sync::{Arc, OnceLock},
     time::Duration,
 };
 
@@ -13,13 +18,14 @@ use tonic_health::server::HealthReporter;
 use tracing::{info, warn};
 
 use crate::{
-    config::{Config, Isolation},
+    config::{Config, Isolation, LogFormat},
     error::{number_of, size},
     grpc,
     listener::{self, Listener},
     memory::Budget,
     queue::{Processes, Queue, Solver},
     rest,
+    spans::{self, Exporting},
     store::{self, Store, StoreError},
     verbs::Service,
 };
@@ -35,6 +41,8 @@ pub struct App {
     closing: CancellationToken,
     server: JoinHandle<()>,
     grace: Duration,
+    /// Sends spans, if they are wanted.
+    exporting: Option<Exporting>,
 }
 
 /// The service cannot listen at this address.
@@ -44,6 +52,9 @@ pub struct CannotListen(SocketAddr);
 
 /// The argument of the program by which it serves as a worker process.
 pub const WORKER: &str = "worker";
+
+/// How the log of this process is written, and that of its worker processes, which goes to the same place.
+static LOG_FORMAT: OnceLock<LogFormat> = OnceLock::new();
 
 /// This program, as a worker process.
 fn worker_process() -> Command {
@@ -55,6 +66,9 @@ fn worker_process() -> Command {
     };
     let mut command = Command::new(program);
     command.arg0(env!("CARGO_PKG_NAME")).arg(WORKER); // as `ps` shows it
+    if let Some(format) = LOG_FORMAT.get() {
+        command.env("SIGNORINI_LOG_FORMAT", format.to_string());
+    }
     command
 }
 
@@ -106,11 +120,16 @@ impl App {
         if let Some(most) = config.max_running_per_owner {
             store.set_most_running_of_owner(most.into());
         }
+        let _ = LOG_FORMAT.set(config.telemetry.log_format); // there is one service in a process, but in tests
         let solver = match config.isolation {
             Isolation::Thread => Solver::Threads(solver::solve_on),
             Isolation::Process => Solver::Processes(Processes::new(worker_process)),
         };
         refuse_open(config, &store)?;
+        let exporting = match &config.telemetry.otlp_endpoint {
+            Some(endpoint) => Some(spans::start(endpoint).context("spans cannot be sent")?),
+            None => None,
+        };
         let queue = Queue::new(store.clone(), solver, config.workers);
         let service = Arc::new(Service::new(config, store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;
@@ -142,6 +161,7 @@ impl App {
             closing,
             server,
             grace: Duration::from_secs(config.grace_s),
+            exporting,
         })
     }
 
@@ -168,6 +188,9 @@ impl App {
             .is_err()
         {
             warn!("the store did not close in time");
+        }
+        if let Some(exporting) = self.exporting {
+            exporting.stop().await;
         }
         info!("stopped");
     }

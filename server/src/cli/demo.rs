@@ -14,7 +14,7 @@ use tonic::transport::Channel;
 use super::{examples, exit::Exit, output, report};
 use crate::{
     app::App,
-    config::{Config, Isolation, MemoryBudget, ProxyTrust, Web},
+    config::{Config, Isolation, MemoryBudget, ProxyTrust, Telemetry, Web},
     event::{Event, Payload},
     job::{Job, Status},
     pb::{self, job_service_client::JobServiceClient},
@@ -46,6 +46,7 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         max_received_bytes: 64 << 20,
         max_sent_bytes: 128 << 20,
         grace_s: 5,
+        telemetry: Telemetry::default(),
     };
     let app = App::start(&config).await?;
     let shown = show(&app.url()).await;

@@ -14,7 +14,9 @@ mod object;
 mod origin;
 
 // Answers.
+mod asked;
 mod data;
+mod observe;
 mod refused;
 mod reply;
 mod while_valid;

@@ -119,6 +119,8 @@ pub(super) fn cors(web: &Web) -> Option<CorsLayer> {
         "last-event-id",
         "prefer",
         "range",
+        "traceparent",
+        "x-request-id",
     ];
     let read = [
         "content-range",
@@ -127,6 +129,7 @@ pub(super) fn cors(web: &Web) -> Option<CorsLayer> {
         "location",
         "preference-applied",
         "retry-after",
+        "x-request-id",
     ];
     (!origins.is_empty()).then(|| {
         CorsLayer::new()

@@ -7,8 +7,8 @@ use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 
 use super::{
-    authenticate::authenticate, call::AppState, limits::limits, openapi::openapi, operations,
-    origin, reply,
+    authenticate::authenticate, call::AppState, limits::limits, observe, openapi::openapi,
+    operations, origin, reply,
 };
 use crate::{error::ApiError, verbs::Service};
 
@@ -34,4 +34,6 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn_with_state(service, limits))
         .layer(middleware::from_fn(reply::errors_as_documents))
+        // outermost: it sees what the client is answered
+        .layer(middleware::from_fn(observe::observe))
 }
