@@ -3,13 +3,14 @@ own client library, spans by a collector made from OpenTelemetry's own contract.
 
     telemetry.py
 
-Metrics: names, types, explanations; counters never fall; hostile paths add no labels.
+Metrics: names, types, explanations; counters never fall; hostile paths add no labels; every name in the dashboard exists.
 Spans: of requests over REST and gRPC and of their jobs, with the ids of the client's trace. A collector that is absent or
 does not answer costs no request anything.
 """
 
 import concurrent.futures
 import contextlib
+import json
 import os
 import re
 import socket
@@ -29,6 +30,7 @@ from outside import TOP, Server, check, equal, example, percentile, submission
 sys.path.insert(0, str(TOP / "tests/clients"))
 from reflected import Client  # noqa: E402
 
+DASHBOARD = TOP / "contrib/grafana/signorini.json"
 TRACE, SPAN = "4bf92f3577b34da6a3ce929d0e0e4736", "00f067aa0ba902b7"
 TRACEPARENT = "00-%s-%s-01" % (TRACE, SPAN)
 # labels and the most values that each may have; le is that of histograms
@@ -135,6 +137,15 @@ def test_metrics():
             check(all(len(text) < 80 for text in found), "values of %s: %r" % (label, found))
         check(len(after) < len(before) + 150, "%d series became %d" % (len(before), len(after)))
         equal(value("signorini_grpc_requests_total", of=after, rpc="unknown", code="UNIMPLEMENTED"), 400, "unknown calls")
+
+        names = {name for name, _ in after}
+        dashboard = json.loads(DASHBOARD.read_text(encoding="utf-8"))
+        expressions = [target["expr"] for panel in dashboard["panels"] for target in panel.get("targets", [])]
+        expressions += [variable["query"]["query"] for variable in dashboard["templating"]["list"] if variable["type"] == "query"]
+        check(len(expressions) > 20, "%d expressions" % len(expressions))
+        for expression in expressions:
+            used = set(re.findall(r"\b(?:signorini|process)_[a-z_]+", expression))
+            check(used and used <= names, "%s: unknown are %r" % (expression, used - names))
 
         created = server.call("POST", "/v1/tokens", {"name": "test", "owner": "root", "scopes": ["admin"]})
         equal(server.call("GET", "/metrics").status, 401, "metrics without a token, where there are tokens")
