@@ -2,7 +2,12 @@
 //! and stops in reverse order.
 
 use std::{
-    env, net::SocketAddr, os::unix::process::CommandExt, path::Path, process::Command, sync::Arc,
+    env,
+    net::SocketAddr,
+    os::unix::process::CommandExt,
+    path::Path,
+    process::Command,
+    sync::{Arc, OnceLock},
     time::Duration,
 };
 
@@ -14,13 +19,14 @@ use tracing::{info, warn};
 
 use crate::{
     address,
-    config::{Config, Isolation},
+    config::{Config, Isolation, LogFormat},
     error::{number_of, size},
     grpc,
     listener::{self, Listener, Tls},
     memory::Budget,
     queue::{self, Processes, Queue, Solver},
     rest,
+    spans::{self, Exporting},
     store::{self, Retention, Store, StoreError},
     verbs::Service,
 };
@@ -37,6 +43,8 @@ pub struct App {
     server: JoinHandle<()>,
     grace: Duration,
     tls: Option<Arc<Tls>>,
+    /// Sends spans, if they are wanted.
+    exporting: Option<Exporting>,
 }
 
 /// Shows whether the service is alive.
@@ -76,6 +84,9 @@ pub struct CannotListen(SocketAddr);
 /// The argument of the program by which it serves as a worker process.
 pub const WORKER: &str = "worker";
 
+/// How the log of this process is written, and that of its worker processes, which goes to the same place.
+static LOG_FORMAT: OnceLock<LogFormat> = OnceLock::new();
+
 /// This program, as a worker process.
 fn worker_process() -> Command {
     // it leads to the running program even after an upgrade has replaced the file
@@ -86,6 +97,9 @@ fn worker_process() -> Command {
     };
     let mut command = Command::new(program);
     command.arg0(env!("CARGO_PKG_NAME")).arg(WORKER); // as `ps` shows it
+    if let Some(format) = LOG_FORMAT.get() {
+        command.env("SIGNORINI_LOG_FORMAT", format.to_string());
+    }
     command
 }
 
@@ -154,11 +168,16 @@ impl App {
         if let Some(most) = config.max_running_per_owner {
             store.set_most_running_of_owner(most.into());
         }
+        let _ = LOG_FORMAT.set(config.telemetry.log_format); // there is one service in a process, but in tests
         let solver = match config.isolation {
             Isolation::Thread => Solver::Threads(solver::solve_on),
             Isolation::Process => Solver::Processes(Processes::new(worker_process)),
         };
         refuse_open(config, &store)?;
+        let exporting = match &config.telemetry.otlp_endpoint {
+            Some(endpoint) => Some(spans::start(endpoint).context("spans cannot be sent")?),
+            None => None,
+        };
         let queue = Queue::new(store.clone(), solver, config.workers);
         let service = Arc::new(Service::new(config, store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;
@@ -195,6 +214,7 @@ impl App {
             server,
             grace: Duration::from_secs(config.grace_s),
             tls,
+            exporting,
         })
     }
 
@@ -235,6 +255,9 @@ impl App {
             .is_err()
         {
             warn!("the store did not close in time");
+        }
+        if let Some(exporting) = self.exporting {
+            exporting.stop().await;
         }
         info!("stopped");
     }

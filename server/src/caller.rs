@@ -6,6 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use strum::VariantArray;
 
+use crate::trace::Trace;
+
 /// What a caller may do.
 #[derive(
     Clone,
@@ -68,6 +70,8 @@ pub struct Caller {
     owner: String,
     /// What this caller may do.
     scopes: BTreeSet<Scope>,
+    /// The request that they make, as a part of a trace.
+    trace: Option<Trace>,
 }
 
 impl Caller {
@@ -76,6 +80,7 @@ impl Caller {
         Caller {
             owner: owner.into(),
             scopes: scopes.into_iter().collect(),
+            trace: None,
         }
     }
 
@@ -87,6 +92,16 @@ impl Caller {
     /// Someone who is not identified, and may use open operations only.
     pub fn anonymous() -> Caller {
         Caller::new("", [])
+    }
+
+    /// The same caller, making this request.
+    pub fn in_trace(self, trace: Option<Trace>) -> Caller {
+        Caller { trace, ..self }
+    }
+
+    /// The request that they make.
+    pub fn trace(&self) -> Option<&Trace> {
+        self.trace.as_ref()
     }
 
     /// Whether this caller may use operations that need this scope.

@@ -1,20 +1,22 @@
-//! The configuration: one struct, whose doc comments are the help text, in the order of the help.
+//! The configuration: one struct, whose doc comments are the help text, in the order of the help. Each option has an
+//! environment variable, whose name without `SIGNORINI_` and in small letters is its key in a file (`cli/settings.rs`).
 
 use std::{
     net::{IpAddr, SocketAddr, ToSocketAddrs},
     path::PathBuf,
 };
 
-use axum::http::HeaderName;
+use axum::http::{HeaderName, Uri};
 use clap::{Args, ValueEnum};
 use ipnet::IpNet;
 use schemars::JsonSchema;
 use serde::Serialize;
 use strum::Display;
+use tracing_subscriber::filter::{LevelFilter, Targets};
 
 use crate::caller::{Caller, Scope};
 
-/// Settings of the service. A flag takes precedence over its environment variable.
+/// Settings of the service. A flag takes precedence over its environment variable, and that over the file.
 #[derive(Clone, Debug, Args)]
 pub struct Config {
     /// Address and port of both REST and gRPC; port 0 chooses a free one
@@ -140,6 +142,10 @@ pub struct Config {
         value_name = "SECONDS"
     )]
     pub grace_s: u64,
+
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the command
+    pub telemetry: Telemetry,
 }
 
 impl Config {
@@ -247,6 +253,50 @@ impl Tls {
         let (cert, key) = (self.cert.clone()?, self.key.clone()?);
         Some(TlsFiles { cert, key })
     }
+}
+
+/// What the service tells about itself.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Telemetry {
+    /// What the log tells: a level (error, warn, info, debug, trace), and levels of parts of the program, as
+    /// info,service::request=warn [default: RUST_LOG, or info]
+    #[arg(long, env = "SIGNORINI_LOG", value_name = "FILTER", value_parser = log_filter)]
+    pub log: Option<Targets>,
+
+    /// Lines of the log as text, or each as a JSON object
+    #[arg(long, env = "SIGNORINI_LOG_FORMAT", value_enum, default_value_t = LogFormat::Text)]
+    pub log_format: LogFormat,
+
+    /// Send spans of requests and jobs to a collector at this address by OTLP over gRPC, as `http://127.0.0.1:4317` [default: no
+    /// spans are sent]
+    #[arg(long, env = "SIGNORINI_OTLP_ENDPOINT", value_name = "URL", value_parser = endpoint)]
+    pub otlp_endpoint: Option<String>,
+}
+
+/// How the log is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Display)]
+#[strum(serialize_all = "lowercase")]
+pub enum LogFormat {
+    /// For people
+    #[default]
+    Text,
+    /// For programs
+    Json,
+}
+
+/// What a log tells, as a level and levels of targets.
+pub fn log_filter(text: &str) -> Result<Targets, String> {
+    const EXPECTED: &str = "expected a level (off, error, warn, info, debug, trace), or levels of targets, such as \
+                            info,service::request=warn";
+    // `Targets` takes any other word for a target: `verbose` would be a log without a line
+    // or for a level, if it is empty
+    let level = |part: &str| !part.is_empty() && part.parse::<LevelFilter>().is_ok();
+    let word = |part: &&str| !part.contains('=') && !level(part);
+    if let Some(word) = text.split(',').map(str::trim).find(word) {
+        return Err(format!("{EXPECTED} ({word:?} is no level)"));
+    }
+    text.parse()
+        .map_err(|error| format!("{EXPECTED} ({error})"))
 }
 
 /// What requests from browsers may name.
@@ -378,6 +428,21 @@ fn path_prefix(text: &str) -> Result<String, String> {
         Some(rest) if path.len() <= MOST && rest.split('/').all(named) => Ok(path.to_owned()),
         _ => Err("expected a path of letters, digits and - . _ ~, such as /signorini".into()),
     }
+}
+
+/// The address of a collector. Its credentials are a secret, and so no part of a setting, which is shown.
+fn endpoint(text: &str) -> Result<String, String> {
+    const EXPECTED: &str = "expected an address as http://127.0.0.1:4317, without a user or a path; a collector on the same \
+                            machine or network passes spans on over TLS";
+    let found: Result<Uri, _> = text.parse();
+    let good = found.is_ok_and(|uri| {
+        let host = uri
+            .authority()
+            .is_some_and(|host| !host.as_str().contains('@'));
+        let bare = matches!(uri.path(), "" | "/") && uri.query().is_none();
+        host && bare && uri.scheme_str() == Some("http")
+    });
+    good.then(|| text.to_owned()).ok_or_else(|| EXPECTED.into())
 }
 
 /// Scheme, host and port, as a browser writes them.

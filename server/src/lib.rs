@@ -10,12 +10,17 @@ pub mod event;
 pub mod job;
 pub mod memory;
 pub mod mesh;
+pub mod metrics;
 pub mod sweep;
 pub mod time;
 pub mod token;
+pub mod trace;
 
 // The messages of gRPC, read within a limit.
 pub mod codec;
+
+// What is told of requests and jobs to a collector.
+pub mod spans;
 
 // Errors of requests, their parameters, the bytes that they may occupy, and the configuration.
 pub mod config;

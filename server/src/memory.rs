@@ -58,6 +58,11 @@ impl Budget {
         self.bytes
     }
 
+    /// What the running jobs have reserved of it.
+    pub fn reserved(&self) -> u64 {
+        self.state().reserved
+    }
+
     /// Reserves what a job is estimated to need; none if it does not fit beside the running ones. A job of unknown
     /// need, or of more than the budget (which was larger when it was accepted), takes all of it: it runs alone. Kept
     /// bodies that no job uses are dropped for it, if it fits then.

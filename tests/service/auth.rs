@@ -42,6 +42,7 @@ const POLICY: &[(&str, &[&str])] = &[
             "GetProto",
             "GetDocs",
             "GetDocsFile",
+            "GetMetrics",
         ],
     ),
     (

@@ -14,7 +14,7 @@ use tonic::transport::Channel;
 use super::{client, examples, exit::Exit, output, report};
 use crate::{
     app::App,
-    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Tls, Web},
+    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Telemetry, Tls, Web},
     event::{Event, Payload},
     job::{Job, Status},
     pb::{self, job_service_client::JobServiceClient},
@@ -50,6 +50,7 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         max_received_bytes: 64 << 20,
         max_sent_bytes: 128 << 20,
         grace_s: 5,
+        telemetry: Telemetry::default(),
     };
     let app = App::start(&config).await?;
     let shown = show(&app.url()).await;

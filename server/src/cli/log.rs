@@ -2,9 +2,16 @@
 
 use std::{io::IsTerminal, panic, time::Duration};
 
+use clap::ValueEnum;
 use tracing::{error, level_filters::LevelFilter, warn};
 use tracing_appender::non_blocking::{ErrorCounter, NonBlocking, NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::{filter::Targets, prelude::*};
+
+use super::log_line::Lines;
+use crate::{
+    config::{LogFormat, Telemetry, log_filter},
+    metrics::METRICS,
+};
 
 /// Lines that wait to be written; further ones are lost, and counted. A line has some 200 bytes.
 const MOST_WAITING: usize = 10_000;
@@ -17,22 +24,68 @@ pub(super) struct Log {
     _writing: WorkerGuard,
 }
 
-/// Starts the log, filtered by SIGNORINI_LOG, e.g. `info,service=debug`.
+/// Starts the log of a command, filtered by SIGNORINI_LOG or RUST_LOG. A filter that cannot be read is told and ignored: it
+/// may have been meant for another program.
 pub(super) fn start(default: LevelFilter) -> Log {
-    let asked = std::env::var("SIGNORINI_LOG").unwrap_or_default();
-    let filter = filter(&asked, default);
-    let (writer, writing): (NonBlocking, _) = NonBlockingBuilder::default()
+    let filter = of_variable("SIGNORINI_LOG").or_else(|| of_variable("RUST_LOG"));
+    let filter = filter.unwrap_or_else(|| Targets::new().with_default(default));
+    write(filter, LogFormat::Text)
+}
+
+/// Starts the log of a worker process, which is a part of that of the service.
+pub(super) fn start_of_worker() -> Log {
+    let asked = std::env::var("SIGNORINI_LOG_FORMAT").unwrap_or_default();
+    let format = LogFormat::from_str(&asked, true).unwrap_or_default();
+    write(Targets::new().with_default(LevelFilter::WARN), format)
+}
+
+/// Starts the log of the service.
+pub(super) fn start_as(settings: &Telemetry) -> Log {
+    let filter = settings.log.clone().or_else(|| of_variable("RUST_LOG"));
+    let filter = filter.unwrap_or_else(|| Targets::new().with_default(LevelFilter::INFO));
+    write(filter, settings.log_format)
+}
+
+fn of_variable(name: &str) -> Option<Targets> {
+    let asked = std::env::var(name).ok()?;
+    if asked.trim().is_empty() {
+        return None;
+    }
+    match log_filter(&asked) {
+        Ok(filter) => Some(filter),
+        Err(expected) => {
+            eprintln!("signorini: {name}={asked:?} is ignored: {expected}");
+            None
+        }
+    }
+}
+
+fn write(filter: Targets, format: LogFormat) -> Log {
+    let (to, writing): (NonBlocking, _) = NonBlockingBuilder::default()
         .lossy(true)
         .buffered_lines_limit(MOST_WAITING)
         .finish(std::io::stderr());
-    let lost = writer.error_counter();
-    let lines = tracing_subscriber::fmt::layer()
-        .with_writer(writer)
+    let lost = to.error_counter();
+    let colours = format == LogFormat::Text && std::io::stderr().is_terminal();
+    let lines = Lines {
+        to,
+        format,
+        colours,
+    };
+    let layer = tracing_subscriber::fmt::layer()
+        .with_writer(lines)
         // a log that cannot be written must not end the process
         .log_internal_errors(false)
-        .with_ansi(std::io::stderr().is_terminal());
+        .with_ansi(colours);
+    let layer = match format {
+        LogFormat::Text => layer.boxed(),
+        LogFormat::Json => {
+            let json = layer.json().flatten_event(true);
+            json.with_current_span(false).with_span_list(false).boxed()
+        }
+    };
     tracing_subscriber::registry()
-        .with(lines)
+        .with(layer)
         .with(filter)
         .init();
     // The usual hook writes to standard error itself, and would wait for its reader.
@@ -58,6 +111,7 @@ pub(super) async fn report_lost_lines(lost: ErrorCounter) {
         let all = lost.dropped_lines();
         if all > reported {
             let lines = all - reported;
+            METRICS.log_lines_lost.inc_by(lines as u64);
             warn!(
                 lines,
                 "{lines} lines of this log were lost: they were not read in time"
@@ -67,35 +121,23 @@ pub(super) async fn report_lost_lines(lost: ErrorCounter) {
     }
 }
 
-/// What is logged. An invalid filter is reported and ignored.
-fn filter(asked: &str, default: LevelFilter) -> Targets {
-    let default = Targets::new().with_default(default);
-    if asked.trim().is_empty() {
-        return default;
-    }
-    asked.parse().unwrap_or_else(|error| {
-        eprintln!("signorini: SIGNORINI_LOG={asked} is ignored: {error}");
-        default
-    })
-}
-
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
     use tracing::Level;
 
     #[test]
-    fn a_log_filter_is_a_level_and_targets_or_the_default() {
+    fn a_log_filter_is_a_level_and_targets() {
         let debug = |asked| {
-            let filter = filter(asked, LevelFilter::WARN);
+            let filter = log_filter(asked).unwrap();
             ["service::queue", "hyper"].map(|target| filter.would_enable(target, &Level::DEBUG))
         };
         assert_eq!(debug("info,service=debug"), [true, false]);
         assert_eq!(debug("debug"), [true, true]);
-        for asked in ["", " ", "service=loud"] {
-            assert_eq!(debug(asked), [false, false], "{asked}");
-            let warnings = filter(asked, LevelFilter::WARN).would_enable("hyper", &Level::WARN);
-            assert!(warnings, "{asked}");
+        for wrong in ["service=loud", "verbose", "info,verbose", "info,"] {
+            let told = log_filter(wrong).unwrap_err();
+            assert!(told.starts_with("expected a level"), "{told}");
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod backup;
 mod client;
+mod config;
 mod demo;
 mod doctor;
 pub mod examples;
@@ -9,22 +10,24 @@ mod exit;
 mod explain;
 mod health;
 mod log;
+mod log_line;
 mod notify;
 mod output;
 mod report;
 mod restore;
 mod serve;
+mod settings;
 mod solve;
 mod sweep;
 mod token;
 
-use std::process::ExitCode;
+use std::{env, ffi::OsString, process::ExitCode};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use tracing::level_filters::LevelFilter;
 
 use self::exit::Exit;
-use crate::{app::WORKER, config::Config, error::ApiError, rest};
+use crate::{app::WORKER, error::ApiError, rest};
 
 /// Solves frictional contact problems, one at a time or as jobs of a service
 #[derive(Debug, Parser)]
@@ -39,7 +42,9 @@ enum Command {
     /// Start the service: REST and gRPC on one port. Exit code: 0 stopped, 3 cannot listen, 4 the folder cannot be used,
     /// 5 another server uses it, 6 its tables are of another program or version, 7 stored data is missing or damaged, 2 an
     /// invalid option, 1 anything else
-    Serve(Box<Config>),
+    Serve(Box<settings::Arguments>),
+    /// Show the settings of the service, and where they come from. Exit code: 0 printed, 2 an invalid setting
+    Config(config::Arguments),
     /// Check a store that no server is using, and save what is intact. Exit code: 0 all is intact, 4 the folder cannot be
     /// used, 5 a server uses it, 6 its tables are of another program or version, 7 something is missing or damaged, 2 an
     /// invalid option, 1 anything else
@@ -82,12 +87,25 @@ enum Command {
 
 /// Parses the command line and runs the command.
 pub fn main() -> ExitCode {
-    let Cli { command } = Cli::parse();
-    let exit = match command {
-        Command::Serve(config) => {
-            let lines = log::start(LevelFilter::INFO);
-            with_runtime(serve::run(&config, lines.lost()))
+    let line: Vec<OsString> = env::args_os().collect();
+    let (command, lines) = match settings::with_file(Cli::command(), &line) {
+        Ok(found) => found,
+        Err(wrong) => {
+            wrong
+                .iter()
+                .for_each(|wrong| eprintln!("signorini: {wrong}"));
+            return ExitCode::from(Exit::Invalid as u8);
         }
+    };
+    let matches = command.get_matches_from(line);
+    let Cli { command } = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let exit = match command {
+        Command::Serve(arguments) => {
+            let config = arguments.settings;
+            let written = log::start_as(&config.telemetry);
+            with_runtime(serve::run(&config, written.lost()))
+        }
+        Command::Config(arguments) => config::run(arguments, settings::of_serve(&matches), &lines),
         Command::Doctor(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
             with_runtime(doctor::run(arguments))
@@ -126,7 +144,7 @@ pub fn main() -> ExitCode {
             output::print(&text).map(|()| Exit::Ok).map_err(Into::into)
         }
         Command::Worker => {
-            let _lines = log::start(LevelFilter::WARN);
+            let _lines = log::start_of_worker();
             with_runtime(serve::work())
         }
         Command::Demo => {

@@ -8,7 +8,7 @@ use tokio::signal::unix::{Signal as Signals, SignalKind, signal};
 use tracing::{info, warn};
 use tracing_appender::non_blocking::ErrorCounter;
 
-use super::{exit::Exit, log, notify};
+use super::{exit::Exit, log, notify, settings};
 use crate::{app::App, config::Config, listener, queue};
 
 /// Serves until SIGTERM or SIGINT. `lost` counts the lines of the log that were lost.
@@ -22,6 +22,9 @@ pub(super) async fn run(config: &Config, lost: ErrorCounter) -> anyhow::Result<E
     let mut terminate = signal(SignalKind::terminate()).context("SIGTERM cannot be caught")?;
     let mut interrupt = signal(SignalKind::interrupt()).context("SIGINT cannot be caught")?;
     tokio::spawn(log::report_lost_lines(lost));
+    for (name, similar) in settings::unknown_variables() {
+        warn!("{name} is no setting, and is ignored; did you mean {similar}?");
+    }
     let app = App::start(config).await?;
     match app.tls() {
         Some(tls) => {

@@ -31,7 +31,7 @@ use super::{
     places::Place,
     tls::{Stream, Tls},
 };
-use crate::{caller::Peer, error::ApiError, rest};
+use crate::{caller::Peer, error::ApiError, metrics::METRICS, rest};
 
 /// Requests at the same time on one connection; a client with more waits or opens another one.
 const MOST_STREAMS: u32 = 100;
@@ -137,7 +137,10 @@ fn answer(
     let under_way = Arc::new(activity.begin());
     async move {
         let response = match reserved && !rest::is_probe(request.uri().path()) {
-            true => rest::refuse(&request, ApiError::Overloaded),
+            true => {
+                METRICS.refused_connections.inc();
+                rest::refuse(&request, ApiError::Overloaded)
+            }
             false => match router.oneshot(request).await {
                 Ok(response) => response,
                 Err(never) => match never {},

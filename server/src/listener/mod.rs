@@ -25,7 +25,7 @@ use tokio_util::{sync::CancellationToken, task::TaskTracker};
 use tracing::{info, warn};
 
 use self::places::Places;
-use crate::caller::Peer;
+use crate::{caller::Peer, metrics::METRICS};
 
 pub use files::most_connections;
 pub use tls::{BadCertificate, Tls, reload_on};
@@ -117,6 +117,7 @@ impl Listener {
             tracing::debug!(%error, "TCP_NODELAY: {error}");
         }
         let Some(place) = self.places.take() else {
+            METRICS.refused_connections.inc();
             if is_due(logged) {
                 warn!("a connection was closed at once: all places are taken by busy ones");
             }

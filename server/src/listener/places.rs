@@ -6,6 +6,7 @@ use std::{
 };
 
 use super::activity::Activity;
+use crate::metrics::METRICS;
 
 /// Places beyond the limit, when all others are busy: for the probes, and for telling others to come back.
 const RESERVED: usize = 16;
@@ -50,6 +51,8 @@ impl Places {
         open.last += 1;
         let (number, activity) = (open.last, Activity::new());
         open.connections.insert(number, activity.clone());
+        METRICS.connections.inc();
+        METRICS.accepted_connections.inc();
         Some(Place {
             places: self.clone(),
             number,
@@ -97,6 +100,7 @@ impl Place {
 impl Drop for Place {
     fn drop(&mut self) {
         self.places.open().connections.remove(&self.number);
+        METRICS.connections.dec();
     }
 }
 

@@ -19,6 +19,7 @@ mod feed;
 mod running;
 mod watchers;
 
+mod phases;
 mod report;
 
 mod ending;

@@ -10,6 +10,7 @@ use tracing::warn;
 
 use super::{
     backoff::Backoff,
+    phases::Phases,
     report::Report,
     running::{Running, StopReason},
     state::Queue,
@@ -51,12 +52,18 @@ pub(super) async fn record(
     job: &Job,
     running: &Running,
     mut reports: mpsc::Receiver<Report>,
-) -> FinalBatch {
+) -> (FinalBatch, Phases) {
     let (mut progress, mut one_level) = (Progress::default(), false);
+    let mut phases = Phases::default();
     loop {
         let batch = next_batch(&mut reports).await;
         let payloads = batch.events.iter().map(|(_, payload)| payload);
         one_level |= batch.one_level;
+        for (time, payload) in &batch.events {
+            if let Payload::Stage { stage } = payload {
+                phases.enter(*stage, *time);
+            }
+        }
         payloads.for_each(|payload| update_progress(&mut progress, payload, one_level));
         if batch.last {
             // rows of members are not stored together with the end: a row that is told is there, whatever becomes of it
@@ -69,10 +76,12 @@ pub(super) async fn record(
             {
                 break;
             }
-            return FinalBatch {
+            phases.end(Time::now());
+            let last = FinalBatch {
                 events: batch.events,
                 progress,
             };
+            return (last, phases);
         }
         if !store_with_retries(queue, job, running, &batch, &progress).await {
             break;
@@ -80,7 +89,8 @@ pub(super) async fn record(
     }
     running.stop(StopReason::Unwanted);
     while reports.recv().await.is_some() {} // the solver must not block on a full channel
-    FinalBatch::default()
+    phases.end(Time::now());
+    (FinalBatch::default(), phases)
 }
 
 /// Stores a batch, however long that takes; false when the attempt is no longer the current one, or the service

@@ -1,7 +1,7 @@
 //! The data that all tasks of the queue share, and the state of the queue.
 
 use std::{
-    collections::HashMap,
+    collections::{BTreeMap, HashMap},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
@@ -17,10 +17,13 @@ use crate::{
     job::Job,
     run::Solve,
     store::{self, Ending, FinalBatch, Store},
+    trace::Trace,
 };
 
 /// Reads of jobs by those who wait for them, at the same time: a few for each connection to the database.
 const MOST_TURNS: usize = 16;
+/// Jobs whose requests are remembered: as many as may wait, by default.
+const MOST_ORIGINS: usize = 100_000;
 
 /// Where problems are solved.
 #[derive(Debug)]
@@ -51,6 +54,9 @@ pub struct Queue {
     /// Held for reading while a job is claimed and entered into `running`, for writing while one is asked to stop, so
     /// that no cancel comes between the two steps.
     pub(super) claiming: RwLock<()>,
+    /// The requests that have submitted the jobs, by the keys of these, for spans. They are not stored: after a restart a
+    /// job begins a trace of its own.
+    origins: Mutex<BTreeMap<i64, Trace>>,
     /// Canceled when the service is about to stop.
     pub(super) stopping: CancellationToken,
 }
@@ -98,6 +104,7 @@ impl Queue {
             turns: Semaphore::new(MOST_TURNS),
             running: Mutex::default(),
             claiming: RwLock::default(),
+            origins: Mutex::default(),
             stopping: CancellationToken::new(),
         })
     }
@@ -176,6 +183,32 @@ impl Queue {
             self.wake.notify_one();
         }
         Ok(changed.is_some())
+    }
+
+    /// Remembers which request has submitted these jobs; of too many, the latest.
+    pub fn remember_origin(&self, jobs: &[Job], trace: &Trace) {
+        let mut origins = self.origins();
+        for job in jobs.iter().filter(|job| !job.status.is_terminal()) {
+            origins.insert(job.key, trace.clone());
+        }
+        while origins.len() > MOST_ORIGINS {
+            origins.pop_first();
+        }
+    }
+
+    /// The request that has submitted a job.
+    pub(super) fn origin(&self, key: i64) -> Option<Trace> {
+        self.origins().get(&key).cloned()
+    }
+
+    /// The job has ended, or its request is not needed any more.
+    pub(super) fn forget_origin(&self, key: i64) {
+        self.origins().remove(&key);
+    }
+
+    fn origins(&self) -> MutexGuard<'_, BTreeMap<i64, Trace>> {
+        // No code panics while it holds this lock.
+        self.origins.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Its worker has finished with the job. If it was requeued, another worker may have it already.

@@ -119,7 +119,7 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
     });
     let timer = tokio::spawn(time_out(queue.clone(), job.clone(), running.clone()));
     let timer = AbortOnDropHandle::new(timer);
-    let last = recorder::record(queue, &job, &running, reports).await;
+    let (last, phases) = recorder::record(queue, &job, &running, reports).await;
     let solved = solving.await.unwrap_or_else(|panic| {
         let panic = panic
             .try_into_panic()
@@ -128,12 +128,17 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
         Err(NoSolution::Internal(cause))
     });
     drop(timer);
+    let origin = queue.origin(job.key);
     if let Err(NoSolution::Lost(how)) = &solved {
+        phases.tell_spans(&job, origin.as_ref(), None);
         requeue_with_retries(queue, &job, how).await;
     } else {
         let (ending, parts) = ending_of_attempt(&job, solved, running.stop.get().copied());
         // when the service stops, it is requeued then or at the next start, and not canceled
-        if !(ending.status == Status::Canceled && queue.stopping.is_cancelled()) {
+        let requeued = ending.status == Status::Canceled && queue.stopping.is_cancelled();
+        phases.tell_spans(&job, origin.as_ref(), (!requeued).then_some(&ending));
+        queue.forget_origin(job.key);
+        if !requeued {
             end_with_retries(queue, &job, ending, last, parts).await;
         }
     }

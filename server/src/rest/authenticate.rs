@@ -20,6 +20,7 @@ use crate::{
     caller::{Access, Caller, Peer, Scope},
     error::ApiError,
     token::Presented,
+    trace::Trace,
     verbs::{
         Service,
         identify::{By, Credentials, Identified, identify},
@@ -35,8 +36,11 @@ pub(super) async fn authenticate(
 ) -> Response {
     match admit(&service, &request) {
         Ok(Identified { caller, by }) => {
-            request.extensions_mut().insert(caller);
-            let answer = next.run(request).await;
+            let trace = request.extensions().get::<Trace>().cloned();
+            let caller = caller.in_trace(trace);
+            request.extensions_mut().insert(caller.clone());
+            let mut answer = next.run(request).await;
+            answer.extensions_mut().insert(caller); // for `observe`
             while_valid(answer, service.store.clone(), by)
         }
         Err(error) => {

@@ -15,8 +15,10 @@ mod object;
 mod origin;
 
 // Answers.
+mod asked;
 mod compressed;
 mod data;
+mod observe;
 mod refused;
 mod reply;
 mod while_valid;

@@ -125,6 +125,8 @@ pub(super) fn cors(web: &Web) -> Option<CorsLayer> {
         "last-event-id",
         "prefer",
         "range",
+        "traceparent",
+        "x-request-id",
     ];
     let read = [
         "content-range",
@@ -134,6 +136,7 @@ pub(super) fn cors(web: &Web) -> Option<CorsLayer> {
         "preference-applied",
         "result-available",
         "retry-after",
+        "x-request-id",
     ];
     (!origins.is_empty()).then(|| {
         CorsLayer::new()

@@ -44,10 +44,7 @@ impl IntoResponse for ApiError {
 /// Writes errors as documents whose `instance` is the path of the request.
 pub(super) async fn errors_as_documents(request: Request, next: Next) -> Response {
     let path = request.uri().path().to_string();
-    let method = request.method().clone();
     let response = next.run(request).await;
-    let status = response.status();
-    tracing::debug!(http.method = %method, http.path = path, http.status = status.as_u16(), "{method} {path}: {status}");
     with_document(response, &path)
 }
 

@@ -11,7 +11,7 @@ use tower_http::catch_panic::CatchPanicLayer;
 
 use super::{
     authenticate::authenticate, call::AppState, compressed::compressed, forwarded, limits::limits,
-    openapi::openapi, operations, origin, reply,
+    observe, openapi::openapi, operations, origin, reply,
 };
 use crate::{error::ApiError, verbs::Service};
 
@@ -39,7 +39,9 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         .layer(middleware::from_fn_with_state(service, limits))
         .layer(middleware::from_fn(reply::errors_as_documents))
         // outside of the limits: the bytes that are compressed are counted, and there are never more of the others
-        .layer(middleware::from_fn(compressed));
+        .layer(middleware::from_fn(compressed))
+        // outermost: it sees what the client is answered
+        .layer(middleware::from_fn(observe::observe));
     match prefix.is_empty() {
         true => routes,
         // outside of the routes, which are found by the rest of the path

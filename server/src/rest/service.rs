@@ -16,6 +16,7 @@ use crate::{
     parameters::{Variable, Words},
     verbs::{
         info::{self as about, Info, Me, OwnerUse},
+        metrics::metrics as all_metrics,
         queue::{self as verbs, QueueState},
     },
 };
@@ -115,10 +116,22 @@ pub(super) async fn proto(_: Call) -> Result<impl IntoResponse, ApiError> {
     Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], TEXT))
 }
 
-/// Whether a request asks for one of the probes, which are answered even if all connections are busy.
+/// Whether a request asks for one of the probes, or for metrics, which are answered even if all connections are busy.
 pub fn is_probe(path: &str) -> bool {
-    matches!(path, "/livez" | "/readyz" | "/grpc.health.v1.Health/Check")
+    matches!(
+        path,
+        "/livez" | "/readyz" | "/metrics" | "/grpc.health.v1.Health/Check"
+    )
 }
+
+/// Metrics, in the text format of OpenMetrics, which Prometheus and others read whatever they ask for.
+pub(super) async fn metrics(call: Call) -> Result<impl IntoResponse, ApiError> {
+    let text = all_metrics(&call.service, &call.caller).await?;
+    Ok(([(header::CONTENT_TYPE, OPENMETRICS)], text))
+}
+
+/// The text format of metrics.
+pub(super) const OPENMETRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
 /// The process is alive.
 pub(super) async fn livez(_: Call) -> Result<&'static str, ApiError> {

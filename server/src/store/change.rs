@@ -21,6 +21,7 @@ use super::{
 use crate::{
     job::{Job, JobId, Reason, Status},
     memory::Budget,
+    metrics::METRICS,
     time::Time,
 };
 
@@ -45,6 +46,8 @@ pub(super) struct Change<'a> {
 /// What the log tells of a job.
 enum LogLine {
     Ended {
+        owner: String,
+        times_s: Option<(f64, f64)>,
         status: Status,
         reason: Option<Reason>,
         detail: String,
@@ -122,15 +125,19 @@ impl Change<'_> {
         self.touched.insert(key);
     }
 
-    /// A job ends: told in the log, once this is committed.
+    /// A job ends: told in the log and counted, once this is committed. `times_s`: how long it waited and ran, if it ran.
     pub(super) fn ended(
         &mut self,
-        id: JobId,
+        job: &Job,
+        times_s: Option<(f64, f64)>,
         status: Status,
         reason: Option<Reason>,
         detail: String,
     ) {
+        let (id, owner) = (job.id, job.owner.clone());
         let ended = LogLine::Ended {
+            owner,
+            times_s,
             status,
             reason,
             detail,
@@ -278,18 +285,23 @@ impl LogLine {
         match self {
             LogLine::Deleted => info!(job.id = %job, "job {job} was deleted"),
             LogLine::Ended {
+                owner,
+                times_s,
                 status,
                 reason,
                 detail,
             } => {
-                let (status, reason) = (<&str>::from(*status), reason.map(<&str>::from));
+                let (status, reason): (&'static str, _) =
+                    ((*status).into(), reason.map(<&'static str>::from));
                 let words = [
                     Some(status),
                     reason,
                     Some(&**detail).filter(|detail| !detail.is_empty()),
                 ];
                 let words: Vec<&str> = words.into_iter().flatten().collect();
-                info!(job.id = %job, status, reason, "job {job} has ended: {}", words.join(": "));
+                METRICS.job_ended(status, reason, *times_s);
+                let (wait_s, run_s) = times_s.unzip();
+                info!(job.id = %job, owner, job.status = status, job.reason = reason, wait_s, run_s, "job {job} has ended: {}", words.join(": "));
             }
         }
     }

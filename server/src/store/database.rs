@@ -8,7 +8,7 @@ use std::{
         Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock,
         atomic::{AtomicBool, AtomicI64, Ordering::Relaxed},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use sqlx::{
@@ -32,7 +32,7 @@ use super::{
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
-use crate::{memory::Budget, token::Tokens};
+use crate::{memory::Budget, metrics::METRICS, token::Tokens};
 
 /// How long a list waits for a connection.
 const LIST_PATIENCE: Duration = Duration::from_secs(5);
@@ -114,7 +114,9 @@ impl Writing {
         if is_full(&self.full_commits) {
             return Err(StoreError::Full);
         }
+        let start = Instant::now();
         self.tx.commit().await?;
+        METRICS.committed(start.elapsed());
         self.progress.reached(self.number);
         Ok(())
     }

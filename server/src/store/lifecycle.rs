@@ -14,6 +14,7 @@ use super::{
 use crate::{
     event::Payload,
     job::{Failure, Job, Reason, ResultAvailable, Status},
+    time::Time,
 };
 
 /// How a job ends.
@@ -127,7 +128,10 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
     change.changed(job.key);
     let failure = ending.failure.as_ref();
     let detail = failure.map_or_else(String::new, |failure| failure.detail.clone());
-    change.ended(job.id, ending.status, ending.reason, detail);
+    let seconds = |from: Time, to: Time| (to.micros() - from.micros()) as f64 / 1e6;
+    let started = job.started_at.filter(|_| job.status == Status::Running);
+    let times = started.map(|at| (seconds(job.created_at, at), seconds(at, now)));
+    change.ended(job, times, ending.status, ending.reason, detail);
     Ok(())
 }
 

@@ -53,6 +53,18 @@ impl Store {
         Ok(status.map(|word| word.parse().is_ok_and(Status::is_terminal)))
     }
 
+    /// How long the job has waited that was accepted first of those that wait for a worker.
+    pub async fn oldest_wait_s(&self) -> Result<Option<f64>> {
+        let Some(key) = self.waiting_jobs().oldest() else {
+            return Ok(None);
+        };
+        let created: Option<i64> = sqlx::query_scalar("select created_at from job where id = ?")
+            .bind(key)
+            .fetch_optional(&self.reader)
+            .await?;
+        Ok(created.map(|at| (self.now().micros() - at).max(0) as f64 / 1e6))
+    }
+
     /// The key of the newest job; 0 when there is none.
     pub async fn last_key(&self) -> Result<i64> {
         let last = sqlx::query_scalar("select coalesce(max(id), 0) from job");

@@ -223,6 +223,12 @@ impl WaitingJobs {
         self.coalesced + self.count
     }
 
+    /// The first that was accepted of those that wait for a worker: keys go by arrival.
+    pub(super) fn oldest(&self) -> Option<i64> {
+        let rows = self.rows.iter().flat_map(BTreeMap::values);
+        rows.filter_map(|keys| keys.first()).min().copied()
+    }
+
     /// The same of one owner.
     pub(super) fn len_of(&self, owner: &str) -> usize {
         let waiting = self.rows.iter().filter_map(|row| row.get(owner));

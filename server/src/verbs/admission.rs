@@ -17,6 +17,8 @@ use crate::{
     digest,
     error::{ApiError, Quota, QuotaOf},
     job::{Job, JobId},
+    metrics::METRICS,
+    spans,
     store::{Accepted, NewJob, NewSweep, QueueLimits, RequestKey, StoreError, Submission},
 };
 
@@ -217,6 +219,12 @@ pub(super) async fn enqueue_sweep(
         }
         other => other.into(),
     })?;
+    if !accepted.replayed {
+        METRICS.jobs_accepted.inc_by(accepted.jobs.len() as u64);
+        if let Some(trace) = caller.trace().filter(|_| spans::are_wanted()) {
+            service.queue.remember_origin(&accepted.jobs, trace);
+        }
+    }
     if let Some(id) = accepted.jobs.iter().find_map(|job| job.sweep) {
         let jobs = accepted.jobs.len();
         info!(sweep.id = %id, jobs, "sweep {id} accepted: {jobs} jobs");

@@ -42,6 +42,7 @@ pub mod tokens;
 
 // The service itself.
 pub mod info;
+pub mod metrics;
 pub mod queue;
 
 pub use service::{MAX_MESSAGE_BYTES, Service};

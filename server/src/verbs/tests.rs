@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     caller::{Caller, Scope},
-    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Tls, Web},
+    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Telemetry, Tls, Web},
     error::ApiError,
     fake,
     formats::Format,
@@ -58,6 +58,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
         max_received_bytes: 64 << 20,
         max_sent_bytes: 128 << 20,
         grace_s: 1,
+        telemetry: Telemetry::default(),
     };
     let store = Store::open(folder).await.unwrap();
     let queue = Queue::new(store.clone(), Solver::Threads(fake::solve), 1);

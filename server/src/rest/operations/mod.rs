@@ -106,7 +106,7 @@ mod tests {
             .collect();
         let named: BTreeSet<String> = named.into_iter().map(str::to_owned).collect();
         assert_eq!(named, rpcs());
-        // plots, pages and documents, and probes of HTTP have no rpc
+        // plots, pages and documents, and what is asked by HTTP everywhere (probes, metrics) have no rpc
         let rest_only = [
             "/v1/jobs/{id}/plots/{plot}",
             "/docs",
@@ -115,6 +115,7 @@ mod tests {
             "/proto/signorini.proto",
             "/v1/schema/problem.json",
             "/v1/errors/{code}",
+            "/metrics",
             "/livez",
             "/readyz",
         ];

@@ -78,6 +78,10 @@ pub(super) fn operations() -> Vec<Operation> {
             .rest_only("GetDocsFile")
             .summary("Returns a file that this page loads")
             .answers(200, "The file", PARTS.map(bytes).concat()),
+        get(READ, "/metrics", (), service::metrics)
+            .rest_only("GetMetrics")
+            .summary("Returns metrics for Prometheus: queue, jobs, solver, store, requests, memory, process")
+            .answers(200, "The text format of OpenMetrics", bytes("application/openmetrics-text")),
         probe("/livez", service::livez)
             .rest_only("Live")
             .summary("Answers as long as the process is alive")

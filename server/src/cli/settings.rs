@@ -1,0 +1,457 @@
+//! The settings of `serve`, from the command line, the environment and a file, in this order of precedence.
+//!
+//! The struct `Config` is the only list of them: what is known of a setting (its flag, variable, type and values) is asked
+//! of clap's description of it. Values of the file become defaults of the command line, so that precedence is clap's own. No
+//! crate that merges sources is used: it would read into a second, serializable form of that struct, and with other
+//! messages than those of flags.
+
+use std::{
+    any::TypeId,
+    collections::BTreeMap,
+    env,
+    ffi::{OsStr, OsString},
+    fmt, fs,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use clap::{
+    Arg, ArgAction, ArgMatches, Args, Command,
+    builder::Resettable,
+    error::{ContextKind, ContextValue, ErrorKind},
+};
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue},
+};
+
+use crate::config::Config;
+
+/// The settings, and where they are read from.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// File of settings, in TOML; each key is the name of an environment variable below without SIGNORINI_ and in small
+    /// letters. Flags and environment variables take precedence over it
+    #[arg(long = "config", env = "SIGNORINI_CONFIG", value_name = "FILE")]
+    file: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(super) settings: Config,
+}
+
+/// The id of the argument that names the file; it is not itself a setting.
+const FILE: &str = "file";
+/// What the names of all variables begin with.
+const PREFIX: &str = "SIGNORINI_";
+/// A larger file is not one of settings.
+const LARGEST_FILE: u64 = 1 << 20;
+/// Names that are so similar are proposed for one that is not known.
+const SIMILAR: f64 = 0.85;
+
+/// What is wrong with a setting, and where it stands.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Wrong {
+    place: String,
+    what: String,
+}
+
+impl fmt::Display for Wrong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.place, self.what)
+    }
+}
+
+/// Where each value of the file stands: `file:line`, by the id of its setting.
+pub(super) type Lines = BTreeMap<String, String>;
+
+/// The command with the values of the file as defaults, and where these stand; or all that is wrong with the file and with
+/// the environment. A command line that is wrong itself, or is no `serve`, stays as it is.
+pub(super) fn with_file(
+    command: Command,
+    line: &[OsString],
+) -> Result<(Command, Lines), Vec<Wrong>> {
+    // the environment is checked below, together with the file
+    let bare = change(command.clone(), &|arg| match is_setting(&arg) {
+        true => arg.env(Resettable::Reset),
+        false => arg,
+    });
+    let Ok(matches) = bare.try_get_matches_from(line) else {
+        return Ok((command, Lines::new()));
+    };
+    let Some(matches) = of_serve(&matches) else {
+        return Ok((command, Lines::new()));
+    };
+    let settings = settings();
+    let mut wrong = wrong_variables(&settings);
+    let mut values = BTreeMap::new();
+    if let Some(path) = matches.get_one::<PathBuf>(FILE) {
+        match read(path) {
+            Ok(text) => values = values_of(&text, path, &settings, &mut wrong),
+            Err(what) => wrong.push(Wrong {
+                place: path.display().to_string(),
+                what,
+            }),
+        }
+    }
+    if !wrong.is_empty() {
+        return Err(wrong);
+    }
+    let command = change(command, &|arg| {
+        let arg = match is_setting(&arg) && is_empty_variable(&arg) {
+            true => arg.env(Resettable::Reset),
+            false => arg,
+        };
+        match values.get(arg.get_id().as_str()) {
+            Some(Value { texts, .. }) if is_setting(&arg) => arg.default_values(texts),
+            _ => arg,
+        }
+    });
+    let lines = values.into_iter().map(|(id, value)| (id, value.place));
+    Ok((command, lines.collect()))
+}
+
+/// The matches of a command that takes settings.
+pub(super) fn of_serve(matches: &ArgMatches) -> Option<&ArgMatches> {
+    match matches.subcommand()? {
+        ("serve", matches) => Some(matches),
+        ("config", matches) => matches.subcommand_matches("show"),
+        _ => None,
+    }
+}
+
+/// All settings, as clap describes them, in the order of the help.
+pub(super) fn settings() -> Vec<Arg> {
+    let all = Config::augment_args(Command::new("serve"));
+    all.get_arguments().cloned().collect()
+}
+
+/// Changes the arguments of both commands that take settings.
+fn change(command: Command, with: &dyn Fn(Arg) -> Arg) -> Command {
+    command
+        .mut_subcommand("serve", |serve| serve.mut_args(with))
+        .mut_subcommand("config", |config| {
+            config.mut_subcommand("show", |show| show.mut_args(with))
+        })
+}
+
+fn is_setting(arg: &Arg) -> bool {
+    arg.get_id() != FILE && arg.get_env().is_some()
+}
+
+/// The key of a setting in a file.
+pub(super) fn key(arg: &Arg) -> String {
+    let name = arg.get_env().unwrap_or_default().to_string_lossy();
+    name.trim_start_matches(PREFIX).to_ascii_lowercase()
+}
+
+/// An empty variable counts as one that is not set, as many programs that start services write it.
+fn is_empty_variable(arg: &Arg) -> bool {
+    let value = arg.get_env().and_then(env::var_os);
+    value.is_some_and(|value| value.is_empty())
+}
+
+fn wrong_variables(settings: &[Arg]) -> Vec<Wrong> {
+    let mut wrong = vec![];
+    for arg in settings {
+        let Some(name) = arg.get_env() else { continue };
+        let Some(value) = env::var_os(name).filter(|value| !value.is_empty()) else {
+            continue;
+        };
+        if let Err(expected) = check(arg, &value) {
+            wrong.push(Wrong {
+                place: name.to_string_lossy().into_owned(),
+                what: format!("found {:?}, {expected}", value.to_string_lossy()),
+            });
+        }
+    }
+    wrong
+}
+
+/// Variables that look like a setting and are none, each with the one that is most similar.
+pub(super) fn unknown_variables() -> Vec<(String, String)> {
+    const OTHERS: [&str; 3] = ["SIGNORINI_CONFIG", "SIGNORINI_URL", "SIGNORINI_TOKEN"];
+    let settings = settings();
+    let known: Vec<&str> = settings
+        .iter()
+        .filter_map(|arg| arg.get_env()?.to_str())
+        .chain(OTHERS)
+        .collect();
+    let set = env::vars_os().filter_map(|(name, _)| name.into_string().ok());
+    set.filter(|name| name.starts_with(PREFIX) && !known.contains(&name.as_str()))
+        .filter_map(|name| {
+            let similar = most_similar(name.trim_start_matches(PREFIX), &known, |known| {
+                known.trim_start_matches(PREFIX)
+            })?;
+            Some((name, similar.to_string()))
+        })
+        .collect()
+}
+
+fn most_similar<'a, T>(name: &str, known: &'a [T], text: impl Fn(&T) -> &str) -> Option<&'a T> {
+    let alike = |one: &T| strsim::jaro_winkler(text(one), name);
+    let known = known.iter().map(|one| (alike(one), one));
+    let best = known.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (best.0 >= SIMILAR).then_some(best.1)
+}
+
+/// What a file may have for a setting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Text,
+    Integer,
+    Flag,
+    List,
+}
+
+impl Kind {
+    pub(super) fn of(arg: &Arg) -> Kind {
+        let integers = [
+            TypeId::of::<u16>(),
+            TypeId::of::<u32>(),
+            TypeId::of::<u64>(),
+            TypeId::of::<usize>(),
+        ];
+        let found = arg.get_value_parser().type_id();
+        match arg.get_action() {
+            ArgAction::SetTrue => Kind::Flag,
+            _ if arg.get_value_delimiter().is_some() => Kind::List,
+            _ if integers.iter().any(|integer| found == *integer) => Kind::Integer,
+            _ => Kind::Text,
+        }
+    }
+
+    fn expected(self) -> &'static str {
+        match self {
+            Kind::Text => "expected a text in quotation marks",
+            Kind::Integer => "expected an integer",
+            Kind::Flag => "expected true or false",
+            Kind::List => "expected a list of texts, such as [\"one\", \"another\"]",
+        }
+    }
+}
+
+/// Checks a value as clap would on the command line; an error is what was expected.
+fn check(arg: &Arg, value: &OsStr) -> Result<(), String> {
+    let kind = Kind::of(arg);
+    if kind == Kind::Flag {
+        let known = ["true", "false"].iter().any(|text| value == *text);
+        return known.then_some(()).ok_or_else(|| kind.expected().into());
+    }
+    let mut given = OsString::from(format!("--{}=", arg.get_long().unwrap_or_default()));
+    given.push(value);
+    let alone = Command::new("")
+        .no_binary_name(true)
+        .disable_help_flag(true);
+    let alone = alone.arg(arg.clone().env(Resettable::Reset).required(false));
+    let Err(error) = alone.try_get_matches_from([given]) else {
+        return Ok(());
+    };
+    let source = std::error::Error::source(&error).map(ToString::to_string);
+    let choices = error.get(ContextKind::ValidValue);
+    Err(match (error.kind(), choices, source) {
+        (_, Some(ContextValue::Strings(choices)), _) if !choices.is_empty() => {
+            format!("expected {}", choices.join(" or "))
+        }
+        (_, _, Some(source)) if source.starts_with("expected") => source,
+        (_, _, Some(source)) => format!("{} ({source})", kind.expected()),
+        (ErrorKind::InvalidUtf8, ..) => "expected UTF-8".into(),
+        _ => kind.expected().into(),
+    })
+}
+
+/// A setting in a file.
+#[derive(Debug)]
+struct Value {
+    /// One, or those of a list.
+    texts: Vec<String>,
+    place: String,
+}
+
+fn read(path: &Path) -> Result<String, String> {
+    let unread = |error: std::io::Error| format!("cannot be read: {error}");
+    // opening a pipe would wait for its writer
+    if !fs::metadata(path).map_err(unread)?.is_file() {
+        return Err("expected a file of settings, and this is not a file".into());
+    }
+    let mut text = String::new();
+    let file = fs::File::open(path).map_err(unread)?;
+    let read = file.take(LARGEST_FILE + 1).read_to_string(&mut text);
+    if read.map_err(unread)? as u64 > LARGEST_FILE {
+        return Err("expected a file of settings, and this has more than 1 MiB".into());
+    }
+    Ok(text)
+}
+
+/// The values of a file by the ids of their settings.
+fn values_of(
+    text: &str,
+    path: &Path,
+    settings: &[Arg],
+    wrong: &mut Vec<Wrong>,
+) -> BTreeMap<String, Value> {
+    let place = |start: usize| {
+        let before = text.as_bytes().get(..start).unwrap_or_default();
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        format!("{}:{line}", path.display())
+    };
+    let (table, mut errors) = DeTable::parse_recoverable(text);
+    errors.sort_by_key(|error| error.span().map_or(0, |span| span.start));
+    for error in &errors {
+        wrong.push(Wrong {
+            place: place(error.span().map_or(0, |span| span.start)),
+            what: format!("this is no TOML: {}", error.message()),
+        });
+    }
+    if !errors.is_empty() {
+        // what was made of the rest may be something else than what was meant
+        return BTreeMap::new();
+    }
+    let keys: Vec<(String, &Arg)> = settings.iter().map(|arg| (key(arg), arg)).collect();
+    let mut values = BTreeMap::new();
+    let mut entries: Vec<_> = table.get_ref().iter().collect();
+    entries.sort_by_key(|(name, _)| name.span().start);
+    for (name, value) in entries {
+        let (place, name) = (place(name.span().start), name.get_ref());
+        let Some((_, arg)) = keys.iter().find(|(key, _)| key == name) else {
+            let similar = most_similar(&name.replace('-', "_"), &keys, |(key, _)| key);
+            let hint = match similar {
+                Some((key, _)) => format!("did you mean {key}?"),
+                None => "`signorini config show` prints all that there are".into(),
+            };
+            let what = format!("{name:?}: there is no such setting; {hint}");
+            wrong.push(Wrong { place, what });
+            continue;
+        };
+        match texts(arg, value.get_ref()) {
+            Ok(texts) => {
+                values.insert(arg.get_id().to_string(), Value { texts, place });
+            }
+            Err(what) => wrong.push(Wrong {
+                place,
+                what: format!("{name}: {what}"),
+            }),
+        }
+    }
+    values
+}
+
+/// The texts of a value, checked.
+fn texts(arg: &Arg, value: &DeValue<'_>) -> Result<Vec<String>, String> {
+    let kind = Kind::of(arg);
+    let mismatch = |found: &DeValue<'_>| format!("found {}, {}", shown(found), kind.expected());
+    let texts: Vec<String> = match (kind, value) {
+        (Kind::Text, DeValue::String(text)) => vec![text.to_string()],
+        (Kind::Flag, DeValue::Boolean(flag)) => vec![flag.to_string()],
+        (Kind::Integer, DeValue::Integer(integer)) => {
+            let parsed = i128::from_str_radix(integer.as_str(), integer.radix());
+            vec![parsed.map_err(|_| mismatch(value))?.to_string()]
+        }
+        (Kind::List, DeValue::Array(list)) => {
+            let text = |item: &Spanned<DeValue<'_>>| match item.get_ref() {
+                DeValue::String(text) => Ok(text.to_string()),
+                other => Err(mismatch(other)),
+            };
+            list.iter().map(text).collect::<Result<_, _>>()?
+        }
+        _ => return Err(mismatch(value)),
+    };
+    for text in &texts {
+        if kind == Kind::List && text.contains(',') {
+            return Err(format!(
+                "found {text:?}, expected each as an element of its own"
+            ));
+        }
+        check(arg, OsStr::new(text)).map_err(|expected| {
+            let found = match kind {
+                Kind::Integer => text.clone(),
+                _ => format!("{text:?}"),
+            };
+            format!("found {found}, {expected}")
+        })?;
+    }
+    Ok(texts)
+}
+
+/// A value for a message: itself if it is short.
+fn shown(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) if text.len() <= 60 => format!("{text:?}"),
+        DeValue::Integer(integer) => integer.as_str().to_owned(),
+        DeValue::Boolean(flag) => flag.to_string(),
+        other => format!("a value of the type {}", other.type_str()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn read(text: &str) -> (BTreeMap<String, Value>, Vec<String>) {
+        let mut wrong = vec![];
+        let values = values_of(text, Path::new("a.toml"), &settings(), &mut wrong);
+        (values, wrong.iter().map(ToString::to_string).collect())
+    }
+
+    #[test]
+    fn every_setting_has_a_flag_a_variable_and_a_key_of_its_own() {
+        let mut keys = std::collections::BTreeSet::new();
+        for arg in settings() {
+            assert!(arg.get_long().is_some(), "{arg}");
+            let name = arg.get_env().unwrap().to_str().unwrap();
+            assert!(name.starts_with(PREFIX), "{name}");
+            assert!(keys.insert(key(&arg)), "{name}");
+        }
+        assert!(keys.contains("max_queued") && !keys.contains("config"));
+    }
+
+    #[test]
+    fn values_of_every_kind_are_read() {
+        let (values, wrong) = read(
+            "workers = 0x10\ndata = '/srv'\nallow_unauthenticated = true\ntrusted_proxies = ['::1', '10.0.0.0/8']\n\
+             proxy_scopes = []\nlog = 'debug,hyper=warn'\n",
+        );
+        assert!(wrong.is_empty(), "{wrong:?}");
+        let texts = |id| values[id].texts.join(" ");
+        assert_eq!(texts("workers"), "16");
+        assert_eq!(texts("allow_unauthenticated"), "true");
+        assert_eq!(texts("proxies"), "::1 10.0.0.0/8");
+        assert_eq!(texts("scopes"), "");
+        assert_eq!(values["data"].place, "a.toml:2");
+    }
+
+    #[test]
+    fn all_that_is_wrong_is_told_with_its_line_what_was_found_and_what_is_expected() {
+        let (_, wrong) = read(
+            "wokers = 2\nworkers = 'many'\n\nisolation = 'proces'\nmax_queued = -1\nallowed_hosts = 'lab'\n\
+             allowed_origins = ['https://a', 'lab/']\nproxy_admins = ['a,b']\nallow_unauthenticated = 1\nlisten = 80\n\
+             [tls]\nkey = 1\n",
+        );
+        let expected = [
+            "a.toml:1: \"wokers\": there is no such setting; did you mean workers?",
+            "a.toml:2: workers: found \"many\", expected an integer",
+            "a.toml:4: isolation: found \"proces\", expected thread or process",
+            "a.toml:5: max_queued: found -1, expected an integer (-1 is not in 0..=4294967295)",
+            "a.toml:6: allowed_hosts: found \"lab\", expected a list of texts, such as [\"one\", \"another\"]",
+            "a.toml:7: allowed_origins: found \"lab/\", expected scheme, host and port without a path, such as \
+             https://dashboard.example",
+            "a.toml:8: proxy_admins: found \"a,b\", expected each as an element of its own",
+            "a.toml:9: allow_unauthenticated: found 1, expected true or false",
+            "a.toml:10: listen: found 80, expected a text in quotation marks",
+            "a.toml:11: \"tls\": there is no such setting; `signorini config show` prints all that there are",
+        ];
+        assert_eq!(wrong, expected);
+    }
+
+    #[test]
+    fn what_is_no_toml_is_told_with_all_its_lines() {
+        let (values, wrong) = read("workers = \nlisten 80\nworkers = 3\n");
+        assert!(values.is_empty());
+        assert!(wrong.len() >= 2, "{wrong:?}");
+        assert!(
+            wrong[0].starts_with("a.toml:1: this is no TOML: "),
+            "{wrong:?}"
+        );
+        assert!(wrong[1].starts_with("a.toml:2: "), "{wrong:?}");
+    }
+}

@@ -1,0 +1,95 @@
+//! What a request asks for and how it was answered, by names of which there are few: for logs, metrics and spans.
+
+use std::{collections::BTreeSet, sync::LazyLock};
+
+use axum::{
+    extract::{MatchedPath, Request},
+    http::Method,
+};
+use tonic::Code;
+
+use super::{operations, reply::is_grpc};
+
+/// What is no route and no rpc.
+pub(super) const UNKNOWN: &str = "unknown";
+
+/// What a request asks for, by a name of which there are few.
+#[derive(Clone, Debug)]
+pub(super) enum Asked {
+    /// A method and the template of a route.
+    Route(&'static str, MatchedPath),
+    /// A method and a path that is none.
+    NoRoute(&'static str),
+    /// A method of a service, with its name.
+    Rpc(&'static str),
+}
+
+impl Asked {
+    /// By its path, or by the route that was found for it.
+    pub(super) fn of(request: &Request) -> Asked {
+        /// The calls that there are, by their paths.
+        static RPCS: LazyLock<BTreeSet<String>> = LazyLock::new(|| {
+            let all = operations::all().into_iter();
+            let ours = all.flat_map(|operation| operation.rpcs.iter());
+            let ours = ours.map(|rpc| format!("/signorini.v1.JobService/{rpc}"));
+            let others = [
+                "/grpc.health.v1.Health/Check",
+                "/grpc.health.v1.Health/List",
+                "/grpc.health.v1.Health/Watch",
+                "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
+                "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+            ];
+            ours.chain(others.map(str::to_owned)).collect()
+        });
+        let rpcs: &'static BTreeSet<String> = &RPCS;
+        let path = request.uri().path();
+        if let Some(rpc) = rpcs.get(path) {
+            return Asked::Rpc(rpc.trim_start_matches('/'));
+        }
+        let method = method(request.method());
+        match request.extensions().get::<MatchedPath>() {
+            // a service of the contract, without such a method
+            Some(route) if route.as_str().contains('*') => Asked::Rpc(UNKNOWN),
+            Some(route) => Asked::Route(method, route.clone()),
+            None if is_grpc(request) => Asked::Rpc(UNKNOWN),
+            None => Asked::NoRoute(method),
+        }
+    }
+}
+
+/// One of the usual methods; clients may send any word.
+fn method(method: &Method) -> &'static str {
+    match *method {
+        Method::GET => "GET",
+        Method::HEAD => "HEAD",
+        Method::POST => "POST",
+        Method::PUT => "PUT",
+        Method::PATCH => "PATCH",
+        Method::DELETE => "DELETE",
+        Method::OPTIONS => "OPTIONS",
+        _ => "OTHER",
+    }
+}
+
+/// The names that gRPC has for them.
+pub(super) fn name_of(code: Code) -> &'static str {
+    match code {
+        Code::Ok => "OK",
+        Code::Cancelled => "CANCELLED",
+        Code::Unknown => "UNKNOWN",
+        Code::InvalidArgument => "INVALID_ARGUMENT",
+        Code::DeadlineExceeded => "DEADLINE_EXCEEDED",
+        Code::NotFound => "NOT_FOUND",
+        Code::AlreadyExists => "ALREADY_EXISTS",
+        Code::PermissionDenied => "PERMISSION_DENIED",
+        Code::ResourceExhausted => "RESOURCE_EXHAUSTED",
+        Code::FailedPrecondition => "FAILED_PRECONDITION",
+        Code::Aborted => "ABORTED",
+        Code::OutOfRange => "OUT_OF_RANGE",
+        Code::Unimplemented => "UNIMPLEMENTED",
+        Code::Internal => "INTERNAL",
+        Code::Unavailable => "UNAVAILABLE",
+        Code::DataLoss => "DATA_LOSS",
+        Code::Unauthenticated => "UNAUTHENTICATED",
+    }
+}

@@ -1,0 +1,170 @@
+//! Settings from flags, environment variables and a file: `serve` and `config show`.
+
+use std::{
+    path::Path,
+    process::{Command, Output},
+};
+
+use suite::harness::Server;
+
+use crate::SIGNORINI;
+
+/// `config show` with these options, and no variables but these.
+fn show(options: &[&str], variables: &[(&str, &str)]) -> Output {
+    let mut command = Command::new(SIGNORINI);
+    for (name, _) in std::env::vars_os() {
+        if name.to_string_lossy().starts_with("SIGNORINI_") {
+            command.env_remove(name);
+        }
+    }
+    command.args(["config", "show"]).args(options);
+    command.envs(variables.iter().copied()).output().unwrap()
+}
+
+fn text(output: &Output) -> String {
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> String {
+    let path = folder.join(name);
+    std::fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_flag_precedes_a_variable_which_precedes_the_file_which_precedes_the_default() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = "# of the lab\nworkers = 3\nmax_queued = 5\ngrace_s = 7\nallowed_hosts = [\"lab\", \"lab:1\"]\n";
+    let file = write(folder.path(), "settings.toml", settings);
+    let variables = [
+        ("SIGNORINI_MAX_QUEUED", "6"),
+        ("SIGNORINI_GRACE_S", "8"),
+        ("SIGNORINI_MAX_CONNECTIONS", ""), // as if it were not set
+    ];
+    let options = ["--config", &file, "--grace-s", "9", "--origin"];
+    let shown = text(&show(&options, &variables));
+    for line in [
+        format!("workers = 3  # {file}:2\n"),
+        "max_queued = 6  # SIGNORINI_MAX_QUEUED\n".into(),
+        "grace_s = 9  # --grace-s\n".into(),
+        format!("allowed_hosts = [\"lab\", \"lab:1\"]  # {file}:5\n"),
+        "max_connections = 8192  # default\n".into(),
+        "isolation = \"thread\"  # default\n".into(),
+        "allow_unauthenticated = false  # default\n".into(),
+        "# max_running_per_owner is not set: as many as there are workers\n".into(),
+    ] {
+        assert!(shown.contains(&line), "{line}is not in\n{shown}");
+    }
+}
+
+#[test]
+fn what_config_show_prints_can_be_read_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let strange = folder.path().join("a \"quoted\"\nname\u{7f}");
+    let options = [
+        "--data",
+        strange.to_str().unwrap(),
+        "--workers=5",
+        "--allow-unauthenticated",
+        "--trusted-proxy=10.0.0.0/8,::1",
+        "--log=info,hyper=warn",
+        "--memory-budget-bytes=18446744073709551615",
+    ];
+    let first = text(&show(&options, &[]));
+    let with_origin = text(&show(&[&options[..], &["--origin"]].concat(), &[]));
+    for (name, shown) in [("first.toml", &first), ("origins.toml", &with_origin)] {
+        let file = write(folder.path(), name, shown);
+        // once by the flag and once by the variable
+        assert_eq!(text(&show(&["--config", &file], &[])), first);
+        assert_eq!(text(&show(&[], &[("SIGNORINI_CONFIG", &file)])), first);
+    }
+}
+
+#[test]
+fn all_invalid_settings_are_reported_together_and_nothing_starts() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = "wokers = 3\nmax_queued = \"many\"\n\nisolation = \"proces\"\n";
+    let file = write(folder.path(), "wrong.toml", settings);
+    let variables = [("SIGNORINI_WORKERS", "0"), ("SIGNORINI_LOG", "loud")];
+    for command in [&["config", "show"][..], &["serve"][..]] {
+        let mut serve = Command::new(SIGNORINI);
+        serve
+            .args(command)
+            .args(["--config", &file])
+            .envs(variables);
+        let output = serve.current_dir(folder.path()).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        let told = String::from_utf8(output.stderr).unwrap();
+        let lines: Vec<&str> = told.lines().collect();
+        let expected = [
+            "signorini: SIGNORINI_WORKERS: found \"0\", expected an integer (0 is not in 1..=256)"
+                .to_owned(),
+            "signorini: SIGNORINI_LOG: found \"loud\", expected a level".to_owned(),
+            format!(
+                "signorini: {file}:1: \"wokers\": there is no such setting; did you mean workers?"
+            ),
+            format!("signorini: {file}:2: max_queued: found \"many\", expected an integer"),
+            format!("signorini: {file}:4: isolation: found \"proces\", expected thread or process"),
+        ];
+        assert_eq!(lines.len(), expected.len(), "{told}");
+        for (line, expected) in lines.iter().zip(&expected) {
+            assert!(line.starts_with(expected), "{line}\n{expected}");
+        }
+    }
+    assert!(!folder.path().join("signorini-data").exists());
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let large = write(folder.path(), "large.toml", &"#\n".repeat(1 << 20));
+    let absent = folder.path().join("absent.toml");
+    for (file, told) in [
+        (absent.to_str().unwrap(), "cannot be read"),
+        (folder.path().to_str().unwrap(), "this is not a file"),
+        ("/dev/zero", "this is not a file"),
+        (&large, "more than 1 MiB"),
+    ] {
+        let output = show(&["--config", file], &[]);
+        assert_eq!(output.status.code(), Some(2), "{file}");
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(error.contains(file) && error.contains(told), "{error}");
+    }
+}
+
+#[test]
+fn a_variable_that_is_misspelt_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut serve = Command::new(SIGNORINI);
+    // it cannot listen there, and ends soon
+    serve.args([
+        "serve",
+        "--listen",
+        "192.0.2.1:1",
+        "--allow-unauthenticated",
+        "--data",
+    ]);
+    serve.arg(folder.path().join("data"));
+    serve.envs([("SIGNORINI_WOKERS", "3"), ("SIGNORINI_TOKEN", "sgn_")]);
+    let output = serve.output().unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    let log = String::from_utf8(output.stderr).unwrap();
+    let told = "SIGNORINI_WOKERS is no setting, and is ignored; did you mean SIGNORINI_WORKERS?";
+    assert!(
+        log.contains(told) && !log.contains("SIGNORINI_TOKEN"),
+        "{log}"
+    );
+}
+
+#[tokio::test]
+async fn serve_reads_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = write(folder.path(), "serve.toml", "workers = 3\nmax_queued = 7\n");
+    let server = Server::start(SIGNORINI, &["--config", &file, "--max-queued", "8"]).await;
+    let info = server.json("/v1/info").await;
+    assert_eq!(
+        (&info["workers"], &info["limits"]["max_queued"]),
+        (&3.into(), &8.into())
+    );
+}
