@@ -302,7 +302,8 @@ async fn both_protocols_return_the_same_about_the_service() {
     assert_eq!(
         me,
         json!({ "owner": caller.owner, "scopes": caller.scopes,
-            "queued": share(caller.queued), "running": share(caller.running) })
+            "queued": share(caller.queued), "running": share(caller.running),
+            "stored_bytes": { "used": caller.stored_bytes.unwrap().used, "limit": null } })
     );
     // right after the start the dispatcher holds a worker while it looks for a job
     let queue = soon("all workers are idle", async {

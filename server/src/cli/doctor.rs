@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{exit::Exit, output};
-use crate::store::{self, Report, StoreError};
+use crate::{
+    error::size,
+    store::{self, Report, StoreError},
+};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -26,6 +29,11 @@ pub(super) struct Arguments {
     /// start anew in this folder
     #[arg(long, conflicts_with = "salvage")]
     accept: bool,
+
+    /// Rebuild the database without unused space, which takes as much space again for a while. From then on it gives the space of
+    /// what is deleted back to the file system
+    #[arg(long, conflicts_with_all = ["salvage", "accept"])]
+    compact: bool,
 }
 
 /// Prints a line for each finding, and a summary as the last one.
@@ -34,7 +42,19 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         data,
         salvage,
         accept,
+        compact,
     } = arguments;
+    if compact {
+        let (before, after) = store::compact_folder(&data).await?;
+        let text = format!(
+            "{} had {}, and has {}\n",
+            data.display(),
+            size(before),
+            size(after)
+        );
+        output::print(&text)?;
+        return Ok(Exit::Ok);
+    }
     if accept {
         let known = store::accept(&data).map_err(|error| {
             StoreError::Folder(format!("cannot change {}: {error}", data.display()))

@@ -438,7 +438,7 @@ mod tests {
             "a.toml:8: proxy_admins: found \"a,b\", expected each as an element of its own",
             "a.toml:9: allow_unauthenticated: found 1, expected true or false",
             "a.toml:10: listen: found 80, expected a text in quotation marks",
-            "a.toml:11: \"tls\": there is no such setting; `signorini config show` prints all that there are",
+            "a.toml:11: \"tls\": there is no such setting; did you mean tls_key?",
         ];
         assert_eq!(wrong, expected);
     }

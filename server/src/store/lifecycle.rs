@@ -120,11 +120,14 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
         (ResultAvailable::None, _) => results::keep_partial(change.sql(), job.key).await?,
         _ => results::remove(change.sql(), partial_key(job.key)).await?,
     }
+    // the same as is told of it later
+    let mut ended = read(change.sql(), job.key).await?;
+    sizes::count(change.sql(), job.key).await?;
+    sizes::add_sizes(change.sql(), std::slice::from_mut(&mut ended)).await?;
     let done = Payload::Done {
-        job: Box::new(read(change.sql(), job.key).await?),
+        job: Box::new(ended),
     };
     events::append(change.sql(), job.key, job.attempt, &[(now, done)]).await?;
-    sizes::count(change.sql(), job.key).await?;
     change.changed(job.key);
     let failure = ending.failure.as_ref();
     let detail = failure.map_or_else(String::new, |failure| failure.detail.clone());

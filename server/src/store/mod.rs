@@ -108,7 +108,7 @@ pub use self::{
     retention::{Retention, Retired, keep_within},
     sizes::OwnerSize,
     snapshot::Snapshot,
-    space::Space,
+    space::{Space, compact_folder},
     submission::{Accepted, Claim, NewJob, NewSweep, QueueLimits, RequestKey, Submission},
     sweeps::{MemberEvents, MembersTask},
 };

@@ -193,8 +193,10 @@ fn links(job: &Job) -> BTreeMap<String, String> {
 
 /// The figures that can be drawn of a job, as far as its row says.
 fn plots(job: &Job) -> Vec<&'static str> {
-    // without contacts there are no iterations; a job that was answered by another one has counted none itself
-    let iterations = job.progress.as_ref().is_some_and(|made| made.iteration > 0);
+    // without contacts there is one iteration without a residual; a job that was answered by another one has counted none itself
+    let iterations = job.progress.as_ref().is_some_and(|made| {
+        made.iteration > 1 || (made.iteration == 1 && made.residual.is_some_and(|left| left > 0.0))
+    });
     let has_contacts = iterations || job.cached_from.is_some();
     let has_result = job.result_available != ResultAvailable::None;
     // fields are those of a solver that came to an end by itself

@@ -1,8 +1,15 @@
 //! The space of the database on the disk: how much it is, and what is free in it given back to the file system.
 
+use std::path::Path;
+
 use sqlx::SqliteConnection;
 
-use super::{database::Store, error::Result};
+use super::{
+    compact,
+    database::{Store, with_advice},
+    error::{Result, StoreError},
+    folder::DATABASE,
+};
 
 /// Free pages that stay in the file, since new rows fill them soon: 4 MiB.
 const KEPT_PAGES: i64 = 1024;
@@ -71,4 +78,23 @@ impl Store {
         let free = sqlx::query_scalar("pragma freelist_count");
         Ok(free.fetch_one(&self.reader).await?)
     }
+}
+
+/// Rebuilds the database of a store that no service uses; its size before and after, in bytes.
+pub async fn compact_folder(folder: &Path) -> Result<(u64, u64)> {
+    if !folder.join(DATABASE).exists() {
+        let text = format!("there is no store in {}", folder.display());
+        return Err(StoreError::Folder(text));
+    }
+    let connected = Store::connect(folder).await;
+    let (store, _) = connected.map_err(|error| with_advice(error, folder))?;
+    let before = store.space().await?.used;
+    // only the one that writes may be open
+    store.lists.close().await;
+    store.reader.close().await;
+    let compacted = compact::compact(&mut *store.writer.acquire().await?).await;
+    store.close_as_found().await;
+    compacted?;
+    let after = std::fs::metadata(folder.join(DATABASE)).map_or(0, |file| file.len());
+    Ok((before, after))
 }

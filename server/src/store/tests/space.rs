@@ -225,6 +225,30 @@ async fn the_space_of_what_is_removed_is_given_back_to_the_file_system() {
     assert!(left < 6 << 20, "{left} bytes");
 }
 
+#[tokio::test]
+async fn a_store_is_rebuilt_without_unused_space_and_only_while_no_service_uses_it() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(
+        compact_folder(folder.path()).await.is_err(),
+        "there is none"
+    );
+    let store = Store::open(folder.path()).await.unwrap();
+    for input in 0..4 {
+        solved(&store, "ada", &input.to_string(), 2 << 20).await;
+    }
+    for key in 1..4 {
+        store.delete(Owners::All, key).await.unwrap();
+    }
+    let used = compact_folder(folder.path()).await;
+    assert!(matches!(used, Err(StoreError::Locked(_))), "{used:?}");
+    store.close().await;
+    drop(store);
+    let (before, after) = compact_folder(folder.path()).await.unwrap();
+    assert!(before > 8 << 20 && after < 3 << 20, "{before} and {after}");
+    let store = Store::open(folder.path()).await.unwrap();
+    assert_eq!(left(&store).await, [4]);
+}
+
 #[test]
 fn fields_are_stored_as_columns_and_everything_else_deflated() {
     let mut fields = Fields::default();
