@@ -47,7 +47,7 @@ end;
 insert into job_size (job_id, owner, bytes, finished_at, fields)
     select id, owner,
            (select coalesce(sum(length(body)), 0) from result_part where job_id = job.id)
-           + (select coalesce(sum(length(body)), 0) from event where job_id = job.id)
+           + (select coalesce(sum(length(body)), 0) from event where job_id = job.id and type <> 'done')
            + (select coalesce(sum(length(body)), 0) from sweep_member where job = job.id),
            finished_at,
            exists (select 1 from result_part where job_id = coalesce(job.result_job, job.id) and name = 'fields')
