@@ -40,7 +40,7 @@ impl Queue {
             let mut accepted = self.store.submit(submission, false).await?;
             self.announce(&accepted.changed);
             self.wake.notify_one();
-            self.store.try_add_queue_positions(&mut accepted.jobs).await;
+            self.store.try_complete(&mut accepted.jobs).await;
             return Ok(accepted);
         };
         let _guard = self.claiming.read().await;
@@ -54,7 +54,7 @@ impl Queue {
                     None => drop(slot),
                 }
                 self.wake.notify_one(); // there may be several jobs, or the slot is free again
-                self.store.try_add_queue_positions(&mut accepted.jobs).await;
+                self.store.try_complete(&mut accepted.jobs).await;
                 Ok(accepted)
             }
             Err(cause) => {

@@ -98,7 +98,7 @@ impl Store {
         let edited = read(change.sql(), key).await?;
         change.commit().await?;
         let mut edited = [edited];
-        self.try_add_queue_positions(&mut edited).await;
+        self.try_complete(&mut edited).await;
         let [edited] = edited;
         Ok(Some(Ok(edited)))
     }

@@ -29,7 +29,7 @@ impl Store {
             let Some(mut jobs) = remaining(&mut connection, keys).await? else {
                 return Ok(None);
             };
-            self.add_queue_positions(&mut connection, &mut jobs).await?;
+            self.complete(&mut connection, &mut jobs).await?;
             Ok(Some(jobs))
         };
         self.damages.noting(read).await

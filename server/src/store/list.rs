@@ -12,7 +12,6 @@ use super::{
     error::Result,
     filter::{Cursor, Filter, GroupBy, Order, OrderBy},
     rows::from_row,
-    sizes,
 };
 use crate::{
     caller::Owners,
@@ -59,8 +58,7 @@ impl Store {
             let mut query = page_of_jobs(filter, &paths, order, cursor, limit);
             let rows = query.build().fetch_all(&mut *connection).await?;
             let mut jobs = rows.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
-            self.add_queue_positions(&mut connection, &mut jobs).await?;
-            sizes::add_sizes(&mut connection, &mut jobs).await?;
+            self.complete(&mut connection, &mut jobs).await?;
             self.damages.indexes_are_intact()?;
             Ok(jobs)
         };

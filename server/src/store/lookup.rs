@@ -5,7 +5,6 @@ use super::{
     error::Result,
     problems,
     rows::{find, with_id},
-    sizes,
 };
 use crate::{
     caller::Owners,
@@ -21,9 +20,8 @@ impl Store {
                 self.damages.indexes_are_intact()?;
                 return Ok(None);
             };
-            let one = std::slice::from_mut(&mut job);
-            self.add_queue_positions(&mut connection, one).await?;
-            sizes::add_sizes(&mut connection, one).await?;
+            self.complete(&mut connection, std::slice::from_mut(&mut job))
+                .await?;
             Ok(Some(job))
         };
         self.damages.noting(read).await

@@ -8,6 +8,7 @@ use super::{
     database::Store,
     error::Result,
     rows::find,
+    sizes,
     waiting::{Move, Owner, Place},
 };
 use crate::job::{Job, QueuePosition, Status, Waiting};
@@ -105,24 +106,34 @@ impl Store {
         self.waiting_jobs().len()
     }
 
-    /// Fills in the queue positions, if they can be read: a request that has changed something is answered even without
-    /// them.
-    pub async fn try_add_queue_positions(&self, jobs: &mut [Job]) {
-        if jobs.iter().all(|job| job.status != Status::Queued) {
+    /// Fills in the queue positions, and what jobs keep that have ended, if they can be read: a request that has changed
+    /// something is answered even without them.
+    pub async fn try_complete(&self, jobs: &mut [Job]) {
+        if jobs.iter().all(|job| job.status == Status::Running) {
             return;
         }
         let added = async {
             let mut connection = self.reader.acquire().await?;
-            self.add_queue_positions(&mut connection, jobs).await
+            self.complete(&mut connection, jobs).await
         };
         if let Err(cause) = added.await {
-            tracing::warn!(%cause, "queue positions could not be read: {cause}");
+            tracing::warn!(%cause, "queue positions and sizes could not be read: {cause}");
         }
+    }
+
+    /// Fills in what is not in the row of a job: its position in the queue, and what it keeps once it has ended.
+    pub(super) async fn complete(
+        &self,
+        connection: &mut SqliteConnection,
+        jobs: &mut [Job],
+    ) -> Result<()> {
+        self.add_queue_positions(connection, jobs).await?;
+        sizes::add_sizes(connection, jobs).await
     }
 
     /// Fills in the queue positions of those that are queued. A coalesced job has the position and the progress of
     /// its primary.
-    pub(super) async fn add_queue_positions(
+    async fn add_queue_positions(
         &self,
         connection: &mut SqliteConnection,
         jobs: &mut [Job],
