@@ -7,9 +7,12 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::Args;
-use reqwest::Client;
 
-use super::{exit::Exit, output};
+use super::{
+    client::{self, Trust},
+    exit::Exit,
+    output,
+};
 
 /// The service itself takes two seconds at most.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -30,19 +33,24 @@ pub(super) struct Arguments {
         value_name = "ADDRESS"
     )]
     listen: SocketAddr,
+
+    #[command(flatten)]
+    trust: Trust,
 }
 
 /// Prints what `/readyz` answers.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
-    let url = match arguments.url {
-        Some(url) => url,
-        None => format!("http://{}", reachable(arguments.listen)),
+    let (client, url) = match arguments.url {
+        Some(url) => (arguments.trust.client(&url)?, url),
+        None => {
+            let address = reachable(arguments.listen);
+            (client::local()?, format!("http://{address}"))
+        }
     };
     let url = format!("{}/readyz", url.trim_end_matches('/'));
-    // a proxy in the environment is for other machines
-    let client = Client::builder().timeout(PATIENCE).no_proxy().build()?;
     let unanswered = || format!("{url} does not answer");
-    let answer = client.get(&url).send().await.with_context(unanswered)?;
+    let request = client.get(&url).timeout(PATIENCE);
+    let answer = request.send().await.with_context(unanswered)?;
     let status = answer.status();
     let text = answer.text().await.with_context(unanswered)?;
     let text: String = text.chars().take(MOST_CHARS).collect();

@@ -170,8 +170,10 @@ pub(super) struct Identity {
 struct Seen {
     database: Option<(u64, u64)>,
     log: Option<(u64, u64)>,
-    /// It never shrinks.
+    /// It shrinks only when the store gives space back.
     bytes: u64,
+    /// Then it may become as small as this, whenever the log is next copied into it.
+    least: Option<u64>,
     /// What is wrong, as it was logged.
     wrong: Option<String>,
 }
@@ -211,6 +213,12 @@ impl Identity {
         wrong.map_or(Ok(()), |what| Err(StoreError::Replaced(what)))
     }
 
+    /// The store is about to give space back: the database may become as small as this (bytes).
+    pub(super) fn may_shrink_to(&self, bytes: u64) {
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        seen.least = Some(seen.least.map_or(bytes, |least| least.min(bytes)));
+    }
+
     fn difference(&self, seen: &mut Seen) -> Option<String> {
         let Ok(found) = fs::metadata(&self.database) else {
             return Some(format!("{} was removed", self.database.display()));
@@ -219,10 +227,12 @@ impl Identity {
         if *seen.database.get_or_insert(id) != id {
             return Some(format!("{} was replaced", self.database.display()));
         }
-        if found.len() < seen.bytes {
+        let given_back = seen.least.is_some_and(|least| found.len() >= least);
+        if found.len() < seen.bytes && !given_back {
             return Some(format!("{} was cut short", self.database.display()));
         }
         seen.bytes = found.len();
+        seen.least = seen.least.filter(|least| found.len() > *least);
         let id = fs::metadata(&self.log).map(|found| (found.dev(), found.ino()));
         match (seen.log, id) {
             (None, Ok(id)) => seen.log = Some(id),

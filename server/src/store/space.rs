@@ -56,6 +56,7 @@ impl Store {
             if free <= KEPT_PAGES {
                 return Ok(given);
             }
+            self.identity.may_shrink_to(self.least_bytes().await?);
             let give = async {
                 let mut tx = self.begin_control().await?;
                 // 1 MiB; it takes a step for each page
@@ -72,6 +73,17 @@ impl Store {
             given += free - left;
             tokio::task::yield_now().await;
         }
+    }
+
+    /// As small as the database can become, in bytes: without free pages, and some that tell where others are.
+    async fn least_bytes(&self) -> Result<u64> {
+        let (pages, free, page): (i64, i64, i64) = sqlx::query_as(
+            "select page_count, freelist_count, page_size from pragma_page_count(), pragma_freelist_count(), pragma_page_size()",
+        )
+        .fetch_one(&self.reader)
+        .await?;
+        let of_places = pages / 500 + 2;
+        Ok(u64::try_from((pages - free - of_places) * page).unwrap_or(0))
     }
 
     async fn free_pages(&self) -> Result<i64> {

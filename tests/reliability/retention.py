@@ -1,0 +1,94 @@
+"""Small jobs of twenty owners, one after the other, with retention on (R24): nothing grows.
+
+    retention.py [--soak]
+
+4,000 jobs (a million with --soak) are solved and removed some seconds after their end. Of the second and the last third
+of the time are compared: memory, open files, the size of the database, and how long one answer takes. In the end all
+jobs are gone, their space is given back to the file system, and an id is answered with 410.
+"""
+
+import json
+import pathlib
+import time
+
+from attack import MIB, SOAK, Attacked, check, equal, example, percentile
+
+JOBS = 1_000_000 if SOAK else 4_000
+KEPT_S = 60 if SOAK else 4
+OWNERS = 20
+BATCH = 50
+# enough to keep the workers busy, and few enough to be solved soon
+MOST_WAITING = 400
+# after the last job: those that are kept, and the next two times that the limits are applied
+END_S = KEPT_S + 30
+# the promise is 1 MiB in an hour; an allocator takes some before it is even
+MOST_GROWTH = 8 * MIB
+
+
+def look(server, job):
+    """What there is now."""
+    began = time.monotonic()
+    equal(server.call("GET", "/v1/queue", x_remote_user="root").status, 200, "the queue")
+    took = time.monotonic() - began
+    folder = pathlib.Path(server.data)
+    size = lambda name: (folder / name).stat().st_size if (folder / name).exists() else 0
+    return {"t": time.monotonic(), "rss": server.memory(), "files": server.files(), "took": took,
+            "db": size("signorini.db"), "wal": size("signorini.db-wal")}
+
+
+def main():
+    arguments = ["--trusted-proxy", "127.0.0.1", "--proxy-admin", "root", "--retain-days", repr(KEPT_S / 86400)]
+    with Attacked(*arguments) as server:
+        body = {"jobs": [{"problem": example(), "cache": "off"}] * BATCH}
+        body = json.dumps(body).encode()
+        seen, submitted, first = [], 0, None
+        while submitted < JOBS:
+            queue = server.call("GET", "/v1/queue", x_remote_user="root").json()
+            seen.append(look(server, first))
+            if queue["queued"] > MOST_WAITING:
+                time.sleep(0.05)
+                continue
+            owner = "user%02d" % (submitted // BATCH % OWNERS)
+            answer = server.call("POST", "/v1/jobs/batch", body, x_remote_user=owner)
+            equal((answer.status, answer.body[:300] if answer.status != 202 else b""), (202, b""), "a batch of " + owner)
+            first = first or (owner, answer.json()["jobs"][0]["id"])
+            submitted += BATCH
+        began, ended = seen[0]["t"], seen[-1]["t"]
+        third = lambda n: [one for one in seen if n <= 3 * (one["t"] - began) / (ended - began + 1e-9) < n + 1]
+        second, last = third(1), third(2)
+        median = lambda rows, name: percentile([row[name] for row in rows], 0.5)
+        growth = median(last, "rss") - median(second, "rss")
+        check(growth < MOST_GROWTH, "memory grew by %.1f MiB" % (growth / MIB))
+        files = median(last, "files") - median(second, "files")
+        check(abs(files) <= 5, "%d more open files" % files)
+        largest = lambda rows, name: max(row[name] for row in rows)
+        check(largest(last, "db") <= 1.5 * largest(second, "db") + 4 * MIB, "the database grew from %.1f to %.1f MiB" % (
+            largest(second, "db") / MIB, largest(last, "db") / MIB))
+        check(largest(seen, "wal") <= 64 * MIB, "the write-ahead log has %.1f MiB" % (largest(seen, "wal") / MIB))
+        p99 = [1e3 * percentile([row["took"] for row in rows], 0.99) for rows in (second, last)]
+        if SOAK:
+            check(p99[1] <= 1.2 * p99[0] + 1, "99 %% of answers took %.1f ms, then %.1f ms" % tuple(p99))
+        end = time.monotonic() + END_S
+        left = -1
+        while left and time.monotonic() < end:
+            time.sleep(0.5)
+            left = sum(server.call("GET", "/v1/jobs/count", x_remote_user="root").json()["counts"].values())
+        equal(left, 0, "jobs that are left")
+        owner, job = first
+        equal(server.call("GET", "/v1/jobs/" + job, x_remote_user=owner).status, 410, "the first job")
+        owners = server.call("GET", "/v1/owners", x_remote_user="root").json()["owners"]
+        equal({(one["jobs"], one["job_bytes"]) for one in owners}, {(0, 0)}, "what owners keep")
+        while seen[-1]["db"] > 6 * MIB and time.monotonic() < end:
+            time.sleep(0.5)
+            seen.append(look(server, first))
+        server.stop()
+        size = (pathlib.Path(server.data) / "signorini.db").stat().st_size
+        check(size <= 8 * MIB, "the database still has %.1f MiB" % (size / MIB))
+        print("figure: %d jobs of %d owners in %.0f s, each kept for %d s: memory %+.1f MiB from the second to the last third of "
+              "the time, open files %+d, the database at most %.1f and %.1f MiB, its log at most %.1f MiB, 99 %% of answers %.1f "
+              "and %.1f ms; in the end all are gone and the database has %.1f MiB" % (
+                  submitted, OWNERS, ended - began, KEPT_S, growth / MIB, files, largest(second, "db") / MIB,
+                  largest(last, "db") / MIB, largest(seen, "wal") / MIB, *p99, size / MIB))
+
+
+main()
