@@ -90,9 +90,10 @@ class Answer:
 def children(pid):
     """The ids of the processes that a process has started: the worker processes of a service."""
     found = []
-    for task in pathlib.Path("/proc/%d/task" % pid).glob("*"):
-        with contextlib.suppress(OSError):  # a thread that has ended meanwhile
-            found += map(int, (task / "children").read_text().split())
+    with contextlib.suppress(OSError):  # it has ended meanwhile
+        for task in list(pathlib.Path("/proc/%d/task" % pid).glob("*")):
+            with contextlib.suppress(OSError):  # or a thread of it
+                found += map(int, (task / "children").read_text().split())
     return found
 
 

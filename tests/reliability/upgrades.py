@@ -34,7 +34,10 @@ KILLS = 400 if SOAK else 5
 # columns and tables under the names that they had
 OLD_NAMES = {("job", "twin_of"): "coalesced_into"}
 # what a table has that was filled from another one, or belongs to the new store alone
-NOT_COPIED = ("_sqlx_migrations", "sqlite_sequence", "progress")
+NOT_COPIED = ("_sqlx_migrations", "sqlite_sequence", "progress", "owner_size")
+# the first version that stores results compactly
+COMPACT = 10
+PIECE_BYTES = 256 << 10
 
 
 def everything(server, jobs, mesh, sweep):
@@ -86,7 +89,27 @@ def checksum(texts):
     return zlib.crc32(b"".join(struct.pack("<cIQ", b"t", place, len(text)) + text for place, text in pairs))
 
 
-def older(source, folder, version):
+def as_json(store, fields):
+    """Results as versions before COMPACT stored them: as JSON, here without checksums."""
+    key_of = dict(store.execute("select uuid, coalesce(result_job, id) from new.job"))
+    fields = {key_of[job.removeprefix("job_")]: text for job, text in fields.items()}
+    parts = store.execute("select job_id, name, encoding from new.result_info where encoding is not null").fetchall()
+    for job, name, encoding in parts:
+        rows = store.execute("select body from main.result_part where job_id = ? and name = ? order by piece", (job, name))
+        stored = b"".join(body for body, in rows.fetchall())
+        if not stored:
+            continue  # of a job that this version does not have
+        text = zlib.decompress(stored, -15) if encoding == 1 else fields[job]
+        store.execute("delete from main.result_part where job_id = ? and name = ?", (job, name))
+        for place in range(0, len(text), PIECE_BYTES):
+            store.execute("insert into main.result_part (job_id, name, piece, body) values (?, ?, ?, ?)",
+                          (job, name, place // PIECE_BYTES, text[place:place + PIECE_BYTES]))
+    columns = [column for _, column, *_ in store.execute("pragma main.table_info(result_info)")]
+    if "checksum" in columns:
+        store.execute("update main.result_info set checksum = null")
+
+
+def older(source, fields, folder, version):
     """The store as this version would have it."""
     folder.mkdir(mode=0o700)
     store = sqlite3.connect(folder / "signorini.db", isolation_level=None)
@@ -103,7 +126,7 @@ def older(source, folder, version):
     store.execute("begin")
     tables = [name for name, in store.execute("select name from main.sqlite_schema where type = 'table'")]
     # rows before those that refer to them
-    order = ("problem", "job", "mesh", "sweep")
+    order = ("problem", "job", "mesh", "mesh_piece", "sweep")
     for table in sorted(tables, key=lambda name: (name not in order, order.index(name) if name in order else name)):
         if table in NOT_COPIED:
             continue
@@ -117,6 +140,11 @@ def older(source, folder, version):
             where = " where abs(job_id) in (select id from new.job where sweep is null)"
         store.execute("insert into main.%s (%s) select %s from new.%s%s" % (
             table, ", ".join(old for old, _ in pairs), ", ".join(new for _, new in pairs), table, where))
+    if version < COMPACT:
+        as_json(store, fields)
+    if 6 <= version < 11:
+        # their checksums are those of rows with warnings
+        store.execute("update main.job set checksum = null where id in (select id from new.job where warnings is not null)")
     if version == 6:
         # its checksum was that of the columns of the time
         for row in store.execute("select input_hash, body, mesh from main.problem").fetchall():
@@ -195,11 +223,13 @@ def main():
             known = fill(server)
             before = everything(server, known[0], known[1], known[2])
             check(all(status == 200 for status, _ in before.values()), "before: %r" % before)
+            answers = {job["id"]: server.call("GET", "/v1/jobs/%s/fields?format=json" % job["id"]) for job in server.every_job()}
+            fields = {job: answer.body for job, answer in answers.items() if answer.status == 200}
             server.stop()
             shutil.copy(server.data / "signorini.db", folder / "new.db")
 
         def make(data, version):
-            older(folder / "new.db", data, version)
+            older(folder / "new.db", fields, data, version)
 
         for version in range(1, len(STEPS) + 1):
             server, kept = Server(), folder / ("version %d" % version)
