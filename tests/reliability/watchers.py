@@ -31,8 +31,7 @@ WAITERS = 10_000 if SOAK else 2_000
 MOST_LONGER = (1.05, 1.25) if SOAK else (None, None)
 # With slow watchers; with all. Of the rounds the least counts: what else the machine does only adds to it. A measurement that
 # was disturbed is repeated, so many rounds at most; a cost that is real stays.
-# The small form's solve takes a third of a second, of which some hundredths of noise are a tenth.
-MOST_PROCESSOR, MOST_ROUNDS = ((1.2, 1.5), 100) if SOAK else ((1.35, 1.6), 15)
+MOST_PROCESSOR, MOST_ROUNDS = (1.2, 1.5), 100 if SOAK else 30
 MOST_MEMORY, MOST_WAL = 64 << 10, 64 * MIB
 WATCHED_S, FEWEST_ROUNDS = (600, 10) if SOAK else (2, 5)
 # ten events for each increment

@@ -74,6 +74,11 @@ async fn a_store_from_before_the_job_api_is_upgraded_with_its_content() {
         .unwrap();
     assert_eq!(found.part("fields").await.unwrap().unwrap(), b"{}");
     drop(found);
+    let mut connection = store.reader.acquire().await.unwrap();
+    let read = intact::read_part(&mut connection, key, "fields").await;
+    let (info, _) = read.unwrap().unwrap();
+    assert_eq!((info.bytes, info.digest.len()), (2, 32));
+    drop(connection);
     // the waiting job is in the queue, and does not count as having waited too long
     assert_eq!(store.waiting(), 1);
     assert!(
@@ -90,6 +95,7 @@ async fn a_store_from_before_the_job_api_is_upgraded_with_its_content() {
         Deletion::Deleted
     );
     assert_eq!(store.fields_memory(key).await.unwrap(), None);
+    assert_eq!(store.json_of(key, "fields").await.unwrap(), None);
 }
 
 #[tokio::test]
