@@ -105,6 +105,9 @@ pub enum ApiError {
     /// A body in a format that is not understood.
     #[error("expected a body of type application/json, got {0}")]
     UnsupportedMedia(String),
+    /// A body with a Content-Encoding that is not understood.
+    #[error("expected a body without Content-Encoding, or with gzip or zstd, got {0}")]
+    UnsupportedEncoding(String),
     /// The job has not ended.
     #[error("the job is {0}; cancel it, or wait for its end")]
     JobActive(JobStatus),
@@ -133,6 +136,14 @@ pub enum ApiError {
     PayloadTooLarge {
         /// The limit.
         limit_bytes: usize,
+    },
+    /// The body becomes much larger when its Content-Encoding is undone.
+    #[error(
+        "the body becomes more than {ratio} times larger when its Content-Encoding is undone; send it without"
+    )]
+    EncodedTooLarge {
+        /// The limit.
+        ratio: usize,
     },
     /// The message has too many parts.
     #[error(
@@ -294,7 +305,9 @@ impl ApiError {
             ApiError::NoResult(_) | ApiError::FieldsDeleted(_) => Code::NoResult,
             ApiError::MethodNotAllowed => Code::MethodNotAllowed,
             ApiError::NotAcceptable { .. } => Code::NotAcceptable,
-            ApiError::UnsupportedMedia(_) => Code::UnsupportedMedia,
+            ApiError::UnsupportedMedia(_) | ApiError::UnsupportedEncoding(_) => {
+                Code::UnsupportedMedia
+            }
             ApiError::JobActive(_) | ApiError::SweepActive(_) | ApiError::MeshInUse => {
                 Code::JobActive
             }
@@ -304,6 +317,7 @@ impl ApiError {
             ApiError::RangeNotSatisfiable(_) => Code::RangeNotSatisfiable,
             ApiError::ResultNotReady(_) => Code::ResultNotReady,
             ApiError::PayloadTooLarge { .. }
+            | ApiError::EncodedTooLarge { .. }
             | ApiError::MessageTooLarge { .. }
             | ApiError::AnswerTooLarge { .. } => Code::PayloadTooLarge,
             ApiError::ProblemTooLarge { .. } => Code::ProblemTooLarge,

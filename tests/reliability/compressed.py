@@ -1,23 +1,26 @@
-"""Compressed bodies, and files that are archives: refused, and never unpacked (R12).
+"""Compressed bodies, and files that are archives: never unpacked beyond the limits (R12).
 
     compressed.py [--soak]
 
 A few kilobytes that would become 10 GiB: as gzip, deflate, br and zstd, one around the other, as a body of JSON and as
 a mesh in a gzip, zip or npz file; and compressed messages over gRPC. Each is refused at once with the status that tells
-why, and takes neither memory nor time.
+why, and takes neither memory nor time. Honest bodies as gzip and zstd are taken, and large answers come as either.
 """
 
+import gzip
 import http.client
 import struct
 import time
 import zlib
 
 import grpc
+import zstandard
 
 from attack import DATA, END_STREAM, HEADERS, MIB, PREFACE, SOAK, Attacked, Bystander, check, equal, frame, frames_of, head, settings
-from outside import Answer
+from outside import TOP, Answer, example, submission
 
 UNPACKED = 10 << 30
+MESH = (TOP / "tests/data/gmsh/fillet-mixed-msh41-ascii.msh").read_bytes()
 ROUNDS = 20 if SOAK else 1
 MOST_MEMORY, MOST_CPU_S = 32 * MIB, 0.5
 # of a small body; the small form runs beside other tests. 10 MB that may be a mesh are read to the end.
@@ -45,7 +48,7 @@ def nested(wbits):
 
 
 def zstd():
-    """A frame of 10 GiB: blocks that repeat one byte 128 KiB times. Four bytes each; there is no library for it here."""
+    """A frame of 10 GiB: blocks that repeat one byte 128 KiB times. Four bytes each, fewer than the library needs."""
     most = 128 << 10
     block = struct.pack("<I", most << 3 | 1 << 1)[:3] + b" "
     last = struct.pack("<I", most << 3 | 1 << 1 | 1)[:3] + b" "
@@ -121,13 +124,18 @@ def refused(server, path, body, wanted, what, **headers):
     return "%d %s" % found
 
 
+UNDERSTOOD = ("gzip", "zstd")
+
+
 def bodies(server, packed):
     """Bodies of JSON with a Content-Encoding."""
     for encoding, body in packed.items():
+        wanted = (413, "payload-too-large") if encoding in UNDERSTOOD else (415, "unsupported-media")
         for path in ("/v1/jobs", "/v1/jobs/batch", "/v1/problems/validate"):
-            found = refused(server, path, body, [(415, "unsupported-media")], "%s to %s" % (encoding, path),
-                            content_encoding=encoding)
+            found = refused(server, path, body, [wanted], "%s to %s" % (encoding, path), content_encoding=encoding)
         print("Content-Encoding %s, %d bytes: %s" % (encoding, len(body), found))
+    answer = server.call("POST", "/v1/problems/validate", {"problem": {}}, content_encoding="br")
+    equal((answer.status, answer.headers["accept-encoding"]), (415, "gzip, zstd"), "what would be taken")
     # an encoding that is not told: then it is not JSON
     for encoding, body in packed.items():
         found = refused(server, "/v1/problems/validate", body, [(400, "malformed-json")], "untold " + encoding)
@@ -139,7 +147,6 @@ def bodies(server, packed):
 
 # as what it is not, or as what is not taken
 REFUSED = [(422, "invalid-problem"), (415, "unsupported-media")]
-UNSUPPORTED = [(415, "unsupported-media")]
 
 
 def meshes(server, packed):
@@ -155,11 +162,36 @@ def meshes(server, packed):
         for headers in ({}, {"content_type": "application/octet-stream"}, {"content_type": "application/zip"}):
             found = refused(server, "/v1/meshes", content, REFUSED, what, **headers)
         print("%s as a mesh, %d bytes: %s" % (what, len(content), found))
-    for encoding in ("gzip", "zstd"):
-        found = refused(server, "/v1/meshes", packed[encoding], UNSUPPORTED, "a mesh as " + encoding,
+    for encoding in UNDERSTOOD:
+        found = refused(server, "/v1/meshes", packed[encoding], [(413, "payload-too-large")], "a mesh as " + encoding,
                         content_encoding=encoding)
     print("a mesh with Content-Encoding: " + found)
+    found = refused(server, "/v1/meshes", packed["gzip, gzip, gzip"], REFUSED, "a mesh as gzip in gzip in gzip",
+                    content_encoding="gzip")
+    print("a mesh as gzip in gzip in gzip: " + found)
     equal(server.json("/v1/meshes")["meshes"], [], "meshes that were stored")
+
+
+def honest(server, job):
+    """What is smaller than the limits is taken, and answers come in either coding."""
+    pack = {"gzip": gzip.compress, "zstd": zstandard.ZstdCompressor().compress}
+    unpack = {"gzip": gzip.decompress, "zstd": lambda body: zstandard.ZstdDecompressor().decompressobj().decompress(body)}
+    plain = server.call("POST", "/v1/problems/validate", submission(example())).json()
+    known = server.call("POST", "/v1/meshes", MESH, content_type="application/octet-stream").json()["hash"]
+    for encoding in UNDERSTOOD:
+        answer = server.call("POST", "/v1/problems/validate", pack[encoding](submission(example())), content_encoding=encoding)
+        equal((answer.status, answer.json()), (200, plain), "a problem as " + encoding)
+        answer = server.call("POST", "/v1/meshes", pack[encoding](MESH), content_encoding=encoding,
+                             content_type="application/octet-stream")
+        equal((answer.status, answer.json()["hash"]), (200, known), "a mesh as %s, %r" % (encoding, answer))
+        cut = server.call("POST", "/v1/problems/validate", pack[encoding](submission(example()))[:-8], content_encoding=encoding)
+        equal((cut.status, cut.json()["code"]), (400, "malformed-json"), "a body as %s that is cut off" % encoding)
+        path = "/v1/jobs/%s/fields" % job
+        fields, answer = server.call("GET", path), server.call("GET", path, accept_encoding=encoding)
+        equal(answer.headers["content-encoding"], encoding, "the coding of an answer")
+        equal(unpack[encoding](answer.body), fields.body, "fields as " + encoding)
+        check(len(answer.body) < 0.8 * len(fields.body), "%d of %d bytes" % (len(answer.body), len(fields.body)))
+    equal(server.call("DELETE", "/v1/meshes/" + known).status, 204, "deleting the mesh")
 
 
 def messages(server, packed):
@@ -193,18 +225,19 @@ def messages(server, packed):
 
 
 def main():
-    gzip = deflated(31)
+    bomb = deflated(31)
     packed = {
-        "gzip": gzip,
+        "gzip": bomb,
         "deflate": deflated(15),
         "gzip, gzip, gzip": nested(31),
         "br": BR,
         "zstd": zstd(),
         "x-unknown": b"x" * 10000,
     }
-    assert zlib.decompressobj(31).decompress(gzip, 100) == b" " * 100
+    assert zlib.decompressobj(31).decompress(bomb, 100) == b" " * 100
     with Attacked() as server:
         job = server.finished_job()
+        honest(server, job)
         with Bystander(server):
             for _ in range(ROUNDS):
                 bodies(server, packed)

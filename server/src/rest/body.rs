@@ -8,10 +8,8 @@ use axum::{
 };
 use futures_util::StreamExt;
 
-use crate::{
-    error::ApiError,
-    transfer::{self, Received},
-};
+use super::coding;
+use crate::{error::ApiError, transfer::Received};
 
 /// What the headers declare the body to be.
 fn content_type(headers: &HeaderMap) -> &str {
@@ -53,51 +51,42 @@ pub(super) async fn json_text(
     limit_bytes: usize,
     received: &Received,
 ) -> Result<String, ApiError> {
-    is_not_encoded(headers)?;
-    let mut pieces = body.into_data_stream();
-    let length = declared_length(headers);
-    let mut bytes = Vec::new();
-    let mut too_large = length.is_some_and(|length| length > limit_bytes);
-    while !too_large && let Some(piece) = pieces.next().await {
-        let piece = piece.map_err(incomplete)?;
-        too_large = bytes.len() + piece.len() > limit_bytes;
-        if !too_large {
-            if let Err(error) = received.count(piece.len()) {
-                tokio::spawn(discard(pieces));
-                return Err(error);
-            }
-            // twice as much as before, as usual, but never more than can be needed
-            if bytes.capacity() < bytes.len() + piece.len() {
-                let wanted = (2 * bytes.len()).clamp(bytes.len() + piece.len(), limit_bytes);
-                bytes.reserve_exact(wanted - bytes.len());
-            }
-            bytes.extend_from_slice(&piece);
-        }
+    let mut body = body.into_data_stream();
+    let text = text(headers, &mut body, limit_bytes, received).await;
+    if text.is_err() {
+        tokio::spawn(discard(body));
     }
-    if too_large {
-        tokio::spawn(discard(pieces));
-        return Err(ApiError::PayloadTooLarge { limit_bytes });
+    text
+}
+
+async fn text(
+    headers: &HeaderMap,
+    body: &mut BodyDataStream,
+    limit_bytes: usize,
+    received: &Received,
+) -> Result<String, ApiError> {
+    let too_large = ApiError::PayloadTooLarge { limit_bytes };
+    let mut pieces = coding::decoded(headers, body)?;
+    if declared_length(headers).is_some_and(|length| length > limit_bytes) {
+        return Err(too_large);
+    }
+    let mut bytes = Vec::new();
+    while let Some(piece) = pieces.next().await {
+        let piece = piece?;
+        if bytes.len() + piece.len() > limit_bytes {
+            return Err(too_large);
+        }
+        received.count(piece.len())?;
+        // twice as much as before, as usual, but never more than can be needed
+        if bytes.capacity() < bytes.len() + piece.len() {
+            let wanted = (2 * bytes.len()).clamp(bytes.len() + piece.len(), limit_bytes);
+            bytes.reserve_exact(wanted - bytes.len());
+        }
+        bytes.extend_from_slice(&piece);
+        // what is decoded may be there at once, and others have their turn
+        tokio::task::consume_budget().await;
     }
     String::from_utf8(bytes).map_err(|error| ApiError::MalformedJson(error.to_string()))
-}
-
-/// An error if the body is compressed: it would have to be unpacked before its size is known.
-pub(super) fn is_not_encoded(headers: &HeaderMap) -> Result<(), ApiError> {
-    match headers.get(header::CONTENT_ENCODING) {
-        Some(coding) if coding.as_bytes() != b"identity" => {
-            let coding = String::from_utf8_lossy(coding.as_bytes());
-            Err(ApiError::UnsupportedMedia(format!(
-                "a body with the encoding {coding}"
-            )))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Why a body could not be read to its end.
-pub(super) fn incomplete(error: axum::Error) -> ApiError {
-    transfer::cause(error)
-        .unwrap_or_else(|error| ApiError::MalformedJson(format!("the body is incomplete: {error}")))
 }
 
 /// The length of the body that the headers declare.

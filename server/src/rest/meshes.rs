@@ -5,13 +5,13 @@ use axum::{
     http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
-use futures_util::StreamExt;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    body::{declared_length, discard, incomplete, is_not_encoded},
+    body::{declared_length, discard},
     call::Call,
+    coding,
 };
 use crate::{
     address::link,
@@ -23,17 +23,17 @@ use crate::{
 /// The file is the body, of any media type: its format is recognized from its first bytes.
 pub(super) async fn upload(call: Call) -> Result<Response, ApiError> {
     let limit_bytes = call.service.max_mesh_bytes;
-    let mut pieces = call.body.into_data_stream();
-    let found = if let Err(error) = is_not_encoded(&call.headers) {
-        Err(error)
-    } else if declared_length(&call.headers).is_some_and(|length| length > limit_bytes) {
+    let mut body = call.body.into_data_stream();
+    let found = if declared_length(&call.headers).is_some_and(|length| length > limit_bytes) {
         Err(ApiError::PayloadTooLarge { limit_bytes })
     } else {
-        let stream = (&mut pieces).map(|piece| piece.map_err(incomplete));
-        verbs::upload(&call.service, &call.caller, Box::pin(stream)).await
+        match coding::decoded(&call.headers, &mut body) {
+            Ok(pieces) => verbs::upload(&call.service, &call.caller, pieces).await,
+            Err(error) => Err(error),
+        }
     };
     if found.is_err() {
-        tokio::spawn(discard(pieces));
+        tokio::spawn(discard(body));
     }
     let (info, new) = found?;
     let status = if new {

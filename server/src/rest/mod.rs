@@ -6,6 +6,7 @@ mod authenticate;
 mod bodies;
 mod body;
 mod call;
+mod coding;
 mod filters;
 mod forwarded;
 mod headers;

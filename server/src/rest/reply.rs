@@ -10,7 +10,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::refused;
+use super::{coding, refused};
 use crate::{address::link, error::ApiError};
 
 impl IntoResponse for ApiError {
@@ -30,6 +30,12 @@ impl IntoResponse for ApiError {
             response
                 .headers_mut()
                 .insert(header::WWW_AUTHENTICATE, WAYS);
+        }
+        if let ApiError::UnsupportedEncoding(_) = &self {
+            const CODINGS: HeaderValue = HeaderValue::from_static(coding::UNDERSTOOD);
+            response
+                .headers_mut()
+                .insert(header::ACCEPT_ENCODING, CODINGS);
         }
         if let ApiError::RangeNotSatisfiable(bytes) = &self
             && let Ok(value) = HeaderValue::from_str(&format!("bytes */{bytes}"))

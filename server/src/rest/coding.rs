@@ -1,0 +1,269 @@
+//! Content codings of bodies, gzip and zstd (RFC 9110, 8.4): chosen for an answer, and undone for a request within limits.
+
+use std::{
+    io,
+    pin::Pin,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering::Relaxed},
+    },
+};
+
+use async_compression::{
+    Level,
+    tokio::bufread::{GzipDecoder, GzipEncoder, ZstdDecoder, ZstdEncoder},
+    zstd::DParameter,
+};
+use axum::{
+    body::{Body, BodyDataStream, Bytes},
+    http::{HeaderMap, header},
+};
+use futures_util::{Stream, StreamExt, TryStreamExt};
+use tokio::io::AsyncRead;
+use tokio_util::io::{ReaderStream, StreamReader};
+
+use crate::{error::ApiError, transfer};
+
+/// A coding that is understood.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Coding {
+    Gzip,
+    Zstd,
+}
+
+/// What a refused request is told.
+pub(super) const UNDERSTOOD: &str = "gzip, zstd";
+
+/// Bytes that are handed on at once: few, so that one answer of very regular text does not keep a thread for itself.
+const PIECE_BYTES: usize = 8 << 10;
+/// The window that a frame of zstd may ask for, as a power of two: what RFC 9659 has for HTTP. Each stream takes that much memory.
+const MOST_WINDOW_LOG: u32 = 23;
+/// Text of a mesh becomes 3 to 20 times smaller. More than this many bytes for one that arrived, beyond the first 16 MiB, are
+/// no mesh, and cost their sender nothing.
+const MOST_RATIO: usize = 32;
+const FREE_BYTES: usize = 16 << 20;
+
+/// A body in pieces, as it was before it was encoded.
+pub(super) type Pieces<'a> = Pin<Box<dyn Stream<Item = Result<Bytes, ApiError>> + Send + 'a>>;
+
+impl Coding {
+    fn of(name: &str) -> Option<Coding> {
+        let is = |known| name.eq_ignore_ascii_case(known);
+        match () {
+            () if is("gzip") || is("x-gzip") => Some(Coding::Gzip),
+            () if is("zstd") => Some(Coding::Zstd),
+            () => None,
+        }
+    }
+
+    /// Its name in headers.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Coding::Gzip => "gzip",
+            Coding::Zstd => "zstd",
+        }
+    }
+
+    /// The coding that the client weighs most, zstd before gzip; `*` is gzip, and the weight 0 refuses (RFC 9110, 12.5.3).
+    pub(super) fn accepted(headers: &HeaderMap) -> Option<Coding> {
+        let (mut gzip, mut zstd, mut any) = (None, None, 0.0);
+        let values = headers.get_all(header::ACCEPT_ENCODING).iter();
+        let items = values.filter_map(|value| value.to_str().ok());
+        for item in items.flat_map(|text| text.split(',')) {
+            let mut parts = item.split(';').map(str::trim);
+            let name = parts.next().unwrap_or_default();
+            let weight = parts.find_map(|part| part.strip_prefix("q=").or(part.strip_prefix("Q=")));
+            let weight = weight.map_or(1.0, |weight| weight.parse::<f32>().unwrap_or(1.0));
+            match Coding::of(name) {
+                Some(Coding::Gzip) => gzip = Some(weight),
+                Some(Coding::Zstd) => zstd = Some(weight),
+                None if name == "*" => any = weight,
+                None => {}
+            }
+        }
+        let (gzip, zstd) = (gzip.unwrap_or(any), zstd.unwrap_or(0.0));
+        match zstd >= gzip {
+            true => (zstd > 0.0).then_some(Coding::Zstd),
+            false => Some(Coding::Gzip),
+        }
+    }
+
+    /// The body in this coding, as fast as it can be made.
+    pub(super) fn encoded(self, body: Body) -> Body {
+        let reader = StreamReader::new(body.into_data_stream().map_err(io::Error::other));
+        match self {
+            Coding::Gzip => from_reader(GzipEncoder::with_quality(reader, Level::Fastest)),
+            Coding::Zstd => from_reader(ZstdEncoder::with_quality(reader, Level::Fastest)),
+        }
+    }
+}
+
+fn from_reader(reader: impl AsyncRead + Send + 'static) -> Body {
+    Body::from_stream(ReaderStream::with_capacity(reader, PIECE_BYTES))
+}
+
+/// The body of a request without its coding. The caller has the limit of its bytes; whatever that is, they are not many times
+/// more than those that arrived. An error if the coding is none of these, or several.
+pub(super) fn decoded<'a>(
+    headers: &HeaderMap,
+    body: &'a mut BodyDataStream,
+) -> Result<Pieces<'a>, ApiError> {
+    let named = headers.get_all(header::CONTENT_ENCODING).iter();
+    let named: Vec<_> = named
+        .map(|value| String::from_utf8_lossy(value.as_bytes()))
+        .filter(|name| !name.eq_ignore_ascii_case("identity"))
+        .collect();
+    let Some(name) = named.first() else {
+        return Ok(Box::pin(body.map_err(incomplete)));
+    };
+    let coding = Coding::of(name.trim()).filter(|_| named.len() == 1);
+    let coding = coding.ok_or_else(|| ApiError::UnsupportedEncoding(named.join(", ")))?;
+    let arrived = Arc::new(AtomicUsize::new(0));
+    let counted = arrived.clone();
+    let body = body.inspect_ok(move |piece| {
+        counted.fetch_add(piece.len(), Relaxed);
+    });
+    let reader = StreamReader::new(body.map_err(io::Error::other));
+    let reader: Pin<Box<dyn AsyncRead + Send>> = match coding {
+        Coding::Gzip => {
+            let mut decoder = GzipDecoder::new(reader);
+            decoder.multiple_members(true);
+            Box::pin(decoder)
+        }
+        Coding::Zstd => {
+            let window = DParameter::window_log_max(MOST_WINDOW_LOG);
+            let mut decoder = ZstdDecoder::with_params(reader, &[window]);
+            decoder.multiple_members(true);
+            Box::pin(decoder)
+        }
+    };
+    let mut bytes = 0;
+    let pieces = ReaderStream::with_capacity(reader, PIECE_BYTES).map(move |piece| {
+        let piece = piece.map_err(|error| match error.downcast::<axum::Error>() {
+            Ok(error) => incomplete(error),
+            Err(error) => ApiError::MalformedJson(format!(
+                "the body is not as its Content-Encoding {} says: {error}",
+                coding.name()
+            )),
+        })?;
+        bytes += piece.len();
+        match bytes > FREE_BYTES + MOST_RATIO * arrived.load(Relaxed) {
+            true => Err(ApiError::EncodedTooLarge { ratio: MOST_RATIO }),
+            false => Ok(piece),
+        }
+    });
+    Ok(Box::pin(pieces))
+}
+
+/// Why a body could not be read to its end.
+fn incomplete(error: axum::Error) -> ApiError {
+    transfer::cause(error)
+        .unwrap_or_else(|error| ApiError::MalformedJson(format!("the body is incomplete: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn an_encoding_is_chosen_as_the_rfc_specifies() {
+        let chosen = |text: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::ACCEPT_ENCODING, text.parse().unwrap());
+            Coding::accepted(&headers)
+        };
+        for gzip in [
+            "gzip",
+            "br, gzip;q=0.5",
+            "GZIP",
+            "*",
+            "identity;q=0, *",
+            "br;q=1,*;q=0.1",
+            "zstd;q=0.5, gzip",
+            "zstd;q=0, *",
+        ] {
+            assert_eq!(chosen(gzip), Some(Coding::Gzip), "{gzip}");
+        }
+        for zstd in ["zstd", "gzip, deflate, br, zstd", "gzip;q=0.5, Zstd;q=0.8"] {
+            assert_eq!(chosen(zstd), Some(Coding::Zstd), "{zstd}");
+        }
+        for no in [
+            "",
+            "br",
+            "identity",
+            "gzip;q=0",
+            "gzip;q=0.0, *",
+            "*;q=0",
+            "zstd;q=0",
+        ] {
+            assert_eq!(chosen(no), None, "{no}");
+        }
+        assert_eq!(Coding::accepted(&HeaderMap::new()), None);
+    }
+
+    async fn all(body: Body, encoding: &str) -> Result<Vec<u8>, ApiError> {
+        let mut headers = HeaderMap::new();
+        headers.insert(header::CONTENT_ENCODING, encoding.parse().unwrap());
+        let mut body = body.into_data_stream();
+        let mut pieces = decoded(&headers, &mut body)?;
+        let mut found = vec![];
+        while let Some(piece) = pieces.next().await {
+            found.extend_from_slice(&piece?);
+        }
+        Ok(found)
+    }
+
+    async fn bytes(body: Body) -> Vec<u8> {
+        axum::body::to_bytes(body, usize::MAX)
+            .await
+            .unwrap()
+            .to_vec()
+    }
+
+    #[tokio::test]
+    async fn what_is_encoded_is_decoded_also_in_several_members() {
+        let text: String = (0..20_000).map(|n| format!("{n},")).collect();
+        for coding in [Coding::Gzip, Coding::Zstd] {
+            let encoded = bytes(coding.encoded(Body::from(text.clone()))).await;
+            assert!(
+                encoded.len() < text.len() / 2,
+                "{coding:?}: {}",
+                encoded.len()
+            );
+            let twice = [&encoded[..], &encoded[..]].concat();
+            let found = all(Body::from(twice), coding.name()).await.unwrap();
+            assert_eq!(found, text.repeat(2).as_bytes());
+            // cut off, or something else
+            for wrong in [&encoded[..encoded.len() - 9], text.as_bytes()] {
+                let error = all(Body::from(wrong.to_vec()), coding.name()).await;
+                assert!(
+                    matches!(error, Err(ApiError::MalformedJson(_))),
+                    "{error:?}"
+                );
+            }
+        }
+    }
+
+    #[tokio::test]
+    async fn what_becomes_many_times_larger_is_refused() {
+        for coding in [Coding::Gzip, Coding::Zstd] {
+            for (mib, refused) in [(15, false), (64, true)] {
+                let body = coding.encoded(Body::from(vec![b' '; mib << 20]));
+                let found = all(Body::from(bytes(body).await), coding.name()).await;
+                assert_eq!(
+                    matches!(found, Err(ApiError::EncodedTooLarge { .. })),
+                    refused,
+                    "{coding:?}, {mib} MiB"
+                );
+            }
+        }
+        for unknown in ["br", "gzip, gzip", "deflate"] {
+            let error = all(Body::empty(), unknown).await;
+            assert!(
+                matches!(error, Err(ApiError::UnsupportedEncoding(_))),
+                "{error:?}"
+            );
+        }
+    }
+}
