@@ -75,7 +75,7 @@ def submit_and_poll(client):
     equal((job["name"], job["labels"], job["priority"], job["owner"]), ("poll", {"kind": "punch"}, 3, "local"), "a new job")
     job = client.finished(job["id"])
     equal((job["status"], job["attempt"], job["cached_from"]), ("succeeded", 1, None), "a job that has run")
-    tag = '"%d"' % job["version"]
+    tag = 'W/"%d"' % job["version"]
     began = time.monotonic()
     answer = client("GET", "/v1/jobs/%s?wait=1" % job["id"], if_none_match=tag)
     equal((answer.status, time.monotonic() - began >= 0.9), (304, True), "a long poll for a change that does not come")
@@ -90,14 +90,14 @@ def submit_and_poll(client):
 def poll_for_each_change(client):
     """Every version of a running job by If-None-Match, until the last."""
     job = client.submit(talkative(200, refine=3))
-    tags = ['"%d"' % job["version"]]
+    tags = ['W/"%d"' % job["version"]]
     while job["status"] not in TERMINAL:
         answer = client("GET", "/v1/jobs/%s?wait=30" % job["id"], if_none_match=tags[-1])
         check(answer.status in (200, 304), "a long poll, %r" % answer)
         if answer.status == 200:
             job = answer.json()
             tags.append(answer.headers["etag"])
-    equal(sorted(set(tags), key=lambda tag: int(tag.strip('"'))), tags, "the versions, each once and in order")
+    equal(sorted(set(tags), key=lambda tag: int(tag.strip('W/"'))), tags, "the versions, each once and in order")
     equal(job["status"], "succeeded", "the job of many polls")
 
 
@@ -248,7 +248,7 @@ def retry_edit_delete(client, job):
     client.refused(412, "stale-version", "PATCH", path, {"name": "lost"}, if_match=tag)
     equal(client.get(path)["name"], "edited", "the name after a stale edit")
 
-    running = client.submit(talkative(200, refine=3))["id"]
+    running = client.submit(talkative(4000, refine=3))["id"]
     client.refused(409, "job-active", "DELETE", "/v1/jobs/" + running)
     client("POST", "/v1/jobs/%s/cancel" % running)
     client.finished(running)

@@ -21,7 +21,7 @@ async fn a_submitted_job_is_accepted_with_its_address_and_version() {
         headers["location"],
         format!("/v1/jobs/{}", job["id"].as_str().unwrap())
     );
-    assert_eq!(headers["etag"], format!("\"{}\"", job["version"]));
+    assert_eq!(headers["etag"], format!("W/\"{}\"", job["version"]));
     assert!(headers.contains_key("retry-after"));
     assert_eq!(
         (&job["name"], &job["labels"]["a"], &job["priority"]),

@@ -75,6 +75,12 @@ pub(super) const IF_MATCH: Condition = Condition {
     meaning: "ETag of the job; the change is made only if it is still current",
 };
 
+/// The entity tag of a version of a job or sweep. It is weak: the version counts changes of the status and edits, and of two
+/// answers with the same one the later may tell of more progress.
+pub(super) fn version_tag(version: i64) -> String {
+    format!("W/\"{version}\"")
+}
+
 /// A header of entity tags.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Condition {
@@ -110,27 +116,36 @@ impl Tags {
         Some(Tags(tags.collect()))
     }
 
-    /// Whether this tag, with its quotes, is among them, as `If-None-Match` compares: weakly.
+    /// Whether this tag is among them, as `If-None-Match` compares: weakly.
     pub(super) fn contain(&self, tag: &str) -> bool {
-        let same = |own: &String| own == "*" || own.strip_prefix("W/").unwrap_or(own) == tag;
+        let same = |own: &String| own == "*" || opaque(own) == opaque(tag);
         self.0.iter().any(same)
     }
 
-    /// The versions that match as `If-Match` compares: strongly. `None`: all of them.
+    /// The versions among them; `None`: all of them. `If-Match` compares strongly, so that by the RFC the tag of a job would
+    /// match nothing; what is compared here are versions, of which each change makes a new one.
     pub(super) fn versions(&self) -> Option<Vec<i64>> {
-        let strong = |tag: &String| tag.strip_prefix('"')?.strip_suffix('"')?.parse().ok();
         let any = self.0.iter().any(|tag| tag == "*");
-        (!any).then(|| self.0.iter().filter_map(strong).collect())
+        (!any).then(|| self.0.iter().filter_map(|tag| number(tag)).collect())
     }
 
-    /// The first number among them.
+    /// The first version among them.
     pub(super) fn version(&self) -> Option<i64> {
-        let number = |tag: &String| {
-            let tag = tag.strip_prefix("W/").unwrap_or(tag);
-            tag.trim_matches('"').parse().ok()
-        };
-        self.0.iter().find_map(number)
+        self.0.iter().find_map(|tag| number(tag))
     }
+}
+
+/// The tag in its quotes, weak or not.
+fn opaque(tag: &str) -> &str {
+    tag.strip_prefix("W/").unwrap_or(tag)
+}
+
+fn number(tag: &str) -> Option<i64> {
+    opaque(tag)
+        .strip_prefix('"')?
+        .strip_suffix('"')?
+        .parse()
+        .ok()
 }
 
 /// How long to wait for the end of a submitted job, in whole seconds (RFC 7240).

@@ -13,7 +13,7 @@ use super::{
     bodies::{edit, merge_patch},
     body::is_merge_patch,
     call::Call,
-    headers::Tags,
+    headers::{Tags, version_tag},
 };
 use crate::{
     error::ApiError,
@@ -142,7 +142,7 @@ pub(super) fn job_response(job: &Job) -> Response {
 }
 
 pub(super) fn tag(job: &Job) -> String {
-    format!("\"{}\"", job.version)
+    version_tag(job.version)
 }
 
 /// The effect of asking a job to stop, and the job.

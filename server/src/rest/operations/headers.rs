@@ -12,9 +12,13 @@ pub(super) fn location() -> Description {
     header("Location", text(), "The path of the resource")
 }
 
-/// The version of a job.
+/// The version of a job or sweep.
 pub(super) fn etag() -> Description {
-    header("ETag", text(), "The job's version, as a strong entity tag")
+    header(
+        "ETag",
+        text(),
+        "The version, as a weak entity tag: it stays while there is only progress",
+    )
 }
 
 /// Whether a result is final.
