@@ -22,7 +22,7 @@ HOUR, DAY = 3600, 86400
 TO_1970 = -int(time.time()) + 1000
 ALL = [HOUR, -HOUR, DAY, -DAY, TO_1970]
 JUMPS = {"thread": ALL, "process": ALL} if "--soak" in sys.argv else {"thread": [HOUR, -HOUR, TO_1970], "process": [-HOUR]}
-LONG = talkative(1000, refine=5)  # four times as long as its limit or longer, and its solver asks often whether to stop
+LONG = talkative(8000, refine=5)  # several times as long as its limit on a fast machine, and its solver asks often whether to stop
 # the queue looks once a second for jobs that have waited too long, and this machine may be busy
 TOLERANCE_S = 1.3
 worst = 0.0

@@ -75,7 +75,7 @@ def fill(server):
     gone = server.submit(example(), cache="refresh")
     server.finished(gone)
     equal(server.call("DELETE", "/v1/jobs/" + gone).status // 100, 2, "deleting")
-    canceled = server.submit(talkative(400, refine=2))
+    canceled = server.submit(talkative(4000, refine=2))
     server.call("POST", "/v1/jobs/%s/cancel" % canceled)
     equal(server.finished(canceled)["status"], "canceled", "the canceled job")
     equal(server.call("POST", "/v1/queue/pause").status, 200, "pausing")

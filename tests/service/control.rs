@@ -64,7 +64,7 @@ async fn an_ended_job_is_retried_as_a_new_one() {
 #[tokio::test]
 async fn a_job_that_timed_out_is_retried_with_a_higher_limit() {
     let server = server().await;
-    let body = json!({ "problem": large(), "cache": "off", "limits": { "timeout_s": 0.2, "queue_ttl_s": 60 } });
+    let body = json!({ "problem": large(), "cache": "off", "limits": { "timeout_s": 0.3, "queue_ttl_s": 60 } });
     let first = server.solve(&body).await;
     assert_eq!(first["reason"], "timed_out");
     let retry = format!("/v1/jobs/{}/retry", first["id"].as_str().unwrap());

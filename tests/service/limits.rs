@@ -173,3 +173,32 @@ async fn two_large_jobs_run_at_once_and_a_third_waits() {
     }
     assert!(digests.iter().all(|digest| *digest == digests[0]));
 }
+
+/// Operations: CreateJob, CreateSweep, ValidateProblem
+#[tokio::test]
+async fn a_job_that_would_only_run_into_its_time_limit_is_refused_with_the_estimate() {
+    let server = server().await;
+    let validated = server.post("/v1/problems/validate");
+    let (_, validated) = answer(validated.json(&json!({ "problem": large() }))).await;
+    let run_s = validated["estimate"]["run_s"].as_f64().unwrap();
+    let limits = json!({ "timeout_s": run_s / 20.0 });
+    let axes = json!([{ "path": "/materials/0/youngs_modulus", "values": [1000, 2000] }]);
+    for (route, body) in [
+        ("/v1/jobs", json!({ "problem": large(), "limits": limits })),
+        (
+            "/v1/sweeps",
+            json!({ "base": large(), "axes": axes, "limits": limits }),
+        ),
+    ] {
+        let (status, refused) = answer(server.post(route).json(&body)).await;
+        assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{route}");
+        let errors = refused["errors"].as_array().unwrap();
+        assert_eq!(errors.len(), 1, "{errors:#?}");
+        assert_eq!(errors[0]["pointer"], "/limits/timeout_s");
+        let expected = errors[0]["expected"].as_str().unwrap();
+        assert!(
+            expected.contains(&format!("to take {run_s:.0} s")),
+            "{expected}"
+        );
+    }
+}

@@ -1,7 +1,7 @@
 //! Admission of a job that was read: it is fingerprinted, checked in depth, and stored in the queue.
 
 use solver::{
-    error::{Findings, Violation},
+    error::{Findings, Reason, Violation},
     problem::Problem,
 };
 use tracing::info;
@@ -16,7 +16,7 @@ use crate::{
     caller::Caller,
     digest,
     error::{ApiError, Quota, QuotaOf},
-    job::{Job, JobId},
+    job::{Job, JobId, Limits},
     metrics::METRICS,
     spans,
     store::{Accepted, NewJob, NewSweep, QueueLimits, RequestKey, StoreError, Submission},
@@ -78,6 +78,24 @@ pub(super) async fn replayed(
     }
 }
 
+/// How many times its time limit a job may be estimated to take: what is refused must not be solvable, and a fast machine takes
+/// a third of the estimate or less (`tests/bench/estimates.py`).
+const MOST_OVER: f64 = 10.0;
+
+/// What is wrong with a job that is estimated to take this time (seconds) and would only run into its time limit.
+pub(super) fn time_violation(run_s: Option<f64>, limits: &Limits) -> Option<Violation> {
+    let run_s = run_s?;
+    (run_s > MOST_OVER * limits.timeout_s).then(|| {
+        Violation::new(
+            "/limits/timeout_s",
+            Reason::OutOfRange,
+            format!("{} s", limits.timeout_s),
+            format!("at least {:.0} s: the job is estimated to take {run_s:.0} s", run_s / MOST_OVER),
+            "Raise it to what the estimate says, or solve on a coarser mesh, with less refinement or fewer increments.",
+        )
+    })
+}
+
 /// Checks a job in depth.
 pub(super) async fn admit(
     service: &Service,
@@ -100,6 +118,7 @@ pub(super) async fn admit(
     };
     match admitted {
         Ok(admitted) => {
+            violations.extend(time_violation(admitted.0.run_s, &envelope.limits));
             let admitted = violations.into_result(admitted);
             let (admitted, input_hash) = admitted.map_err(ApiError::InvalidProblem)?;
             let Admitted {
@@ -107,6 +126,7 @@ pub(super) async fn admit(
                 json,
                 mesh,
                 memory_bytes,
+                run_s: _,
             } = admitted;
             let Envelope {
                 name,

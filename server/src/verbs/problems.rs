@@ -22,7 +22,7 @@ use crate::{
 /// The result of checking a problem.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Validation {
-    /// Whether it would be accepted.
+    /// Whether a job of it would be accepted, with a time limit that is not far below the estimate.
     pub valid: bool,
     /// All its violations.
     pub violations: Vec<Violation>,
@@ -119,6 +119,12 @@ pub(super) fn too_large_at(pointer: String, estimate: &Estimate, budget_bytes: u
     }
 }
 
+/// The time (seconds) that a problem is estimated to take, if that is more than a bound: of adaptive refinement it is the time
+/// of the largest mesh that is allowed, which few problems need.
+pub(super) fn told(problem: &Problem, run_s: f64) -> Option<f64> {
+    (!matches!(problem.mesh.refine, Refine::Adaptive(_))).then_some(run_s)
+}
+
 /// A problem that was found valid, as it is stored.
 #[derive(Debug)]
 pub(super) struct Admitted {
@@ -130,6 +136,8 @@ pub(super) struct Admitted {
     pub mesh: Option<String>,
     /// Memory that it is estimated to need (bytes).
     pub memory_bytes: u64,
+    /// Time that it is estimated to take (seconds), if more than a bound is known.
+    pub run_s: Option<f64>,
 }
 
 /// The stored mesh that a problem refers to, if it does.
@@ -163,7 +171,11 @@ pub(super) async fn admit(
         let before = estimate(&problem, stored.as_ref());
         within(before.map_err(|violation| ApiError::InvalidProblem(vec![violation]))?)?;
         let checked = check(&problem, stored).map_err(ApiError::InvalidProblem)?;
-        let memory_bytes = within(checked.estimate)?.memory_bytes;
+        let Estimate {
+            memory_bytes,
+            run_s,
+            ..
+        } = within(checked.estimate)?;
         let title = problem.title.take();
         let json = serde_json::to_string(&problem).map_err(ApiError::internal)?;
         Ok(Admitted {
@@ -171,6 +183,7 @@ pub(super) async fn admit(
             json,
             mesh: problem.mesh.stored().map(str::to_owned),
             memory_bytes,
+            run_s: told(&problem, run_s),
         })
     };
     service.work(admit).await?

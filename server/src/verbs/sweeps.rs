@@ -13,12 +13,12 @@ use solver::{
 use tokio::time::{Instant, timeout, timeout_at};
 
 use super::{
-    admission::{admit, enqueue_sweep, prepare, replayed},
+    admission::{admit, enqueue_sweep, prepare, replayed, time_violation},
     envelope::{Envelope, JobRequest, MAX_NAME},
     filters::SweepIds,
     key::Key,
     page::{Page, Paging},
-    problems::too_large_at,
+    problems::{told, too_large_at},
     service::{Service, detached},
     submit::{self, Submitted},
 };
@@ -138,7 +138,10 @@ pub async fn create(
             })
             .await?;
         let Checked { definition, groups } = checked;
-        let memory_bytes = admit_base(&service, &caller, &definition.base, &mut found).await?;
+        let most = groups.iter().flatten().map(Vec::len).max();
+        let of_base = limits.unwrap_or_else(|| limits_for(most.unwrap_or_default()));
+        let memory_bytes =
+            admit_base(&service, &caller, &definition.base, of_base, &mut found).await?;
         let groups = groups.map_err(|more| found.extend(more)).ok();
         let (Some(memory_bytes), Some(groups)) = (memory_bytes, groups) else {
             return Err(ApiError::InvalidProblem(found.into_violations()));
@@ -157,19 +160,24 @@ async fn admit_base(
     service: &Arc<Service>,
     caller: &Caller,
     base: &Problem,
+    limits: Limits,
     found: &mut Findings,
 ) -> Result<Option<u64>, ApiError> {
     let request = JobRequest {
-        envelope: Envelope::default(),
+        envelope: Envelope {
+            limits,
+            ..Envelope::default()
+        },
         problem: Ok(base.clone()),
     };
     match admit(service, caller, prepare(service, request, None).await?).await {
         Ok(job) => Ok(Some(job.memory_bytes)),
         Err(ApiError::InvalidProblem(more)) => {
             let of_base = |v: Violation| {
-                let inside = v.pointer.strip_prefix(PROBLEM).unwrap_or(&v.pointer);
+                let inside = v.pointer.strip_prefix(PROBLEM);
+                let inside = inside.map(|inside| format!("/base{inside}"));
                 Violation {
-                    pointer: format!("/base{inside}"),
+                    pointer: inside.unwrap_or(v.pointer),
                     ..v
                 }
             };
@@ -223,6 +231,12 @@ async fn admitted(
                 found.add(too_large_at(plan.origin(*first), &estimate, budget_bytes));
                 continue;
             }
+            let of_group = limits.unwrap_or_else(|| limits_for(group.len()));
+            let run_s = estimate.and_then(|estimate| told(&problem, estimate.run_s));
+            if let Some(violation) = time_violation(run_s, &of_group) {
+                found.add(violation);
+                break;
+            }
             let known = match plan.changes_mesh() {
                 true => 0,
                 false => base_bytes, // of the checked base, on the same mesh
@@ -253,7 +267,7 @@ async fn admitted(
                 // 64 of them for each of thousands of jobs would fill the index: they are the sweep's
                 labels: Default::default(),
                 priority,
-                limits: limits.unwrap_or_else(|| limits_for(group.len())),
+                limits: of_group,
                 cache: Cache::Off,
                 parent: None,
                 sweep: Some(id),

@@ -16,7 +16,8 @@ pub struct Estimate {
     pub dofs: u64,
     /// Peak memory (bytes), overestimated rather than underestimated.
     pub memory_bytes: u64,
-    /// Time (seconds).
+    /// Time on one thread (seconds): as much or some times more on a machine of 2024, if friction needs no more iterations
+    /// than usual. Of adaptive refinement that of the largest mesh.
     pub run_s: f64,
 }
 
@@ -246,7 +247,8 @@ impl Size {
         (500.0 * self.nodes + self.history()) as u64
     }
 
-    /// The constants are those of `server/src/queue/tests/estimates.rs`, which compares estimates with measurements.
+    /// The constants of memory are those of `server/src/queue/tests/estimates.rs`, which compares estimates with
+    /// measurements; those of time of `tests/bench/estimates.py`.
     fn estimate(&self, margin: f64) -> Estimate {
         let dofs = 2.0 * self.nodes;
         let contact = self.contact;
@@ -259,8 +261,11 @@ impl Size {
         // mesh and structure of the factor; later displacements and stresses, and the stored result
         let of_nodes = 1500.0 * margin * self.nodes;
         let memory = 8.0 * (factor + dense + self.weights) + of_nodes + self.history() + FLOOR;
-        let sweeps = contact.powi(3) * (1.0 + 2.0 * self.increments * self.repeats);
-        let time = 3e-6 * dofs + 3e-9 * dofs.powf(1.5) + 1e-9 * sweeps + 2.5e-6 * self.weights;
+        // of an uneven mesh; then one elimination of the contact, and for each increment a few updates of it
+        let linear = 2e-6 * dofs + 3.5e-9 * dofs.powf(1.5);
+        let increments = self.increments * (3e-4 + 6e-9 * contact * contact);
+        let contacts = self.repeats * (3e-11 * contact.powi(3) + increments);
+        let time = linear + contacts + 2.5e-6 * self.weights;
         Estimate {
             dofs: dofs as u64,
             memory_bytes: memory as u64,
