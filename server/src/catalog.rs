@@ -160,7 +160,7 @@ catalog! {
     IdConflict: of_request("The id belongs to another job", 409, Grpc::AlreadyExists, None,
         "A job with this id was submitted with other content. An id belongs to one job; use a new one."),
     Deleted: of_request("The job or sweep was deleted", 410, Grpc::NotFound, None,
-        "The job or sweep was deleted within the last 7 days, with its events and its results. After that its id is unknown."),
+        "The job or sweep was deleted within the last 7 days, with its events and its results. After that, or when 100,000 more jobs were deleted, its id is unknown."),
     StaleVersion: of_request("The job has changed", 412, Grpc::Aborted, None,
         "The job no longer has the version given by If-Match. Fetch it again and decide anew."),
     PayloadTooLarge: of_request("The body or message is too large", 413, Grpc::OutOfRange, None,

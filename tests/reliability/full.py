@@ -16,7 +16,7 @@ from outside import BINARY, submission, talkative
 
 ROUNDS = 10 if SOAK else 2
 MOST_REFUSED_S, MOST_BACK_S = 1, 10
-LONG = talkative(400, refine=2)
+LONG = talkative(2000, refine=2)
 slowest = {"refused": 0.0, "control": 0.0, "back": 0.0}
 
 

@@ -1,5 +1,7 @@
 //! Deleting jobs; their ids are remembered for a while.
 
+use std::time::Duration;
+
 use sqlx::SqliteConnection;
 
 use super::{change::Change, database::Store, error::Result, results, rows::find, sweeps};
@@ -7,6 +9,14 @@ use crate::{caller::Owners, job::JobId, time::Time};
 
 /// How long the id of a deleted job is answered with *deleted*; then it is unknown.
 const REMEMBERED_S: f64 = 7.0 * 86_400.0;
+
+/// How many of them are remembered, some 160 bytes each: what is removed as fast as it is solved does not fill the disk.
+pub(super) const MOST_REMEMBERED: u32 = 100_000;
+/// Between two transactions others write.
+pub(super) const PAUSE: Duration = Duration::from_millis(20);
+
+/// Ids that are forgotten in one transaction: some milliseconds of the single writer.
+const FORGOTTEN_AT_ONCE: u32 = 1000;
 
 /// The effect of deleting a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +73,35 @@ impl Store {
             Ok(())
         };
         self.writing(forget).await
+    }
+
+    /// Removes the oldest ids of deleted jobs beyond so many.
+    pub(super) async fn forget_beyond(&self, most: u32) -> Result<()> {
+        let beyond = "select deleted_at from deleted_job indexed by deleted_job_by_time
+             order by deleted_at desc limit 1 offset ?";
+        loop {
+            let newest: Option<i64> = sqlx::query_scalar(beyond)
+                .bind(most)
+                .fetch_optional(&self.reader)
+                .await?;
+            let Some(newest) = newest else {
+                return Ok(());
+            };
+            let forget = async {
+                let mut tx = self.begin_control().await?;
+                sqlx::query(
+                    "delete from deleted_job where uuid in (select uuid from deleted_job indexed by deleted_job_by_time
+                     where deleted_at <= ? order by deleted_at limit ?)",
+                )
+                .bind(newest)
+                .bind(FORGOTTEN_AT_ONCE)
+                .execute(&mut *tx)
+                .await?;
+                tx.commit().await
+            };
+            self.writing(forget).await?;
+            tokio::time::sleep(PAUSE).await;
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Space that is kept free for control: a file that is removed when the disk is full, so that jobs can still be
-//! canceled and deleted, and the queue paused. As long as it is missing, nothing else is written.
+//! canceled and deleted, and the queue paused. As long as it is not there in full, nothing else is written. A part of it
+//! stays for the next start, which must write too, even on a disk that is full to its last byte.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -17,6 +18,10 @@ pub(super) const FILE: &str = "signorini.reserve";
 /// Four times what the write-ahead log grows by before SQLite reuses it: a thousand pages of 4 KiB.
 const BYTES: u64 = 16 << 20;
 
+/// What of it stays for the next start: the index of a write-ahead log of this size or more, and what is written there about
+/// jobs that were running.
+const FOR_A_START: u64 = 2 << 20;
+
 /// With less than this the disk is full: a submit takes some ten kilobytes.
 const LEAST: u64 = 256 << 10;
 
@@ -28,13 +33,15 @@ pub(super) struct Reserve {
 }
 
 impl Reserve {
-    /// Takes the space, if there is some.
+    /// Takes the space, if there is some; if not, frees what was kept for this start.
     pub(super) fn new(folder: &Path) -> Reserve {
         let reserve = Reserve {
             path: folder.join(FILE),
             held: AtomicBool::new(false),
         };
-        reserve.retake(); // if not, the watch tells
+        if !reserve.retake() {
+            let _ = fs::remove_file(&reserve.path); // the watch tells that there is no space
+        }
         reserve
     }
 
@@ -54,12 +61,13 @@ impl Reserve {
             || free.is_some_and(|free| free.f_bavail.saturating_mul(free.f_frsize) < LEAST)
     }
 
-    /// Frees the space; false if that was done before.
+    /// Frees the space but for what the next start needs; false if that was done before.
     pub(super) fn release(&self) -> bool {
         if !self.held.swap(false, Ordering::AcqRel) {
             return false;
         }
-        match fs::remove_file(&self.path) {
+        let file = OpenOptions::new().write(true).open(&self.path);
+        match file.and_then(|file| file.set_len(FOR_A_START)) {
             Ok(()) => true,
             Err(error) => {
                 tracing::warn!(%error, "{}: {error}", self.path.display());
@@ -80,25 +88,34 @@ impl Reserve {
             }
             Err(error) => {
                 tracing::debug!(%error, "{}: {error}", self.path.display());
-                let _ = fs::remove_file(&self.path); // a part of it, or nothing
                 false
             }
         }
     }
 }
 
+/// Gives the file its full size. If it cannot have that, it is as it was before.
 fn allocate(path: &Path) -> io::Result<()> {
-    if fs::metadata(path).is_ok_and(|found| found.len() == BYTES) {
+    let before = fs::metadata(path).map_or(0, |found| found.len());
+    if before == BYTES {
         return Ok(()); // of the last run
     }
     let mut file: File = OpenOptions::new()
         .write(true)
         .create(true)
-        .truncate(true)
+        .truncate(false)
         .mode(0o600)
         .open(path)?;
-    let none = rustix::fs::FallocateFlags::empty();
-    match rustix::fs::fallocate(&file, none, 0, BYTES) {
+    occupy(&mut file).inspect_err(|_| {
+        let _ = match before {
+            0 => fs::remove_file(path),
+            _ => file.set_len(before),
+        };
+    })
+}
+
+fn occupy(file: &mut File) -> io::Result<()> {
+    match rustix::fs::fallocate(&*file, rustix::fs::FallocateFlags::empty(), 0, BYTES) {
         Ok(()) => Ok(()),
         // the file system cannot: the space is taken by writing
         Err(rustix::io::Errno::OPNOTSUPP) => {
@@ -122,15 +139,23 @@ mod tests {
     #[test]
     fn a_reserve_occupies_its_space_until_it_is_released() {
         let folder = tempfile::tempdir().unwrap();
+        let occupied = || {
+            let found = fs::metadata(folder.path().join(FILE)).unwrap();
+            found.blocks() * 512
+        };
         let reserve = Reserve::new(folder.path());
-        let found = fs::metadata(folder.path().join(FILE)).unwrap();
-        assert!(found.blocks() * 512 >= BYTES, "{}", found.blocks());
+        assert!(occupied() >= BYTES, "{}", occupied());
         reserve.has_room().unwrap();
         assert!(reserve.release());
-        assert!(!folder.path().join(FILE).exists());
+        assert!(
+            (FOR_A_START..BYTES / 2).contains(&occupied()),
+            "{}",
+            occupied()
+        );
         assert!(matches!(reserve.has_room(), Err(StoreError::Full)));
         assert!(!reserve.release());
         assert!(reserve.retake());
         reserve.has_room().unwrap();
+        assert!(occupied() >= BYTES, "{}", occupied());
     }
 }

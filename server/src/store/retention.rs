@@ -5,7 +5,7 @@ use std::{collections::HashSet, sync::Weak, time::Duration};
 use super::{
     change::Change,
     database::Store,
-    delete::{self, Deletion},
+    delete::{self, Deletion, PAUSE},
     error::Result,
     fields,
     rows::find,
@@ -35,9 +35,6 @@ const AT_ONCE: usize = 50;
 
 /// What has just ended is never removed for being too much: whoever waits for it must get it.
 const YOUNG_S: f64 = 60.0;
-
-/// Between two transactions others write.
-const PAUSE: Duration = Duration::from_millis(20);
 
 /// The effect of one application of the limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -116,6 +113,7 @@ impl Store {
         if let Some(age_s) = retention.age_s {
             self.forget_keys(now.after_s(-age_s)).await?;
         }
+        self.forget_beyond(delete::MOST_REMEMBERED).await?;
         Ok(retired)
     }
 

@@ -104,7 +104,7 @@ pub(super) fn operations() -> Vec<Operation> {
         delete(CANCEL, "/v1/jobs/{id}", (ID,), jobs::delete)
             .rpcs(&["DeleteJob"])
             .summary("Deletes a job that has ended, with its events and its result")
-            .answers(204, "It is deleted; for 7 days its id answers 410", nothing())
+            .answers(204, "It is deleted; for 7 days its id answers 410, at most for the last 100,000 jobs", nothing())
             .fails(&[Code::JobActive, Code::StorageFull]),
         post(CANCEL, "/v1/jobs/cancel", (FILTERS,), jobs::cancel_many)
             .rpcs(&["CancelJobs"])

@@ -233,6 +233,25 @@ async fn the_space_of_what_is_removed_is_given_back_to_the_file_system() {
 }
 
 #[tokio::test]
+async fn the_ids_of_the_last_deleted_jobs_are_remembered() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let mut ids = vec![];
+    for input in 0..5 {
+        let job = solved(&store, "ada", &input.to_string(), 100).await;
+        ids.push(job.id);
+        store.delete(Owners::All, job.key).await.unwrap();
+    }
+    store.forget_beyond(3).await.unwrap();
+    for (id, remembered) in ids.into_iter().zip([false, false, true, true, true]) {
+        assert_eq!(
+            store.was_deleted(Owners::All, id).await.unwrap(),
+            remembered
+        );
+    }
+}
+
+#[tokio::test]
 async fn a_store_is_rebuilt_without_unused_space_and_only_while_no_service_uses_it() {
     let folder = tempfile::tempdir().unwrap();
     assert!(
