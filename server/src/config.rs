@@ -89,12 +89,12 @@ pub struct Config {
           value_parser = clap::value_parser!(u16).range(1..))]
     pub max_running_per_owner: Option<u16>,
 
-    /// Bytes that one owner may keep, jobs and meshes; with more they can submit nothing until they have deleted some. Where
-    /// there are tokens or a trusted proxy [default: without limit]
+    /// Bytes that one owner may keep, jobs and meshes together. Whoever has more can submit and upload nothing until they have
+    /// deleted some. It applies only where there are tokens or a trusted proxy [default: no limit]
     #[arg(long, env = "SIGNORINI_MAX_BYTES_PER_OWNER", value_name = "BYTES")]
     pub max_bytes_per_owner: Option<u64>,
 
-    /// Jobs that one owner may submit in a minute, where there are tokens or a trusted proxy [default: without limit]
+    /// Jobs that one owner may submit in a minute. It applies only where there are tokens or a trusted proxy [default: no limit]
     #[arg(long, env = "SIGNORINI_MAX_SUBMISSIONS_PER_OWNER_PER_MINUTE", value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub max_submissions_per_owner_per_minute: Option<u32>,
@@ -165,20 +165,21 @@ impl Config {
 /// How long and how much is kept of what has ended.
 #[derive(Clone, Debug, Default, Args)]
 pub struct RetentionLimits {
-    /// Days that a job is kept after its end, unless it is pinned; 0 without limit
+    /// Days that a job is kept after its end, unless it is pinned. 0: no limit
     #[arg(long, env = "SIGNORINI_RETAIN_DAYS", default_value_t = 90.0, value_name = "DAYS", value_parser = days)]
     pub retain_days: f64,
 
-    /// Days that displacements and stresses are kept, most of what a job keeps; summary, history and profiles stay. 0 as
-    /// long as the job
+    /// Days that displacements and stresses, which are most of a result, are kept; summary, history and profiles stay. 0: they
+    /// are kept as long as their job
     #[arg(long, env = "SIGNORINI_RETAIN_FIELDS_DAYS", default_value_t = 0.0, value_name = "DAYS", value_parser = days)]
     pub retain_fields_days: f64,
 
-    /// Bytes of all jobs that have ended: of more, the oldest that are not pinned are removed. 0 without limit
+    /// Most bytes that all jobs that have ended may take; beyond that the oldest that are not pinned are removed. 0: no limit
     #[arg(long, env = "SIGNORINI_RETAIN_BYTES", default_value_t = 20 << 30, value_name = "BYTES")]
     pub retain_bytes: u64,
 
-    /// Bytes of the jobs of one owner that have ended, likewise; 0 without limit
+    /// Most bytes that the jobs of one owner that have ended may take; beyond that their oldest that are not pinned are removed.
+    /// 0: no limit
     #[arg(
         long,
         env = "SIGNORINI_RETAIN_BYTES_PER_OWNER",
@@ -187,7 +188,7 @@ pub struct RetentionLimits {
     )]
     pub retain_bytes_per_owner: u64,
 
-    /// Jobs that have ended, likewise; 0 without limit
+    /// Most jobs that have ended to keep; beyond that the oldest that are not pinned are removed. 0: no limit
     #[arg(
         long,
         env = "SIGNORINI_RETAIN_JOBS",
@@ -196,7 +197,7 @@ pub struct RetentionLimits {
     )]
     pub retain_jobs: u64,
 
-    /// Jobs of one owner that have ended, likewise; 0 without limit
+    /// Most jobs of one owner that have ended to keep; beyond that their oldest that are not pinned are removed. 0: no limit
     #[arg(
         long,
         env = "SIGNORINI_RETAIN_JOBS_PER_OWNER",

@@ -245,6 +245,20 @@ pub enum QuotaOf {
     Submissions,
 }
 
+impl Quota {
+    /// Seconds after which the same request may succeed; none if it asks for more than there ever is.
+    fn retry_after_s(&self, code: Code) -> Option<u64> {
+        match self.of {
+            _ if self.asked > self.limit => None,
+            QuotaOf::Submissions => {
+                let missing = (self.used + self.asked).saturating_sub(self.limit);
+                Some((60 * missing).div_ceil(self.limit.max(1)).max(1))
+            }
+            QuotaOf::Queued | QuotaOf::StoredBytes => code.kind().retry_after_s,
+        }
+    }
+}
+
 impl fmt::Display for Quota {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Quota {
@@ -346,7 +360,10 @@ impl ApiError {
 
     /// Seconds after which the same request may succeed.
     pub fn retry_after_s(&self) -> Option<u64> {
-        self.code().kind().retry_after_s
+        match self {
+            ApiError::QuotaExceeded(quota) => quota.retry_after_s(self.code()),
+            _ => self.code().kind().retry_after_s,
+        }
     }
 
     /// The problem document of RFC 9457; `instance` is the path of the request.
@@ -365,7 +382,7 @@ impl ApiError {
             "code": code,
             "detail": self.to_string(),
             "instance": instance,
-            "retryable": kind.retryable(),
+            "retryable": self.retry_after_s().is_some(),
             "errors": self.violations(),
         });
         match self {
@@ -421,7 +438,7 @@ impl From<ApiError> for Status {
             _ => {}
         }
         details.set_error_info(kind.code, "signorini", metadata);
-        if let Some(seconds) = kind.retry_after_s {
+        if let Some(seconds) = error.retry_after_s() {
             details.set_retry_info(Some(std::time::Duration::from_secs(seconds)));
         }
         // the details are sent in a header in addition to the message, a third longer because of their encoding;

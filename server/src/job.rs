@@ -468,6 +468,8 @@ pub enum Waiting {
     Memory,
     /// The queue is paused.
     Paused,
+    /// The disk has no room for results; jobs start again when there is some.
+    LowDisk,
     /// Its owner has as many running jobs as they may.
     OwnerLimit,
     /// It is coalesced into a job with the same input that waits or runs, and will end with its result.

@@ -32,6 +32,17 @@ impl Rates {
         self.take_at(owner, jobs, Instant::now())
     }
 
+    /// Gives back what was taken for jobs that were not stored.
+    pub fn give_back(&self, owner: &str, jobs: u64) {
+        let Some(per_minute) = self.per_minute else {
+            return;
+        };
+        let mut all = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((left, _)) = all.get_mut(owner) {
+            *left = (*left + jobs as f64).min(f64::from(per_minute));
+        }
+    }
+
     /// How many jobs the owner may submit at once; `None` without limit.
     pub fn left(&self, owner: &str) -> Option<u64> {
         let per_minute = self.per_minute?;
@@ -85,5 +96,11 @@ mod tests {
         assert_eq!(at("ada", 3, 12_001), Err(2));
         assert_eq!(at("ada", 61, 600_000), Err(60), "never more than the limit");
         assert_eq!(Rates::new(None).take("ada", u64::MAX), Ok(()));
+
+        assert_eq!(at("ada", 60, 600_000), Ok(()));
+        rates.give_back("ada", 20);
+        assert_eq!(at("ada", 20, 600_000), Ok(()));
+        rates.give_back("ada", 1000);
+        assert_eq!(at("ada", 61, 600_000), Err(60), "never more than the limit");
     }
 }

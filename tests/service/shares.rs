@@ -301,6 +301,9 @@ async fn what_each_owner_keeps_is_told_and_limited_and_fields_can_be_deleted_alo
         }
         ended(&server, "ada", &answer["jobs"][0]).await;
     }
+    let mesh = server.post("/v1/meshes").header("x-remote-user", "ada");
+    let refused = mesh.body("$MeshFormat").send().await.unwrap();
+    assert_eq!(refused.status(), StatusCode::TOO_MANY_REQUESTS);
     assert_eq!(batch(&server, "bob", 1).await.0, StatusCode::ACCEPTED);
     let owners = get(&server, "root", "/v1/owners").await;
     assert_eq!(owners["owners"][0]["owner"], "ada", "{owners}");
@@ -351,13 +354,40 @@ async fn an_owner_submits_no_more_jobs_in_a_minute_than_allowed() {
         (StatusCode::TOO_MANY_REQUESTS, &json!("rate-limited"))
     );
     assert_eq!(answer["quota"]["of"], "submissions", "{answer}");
+    assert_eq!(answer["retryable"], true);
     let (_, answer) = batch(&server, "bob", 6).await;
     assert!(
         answer["detail"].as_str().unwrap().contains("in parts"),
         "{answer}"
     );
+    assert_eq!(answer["retryable"], false, "more than there ever is");
     let me = get(&server, "ada", "/v1/me").await;
     assert_eq!(me["submissions"], json!({"per_minute": 5, "left": 1}));
+    // a repeated request is no submission
+    for _ in 0..3 {
+        let request = server.post("/v1/jobs").header("x-remote-user", "ada");
+        let request = request.header("Idempotency-Key", "the same");
+        let body = json!({"problem": example_json("rectangular_punch"), "cache": "off"});
+        let answer = request.json(&body).send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::ACCEPTED);
+    }
+    let me = get(&server, "ada", "/v1/me").await;
+    assert_eq!(me["submissions"]["left"], 0);
+}
+
+/// Operations: ListOwners
+#[tokio::test]
+async fn owners_who_keep_nothing_yet_are_listed_with_their_jobs() {
+    let server = shared(&[]).await;
+    queue(&server, "pause").await;
+    batch(&server, "bob", 2).await;
+    let owners = get(&server, "root", "/v1/owners").await;
+    let found = &owners["owners"][0];
+    assert_eq!(
+        (&found["owner"], &found["queued"], &found["jobs"]),
+        (&json!("bob"), &json!(2), &json!(0)),
+        "{owners}"
+    );
 }
 
 /// Operations: DeleteJob

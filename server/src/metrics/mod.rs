@@ -60,8 +60,7 @@ pub struct Metrics {
     pub accepted_connections: Counter,
     /// Connections that were closed at once, or could only ask for the probes.
     pub refused_connections: Counter,
-    /// Jobs that were accepted.
-    pub jobs_accepted: Counter,
+    jobs_accepted: Family<Labels<1>, Counter>,
     jobs_ended: Family<Labels<2>, Counter>,
     job_wait: Histogram,
     job_run: Histogram,
@@ -89,7 +88,7 @@ impl Metrics {
             connections: Gauge::default(),
             accepted_connections: Counter::default(),
             refused_connections: Counter::default(),
-            jobs_accepted: Counter::default(),
+            jobs_accepted: Family::default(),
             jobs_ended: Family::default(),
             job_wait: Histogram::new(LONG_S),
             job_run: Histogram::new(LONG_S),
@@ -111,7 +110,7 @@ impl Metrics {
         all.register("signorini_connections", "Open connections", metrics.connections.clone());
         all.register("signorini_connections_accepted", "Connections that were accepted", metrics.accepted_connections.clone());
         all.register("signorini_connections_refused", "Connections and requests that found no free connection", metrics.refused_connections.clone());
-        all.register("signorini_jobs_accepted", "Jobs that were accepted", metrics.jobs_accepted.clone());
+        all.register("signorini_jobs_accepted", "Jobs that were accepted, by what their result comes from", metrics.jobs_accepted.clone());
         all.register("signorini_jobs_ended", "Jobs that have ended, by status and reason", metrics.jobs_ended.clone());
         all.register("signorini_job_wait_seconds", "From acceptance to the start of the last attempt, of jobs that ran", metrics.job_wait.clone());
         all.register("signorini_job_run_seconds", "From the start of the last attempt to the end, of jobs that ran", metrics.job_run.clone());
@@ -151,6 +150,13 @@ impl Metrics {
         self.grpc_requests.get_or_create(&labels).inc();
         let durations = self.grpc_durations.get_or_create(&[("rpc", rpc.into())]);
         durations.observe(took.as_secs_f64());
+    }
+
+    /// A job was accepted, and its result comes from the solver, from an earlier result, or from a job with the same input that
+    /// waits or runs.
+    pub fn job_accepted(&self, result_from: &'static str) {
+        let labels = [("result_from", result_from.into())];
+        self.jobs_accepted.get_or_create(&labels).inc();
     }
 
     /// A job has ended; with how long it waited and ran, if it did run.

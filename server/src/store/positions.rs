@@ -91,6 +91,11 @@ impl Store {
         (waiting.len_of(owner), waiting.running(owner))
     }
 
+    /// The owners of jobs that wait or run.
+    pub fn owners_with_load(&self) -> BTreeSet<String> {
+        self.waiting_jobs().owners().map(str::to_owned).collect()
+    }
+
     /// Sets how many jobs of one owner may run at the same time; once and before any is claimed.
     pub fn set_most_running_of_owner(&self, most: usize) {
         let _ = self.most_running.set(most); // fails if it is set already, which is kept
@@ -147,6 +152,7 @@ impl Store {
             let Some(primary) = job.coalesced_into else {
                 let reason = match self.is_paused() {
                     true => Waiting::Paused,
+                    false if self.has_room().is_err() => Waiting::LowDisk,
                     false if self.load_of(&job.owner).1 >= self.most_running_of_owner() => {
                         Waiting::OwnerLimit
                     }

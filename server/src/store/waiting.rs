@@ -102,6 +102,16 @@ impl Move {
 }
 
 impl WaitingJobs {
+    /// The owners of jobs that wait or run.
+    pub(super) fn owners(&self) -> impl Iterator<Item = &str> {
+        let waiting = self.rows.iter().flat_map(BTreeMap::keys);
+        let busy = self.owners.iter();
+        let busy = busy.filter(|(_, state)| state.running + state.coalesced > 0);
+        waiting
+            .chain(busy.map(|(owner, _)| owner))
+            .map(AsRef::as_ref)
+    }
+
     /// Applies a move; false if it changes nothing: to enter twice, or to leave twice.
     pub(super) fn apply(&mut self, change: Move) -> bool {
         match change {

@@ -221,6 +221,11 @@ pub(super) async fn enqueue_sweep(
         },
     };
     let accepted = service.queue.submit(submission).await;
+    if !accepted.as_ref().is_ok_and(|accepted| !accepted.replayed)
+        && let Some(rates) = service.rates()
+    {
+        rates.give_back(caller.owner(), asked);
+    }
     let accepted = accepted.map_err(|error| match error {
         StoreError::QueueFull => ApiError::QueueFull {
             limit,
@@ -240,7 +245,13 @@ pub(super) async fn enqueue_sweep(
         other => other.into(),
     })?;
     if !accepted.replayed {
-        METRICS.jobs_accepted.inc_by(accepted.jobs.len() as u64);
+        for job in &accepted.jobs {
+            METRICS.job_accepted(match (&job.cached_from, job.coalesced_into) {
+                (Some(_), _) => "earlier_result",
+                (None, Some(_)) => "running_job",
+                (None, None) => "solver",
+            });
+        }
         if let Some(trace) = caller.trace().filter(|_| spans::are_wanted()) {
             service.queue.remember_origin(&accepted.jobs, trace);
         }

@@ -174,11 +174,17 @@ pub async fn me(service: &Service, caller: &Caller) -> Result<Me, ApiError> {
     })
 }
 
-/// What the owners have in the service, who keeps most first: a thousand of them at most. Those whose jobs have not ended yet and
-/// who have no meshes are not among them.
+/// What the owners have in the service: who keeps most first, a thousand of them at most, then those who keep nothing yet.
 pub async fn owners(service: &Service, _caller: &Caller) -> Result<Vec<OwnerUse>, ApiError> {
     const MOST: i64 = 1000;
-    let sizes = service.store.sizes_of_owners(MOST).await?;
+    let mut sizes = service.store.sizes_of_owners(MOST).await?;
+    let mut others = service.store.owners_with_load();
+    for known in &sizes {
+        others.remove(&known.owner);
+    }
+    for owner in others.into_iter().take(MOST as usize) {
+        sizes.push(service.store.size_of_owner(&owner).await?);
+    }
     let with_load = |size: OwnerSize| {
         let (queued, running) = service.store.load_of(&size.owner);
         OwnerUse {

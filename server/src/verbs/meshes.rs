@@ -70,6 +70,7 @@ pub async fn upload(
 ) -> Result<(MeshInfo, bool), ApiError> {
     service.accepting()?;
     service.store.has_room()?;
+    service.may_keep_more(caller.owner()).await?;
     let limit_bytes = service.max_mesh_bytes;
     // without a name: the system removes it when the process ends
     let file = tempfile::tempfile_in(&service.data).map_err(unwritten)?;

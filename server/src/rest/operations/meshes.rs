@@ -25,7 +25,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .with([location()])
             .answers(201, "A new mesh", json::<MeshInfo>())
             .with([location()])
-            .fails(&[Code::MalformedJson, Code::InvalidProblem, Code::PayloadTooLarge, Code::UnsupportedMedia, Code::Draining, Code::StorageFull]),
+            .fails(&[Code::MalformedJson, Code::InvalidProblem, Code::PayloadTooLarge, Code::UnsupportedMedia, Code::QuotaExceeded, Code::Draining, Code::StorageFull]),
         get(READ, "/v1/meshes", (PAGE_SIZE, PAGE_TOKEN), meshes::list)
             .rpcs(&["ListMeshes"])
             .summary("Lists stored meshes, newest first")
