@@ -3,7 +3,7 @@ uploads pass through, gRPC works, long waits are not cut, and links lead back.
 
     proxy.py [--soak]
 
-Only names, ports and the files of the certificate are replaced in the configurations. Caddy is tried where it is there.
+Only names, ports and the files of the certificate are replaced in the configurations.
 """
 
 import contextlib
@@ -255,9 +255,6 @@ def main():
         issued = authority.issue("proxy")
         for start in (nginx, caddy):
             name = start.__name__
-            if start is caddy and not shutil.which("caddy"):
-                print("caddy is not there: its configuration was not tried")
-                continue
             with Server("--path-prefix", PREFIX, "--max-mesh-bytes", str(512 * MIB)) as server:
                 port, proxy = start(folder, server, issued)
                 with proxy as process:
