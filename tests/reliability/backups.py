@@ -290,4 +290,5 @@ def main():
               ROUNDS, took, jobs, requeued, tried))
 
 
-main()
+if __name__ == "__main__":
+    main()
