@@ -2,7 +2,8 @@
 
     retention.py [--soak]
 
-4,000 jobs (a million with --soak) are solved and removed some seconds after their end. Of the second and the last third
+4,000 jobs (a million with --soak, of which one in twenty is solved and the others are answered from its result) are removed
+some seconds after their end. Of the second and the last third
 of the time are compared: memory, open files, the size of the database, and how long one answer takes. In the end all jobs
 are gone, their space is given back to the file system, and the id of the last one is answered with 410.
 """
@@ -16,7 +17,7 @@ from attack import MIB, SOAK, Attacked, check, equal, example, percentile
 JOBS = 1_000_000 if SOAK else 4_000
 KEPT_S = 60 if SOAK else 4
 OWNERS = 20
-BATCH = 50
+BATCH = 200 if SOAK else 50
 # enough to keep the workers busy, and few enough to be solved soon
 MOST_WAITING = 400
 # after the last job: those that are kept, and the next two times that the limits are applied
@@ -50,8 +51,9 @@ def slope(rows, name):
 def main():
     arguments = ["--trusted-proxy", "127.0.0.1", "--proxy-admin", "root", "--retain-days", repr(KEPT_S / 86400)]
     with Attacked(*arguments) as server:
-        body = {"jobs": [{"problem": example(), "cache": "off"}] * BATCH}
-        body = json.dumps(body).encode()
+        solved, answered = ({"problem": example(), "cache": cache} for cache in ("refresh", "use"))
+        jobs = [answered if SOAK and n % 20 else solved for n in range(BATCH)]
+        body = json.dumps({"jobs": jobs}).encode()
         seen, submitted, first, last_one = [], 0, None, None
         while submitted < JOBS:
             queue = server.call("GET", "/v1/queue", x_remote_user="root").json()
