@@ -72,9 +72,8 @@ pub(super) fn decoded(
             json
         }
         Encoding::Columns => {
-            // a number has eight bytes, and two in its JSON at least
-            let limit = usize::try_from(expected.bytes).unwrap_or(usize::MAX);
-            let fields = columns::decode(&stored, limit.saturating_mul(4))?;
+            let json_bytes = usize::try_from(expected.bytes).unwrap_or(usize::MAX);
+            let fields = columns::decode(&stored, json_bytes)?;
             let info = info_of_fields(&fields).map_err(|error| error.to_string())?;
             return Ok((info, Content::Fields(Box::new(fields))));
         }
