@@ -18,13 +18,13 @@ use solver::{
     solution::{Fields, GaussFields},
 };
 
+pub use self::mechanics::Law;
 use self::{
     differences::{Reader, Writer},
     head::{Head, damaged},
     mechanics::{Known, MOST_MATERIALS, Stresses, at_points, predicted_stresses},
     order::NodeOrder,
 };
-pub use self::{head::HEAD_BYTES, mechanics::Law};
 
 /// Fields as bytes. `Err`: columns of different lengths, elements with nodes that do not exist, or too many materials.
 pub fn encode(fields: &Fields, law: &Law) -> Result<Vec<u8>, String> {
@@ -69,9 +69,9 @@ pub fn encode(fields: &Fields, law: &Law) -> Result<Vec<u8>, String> {
     Ok(out.finish([nodes, fields.elements.len(), points]))
 }
 
-/// The memory that decoding takes at most, the fields among it, as the first bytes say: [`HEAD_BYTES`] of them, or all.
-pub fn memory_to_decode(first: &[u8]) -> Result<usize, String> {
-    Ok(Head::read(first)?.0.memory())
+/// The memory that decoding takes at most, the fields among it, as the head of the bytes says; the rest of them may be missing.
+pub fn memory_to_decode(bytes: &[u8]) -> Result<usize, String> {
+    Ok(Head::read(bytes)?.0.memory())
 }
 
 /// Fields as they were encoded. `json_bytes`: the size of their JSON, which limits the memory; `Err`: these bytes are not those of
