@@ -129,6 +129,35 @@ pub fn npz(fields: &Fields) -> Result<Vec<u8>, String> {
     npz.finish()
 }
 
+/// The memory that fields take, in bytes.
+pub fn memory(fields: &Fields) -> usize {
+    let (f, g) = (fields, &fields.gauss);
+    let nodal = [
+        &f.x,
+        &f.y,
+        &f.ux,
+        &f.uy,
+        &f.stress_xx,
+        &f.stress_yy,
+        &f.stress_xy,
+        &f.stress_zz,
+    ];
+    let at_points = [
+        &g.x,
+        &g.y,
+        &g.stress_xx,
+        &g.stress_yy,
+        &g.stress_xy,
+        &g.stress_zz,
+    ];
+    let numbers = nodal.into_iter().chain(at_points).chain([&f.element_error]);
+    numbers
+        .map(|column| column.capacity() * size_of::<f64>())
+        .sum::<usize>()
+        + f.contact_state.capacity()
+        + f.elements.capacity() * size_of::<Element>()
+}
+
 /// Checks that related arrays have equal length, and elements only existing nodes: other files crash the programs
 /// that read them.
 pub(crate) fn check(fields: &Fields) -> Result<(), String> {

@@ -48,7 +48,15 @@ struct Room {
 
 /// A part of a limit, given back when it is dropped.
 #[derive(Debug)]
-pub struct Share(#[allow(dead_code)] OwnedSemaphorePermit);
+pub struct Share(OwnedSemaphorePermit);
+
+impl Share {
+    /// Gives back what is more than so many bytes.
+    pub fn shrink_to(&mut self, bytes: usize) {
+        let more = self.0.num_permits().saturating_sub(bytes.div_ceil(UNIT));
+        drop(self.0.split(more));
+    }
+}
 
 impl Limit {
     /// A limit of so many bytes, beside the room for small ones.
@@ -401,6 +409,19 @@ mod tests {
         assert!(limit.take(1).is_err());
         drop(share);
         assert!(limit.take(1).is_ok());
+    }
+
+    #[test]
+    fn what_is_more_than_needed_is_given_back_at_once() {
+        let limit = Limit::new(10 << 10);
+        let mut share = limit.take(8 << 10).unwrap();
+        share.shrink_to(20 << 10);
+        assert!(limit.take(3 << 10).is_err());
+        share.shrink_to(5 << 10);
+        assert!(limit.take(6 << 10).is_err());
+        let rest = limit.take(5 << 10).unwrap();
+        drop((share, rest));
+        assert!(limit.take(10 << 10).is_ok());
     }
 
     #[tokio::test]

@@ -1,13 +1,18 @@
-//! Files that no program wrote: real ones changed in every way, and noise. Readers and problem parser may refuse
-//! them, in words; they may not panic, and not take memory or time out of all proportion to the file. A process of
+//! Files that no program wrote: real ones changed in every way, and noise. Readers, problem parser and decoder of stored
+//! fields may refuse them, in words; they may not panic, and not take memory or time out of all proportion to the file. A process of
 //! its own, so that its memory is its own; the cases are the same in every run. A longer one: see `suite::fuzzing`.
 #![allow(clippy::unwrap_used, clippy::panic)]
+
+mod columns;
 
 use std::path::Path;
 
 use files::{ReadError, abaqus, read_mesh};
 use solver::error::Violation;
 use suite::fuzzing::{Figures, Target};
+
+#[global_allocator]
+static COUNTING: allocator::Counting = allocator::Counting;
 
 /// Words that mean something to a reader of meshes.
 const MESHES: [&str; 24] = [

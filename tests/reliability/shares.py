@@ -9,6 +9,7 @@ as many started as the others, or one more or less. The user is named in a heade
 
 import collections
 import json
+import time
 
 from attack import SOAK, Attacked, check, equal, example
 
@@ -16,6 +17,8 @@ JOBS = 50_000 if SOAK else 5_000
 OWNERS = 20
 OF_EACH = 100 if SOAK else 20
 BATCH = 500
+# for one wait; the slowest machine takes a small part of it
+PATIENCE_S = 3600 if SOAK else 900
 
 
 def submit(server, owner, count):
@@ -45,11 +48,18 @@ def started(server, filters):
 
 
 def end_of(server, owner, job):
-    path = "/v1/jobs/%s?wait=60&until=terminal" % job["id"]
-    while True:
+    path, last = "/v1/jobs/%s?wait=60&until=terminal" % job["id"], time.monotonic() + PATIENCE_S
+    while time.monotonic() < last:
         found = server.call("GET", path, x_remote_user=owner).json()
         if found["status"] not in ("queued", "running"):
             return found
+    raise AssertionError("%s's job is %s after %d s" % (owner, found["status"], PATIENCE_S))
+
+
+def ended(server, names, statuses):
+    """How many jobs of these owners have ended so."""
+    states = server.call("GET", "/v1/jobs/count?group_by=owner&status=" + statuses, x_remote_user="root").json()
+    return sum(n for owner, n in states["groups"].items() if owner in names)
 
 
 def main():
@@ -67,7 +77,7 @@ def main():
         # another one, while ada's run
         job = submit(server, "bob", 1)
         check(job["status"] == "running" or job["queue"]["ahead"] <= 1, "bob's second job: %r" % job["queue"])
-        end_of(server, "bob", job)
+        equal(end_of(server, "bob", job)["status"], "succeeded", "bob's second job")
         switch(server, "pause")
         order = started(server, "&status=running,succeeded")
         first = order.index("bob")
@@ -81,10 +91,11 @@ def main():
         switch(server, "resume")
         # all but a few, so that all owners have some left
         enough = OWNERS * (OF_EACH - 2)
-        count = 0
+        count, last = 0, time.monotonic() + PATIENCE_S
         while count < enough:
-            states = server.call("GET", "/v1/jobs/count?group_by=owner&status=succeeded", x_remote_user="root").json()
-            count = sum(n for owner, n in states["groups"].items() if owner in names)
+            check(time.monotonic() < last, "%d of %d jobs have ended after %d s" % (count, enough, PATIENCE_S))
+            count = ended(server, names, "succeeded,failed,canceled")
+        equal(ended(server, names, "failed,canceled"), 0, "jobs that did not succeed")
         order = [owner for owner in started(server, "&status=running,succeeded") if owner in names]
         so_far, widest = collections.Counter({name: 0 for name in names}), 0
         for owner in order[:enough]:

@@ -19,7 +19,7 @@ import tempfile
 import time
 
 from attack import SOAK, check, equal, example
-from outside import BINARY, Server, TOP
+from outside import BINARY, Server, TOP, talkative
 
 WATCHDOG_S = 1.5
 UNIT = TOP / "contrib/systemd/signorini.service"
@@ -65,9 +65,12 @@ def live():
         beats = server.beats(2 * WATCHDOG_S)
         longest = max(after - before for before, after in zip(beats, beats[1:]))
         check(longest < WATCHDOG_S, "%.2f s between two beats" % longest)
-        server.submit(example())
-        statuses = [line for _, lines in server.told(WATCHDOG_S) for line in lines if line.startswith("STATUS=")]
-        check(all(re.search(r"\d+ jobs? running", line) for line in statuses), "%r" % statuses)
+        # it runs until it is canceled: what has not changed between two beats is not told again
+        job = server.submit(talkative(8000, refine=3))
+        statuses = [line for _, lines in server.told(2 * WATCHDOG_S) for line in lines if line.startswith("STATUS=")]
+        check(statuses and all(re.search(r"\b1 job running", line) for line in statuses), "%r" % statuses)
+        equal(server.call("POST", "/v1/jobs/%s/cancel" % job).status, 200, "cancel")
+        server.finished(job)
 
         # the writer cannot get its lock
         connection = sqlite3.connect(server.data / "signorini.db", isolation_level=None)

@@ -7,7 +7,10 @@ use std::io::{Read, Write};
 
 use flate2::{Compression, read::DeflateDecoder, write::DeflateEncoder};
 
-use super::order::NodeOrder;
+use super::{
+    head::{Head, damaged, put_size, take_size},
+    order::NodeOrder,
+};
 
 /// What a plane consists of.
 const ZEROS: u8 = 0;
@@ -26,22 +29,20 @@ const LARGE: usize = 1 << 20;
 
 /// Columns as bytes.
 pub(super) struct Writer {
-    version: u8,
     random: Vec<u8>,
     /// To be deflated: sizes, numbers, marks of planes, and planes.
     stream: Vec<u8>,
 }
 
 impl Writer {
-    pub(super) fn new(version: u8) -> Writer {
+    pub(super) fn new() -> Writer {
         Writer {
-            version,
             random: Vec::new(),
             stream: Vec::new(),
         }
     }
 
-    /// A size, seven bits in each byte.
+    /// A size.
     pub(super) fn size(&mut self, size: usize) {
         put_size(&mut self.stream, size);
     }
@@ -115,16 +116,22 @@ impl Writer {
         }
     }
 
-    /// The bytes.
-    pub(super) fn finish(self) -> Vec<u8> {
-        let mut out = vec![self.version];
-        put_size(&mut out, self.random.len());
+    /// The bytes, with the head of fields that have so many nodes, elements and integration points.
+    pub(super) fn finish(self, [nodes, elements, points]: [usize; 3]) -> Vec<u8> {
+        let head = Head {
+            nodes,
+            elements,
+            points,
+            random: self.random.len(),
+            stream: self.stream.len(),
+        };
+        let mut out = Vec::new();
+        head.write(&mut out);
         out.extend(&self.random);
         let level = match self.stream.len() > LARGE {
             true => Compression::fast(),
             false => Compression::best(),
         };
-        put_size(&mut out, self.stream.len());
         let mut deflate = DeflateEncoder::new(out, level);
         // writing to memory does not fail
         let _ = deflate.write_all(&self.stream);
@@ -133,36 +140,26 @@ impl Writer {
 }
 
 /// Columns from bytes.
-pub(super) struct Reader {
-    random: Vec<u8>,
+pub(super) struct Reader<'a> {
+    random: &'a [u8],
     stream: Vec<u8>,
     at_random: usize,
     at: usize,
 }
 
-impl Reader {
-    pub(super) fn new(bytes: &[u8], version: u8, limit: usize) -> Result<Reader, String> {
-        let (found, mut rest) = bytes.split_first().ok_or_else(|| damaged("no bytes"))?;
-        if *found != version {
-            return Err(format!(
-                "stored fields are of version {found}, and this program reads version {version}"
-            ));
-        }
-        let random = take_size(&mut rest)?;
-        let (random, mut rest) = rest
-            .split_at_checked(random)
+impl Reader<'_> {
+    /// From what follows a head that was checked.
+    pub(super) fn new<'a>(head: &Head, bytes: &'a [u8]) -> Result<Reader<'a>, String> {
+        let (random, deflated) = bytes
+            .split_at_checked(head.random)
             .ok_or_else(|| damaged("length"))?;
-        let size = take_size(&mut rest)?;
-        if size.saturating_add(random.len()) > limit {
-            return Err(damaged("larger than its content"));
-        }
-        let mut stream = Vec::with_capacity(size);
-        let inflated = DeflateDecoder::new(rest)
-            .take(size as u64)
+        let mut stream = Vec::with_capacity(head.stream);
+        let inflated = DeflateDecoder::new(deflated)
+            .take(head.stream as u64)
             .read_to_end(&mut stream);
         match inflated {
-            Ok(all) if all == size => Ok(Reader {
-                random: random.to_vec(),
+            Ok(all) if all == head.stream => Ok(Reader {
+                random,
                 stream,
                 at_random: 0,
                 at: 0,
@@ -232,8 +229,7 @@ impl Reader {
     }
 
     fn planes(&mut self, count: usize) -> Result<Vec<u64>, String> {
-        // a hostile count must not take memory: each plane that is not zero has its bytes here
-        let mut differences: Vec<u64> = Vec::new();
+        let mut differences = vec![0u64; count];
         let Reader {
             random,
             stream,
@@ -247,15 +243,10 @@ impl Reader {
                 DEFLATED => take(stream, at, count)?,
                 _ => return Err(damaged("an unknown plane")),
             };
-            differences.resize(count, 0);
             for (difference, part) in differences.iter_mut().zip(plane) {
                 *difference |= u64::from(*part) << (8 * byte);
             }
         }
-        differences
-            .try_reserve_exact(count.saturating_sub(differences.len()))
-            .map_err(|_| damaged("its size"))?;
-        differences.resize(count, 0);
         Ok(differences)
     }
 
@@ -275,38 +266,12 @@ fn take<'a>(from: &'a [u8], at: &mut usize, count: usize) -> Result<&'a [u8], St
     Ok(taken)
 }
 
-fn put_size(to: &mut Vec<u8>, mut size: usize) {
-    while size >= 0x80 {
-        to.push(size as u8 | 0x80);
-        size >>= 7;
-    }
-    to.push(size as u8);
-}
-
-fn take_size(from: &mut &[u8]) -> Result<usize, String> {
-    let mut size = 0usize;
-    for shift in (0..63).step_by(7) {
-        let (byte, rest) = from.split_first().ok_or_else(|| damaged("it ends early"))?;
-        *from = rest;
-        size |= usize::from(byte & 0x7f) << shift;
-        if byte & 0x80 == 0 {
-            return Ok(size);
-        }
-    }
-    Err(damaged("a size"))
-}
-
 fn differences_in_sequence(values: &[f64]) -> Vec<u64> {
     let before = std::iter::once(&0.0).chain(values);
     let pairs = values.iter().zip(before);
     pairs
         .map(|(value, before)| difference(*value, *before))
         .collect()
-}
-
-/// Bytes that are not those of fields.
-pub(super) fn damaged(what: &str) -> String {
-    format!("stored fields are damaged: {what}")
 }
 
 /// How many numbers lie between two, with its sign.
@@ -388,13 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_and_differences_of_any_value_come_back() {
-        for size in [0, 1, 127, 128, 1 << 40, usize::MAX >> 1] {
-            let mut bytes = Vec::new();
-            put_size(&mut bytes, size);
-            assert_eq!(take_size(&mut bytes.as_slice()), Ok(size));
-        }
-        assert!(take_size(&mut [0xff; 20].as_slice()).is_err());
+    fn differences_of_any_value_come_back() {
         for value in [0, 1, -1, i64::MAX, i64::MIN] {
             assert_eq!(unfolded(folded(value)), value);
         }

@@ -1,8 +1,9 @@
 //! Stresses from displacements by Hooke's law, as a prediction: thesis 2.2, and formulation 3.
 //!
-//! It repeats what the solver does for ordinary elements, in the same order of operations, but shares no code with it that may
-//! change: what is stored must be readable by every later version. Of nearly incompressible elements it is a poor
-//! prediction, which costs space and nothing else.
+//! It repeats what the solver does for ordinary elements, in the same order of operations. The master elements are the solver's
+//! own (`solver::element`: their rules, shapes and map), and a change of one rounding there, or here, would make all that is
+//! stored unreadable; the files of `version_1` tell, in `stored.rs`. Of nearly incompressible elements it is a poor prediction,
+//! which costs space and nothing else.
 
 use solver::{
     elasticity::{COMPONENTS, Moduli, isotropic, orthotropic},
@@ -10,6 +11,9 @@ use solver::{
     problem::{Analysis, Elasticity, Problem},
     solution::{Fields, GaussFields},
 };
+
+/// Materials that stresses are predicted with; a solved problem has few.
+pub(super) const MOST_MATERIALS: usize = u8::MAX as usize;
 
 /// What stresses are predicted with.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,10 +38,9 @@ impl Law {
         let materials = problem.materials.iter();
         Law {
             axisymmetric: matches!(analysis, Analysis::Axisymmetric {}),
-            // a solved problem has few
             moduli: materials
                 .filter_map(|material| moduli(&material.elasticity))
-                .take(usize::from(u8::MAX))
+                .take(MOST_MATERIALS)
                 .collect(),
         }
     }
@@ -257,7 +260,9 @@ pub(super) fn materials_by_element(fields: &Fields, law: &Law) -> Vec<u8> {
         };
         let errors: Vec<f64> = law.moduli.iter().map(error).collect();
         point += strains.len();
-        let best = (0u8..).zip(&errors).min_by(|(_, a), (_, b)| a.total_cmp(b));
+        let best = (0..=u8::MAX)
+            .zip(&errors)
+            .min_by(|(_, a), (_, b)| a.total_cmp(b));
         best.map_or(0, |(material, _)| material)
     };
     fields.elements.iter().map(&mut material).collect()

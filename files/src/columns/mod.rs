@@ -8,6 +8,7 @@
 //! The predictions are a part of the format: a change of one of them, by a single rounding, needs another version.
 
 mod differences;
+mod head;
 mod mechanics;
 mod order;
 
@@ -19,21 +20,19 @@ use solver::{
 
 pub use self::mechanics::Law;
 use self::{
-    differences::{Reader, Writer, damaged},
-    mechanics::{Known, Stresses, at_points, predicted_stresses},
+    differences::{Reader, Writer},
+    head::{Head, damaged},
+    mechanics::{Known, MOST_MATERIALS, Stresses, at_points, predicted_stresses},
     order::NodeOrder,
 };
 
-/// The version of the format.
-const VERSION: u8 = 1;
-
-/// Fields as bytes. `Err`: columns of different lengths, or elements with nodes that do not exist.
+/// Fields as bytes. `Err`: columns of different lengths, elements with nodes that do not exist, or too many materials.
 pub fn encode(fields: &Fields, law: &Law) -> Result<Vec<u8>, String> {
     crate::fields::check(fields)?;
-    let mut out = Writer::new(VERSION);
-    for size in [fields.x.len(), fields.elements.len()] {
-        out.size(size);
+    if law.moduli.len() > MOST_MATERIALS {
+        return Err(format!("{} materials", law.moduli.len()));
     }
+    let mut out = Writer::new();
     out.size(fields.gauss.order as usize);
     out.size(usize::from(law.axisymmetric));
     out.size(law.moduli.len());
@@ -66,23 +65,33 @@ pub fn encode(fields: &Fields, law: &Law) -> Result<Vec<u8>, String> {
     for (column, predicted) in at_nodes(fields).into_iter().zip(&predicted.at_nodes) {
         out.predicted(column, predicted);
     }
-    Ok(out.finish())
+    let (nodes, points) = (fields.x.len(), fields.gauss.x.len());
+    Ok(out.finish([nodes, fields.elements.len(), points]))
 }
 
-/// Fields as they were encoded. `limit`: bytes that their columns may have together; `Err`: these bytes are not those of fields, or larger.
-pub fn decode(bytes: &[u8], limit: usize) -> Result<Fields, String> {
-    let mut from = Reader::new(bytes, VERSION, limit)?;
-    let (nodes, count) = (from.size()?, from.size()?);
-    if nodes.max(count) > limit {
-        return Err(damaged("larger than its content"));
-    }
-    let order = from.size()?;
+/// The memory that decoding takes at most, the fields among it, as the head of the bytes says; the rest of them may be missing.
+pub fn memory_to_decode(bytes: &[u8]) -> Result<usize, String> {
+    Ok(Head::read(bytes)?.0.memory())
+}
+
+/// Fields as they were encoded. `json_bytes`: the size of their JSON, which limits the memory; `Err`: these bytes are not those of
+/// such fields.
+pub fn decode(bytes: &[u8], json_bytes: usize) -> Result<Fields, String> {
+    let (head, rest) = Head::read(bytes)?;
+    head.check(json_bytes)?;
+    let mut from = Reader::new(&head, rest)?;
+    let (nodes, count) = (head.nodes, head.elements);
+    let order = u32::try_from(from.size()?).map_err(|_| damaged("order"))?;
     let axisymmetric = from.size()? != 0;
     let mut law = Law {
         axisymmetric,
         moduli: Vec::new(),
     };
-    for _ in 0..from.size()? {
+    let materials = from.size()?;
+    if materials > MOST_MATERIALS {
+        return Err(damaged("materials"));
+    }
+    for _ in 0..materials {
         let mut moduli = Moduli::default();
         for entry in moduli.iter_mut().flatten() {
             *entry = from.number()?;
@@ -90,6 +99,10 @@ pub fn decode(bytes: &[u8], limit: usize) -> Result<Fields, String> {
         law.moduli.push(moduli);
     }
     let elements = read_elements(&mut from, count, nodes)?;
+    let points = elements.iter().map(|e| e.family().rule(order).len());
+    if points.sum::<usize>() != head.points {
+        return Err(damaged("integration points"));
+    }
     let node_order = NodeOrder::new(&elements, nodes);
     let mut nodal = || from.nodal(&node_order);
     let (x, y, ux, uy) = (nodal()?, nodal()?, nodal()?, nodal()?);
@@ -105,7 +118,7 @@ pub fn decode(bytes: &[u8], limit: usize) -> Result<Fields, String> {
         elements,
         element_error,
         gauss: GaussFields {
-            order: u32::try_from(order).map_err(|_| damaged("order"))?,
+            order,
             ..GaussFields::default()
         },
         ..Fields::default()
@@ -146,7 +159,11 @@ fn write_elements(out: &mut Writer, elements: &[Element]) {
     }
 }
 
-fn read_elements(from: &mut Reader, count: usize, nodes: usize) -> Result<Vec<Element>, String> {
+fn read_elements(
+    from: &mut Reader<'_>,
+    count: usize,
+    nodes: usize,
+) -> Result<Vec<Element>, String> {
     let lengths: Vec<u8> = from.whole(count)?;
     let mut places = Vec::with_capacity(8);
     for _ in 0..8 {
@@ -165,8 +182,14 @@ fn read_elements(from: &mut Reader, count: usize, nodes: usize) -> Result<Vec<El
             false => Err(damaged("nodes of elements")),
         }
     };
-    lengths.iter().enumerate().map(element).collect()
+    let mut elements = Vec::with_capacity(count);
+    for length in lengths.iter().enumerate() {
+        elements.push(element(length)?);
+    }
+    Ok(elements)
 }
 
+#[cfg(test)]
+mod stored;
 #[cfg(test)]
 mod tests;

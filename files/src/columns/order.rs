@@ -31,9 +31,10 @@ impl NodeOrder {
             all.filter(move |(_, between)| (between[0] == NONE) == corner)
                 .map(|(node, between)| (node, *between))
         };
-        NodeOrder {
-            nodes: of_kind(true).chain(of_kind(false)).collect(),
-        }
+        // of a filtered sequence nobody knows the length, and a list that grows by doubling is too large
+        let mut ordered = Vec::with_capacity(nodes);
+        ordered.extend(of_kind(true).chain(of_kind(false)));
+        NodeOrder { nodes: ordered }
     }
 
     /// How many.

@@ -72,14 +72,30 @@ pub(super) fn decoded(
             json
         }
         Encoding::Columns => {
-            // a number has eight bytes, and two in its JSON at least
-            let limit = usize::try_from(expected.bytes).unwrap_or(usize::MAX);
-            let fields = columns::decode(&stored, limit.saturating_mul(4))?;
+            let json_bytes = usize::try_from(expected.bytes).unwrap_or(usize::MAX);
+            let fields = columns::decode(&stored, json_bytes)?;
             let info = info_of_fields(&fields).map_err(|error| error.to_string())?;
             return Ok((info, Content::Fields(Box::new(fields))));
         }
     };
     Ok((info_of_json(&json), Content::Json(json)))
+}
+
+/// The memory that a part of fields takes at most while it is read, in bytes: what is stored, which begins with `first`, and what is
+/// made from it. `Err`: what is wrong with the bytes.
+pub(super) fn memory_to_read(
+    first: &[u8],
+    stored_bytes: usize,
+    encoding: Encoding,
+    json_bytes: usize,
+) -> std::result::Result<usize, String> {
+    let made = match encoding {
+        // a number has eight bytes, and four in its JSON at least; lists grow by doubling
+        Encoding::Plain => json_bytes.saturating_mul(4),
+        Encoding::Deflated => json_bytes.saturating_mul(6),
+        Encoding::Columns => columns::memory_to_decode(first)?,
+    };
+    Ok(stored_bytes.saturating_add(made))
 }
 
 /// Size and hash of a JSON.
@@ -109,4 +125,70 @@ pub(super) fn deflated(text: &[u8]) -> Vec<u8> {
     // writing to memory does not fail
     let _ = deflate.write_all(text);
     deflate.finish().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use allocator::{forget_highest, held, highest};
+    use files::columns::Law;
+    use solver::{element::Element, solution::GaussFields};
+
+    use super::*;
+    use crate::store::parts::Part;
+
+    /// A body without load: every number has eight bytes, and four in its JSON.
+    fn at_rest() -> Fields {
+        let (elements, nodes, points) = (10_000, 40_000, 90_000);
+        let zeros = |count: usize| vec![0.0; count];
+        Fields {
+            x: zeros(nodes),
+            y: zeros(nodes),
+            ux: zeros(nodes),
+            uy: zeros(nodes),
+            stress_xx: zeros(nodes),
+            stress_yy: zeros(nodes),
+            stress_xy: zeros(nodes),
+            stress_zz: zeros(nodes),
+            contact_state: vec![0; nodes],
+            elements: vec![Element::Quad([0, 1, 2, 3, 4, 5, 6, 7]); elements],
+            element_error: zeros(elements),
+            gauss: GaussFields {
+                order: 3,
+                x: zeros(points),
+                y: zeros(points),
+                stress_xx: zeros(points),
+                stress_yy: zeros(points),
+                stress_xy: zeros(points),
+                stress_zz: zeros(points),
+            },
+        }
+    }
+
+    #[test]
+    fn fields_are_read_within_the_memory_that_is_reserved_for_it() {
+        let fields = at_rest();
+        let json = serde_json::to_vec(&fields).unwrap();
+        let columns = Part::of_fields(&fields, &Law::default()).unwrap();
+        let info = columns.info.clone();
+        for (stored, encoding) in [
+            (columns.body, Encoding::Columns),
+            (deflated(&json), Encoding::Deflated),
+            (json, Encoding::Plain),
+        ] {
+            let size = info.bytes as usize;
+            let most = memory_to_read(&stored, stored.len(), encoding, size).unwrap();
+            let before = held() - stored.capacity() as i64;
+            forget_highest();
+            let read = match decoded(stored, encoding, &info).unwrap().1 {
+                Content::Fields(fields) => *fields,
+                Content::Json(json) => serde_json::from_slice(&json).unwrap(),
+            };
+            let took = (highest() - before) as usize;
+            assert!(took <= most, "{encoding:?}: {took} of {most} bytes");
+            let own = files::fields::memory(&read);
+            assert!((size / 2..most).contains(&own), "{encoding:?}: {own} bytes");
+            assert_eq!(read, fields);
+        }
+    }
 }

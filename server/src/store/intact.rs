@@ -9,7 +9,7 @@ use sqlx::SqliteConnection;
 
 use super::{
     checksum::Checksum,
-    encoding::{Content, Encoding, PartInfo, decoded, info_of_json},
+    encoding::{self, Content, Encoding, PartInfo, decoded, info_of_json},
     error::{Record, Result},
 };
 
@@ -170,6 +170,35 @@ pub(super) async fn read_part(
             found.bytes, info.bytes
         ))),
     }
+}
+
+/// The memory that reading fields takes at most, in bytes; `None` if there is no such part.
+pub(super) async fn memory_to_read(
+    connection: &mut SqliteConnection,
+    key: i64,
+    name: &str,
+) -> Result<Option<usize>> {
+    let known = part_info(connection, key, name).await?;
+    let first = piece(connection, key, name, 0).await?;
+    if first.is_none() && !known.as_ref().is_some_and(|known| known.has_checksum) {
+        return Ok(None);
+    }
+    let stored =
+        "select coalesce(sum(length(body)), 0) from result_part where job_id = ? and name = ?";
+    let stored: i64 = sqlx::query_scalar(stored)
+        .bind(key)
+        .bind(name)
+        .fetch_one(connection)
+        .await?;
+    let stored = stored as usize;
+    let (encoding, json_bytes) = known.map_or((Encoding::Plain, stored), |known| {
+        (known.encoding, known.info.bytes as usize)
+    });
+    let first = first.unwrap_or_default();
+    let memory = encoding::memory_to_read(&first, stored, encoding, json_bytes);
+    memory
+        .map(Some)
+        .map_err(|cause| part_of(key, name).damaged(cause))
 }
 
 /// Reads every part of a result, to check it; an error if one is damaged or the summary is missing.

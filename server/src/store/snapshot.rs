@@ -36,21 +36,11 @@ impl Store {
         self.damages.noting(read).await
     }
 
-    /// About the memory that the fields under this key take, in bytes; `None` if there are none.
+    /// The memory that reading the fields under this key takes at most, in bytes; `None` if there are none.
     pub async fn fields_memory(&self, key: i64) -> Result<Option<usize>> {
         let read = async {
             let mut connection = self.reader.acquire().await?;
-            if let Some(known) = intact::part_info(&mut connection, key, FIELDS).await? {
-                // a number has some seventeen digits, and eight bytes
-                return Ok(Some((known.info.bytes / 2) as usize));
-            }
-            let stored = "select sum(length(body)) from result_part where job_id = ? and name = ?";
-            let stored: Option<i64> = sqlx::query_scalar(stored)
-                .bind(key)
-                .bind(FIELDS)
-                .fetch_one(&mut *connection)
-                .await?;
-            Ok(stored.map(|bytes| bytes as usize))
+            intact::memory_to_read(&mut connection, key, FIELDS).await
         };
         self.damages.noting(read).await
     }

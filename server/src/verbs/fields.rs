@@ -78,13 +78,15 @@ async fn load(service: &Service, key: i64) -> Result<Option<Arc<Loaded>>, ApiErr
     let Some(bytes) = service.store.fields_memory(key).await? else {
         return Ok(None);
     };
-    let share = service.sent.wait_for(bytes).await?;
+    let mut share = service.sent.wait_for(bytes).await?;
     if let Some(loaded) = service.fields_in_memory.find(key) {
         return Ok(Some(loaded)); // read by another meanwhile
     }
     let Some((info, fields)) = service.store.fields(key).await? else {
         return Ok(None);
     };
+    // reading took several times as much
+    share.shrink_to(files::fields::memory(&fields));
     let loaded = Arc::new(Loaded {
         info,
         fields,
@@ -109,6 +111,7 @@ impl StoredFields {
             let loaded = match loaded {
                 Some(loaded) => loaded,
                 None => {
+                    let service = service.clone();
                     // in a task of its own: a client that does not read may stop this stream at any point
                     let load = detached(async move { load(&service, key).await });
                     load.await?.ok_or(ApiError::Deleted(id))?
@@ -117,7 +120,7 @@ impl StoredFields {
             let (mut json, mut place) = (FieldsJson::new(Shared(loaded)), 0);
             while place < end {
                 let next = move || (json.piece(), json);
-                let (piece, rest) = tokio::task::spawn_blocking(next).await.map_err(ApiError::internal)?;
+                let (piece, rest) = service.work(next).await?;
                 json = rest;
                 let Some(mut piece) = piece.map_err(ApiError::internal)? else { break };
                 let first = place;
@@ -138,24 +141,83 @@ pub async fn converted_fields(
     id: JobId,
     format: Format,
 ) -> Result<Found<Vec<u8>>, ApiError> {
-    let read = async {
-        let found = with_result(service, caller, id).await?;
-        let job = found.job.clone();
-        drop(found);
-        are_kept(service, &job).await?;
-        let loaded = load(service, job.result_key).await?;
-        let content = loaded.ok_or_else(|| no_result(&job))?;
-        Ok(Found {
-            available: job.result_available,
-            content,
-        })
-    };
-    let written = service.work_on(read, move |found| {
-        let content = formats::fields(&found.content.fields, format)?;
-        Ok::<_, String>(Found {
-            available: found.available,
-            content,
-        })
-    });
-    written.await?.map_err(ApiError::internal)
+    let found = with_result(service, caller, id).await?;
+    let job = found.job.clone();
+    drop(found);
+    are_kept(service, &job).await?;
+    // before there is a permit to work: who has that must not wait for memory, which others keep until they have worked
+    let loaded = load(service, job.result_key).await?;
+    let loaded = loaded.ok_or_else(|| no_result(&job))?;
+    let written = service.work(move || formats::fields(&loaded.fields, format));
+    let content = written.await?.map_err(ApiError::internal)?;
+    Ok(Found {
+        available: job.result_available,
+        content,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::panic)]
+    use std::{pin::pin, sync::mpsc, time::Duration};
+
+    use futures_util::{FutureExt, StreamExt};
+    use tokio::{sync::oneshot, task::spawn_blocking, time::timeout};
+
+    use super::*;
+    use crate::verbs::tests::{caller, service, solved};
+
+    #[tokio::test]
+    async fn conversions_that_wait_for_memory_do_not_hold_up_the_work_of_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let service = &service(folder.path()).await;
+        let ada = &caller("ada");
+        let id = solved(service, ada).await;
+        let all = service.sent.take(usize::MAX).unwrap();
+        let convert = || converted_fields(service, ada, id, Format::Npz);
+        let mut conversions = pin!(async { tokio::join!(convert(), convert(), convert()) });
+        tokio::select! {
+            biased;
+            _ = &mut conversions => panic!("there was no memory"),
+            // for ever, if they have both permits
+            worked = timeout(Duration::from_secs(60), service.work(|| 7)) => assert_eq!(worked.unwrap().unwrap(), 7),
+        }
+        drop(all);
+        let (first, second, third) = conversions.await;
+        for converted in [first, second, third] {
+            assert!(converted.unwrap().content.starts_with(b"PK"));
+        }
+    }
+
+    #[tokio::test]
+    async fn a_stream_is_written_in_the_bounded_pool_and_keeps_the_memory_of_its_fields_only() {
+        let folder = tempfile::tempdir().unwrap();
+        let service = &service(folder.path()).await;
+        let ada = &caller("ada");
+        let id = solved(service, ada).await;
+        let found = fields(service, ada, id).await.unwrap().content;
+        let mut pieces = pin!(found.bytes(service, 0, u64::MAX));
+        let mut json = pieces.next().await.unwrap().unwrap();
+        assert!(service.sent.take(128 << 20).is_err());
+        assert!(service.sent.take((128 << 20) - (64 << 10)).is_ok());
+
+        let mut busy = vec![];
+        for _ in 0..2 {
+            let (service, (send, received)) = (service.clone(), mpsc::channel::<()>());
+            let (start, started) = oneshot::channel();
+            let work = move || (start.send(()), received.recv().is_err());
+            tokio::spawn(async move { service.work(work).await.map(drop) });
+            started.await.unwrap();
+            busy.push(send);
+        }
+        for _ in 0..20 {
+            assert!(pieces.next().now_or_never().is_none());
+            spawn_blocking(|| ()).await.unwrap();
+        }
+        drop(busy);
+        while let Some(piece) = pieces.next().await {
+            json.extend(piece.unwrap());
+        }
+        assert_eq!(json.len() as u64, found.info.bytes);
+    }
 }

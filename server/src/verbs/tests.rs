@@ -66,7 +66,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
 }
 
 /// A caller who may do everything with their own jobs.
-fn caller(owner: &str) -> Caller {
+pub(super) fn caller(owner: &str) -> Caller {
     Caller::new(owner, [Scope::Read, Scope::Submit, Scope::Cancel])
 }
 
@@ -86,6 +86,15 @@ async fn create(service: &Arc<Service>, caller: &Caller, id: Option<JobId>) -> J
     submitted.unwrap().accepted
 }
 
+/// Starts the queue, which solves a job.
+pub(super) async fn solved(service: &Arc<Service>, caller: &Caller) -> JobId {
+    service.queue.start();
+    let id = create(service, caller, None).await.id;
+    let ended = watch::wait(service, caller, id, Until::Terminal, 60.0).await;
+    assert_eq!(ended.unwrap().0.status, Status::Succeeded);
+    id
+}
+
 /// Asserts that the answer is *not found*.
 fn unknown<T>(verb: &str, answer: Result<T, ApiError>) {
     assert!(matches!(answer, Err(ApiError::NotFound(_))), "{verb}");
@@ -95,11 +104,8 @@ fn unknown<T>(verb: &str, answer: Result<T, ApiError>) {
 async fn a_job_of_another_is_not_found_by_any_verb() {
     let folder = tempfile::tempdir().unwrap();
     let service = &service(folder.path()).await;
-    service.queue.start();
     let (ada, bob) = (&caller("ada"), &caller("bob"));
-    let id = create(service, ada, None).await.id;
-    let ended = watch::wait(service, ada, id, Until::Terminal, 60.0).await;
-    assert_eq!(ended.unwrap().0.status, Status::Succeeded);
+    let id = solved(service, ada).await;
 
     unknown("get", jobs::get(service, bob, id).await);
     unknown("problem", jobs::problem(service, bob, id).await);
