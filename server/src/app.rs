@@ -153,7 +153,7 @@ impl App {
     /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
         address::set_prefix(&config.web.path_prefix);
-        let tls = config.tls.files().map(Tls::read).transpose()?;
+        let tls = config.tls.files()?.map(Tls::read).transpose()?;
         let store = Store::open(&config.data).await?;
         // Before the listener opens: no client sees a job as running that no worker solves.
         match clean_up(&store).await {

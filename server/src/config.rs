@@ -220,21 +220,11 @@ fn days(text: &str) -> Result<f64, String> {
 pub struct Tls {
     /// File of a certificate, and those of its issuers behind it, as PEM: the service speaks TLS, and nothing else. SIGHUP
     /// reads it and the key again
-    #[arg(
-        long = "tls-cert",
-        env = "SIGNORINI_TLS_CERT",
-        value_name = "FILE",
-        requires = "key"
-    )]
+    #[arg(long = "tls-cert", env = "SIGNORINI_TLS_CERT", value_name = "FILE")]
     cert: Option<PathBuf>,
 
     /// File of the certificate's private key, as PEM and not encrypted
-    #[arg(
-        long = "tls-key",
-        env = "SIGNORINI_TLS_KEY",
-        value_name = "FILE",
-        requires = "cert"
-    )]
+    #[arg(long = "tls-key", env = "SIGNORINI_TLS_KEY", value_name = "FILE")]
     key: Option<PathBuf>,
 }
 
@@ -247,11 +237,35 @@ pub struct TlsFiles {
     pub key: PathBuf,
 }
 
+/// Only one of the two files is named: the service would not know whether it is to speak TLS.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{given} is set, and {missing} is not: TLS needs both the certificate and its key (on the command line, in the \
+     environment, or in the file of settings)"
+)]
+pub struct HalfOfTls {
+    given: &'static str,
+    missing: &'static str,
+}
+
 impl Tls {
-    /// Both files, or none.
-    pub fn files(&self) -> Option<TlsFiles> {
-        let (cert, key) = (self.cert.clone()?, self.key.clone()?);
-        Some(TlsFiles { cert, key })
+    /// Whether the service speaks TLS.
+    pub fn is_on(&self) -> bool {
+        self.cert.is_some()
+    }
+
+    /// Both files, or none. Not clap's `requires`, which does not see values from the file of settings.
+    pub fn files(&self) -> Result<Option<TlsFiles>, HalfOfTls> {
+        let half = |given, missing| Err(HalfOfTls { given, missing });
+        match (&self.cert, &self.key) {
+            (None, None) => Ok(None),
+            (Some(_), None) => half("--tls-cert", "--tls-key"),
+            (None, Some(_)) => half("--tls-key", "--tls-cert"),
+            (Some(cert), Some(key)) => Ok(Some(TlsFiles {
+                cert: cert.clone(),
+                key: key.clone(),
+            })),
+        }
     }
 }
 
