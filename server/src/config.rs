@@ -126,11 +126,11 @@ pub struct Config {
           value_parser = clap::value_parser!(u32).range(1..))]
     pub max_connections: u32,
 
-    /// Maximum size of all request bodies in memory at the same time
+    /// Maximum size of all request bodies in memory at the same time, with what decodes those that are compressed
     #[arg(long, env = "SIGNORINI_MAX_RECEIVED_BYTES", default_value_t = 64 << 20, value_name = "BYTES")]
     pub max_received_bytes: usize,
 
-    /// Maximum size of all answers in memory at the same time
+    /// Maximum size of all answers in memory at the same time, with what compresses them
     #[arg(long, env = "SIGNORINI_MAX_SENT_BYTES", default_value_t = 128 << 20, value_name = "BYTES")]
     pub max_sent_bytes: usize,
 

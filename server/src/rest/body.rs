@@ -66,7 +66,7 @@ async fn text(
     received: &Received,
 ) -> Result<String, ApiError> {
     let too_large = ApiError::PayloadTooLarge { limit_bytes };
-    let mut pieces = coding::decoded(headers, body)?;
+    let mut pieces = coding::decoded(headers, body, received, coding::FREE_COLLECTED)?;
     if declared_length(headers).is_some_and(|length| length > limit_bytes) {
         return Err(too_large);
     }
