@@ -103,8 +103,13 @@ pub enum ApiError {
         available: String,
     },
     /// A body in a format that is not understood.
-    #[error("expected a body of type application/json, got {0}")]
-    UnsupportedMedia(String),
+    #[error("expected a body of type {expected}, got {got}")]
+    UnsupportedMedia {
+        /// The type that is understood.
+        expected: &'static str,
+        /// The type that was declared.
+        got: String,
+    },
     /// A body with a Content-Encoding that is not understood.
     #[error("expected a body without Content-Encoding, or with gzip or zstd, got {0}")]
     UnsupportedEncoding(String),
@@ -305,7 +310,7 @@ impl ApiError {
             ApiError::NoResult(_) | ApiError::FieldsDeleted(_) => Code::NoResult,
             ApiError::MethodNotAllowed => Code::MethodNotAllowed,
             ApiError::NotAcceptable { .. } => Code::NotAcceptable,
-            ApiError::UnsupportedMedia(_) | ApiError::UnsupportedEncoding(_) => {
+            ApiError::UnsupportedMedia { .. } | ApiError::UnsupportedEncoding(_) => {
                 Code::UnsupportedMedia
             }
             ApiError::JobActive(_) | ApiError::SweepActive(_) | ApiError::MeshInUse => {

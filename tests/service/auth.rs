@@ -799,6 +799,18 @@ async fn foreign_hosts_and_origins_are_refused() {
         "https://dashboard.example"
     );
     assert!(!headers.values().any(|value| value == "*"));
+    // also what is refused before any handler
+    let refused = server
+        .post("/signorini.v1.JobService/GetJob")
+        .header("origin", "https://dashboard.example")
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(refused.status(), StatusCode::UNSUPPORTED_MEDIA_TYPE);
+    assert_eq!(
+        refused.headers()["access-control-allow-origin"],
+        "https://dashboard.example"
+    );
     // a browser asks beforehand, for allowed origins only
     let ask = async |origin: &str| {
         let request = server
@@ -847,15 +859,6 @@ async fn users_are_those_that_a_trusted_proxy_names() {
     for wrong in [&[][..], &["ada", "root"], &["a b"], &[""]] {
         assert_eq!(me(wrong).await.0, 401, "{wrong:?}");
     }
-    let elsewhere = Server::start(SIGNORINI, &["--trusted-proxy", "10.0.0.1"]).await;
-    let forged = elsewhere
-        .get("/v1/me")
-        .header("x-remote-user", "root")
-        .send()
-        .await
-        .unwrap();
-    assert_eq!(forged.status(), StatusCode::UNAUTHORIZED);
-}
     // a user has no token, and is not told of one
     let pause = server
         .post("/v1/queue/pause")
@@ -866,3 +869,12 @@ async fn users_are_those_that_a_trusted_proxy_names() {
         detail.contains("ada, whom the proxy names") && detail.contains("--proxy-scopes"),
         "{detail}"
     );
+    let elsewhere = Server::start(SIGNORINI, &["--trusted-proxy", "10.0.0.1"]).await;
+    let forged = elsewhere
+        .get("/v1/me")
+        .header("x-remote-user", "root")
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(forged.status(), StatusCode::UNAUTHORIZED);
+}

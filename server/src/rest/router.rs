@@ -31,15 +31,17 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
             service.clone(),
             authenticate,
         ))
-        // outside of the authentication: a browser asks beforehand, without the token
-        .layer(option_layer(origin::cors(&service.web)))
         .layer(CatchPanicLayer::custom(reply::panicked))
         // `body::json_text` has a limit of its own, and answers with an error document
         .layer(DefaultBodyLimit::disable())
-        .layer(middleware::from_fn_with_state(service, limits))
+        .layer(middleware::from_fn_with_state(service.clone(), limits))
         .layer(middleware::from_fn(reply::errors_as_documents))
         // outside of the limits: the bytes that are compressed are counted, and there are never more of the others
         .layer(middleware::from_fn_with_state(sent, compressed))
+        // outside of the authentication: a browser asks beforehand, without the token; and of the limits, whose refusals a page
+        // may read
+        .layer(option_layer(origin::cors(&service.web)))
+        .layer(middleware::from_fn_with_state(service, origin::own_site))
         // outermost: it sees what the client is answered
         .layer(middleware::from_fn(observe::observe));
     match prefix.is_empty() {
