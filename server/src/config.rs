@@ -476,7 +476,7 @@ fn origin(text: &str) -> Result<String, String> {
 }
 
 /// An address and a port, by number or by name; of several addresses, the first.
-fn address(text: &str) -> Result<SocketAddr, String> {
+pub fn address(text: &str) -> Result<SocketAddr, String> {
     const EXPECTED: &str =
         "expected an address and a port, such as 127.0.0.1:8080 or localhost:8080";
     let found = text
