@@ -6,6 +6,8 @@ use serde::Serialize;
 use strum::{EnumString, IntoStaticStr, VariantArray};
 use tonic::Code as Grpc;
 
+use crate::address::link;
+
 /// What clients may rely on about a kind of error.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Kind {
@@ -23,6 +25,11 @@ pub struct Kind {
     pub retry_after_s: Option<u64>,
     /// What it means, and what to do.
     pub explanation: &'static str,
+}
+
+/// Where the service explains a kind of error.
+pub fn explained_at(code: &str) -> String {
+    link(&format!("/v1/errors/{code}"))
 }
 
 impl Kind {

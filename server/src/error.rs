@@ -15,7 +15,7 @@ use tonic_types::{ErrorDetails, StatusExt};
 use uuid::Uuid;
 
 use crate::{
-    catalog::{Code, Kind},
+    catalog::{Code, Kind, explained_at},
     job::{JobId, Status as JobStatus, SweepId},
     pace::{LEAST_RATE, LONGEST_PAUSE},
 };
@@ -364,7 +364,7 @@ impl ApiError {
             ..
         } = kind;
         let mut document = json!({
-            "type": format!("/v1/errors/{code}"),
+            "type": explained_at(code),
             "title": title,
             "status": status,
             "code": code,
