@@ -56,7 +56,7 @@ pub struct Pulse {
 
 impl Pulse {
     /// Returns when the store has answered; false if it will not.
-    pub async fn is_felt(&self) -> bool {
+    pub async fn store_answers(&self) -> bool {
         self.store.answers().await
     }
 
