@@ -16,6 +16,12 @@ pub fn prefix() -> &'static str {
     PREFIX.get().map_or("", String::as_str)
 }
 
+/// A path as a client has sent it, without the prefix, if it has it.
+pub fn without_prefix(path: &str) -> &str {
+    let rest = path.strip_prefix(prefix());
+    rest.filter(|rest| rest.starts_with('/')).unwrap_or(path)
+}
+
 /// A path of the service, as clients reach it.
 pub fn link(path: &str) -> String {
     format!("{}{path}", prefix())

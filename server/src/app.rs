@@ -56,7 +56,7 @@ pub struct Pulse {
 
 impl Pulse {
     /// Returns when the store has answered; false if it will not.
-    pub async fn is_felt(&self) -> bool {
+    pub async fn store_answers(&self) -> bool {
         self.store.answers().await
     }
 
@@ -153,7 +153,7 @@ impl App {
     /// Starts everything. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
         address::set_prefix(&config.web.path_prefix);
-        let tls = config.tls.files().map(Tls::read).transpose()?;
+        let tls = config.tls.files()?.map(Tls::read).transpose()?;
         let store = Store::open(&config.data).await?;
         // Before the listener opens: no client sees a job as running that no worker solves.
         match clean_up(&store).await {

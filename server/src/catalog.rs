@@ -6,6 +6,8 @@ use serde::Serialize;
 use strum::{EnumString, IntoStaticStr, VariantArray};
 use tonic::Code as Grpc;
 
+use crate::address::link;
+
 /// What clients may rely on about a kind of error.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Kind {
@@ -23,6 +25,11 @@ pub struct Kind {
     pub retry_after_s: Option<u64>,
     /// What it means, and what to do.
     pub explanation: &'static str,
+}
+
+/// Where the service explains a kind of error.
+pub fn explained_at(code: &str) -> String {
+    link(&format!("/v1/errors/{code}"))
 }
 
 impl Kind {
@@ -142,7 +149,7 @@ catalog! {
     Unauthenticated: of_request("A valid token is required", 401, Grpc::Unauthenticated, None,
         "The request has no token, or one that is unknown, was revoked or has expired. Send it as `Authorization: Bearer TOKEN` (metadata `authorization` over gRPC); a browser that asks for a name and a password takes the token as the password. An administrator creates tokens: `signorini token create`."),
     Forbidden: of_request("Not allowed", 403, Grpc::PermissionDenied, None,
-        "The token does not have the scope that the operation needs, or the request comes from a page of another origin, or names a host that this service does not answer for. `detail` says which; an administrator gives scopes (`signorini token create --scope`), and sets --allowed-host and --allowed-origin."),
+        "The caller does not have the scope that the operation needs, or that a priority above 0 needs (admin), or the request comes from a page of another origin, or names a host that this service does not answer for. `detail` says which; an administrator gives scopes (`signorini token create --scope`, or --proxy-scopes for users whom a proxy names), and sets --allowed-host and --allowed-origin."),
     NotFound: of_request("Not found", 404, Grpc::NotFound, None,
         "There is no such path, job, mesh, boundary or load step. Ids must be written as they were returned: job_ and a UUID in lower case."),
     NoResult: of_request("The job has no result", 404, Grpc::NotFound, None,

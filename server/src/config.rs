@@ -126,11 +126,11 @@ pub struct Config {
           value_parser = clap::value_parser!(u32).range(1..))]
     pub max_connections: u32,
 
-    /// Maximum size of all request bodies in memory at the same time
+    /// Maximum size of all request bodies in memory at the same time, with what decodes those that are compressed
     #[arg(long, env = "SIGNORINI_MAX_RECEIVED_BYTES", default_value_t = 64 << 20, value_name = "BYTES")]
     pub max_received_bytes: usize,
 
-    /// Maximum size of all answers in memory at the same time
+    /// Maximum size of all answers in memory at the same time, with what compresses them
     #[arg(long, env = "SIGNORINI_MAX_SENT_BYTES", default_value_t = 128 << 20, value_name = "BYTES")]
     pub max_sent_bytes: usize,
 
@@ -221,21 +221,11 @@ fn days(text: &str) -> Result<f64, String> {
 pub struct Tls {
     /// File of a certificate, and those of its issuers behind it, as PEM: the service speaks TLS, and nothing else. SIGHUP
     /// reads it and the key again
-    #[arg(
-        long = "tls-cert",
-        env = "SIGNORINI_TLS_CERT",
-        value_name = "FILE",
-        requires = "key"
-    )]
+    #[arg(long = "tls-cert", env = "SIGNORINI_TLS_CERT", value_name = "FILE")]
     cert: Option<PathBuf>,
 
     /// File of the certificate's private key, as PEM and not encrypted
-    #[arg(
-        long = "tls-key",
-        env = "SIGNORINI_TLS_KEY",
-        value_name = "FILE",
-        requires = "cert"
-    )]
+    #[arg(long = "tls-key", env = "SIGNORINI_TLS_KEY", value_name = "FILE")]
     key: Option<PathBuf>,
 }
 
@@ -248,11 +238,35 @@ pub struct TlsFiles {
     pub key: PathBuf,
 }
 
+/// Only one of the two files is named: the service would not know whether it is to speak TLS.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{given} is set, and {missing} is not: TLS needs both the certificate and its key (on the command line, in the \
+     environment, or in the file of settings)"
+)]
+pub struct HalfOfTls {
+    given: &'static str,
+    missing: &'static str,
+}
+
 impl Tls {
-    /// Both files, or none.
-    pub fn files(&self) -> Option<TlsFiles> {
-        let (cert, key) = (self.cert.clone()?, self.key.clone()?);
-        Some(TlsFiles { cert, key })
+    /// Whether the service speaks TLS.
+    pub fn is_on(&self) -> bool {
+        self.cert.is_some()
+    }
+
+    /// Both files, or none. Not clap's `requires`, which does not see values from the file of settings.
+    pub fn files(&self) -> Result<Option<TlsFiles>, HalfOfTls> {
+        let half = |given, missing| Err(HalfOfTls { given, missing });
+        match (&self.cert, &self.key) {
+            (None, None) => Ok(None),
+            (Some(_), None) => half("--tls-cert", "--tls-key"),
+            (None, Some(_)) => half("--tls-key", "--tls-cert"),
+            (Some(cert), Some(key)) => Ok(Some(TlsFiles {
+                cert: cert.clone(),
+                key: key.clone(),
+            })),
+        }
     }
 }
 
@@ -463,7 +477,7 @@ fn origin(text: &str) -> Result<String, String> {
 }
 
 /// An address and a port, by number or by name; of several addresses, the first.
-fn address(text: &str) -> Result<SocketAddr, String> {
+pub fn address(text: &str) -> Result<SocketAddr, String> {
     const EXPECTED: &str =
         "expected an address and a port, such as 127.0.0.1:8080 or localhost:8080";
     let found = text

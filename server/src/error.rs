@@ -15,7 +15,7 @@ use tonic_types::{ErrorDetails, StatusExt};
 use uuid::Uuid;
 
 use crate::{
-    catalog::{Code, Kind},
+    catalog::{Code, Kind, explained_at},
     job::{JobId, Status as JobStatus, SweepId},
     pace::{LEAST_RATE, LONGEST_PAUSE},
 };
@@ -103,8 +103,13 @@ pub enum ApiError {
         available: String,
     },
     /// A body in a format that is not understood.
-    #[error("expected a body of type application/json, got {0}")]
-    UnsupportedMedia(String),
+    #[error("expected a body of type {expected}, got {got}")]
+    UnsupportedMedia {
+        /// The type that is understood.
+        expected: &'static str,
+        /// The type that was declared.
+        got: String,
+    },
     /// A body with a Content-Encoding that is not understood.
     #[error("expected a body without Content-Encoding, or with gzip or zstd, got {0}")]
     UnsupportedEncoding(String),
@@ -319,7 +324,7 @@ impl ApiError {
             ApiError::NoResult(_) | ApiError::FieldsDeleted(_) => Code::NoResult,
             ApiError::MethodNotAllowed => Code::MethodNotAllowed,
             ApiError::NotAcceptable { .. } => Code::NotAcceptable,
-            ApiError::UnsupportedMedia(_) | ApiError::UnsupportedEncoding(_) => {
+            ApiError::UnsupportedMedia { .. } | ApiError::UnsupportedEncoding(_) => {
                 Code::UnsupportedMedia
             }
             ApiError::JobActive(_) | ApiError::SweepActive(_) | ApiError::MeshInUse => {
@@ -376,7 +381,7 @@ impl ApiError {
             ..
         } = kind;
         let mut document = json!({
-            "type": format!("/v1/errors/{code}"),
+            "type": explained_at(code),
             "title": title,
             "status": status,
             "code": code,

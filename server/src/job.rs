@@ -9,7 +9,7 @@ use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 use uuid::Uuid;
 
 use crate::{
-    catalog::{Code, Kind},
+    catalog::{Code, Kind, explained_at},
     time::Time,
 };
 
@@ -519,7 +519,7 @@ impl Failure {
     pub fn new(reason: Reason, detail: impl Into<String>) -> Self {
         let Kind { code, title, .. } = Code::from(reason).kind();
         Failure {
-            r#type: format!("/v1/errors/{code}"),
+            r#type: explained_at(code),
             title: title.into(),
             code: code.into(),
             detail: detail.into(),

@@ -146,6 +146,11 @@ impl Received {
         }
     }
 
+    /// What it counts for.
+    pub fn limit(&self) -> &Limit {
+        &self.limit
+    }
+
     /// Counts some more bytes.
     pub fn count(&self, bytes: usize) -> Result<(), ApiError> {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);

@@ -50,6 +50,23 @@ def plain_text(server):
     check(told.startswith("HTTP/1.1 400 ") and "https://" in told, "the answer to plain text: %r" % told)
 
 
+def health(server, certificate):
+    """The health check of a container has the settings of the service, and nothing else; the certificate need not name
+    127.0.0.1."""
+    def run(*arguments, **more):
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("SIGNORINI_")}
+        return subprocess.run([BINARY, "health", *arguments], capture_output=True, text=True, env={**environment, **more}, timeout=30)
+
+    listen = server.address.replace("127.0.0.1", "localhost")
+    done = run(SIGNORINI_LISTEN=listen, SIGNORINI_TLS_CERT=str(certificate))
+    equal((done.returncode, done.stdout), (0, "ok\n"), "health with the settings of a service with TLS, %r" % done)
+    done = run("--url", "https://" + listen, "--ca", server.ca)
+    equal(done.returncode, 0, "health of a service that is named, %r" % done)
+    for empty in ({}, {"SIGNORINI_TLS_CERT": ""}):
+        done = run(SIGNORINI_LISTEN=listen, **empty)
+        check(done.returncode == 1 and "use https" in done.stderr, "health in plain text, %r" % done)
+
+
 def serial(server):
     """Which certificate it shows now."""
     host, port = server.address.split(":")
@@ -175,6 +192,7 @@ def main():
         with Server(*used.options, ca=str(authority.file)) as server:
             both_protocols(server)
             plain_text(server)
+            health(server, used.cert)
             read_again(server, authority, used)
             token(server)
             server.stop()

@@ -4,11 +4,13 @@
 
 A few kilobytes that would become 10 GiB: as gzip, deflate, br and zstd, one around the other, as a body of JSON and as
 a mesh in a gzip, zip or npz file; and compressed messages over gRPC. Each is refused at once with the status that tells
-why, and takes neither memory nor time. Honest bodies as gzip and zstd are taken, and large answers come as either.
+why, and takes neither memory nor time. Many that stay open share the memory for bodies with the windows of their decoders.
+Honest bodies as gzip and zstd are taken, and large answers come as either.
 """
 
 import gzip
 import http.client
+import select
 import struct
 import time
 import zlib
@@ -58,6 +60,15 @@ def zstd():
 # an uncompressed meta-block cannot say 10 GiB in a few bytes, but whoever decodes br must first read this one: 16 MiB of
 # window, and a meta-block of 16 MiB that never comes
 BR = b"\x0b\xff\xff\x87" + bytes(range(256)) * 40
+
+
+def window():
+    """The beginning of a frame that refers to its last 8 MiB, and fills them: 256 KiB as they are, for which the rest is not
+    too much, then blocks as above."""
+    most = 128 << 10
+    plain = struct.pack("<I", most << 3)[:3] + b" " * most
+    block = struct.pack("<I", most << 3 | 1 << 1)[:3] + b" "
+    return b"\x28\xb5\x2f\xfd\0\x68" + plain * 2 + block * 62
 
 
 def archive(name, content):
@@ -194,6 +205,45 @@ def honest(server, job):
     equal(server.call("DELETE", "/v1/meshes/" + known).status, 204, "deleting the mesh")
 
 
+RECEIVED = 16 * MIB
+STREAMS = 200 if SOAK else 50
+# the limit has room for so many windows
+MOST_HELD = RECEIVED // (8 * MIB)
+# an upload that is not refused yet has buffers: on its way from the socket to the file
+OF_STREAM = MIB
+
+
+def held_open():
+    """Uploads that fill the windows of their decoders, and then stay: the limit on bodies is for all of them together."""
+    with Attacked("--max-received-bytes", str(RECEIVED)) as server:
+        server.finished_job()
+        server.forget_peak()
+        before, streams = server.memory(), []
+        with Bystander(server):
+            for _ in range(STREAMS):
+                stream = server.socket()
+                streams.append(stream)
+                lines = ("POST /v1/meshes HTTP/1.1", "host: " + server.address, "content-encoding: zstd", "content-length: %d" % MIB)
+                try:
+                    stream.sendall("\r\n".join((*lines, "", "")).encode() + window())
+                except OSError:
+                    pass  # it has been refused already
+            waiting, told, end = set(streams), [], time.monotonic() + 60
+            while len(waiting) > MOST_HELD:
+                check(time.monotonic() < end, "%d of %d streams have a window of 8 MiB each" % (len(waiting), STREAMS))
+                for stream in select.select(list(waiting), [], [], 1)[0]:
+                    waiting.remove(stream)
+                    told.append(stream.recv(4096))
+            grown = server.peak() - before
+            for stream in streams:
+                stream.close()
+        for answer in told:
+            check(answer.startswith(b"HTTP/1.1 503 "), "the answer to an upload for which there is no room: %r" % answer[:100])
+        check(grown < RECEIVED + STREAMS * OF_STREAM, "%d streams took %.1f MiB" % (STREAMS, grown / MIB))
+        server.stop()
+    print("%d streams that stay open: %d refused, memory %+.1f MiB" % (STREAMS, len(told), grown / MIB))
+
+
 def messages(server, packed):
     """Messages of gRPC that say they are compressed."""
     for encoding in ("gzip", "deflate", "zstd", "br", "none of these"):
@@ -245,6 +295,7 @@ def main():
                 messages(server, packed)
         equal([one["id"] for one in server.every_job()], [job], "the jobs there are")
         server.stop()
+    held_open()
     print("figure: %d compressed bodies, files and messages, of which the smallest (%d bytes) would become 10 GiB: all refused, "
           "memory at most %+.1f MiB, %.2f s of CPU and %.0f ms each" % (
               worst["requests"], len(packed["gzip, gzip, gzip"]), worst["memory"] / MIB, worst["cpu"], 1e3 * worst["time"]))

@@ -296,6 +296,8 @@ async fn every_rpc_is_for_those_whom_the_policy_names() {
         .map(|(rpc, access)| (format!("/signorini.v1.JobService/{rpc}"), access));
     let others = [
         ("/grpc.health.v1.Health/Check".to_owned(), "open"),
+        ("/grpc.health.v1.Health/List".to_owned(), "open"),
+        ("/grpc.health.v1.Health/Watch".to_owned(), "identified"),
         (
             "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo".to_owned(),
             "read",
@@ -381,6 +383,86 @@ async fn a_stream_ends_with_the_token_that_opened_it() {
         }
     }
     panic!("the stream ended as if it were complete");
+}
+
+/// Figures of the moment, by their names.
+async fn metric(server: &Server, admin: &str, name: &str) -> f64 {
+    let metrics = server.get("/metrics").bearer_auth(admin);
+    let text = metrics.send().await.unwrap().text().await.unwrap();
+    let line = text.lines().find_map(|line| line.strip_prefix(name));
+    line.unwrap().trim().parse().unwrap()
+}
+
+/// A wait may take a minute, and its answer comes after the token's end.
+#[tokio::test]
+async fn a_wait_is_not_answered_with_a_token_that_was_revoked_meanwhile() {
+    let server = server().await;
+    let token =
+        |owner: &str, scopes: &[&str]| json!({"name": "test", "owner": owner, "scopes": scopes});
+    let (_, admin) = create(&server, None, token("root", &["admin"])).await;
+    let (id, ada) = create(&server, Some(&admin), token("ada", &["read", "submit"])).await;
+    let pause = server.post("/v1/queue/pause").bearer_auth(&admin);
+    pause.send().await.unwrap();
+    let body = json!({"problem": example_json("rectangular_punch")});
+    let submit = server.post("/v1/jobs").bearer_auth(&ada).json(&body);
+    let job: Value = submit.send().await.unwrap().json().await.unwrap();
+    let job = job["id"].as_str().unwrap().to_owned();
+
+    let wait = server.get(&format!("/v1/jobs/{job}?wait=60"));
+    let wait = tokio::spawn(wait.bearer_auth(&ada).send());
+    let mut grpc = JobServiceClient::connect(server.url.clone()).await.unwrap();
+    let mut called = Request::new(pb::WaitJobRequest {
+        id: job.clone(),
+        wait: 60.0,
+        ..pb::WaitJobRequest::default()
+    });
+    called
+        .metadata_mut()
+        .insert("authorization", format!("Bearer {ada}").parse().unwrap());
+    let called = tokio::spawn(async move { grpc.wait_job(called).await });
+    for _ in 0..1000 {
+        // both, and this one
+        if metric(&server, &admin, "signorini_requests_in_progress").await >= 3.0 {
+            break;
+        }
+    }
+    let revoke = server.request(Method::DELETE, &format!("/v1/tokens/{id}"));
+    revoke.bearer_auth(&admin).send().await.unwrap();
+    let cancel = server.post(&format!("/v1/jobs/{job}/cancel"));
+    cancel.bearer_auth(&admin).send().await.unwrap();
+    let answer = wait.await.unwrap().unwrap();
+    assert_eq!(answer.status(), StatusCode::UNAUTHORIZED);
+    assert!(!answer.text().await.unwrap().contains(&job[4..]));
+    let answer = called.await.unwrap();
+    assert_eq!(answer.unwrap_err().code(), Code::Unauthenticated);
+}
+
+/// The answer has the only copy of the new secret, though what asked for it is no longer valid.
+#[tokio::test]
+async fn a_token_can_rotate_and_revoke_itself() {
+    let server = server().await;
+    let body = json!({"name": "test", "owner": "root", "scopes": ["admin"]});
+    let (id, first) = create(&server, None, body).await;
+    let rotate = server.post(&format!("/v1/tokens/{id}/rotate"));
+    let answer = rotate.bearer_auth(&first).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::OK);
+    let answer: Value = answer.json().await.unwrap();
+    let second = answer["secret"].as_str().unwrap().to_owned();
+
+    let mut grpc = JobServiceClient::connect(server.url.clone()).await.unwrap();
+    let mut rotate = Request::new(pb::RotateTokenRequest { id: id.clone() });
+    rotate
+        .metadata_mut()
+        .insert("authorization", format!("Bearer {second}").parse().unwrap());
+    let third = grpc.rotate_token(rotate).await.unwrap().into_inner().secret;
+
+    let revoke = || server.request(Method::DELETE, &format!("/v1/tokens/{id}"));
+    let answer = revoke().bearer_auth(&third).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::OK);
+    let answer: Value = answer.json().await.unwrap();
+    assert!(answer["revoked_at"].is_string(), "{answer}");
+    let answer = revoke().bearer_auth(&third).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::UNAUTHORIZED);
 }
 
 /// What others own is not found, by id, key or hash; an administrator finds it.
@@ -717,6 +799,18 @@ async fn foreign_hosts_and_origins_are_refused() {
         "https://dashboard.example"
     );
     assert!(!headers.values().any(|value| value == "*"));
+    // also what is refused before any handler
+    let refused = server
+        .post("/signorini.v1.JobService/GetJob")
+        .header("origin", "https://dashboard.example")
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(refused.status(), StatusCode::UNSUPPORTED_MEDIA_TYPE);
+    assert_eq!(
+        refused.headers()["access-control-allow-origin"],
+        "https://dashboard.example"
+    );
     // a browser asks beforehand, for allowed origins only
     let ask = async |origin: &str| {
         let request = server
@@ -765,6 +859,16 @@ async fn users_are_those_that_a_trusted_proxy_names() {
     for wrong in [&[][..], &["ada", "root"], &["a b"], &[""]] {
         assert_eq!(me(wrong).await.0, 401, "{wrong:?}");
     }
+    // a user has no token, and is not told of one
+    let pause = server
+        .post("/v1/queue/pause")
+        .header("x-remote-user", "ada");
+    let refused: Value = pause.send().await.unwrap().json().await.unwrap();
+    let detail = refused["detail"].as_str().unwrap();
+    assert!(
+        detail.contains("ada, whom the proxy names") && detail.contains("--proxy-scopes"),
+        "{detail}"
+    );
     let elsewhere = Server::start(SIGNORINI, &["--trusted-proxy", "10.0.0.1"]).await;
     let forged = elsewhere
         .get("/v1/me")

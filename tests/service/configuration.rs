@@ -133,6 +133,41 @@ fn a_file_that_cannot_be_read_is_named() {
     }
 }
 
+/// Half of TLS would be plain text that nobody has asked for.
+#[test]
+fn a_certificate_and_its_key_are_set_both_or_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, settings: &str| write(folder.path(), name, settings);
+    let cert = file("cert.toml", "tls_cert = \"cert.pem\"\n");
+    let key = file("key.toml", "tls_key = \"key.pem\"\n");
+    for (half, given, missing) in [
+        (&cert, "--tls-cert", "--tls-key"),
+        (&key, "--tls-key", "--tls-cert"),
+    ] {
+        for command in [&["config", "show"][..], &["serve", "--listen=127.0.0.1:0"]] {
+            let mut half_of_tls = Command::new(SIGNORINI);
+            half_of_tls.args(command).args(["--config", half]);
+            let output = half_of_tls.current_dir(folder.path()).output().unwrap();
+            assert_eq!(output.status.code(), Some(2), "{output:?}");
+            let told = String::from_utf8(output.stderr).unwrap();
+            assert!(
+                told.contains(&format!("{given} is set, and {missing} is not")),
+                "{told}"
+            );
+        }
+    }
+    // each from a source of its own
+    let both = "tls_cert = \"cert.pem\"\ntls_key = \"key.pem\"\n";
+    for shown in [
+        show(&["--config", &cert, "--tls-key", "key.pem"], &[]),
+        show(&["--config", &cert], &[("SIGNORINI_TLS_KEY", "key.pem")]),
+        show(&["--config", &key, "--tls-cert", "cert.pem"], &[]),
+        show(&["--config", &file("both.toml", both)], &[]),
+    ] {
+        assert!(text(&shown).contains(both), "{shown:?}");
+    }
+}
+
 #[test]
 fn a_variable_that_is_misspelt_is_named() {
     let folder = tempfile::tempdir().unwrap();

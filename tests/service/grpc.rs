@@ -5,7 +5,7 @@ use serde_json::json;
 use service::pb::{self, job_service_client::JobServiceClient};
 use suite::{
     example, example_json,
-    harness::{Server, large},
+    harness::{Server, answer, large},
 };
 use tonic::{Code, transport::Channel};
 use tonic_types::StatusExt;
@@ -322,6 +322,34 @@ async fn health_and_unknown_services_answer() {
         .await
         .unwrap_err();
     assert_eq!(status.code(), Code::Unimplemented);
+}
+
+/// A call without the type of gRPC would be taken as one, and the bytes of its body counted as none.
+#[tokio::test]
+async fn a_call_without_the_content_type_of_grpc_is_refused() {
+    let server = server().await;
+    for path in [
+        "/signorini.v1.JobService/CreateJob",
+        "/signorini.v1.JobService/UploadMesh",
+        "/grpc.health.v1.Health/Check",
+    ] {
+        for content_type in [
+            None,
+            Some("application/json"),
+            Some("application/octet-stream"),
+        ] {
+            // an empty message
+            let mut request = server.post(path).body(vec![0; 5]);
+            if let Some(content_type) = content_type {
+                request = request.header("content-type", content_type);
+            }
+            let (status, document) = answer(request).await;
+            assert_eq!(status, 415, "{path}, {content_type:?}");
+            assert_eq!(document["code"], "unsupported-media");
+            let detail = document["detail"].as_str().unwrap();
+            assert!(detail.contains("application/grpc"), "{detail}");
+        }
+    }
 }
 
 #[tokio::test]

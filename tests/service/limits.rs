@@ -8,6 +8,10 @@ use suite::{
     example_json,
     harness::{Server, answer, large},
 };
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::TcpStream,
+};
 
 use crate::{SIGNORINI, server};
 
@@ -40,6 +44,42 @@ async fn a_body_over_the_limit_is_refused() {
         .await
         .unwrap();
     assert_eq!(response.status(), StatusCode::PAYLOAD_TOO_LARGE);
+}
+
+/// Behind a proxy that shows the service below a path, probes are probes, and the links of errors lead there.
+#[tokio::test]
+async fn below_a_path_probes_are_answered_and_errors_explained_when_all_connections_are_busy() {
+    let arguments = ["--max-connections", "1", "--path-prefix", "/lab"];
+    let server = Server::start(SIGNORINI, &arguments).await;
+    let mut busy = TcpStream::connect(server.url.trim_start_matches("http://"))
+        .await
+        .unwrap();
+    // it waits for the body, as soon as it says so
+    let head = "POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\n\
+                content-length: 9\r\nexpect: 100-continue\r\n\r\n";
+    busy.write_all(head.as_bytes()).await.unwrap();
+    let mut told = [0; 12];
+    busy.read_exact(&mut told).await.unwrap();
+    assert_eq!(&told, b"HTTP/1.1 100");
+    for probe in ["/livez", "/lab/livez", "/lab/readyz"] {
+        let answer = server.get(probe).send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::OK, "{probe}");
+    }
+    let (status, refused) = answer(server.get("/lab/v1/jobs")).await;
+    assert_eq!(status, StatusCode::SERVICE_UNAVAILABLE);
+    assert_eq!(refused["instance"], "/lab/v1/jobs");
+    assert_eq!(refused["type"], "/lab/v1/errors/overloaded");
+
+    // of a job, whose failure is stored
+    let server = Server::start(SIGNORINI, &arguments[2..]).await;
+    let body =
+        json!({"problem": example_json("rectangular_punch"), "limits": {"queue_ttl_s": 0.2}});
+    server.post("/v1/queue/pause").send().await.unwrap();
+    let job = server.solve(&body).await;
+    let explained = job["failure"]["type"].as_str().unwrap();
+    assert_eq!(explained, "/lab/v1/errors/queue-expired");
+    let explanation = server.get(explained).send().await.unwrap();
+    assert_eq!(explanation.status(), StatusCode::OK);
 }
 
 /// Each support has five violations, each of which is reported.

@@ -242,6 +242,38 @@ async fn nothing_that_a_client_sends_adds_a_line_or_a_long_one() {
     }
 }
 
+/// Anyone could fill the disk with requests that need no token, as well as with those that are refused.
+#[tokio::test]
+async fn callers_who_are_not_identified_have_some_lines_in_each_second() {
+    const REQUESTS: usize = 400;
+    let server = Server::start(SIGNORINI, &[]).await;
+    let body = json!({"name": "test", "owner": "root", "scopes": ["admin"]});
+    let created = server.post("/v1/tokens").json(&body).send().await.unwrap();
+    let created: Value = created.json().await.unwrap();
+    let admin = created["secret"].as_str().unwrap();
+    let begun = std::time::Instant::now();
+    for _ in 0..REQUESTS {
+        let open = server.get("/v1/errors/not-found").send().await.unwrap();
+        assert_eq!(open.status(), StatusCode::OK);
+    }
+    let seconds = begun.elapsed().as_secs() as usize;
+    server
+        .get("/v1/me")
+        .bearer_auth(admin)
+        .send()
+        .await
+        .unwrap();
+    let log = log_with(&server, "/v1/me").await;
+    let lines = log
+        .lines()
+        .filter(|line| line.contains("/v1/errors/"))
+        .count();
+    assert!(
+        (1..=20 * (seconds + 2)).contains(&lines),
+        "{lines} lines in {seconds} s"
+    );
+}
+
 #[tokio::test]
 async fn the_filter_is_that_of_rust_log_if_there_is_no_other() {
     let folder = tempfile::tempdir().unwrap();

@@ -34,7 +34,8 @@ pub(super) fn run(
     matches: Option<&ArgMatches>,
     lines: &Lines,
 ) -> anyhow::Result<Exit> {
-    let Command::Show { origin, .. } = command;
+    let Command::Show { origin, arguments } = command;
+    arguments.settings.tls.files()?;
     let mut text = String::new();
     for arg in settings::settings() {
         let Some(matches) = matches else { continue };

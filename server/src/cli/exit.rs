@@ -4,6 +4,7 @@ use strum::VariantArray;
 
 use crate::{
     app::{CannotListen, OpenToAll},
+    config::HalfOfTls,
     error::ApiError,
     listener::BadCertificate,
     store::StoreError,
@@ -78,9 +79,8 @@ impl Exit {
                 Exit::Damaged
             }
             _ if error.is::<CannotListen>() => Exit::Listen,
-            _ if error.is::<OpenToAll>() || error.is::<BadCertificate>() || is_invalid(error) => {
-                Exit::Invalid
-            }
+            _ if error.is::<OpenToAll>() || is_invalid(error) => Exit::Invalid,
+            _ if error.is::<HalfOfTls>() || error.is::<BadCertificate>() => Exit::Invalid,
             _ => Exit::Failed,
         }
     }

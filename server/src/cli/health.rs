@@ -1,6 +1,7 @@
 //! `signorini health`.
 
 use std::{
+    ffi::OsString,
     net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
     time::Duration,
 };
@@ -13,6 +14,7 @@ use super::{
     exit::Exit,
     output,
 };
+use crate::config::address;
 
 /// The service itself takes two seconds at most.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -30,9 +32,15 @@ pub(super) struct Arguments {
         long,
         env = "SIGNORINI_LISTEN",
         default_value = "127.0.0.1:8080",
-        value_name = "ADDRESS"
+        value_name = "ADDRESS",
+        value_parser = address
     )]
     listen: SocketAddr,
+
+    /// The certificate that `serve` was told to show, if no --url is given: it is asked over TLS then. The certificate is not
+    /// checked, since it need not name this machine, and nothing secret is sent
+    #[arg(long, env = "SIGNORINI_TLS_CERT", value_name = "FILE")]
+    tls_cert: Option<OsString>,
 
     #[command(flatten)]
     trust: Trust,
@@ -44,7 +52,10 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         Some(url) => (arguments.trust.client(&url)?, url),
         None => {
             let address = reachable(arguments.listen);
-            (client::local()?, format!("http://{address}"))
+            // an empty variable counts as not set, as for `serve`
+            let tls = arguments.tls_cert.is_some_and(|file| !file.is_empty());
+            let scheme = if tls { "https" } else { "http" };
+            (client::local()?, format!("{scheme}://{address}"))
         }
     };
     let url = format!("{}/readyz", url.trim_end_matches('/'));

@@ -31,7 +31,9 @@ pub(super) async fn keep_alive(url: String, pulse: Pulse) {
     let (mut told, mut was_alive) = (String::new(), true);
     loop {
         sleep(period).await;
-        let alive = timeout(period, pulse.is_felt()).await.unwrap_or(false);
+        let alive = timeout(period, pulse.store_answers())
+            .await
+            .unwrap_or(false);
         if alive && watchdog.is_some() {
             tell(&[NotifyState::Watchdog]);
         }

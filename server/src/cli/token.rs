@@ -45,32 +45,32 @@ enum Command {
         #[arg(long, value_name = "TIME", value_parser = duration_s)]
         expires_in: Option<f64>,
         #[command(flatten)]
-        place: Place,
+        at: TokenStore,
     },
     /// List all tokens, without their secrets
     List {
         #[command(flatten)]
-        place: Place,
+        at: TokenStore,
     },
     /// Revoke a token: from then on it is refused
     Revoke {
         /// Its id, as `list` shows it
         id: String,
         #[command(flatten)]
-        place: Place,
+        at: TokenStore,
     },
     /// Give a token another secret and print it; from then on the old one is refused
     Rotate {
         /// Its id, as `list` shows it
         id: String,
         #[command(flatten)]
-        place: Place,
+        at: TokenStore,
     },
 }
 
 /// Where the tokens are.
 #[derive(Debug, Args)]
-struct Place {
+struct TokenStore {
     /// Folder of the store, if no server is using it
     #[arg(
         long,
@@ -95,7 +95,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             owner,
             scopes,
             expires_in,
-            place,
+            at,
         } => {
             let request = TokenRequest {
                 name,
@@ -103,14 +103,14 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                 scopes,
                 expires_in_s: expires_in,
             };
-            let (token, secret) = match place.open(true).await? {
-                Door::Store(store) => {
+            let (token, secret) = match at.open(true).await? {
+                Target::Store(store) => {
                     let new = tokens::create(&store, &Caller::local(), request).await;
                     close(store).await;
                     let new = new?;
                     (new.token, new.secret)
                 }
-                Door::Service(service) => {
+                Target::Service(service) => {
                     let TokenRequest {
                         name,
                         owner,
@@ -131,28 +131,28 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             eprintln!("{}", told(&token));
             output::print(&format!("{secret}\n"))?;
         }
-        Command::List { place } => {
-            let all = match place.open(false).await? {
-                Door::Store(store) => {
+        Command::List { at } => {
+            let all = match at.open(false).await? {
+                Target::Store(store) => {
                     let all = tokens::list(&store, &Caller::local());
                     close(store).await;
                     all
                 }
-                Door::Service(service) => {
+                Target::Service(service) => {
                     let mut answer = service.call(Method::GET, "/v1/tokens", None).await?;
                     serde_json::from_value(answer["tokens"].take()).context(NOT_OURS)?
                 }
             };
             output::print(&table(&all))?;
         }
-        Command::Revoke { id, place } => {
-            let token = match place.open(false).await? {
-                Door::Store(store) => {
+        Command::Revoke { id, at } => {
+            let token = match at.open(false).await? {
+                Target::Store(store) => {
                     let revoked = tokens::revoke(&store, &Caller::local(), &id).await;
                     close(store).await;
                     revoked?
                 }
-                Door::Service(service) => {
+                Target::Service(service) => {
                     let path = format!("/v1/tokens/{id}");
                     let answer = service.call(Method::DELETE, &path, None).await?;
                     serde_json::from_value(answer).context(NOT_OURS)?
@@ -160,15 +160,15 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             };
             eprintln!("{}", told(&token));
         }
-        Command::Rotate { id, place } => {
-            let (token, secret) = match place.open(false).await? {
-                Door::Store(store) => {
+        Command::Rotate { id, at } => {
+            let (token, secret) = match at.open(false).await? {
+                Target::Store(store) => {
                     let new = tokens::rotate(&store, &Caller::local(), &id).await;
                     close(store).await;
                     let new = new?;
                     (new.token, new.secret)
                 }
-                Door::Service(service) => {
+                Target::Service(service) => {
                     let path = format!("/v1/tokens/{id}/rotate");
                     new_token(service.call(Method::POST, &path, None).await?)?
                 }
@@ -188,8 +188,8 @@ fn new_token(mut answer: Value) -> anyhow::Result<(Token, String)> {
     Ok((token, secret))
 }
 
-/// What leads to the tokens.
-enum Door {
+/// What is called for the tokens.
+enum Target {
     Store(Arc<Store>),
     Service(Remote),
 }
@@ -201,9 +201,9 @@ struct Remote {
     token: Option<String>,
 }
 
-impl Place {
+impl TokenStore {
     /// `create`: a store may be made for it.
-    async fn open(&self, create: bool) -> anyhow::Result<Door> {
+    async fn open(&self, create: bool) -> anyhow::Result<Target> {
         let Some(url) = &self.url else {
             if !self.data.exists() {
                 match create {
@@ -220,10 +220,10 @@ impl Place {
                     "{text}; while it runs, give its address with --url"
                 ))
                 .into()),
-                opened => Ok(Door::Store(opened?)),
+                opened => Ok(Target::Store(opened?)),
             };
         };
-        Ok(Door::Service(Remote {
+        Ok(Target::Service(Remote {
             client: self.trust.client(url)?,
             url: url.trim_end_matches('/').to_owned(),
             token: std::env::var("SIGNORINI_TOKEN").ok(),

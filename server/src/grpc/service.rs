@@ -37,7 +37,7 @@ use crate::{
         retry::{self, Changes},
         submit::{self, Submitted},
         sweeps,
-        tokens::{self, TOKEN, TokenRequest},
+        tokens::{self, TOKEN, TokenRequest, TokensChanged},
         watch::{self, AFTER_SEQ, Until, WAIT},
     },
     violations,
@@ -426,7 +426,7 @@ impl JobService for Grpc {
             expires_in_s,
         };
         let new = tokens::create(&self.service.store, &caller, request).await?;
-        Ok(Response::new(new.into()))
+        Ok(of_changed_tokens(new.into()))
     }
 
     async fn list_tokens(
@@ -449,14 +449,14 @@ impl JobService for Grpc {
         let (caller, request) = caller_and_message(request)?;
         let id = TOKEN.read(&request.id)?;
         let token = tokens::revoke(&self.service.store, &caller, &id).await?;
-        Ok(Response::new(token.into()))
+        Ok(of_changed_tokens(token.into()))
     }
 
     async fn rotate_token(&self, request: Request<pb::RotateTokenRequest>) -> Reply<pb::NewToken> {
         let (caller, request) = caller_and_message(request)?;
         let id = TOKEN.read(&request.id)?;
         let new = tokens::rotate(&self.service.store, &caller, &id).await?;
-        Ok(Response::new(new.into()))
+        Ok(of_changed_tokens(new.into()))
     }
 
     async fn get_queue(&self, request: Request<pb::GetQueueRequest>) -> Reply<pb::QueueState> {
@@ -691,4 +691,11 @@ impl Grpc {
         let request = self.service.work(|| job_request(request)).await?;
         submit::create(&self.service, caller, request, id, key).await
     }
+}
+
+/// The answer to a call that has changed tokens.
+fn of_changed_tokens<T>(message: T) -> Response<T> {
+    let mut response = Response::new(message);
+    response.extensions_mut().insert(TokensChanged);
+    response
 }

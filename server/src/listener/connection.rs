@@ -31,7 +31,7 @@ use super::{
     places::Place,
     tls::{Stream, Tls},
 };
-use crate::{caller::Peer, error::ApiError, metrics::METRICS, rest};
+use crate::{address, caller::Peer, error::ApiError, metrics::METRICS, rest};
 
 /// Requests at the same time on one connection; a client with more waits or opens another one.
 const MOST_STREAMS: u32 = 100;
@@ -136,7 +136,8 @@ fn answer(
 ) -> impl Future<Output = Result<Response<Sent>, Infallible>> + use<> {
     let under_way = Arc::new(activity.begin());
     async move {
-        let response = match reserved && !rest::is_probe(request.uri().path()) {
+        let path = address::without_prefix(request.uri().path());
+        let response = match reserved && !rest::is_probe(path) {
             true => {
                 METRICS.refused_connections.inc();
                 rest::refuse(&request, ApiError::Overloaded)

@@ -37,11 +37,11 @@ const DAY: Duration = Duration::from_secs(86400);
 /// The certificate that the listener shows.
 pub struct Tls {
     files: TlsFiles,
-    acceptor: RwLock<Arc<Shown>>,
+    in_use: RwLock<Arc<CertificateInUse>>,
 }
 
-/// A certificate in use.
-struct Shown {
+/// A certificate, and what shows it to clients.
+struct CertificateInUse {
     acceptor: TlsAcceptor,
     certificate: CertificateDer<'static>,
 }
@@ -54,34 +54,33 @@ pub struct BadCertificate(String);
 impl Tls {
     /// Reads both files. A certificate that has expired is used with a warning: jobs go on, and clients are told.
     pub fn read(files: TlsFiles) -> Result<Arc<Tls>, BadCertificate> {
-        let shown = Shown::read(&files)?;
-        if let Err(bad) = shown.check_time(UnixTime::now()) {
+        let read = CertificateInUse::read(&files)?;
+        if let Err(bad) = read.check_time(UnixTime::now()) {
             warn!(error = %bad, "clients will refuse this service: {bad}");
         }
         Ok(Arc::new(Tls {
             files,
-            acceptor: RwLock::new(Arc::new(shown)),
+            in_use: RwLock::new(Arc::new(read)),
         }))
     }
 
     /// Reads both files again, for connections from now on; with an error, the certificate so far stays in use.
     pub fn reload(&self) -> Result<(), BadCertificate> {
-        let shown = Shown::read(&self.files)?;
-        shown.check_time(UnixTime::now())?;
-        let mut current = self
-            .acceptor
-            .write()
-            .unwrap_or_else(PoisonError::into_inner);
-        *current = Arc::new(shown);
+        let read = CertificateInUse::read(&self.files)?;
+        read.check_time(UnixTime::now())?;
+        let mut current = self.in_use.write().unwrap_or_else(PoisonError::into_inner);
+        *current = Arc::new(read);
         Ok(())
     }
 
     /// Warns each day of a certificate that has expired, or will soon. Never returns.
     pub async fn watch_expiry(&self) {
         loop {
-            let (shown, now) = (self.shown(), UnixTime::now());
+            let (in_use, now) = (self.in_use(), UnixTime::now());
             let then = UnixTime::since_unix_epoch(Duration::from_secs(now.as_secs()) + SOON);
-            let of = shown.check_time(now).and_then(|()| shown.check_time(then));
+            let of = in_use
+                .check_time(now)
+                .and_then(|()| in_use.check_time(then));
             if let Err(bad) = of {
                 warn!(error = %bad, "renew the certificate, then send SIGHUP: {bad}");
             }
@@ -89,8 +88,8 @@ impl Tls {
         }
     }
 
-    fn shown(&self) -> Arc<Shown> {
-        let current = self.acceptor.read();
+    fn in_use(&self) -> Arc<CertificateInUse> {
+        let current = self.in_use.read();
         current.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
@@ -102,7 +101,7 @@ impl Tls {
             refuse_plain(&mut stream).await?;
             return Err(io::Error::other("the client does not speak TLS"));
         }
-        let stream = self.shown().acceptor.accept(stream).await?;
+        let stream = self.in_use().acceptor.accept(stream).await?;
         Ok(Stream::Tls(Box::new(stream)))
     }
 }
@@ -124,8 +123,8 @@ async fn refuse_plain(stream: &mut TcpStream) -> io::Result<()> {
     stream.shutdown().await
 }
 
-impl Shown {
-    fn read(files: &TlsFiles) -> Result<Shown, BadCertificate> {
+impl CertificateInUse {
+    fn read(files: &TlsFiles) -> Result<CertificateInUse, BadCertificate> {
         let (chain, key) = (certificates(&files.cert)?, private_key(&files.key)?);
         let (cert, key_file) = (files.cert.display(), files.key.display());
         let certificate = chain[0].clone();
@@ -152,7 +151,7 @@ impl Shown {
             .with_no_client_auth()
             .with_cert_resolver(Arc::new(SingleCertAndKey::from(pair)));
         config.alpn_protocols = vec![b"h2".to_vec(), b"http/1.1".to_vec()];
-        Ok(Shown {
+        Ok(CertificateInUse {
             acceptor: TlsAcceptor::from(Arc::new(config)),
             certificate,
         })

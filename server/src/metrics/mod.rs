@@ -186,7 +186,7 @@ impl Metrics {
         self.commits.observe(took.as_secs_f64());
     }
 
-    /// All, with figures of this moment, in the text format of OpenMetrics.
+    /// All, with figures of this moment, in the text format of OpenMetrics. It reads files of /proc, and so may block.
     pub fn text(&self, now: Snapshot) -> Result<String, fmt::Error> {
         let mut text = String::new();
         encode_registry(&mut text, &self.registry)?;

@@ -34,7 +34,8 @@ pub(super) async fn authenticate(
     mut request: Request,
     next: Next,
 ) -> Response {
-    match admit(&service, &request) {
+    let (grpc, path) = (is_grpc(&request), request.uri().path().to_owned());
+    let answer = match admit(&service, &request) {
         Ok(Identified { caller, by }) => {
             let trace = request.extensions().get::<Trace>().cloned();
             let caller = caller.in_trace(trace);
@@ -43,11 +44,9 @@ pub(super) async fn authenticate(
             answer.extensions_mut().insert(caller); // for `observe`
             while_valid(answer, service.store.clone(), by)
         }
-        Err(error) => {
-            let path = request.uri().path().to_owned();
-            refusal(is_grpc(&request), &path, error)
-        }
-    }
+        Err(error) => Err(error),
+    };
+    answer.unwrap_or_else(|error| refusal(grpc, &path, error))
 }
 
 /// The caller, if the request is one that they may make.
@@ -60,21 +59,28 @@ fn admit(service: &Service, request: &Request) -> Result<Identified, ApiError> {
         // also with a token that is no longer valid, as a monitor may have it
         Err(_) if access == Access::Open => Identified {
             caller: Caller::anonymous(),
-            by: By::Anyone,
+            by: By::OpenOperation,
         },
         Err(error) => return Err(error),
     };
-    let caller = &identified.caller;
     match access {
-        Access::Needs(scope) if !caller.may(scope) => {
-            let scope: &str = scope.into();
-            Err(ApiError::Forbidden(format!(
-                "this needs the scope {scope}, which the token of {} does not have",
-                caller.owner()
-            )))
-        }
+        Access::Needs(scope) if !identified.caller.may(scope) => Err(lacks(&identified, scope)),
         Access::Open | Access::Identified | Access::Needs(_) => Ok(identified),
     }
+}
+
+/// The refusal of a caller who does not have this scope.
+fn lacks(Identified { caller, by }: &Identified, scope: Scope) -> ApiError {
+    let (scope, owner): (&str, _) = (scope.into(), caller.owner());
+    ApiError::Forbidden(match by {
+        By::Proxy => format!(
+            "this needs the scope {scope}, which {owner}, whom the proxy names, does not have; an administrator can give it \
+             with --proxy-scopes, or a token that has it"
+        ),
+        By::Token(_) | By::NoTokensNeeded | By::OpenOperation => {
+            format!("this needs the scope {scope}, which the token of {owner} does not have")
+        }
+    })
 }
 
 /// Who may make a request. What is no operation is answered by 404, 405 or UNIMPLEMENTED, which says nothing that
@@ -102,8 +108,11 @@ fn access(request: &Request) -> Access {
     if path.starts_with("/grpc.reflection.") {
         return operations::DESCRIPTION;
     }
-    if path.starts_with("/grpc.health.v1.Health/") {
-        return Access::Open;
+    match path.strip_prefix("/grpc.health.v1.Health/") {
+        Some("Check" | "List") => return Access::Open,
+        // `Watch` never ends, and occupies a connection
+        Some(_) => return Access::Identified,
+        None => {}
     }
     let Some(route) = request.extensions().get::<MatchedPath>() else {
         return Access::Open; // 404

@@ -12,7 +12,7 @@ use super::coding;
 use crate::{error::ApiError, transfer::Received};
 
 /// What the headers declare the body to be.
-fn content_type(headers: &HeaderMap) -> &str {
+pub(super) fn content_type(headers: &HeaderMap) -> &str {
     let value = headers.get(header::CONTENT_TYPE);
     value
         .and_then(|value| value.to_str().ok())
@@ -39,7 +39,10 @@ pub(super) fn is_json(headers: &HeaderMap) -> Result<&HeaderMap, ApiError> {
         && essence.ends_with("+json")
         && !essence.ends_with("-patch+json");
     if essence != "application/json" && !json {
-        return Err(ApiError::UnsupportedMedia(content_type.into()));
+        return Err(ApiError::UnsupportedMedia {
+            expected: "application/json",
+            got: content_type.into(),
+        });
     }
     Ok(headers)
 }
@@ -66,7 +69,7 @@ async fn text(
     received: &Received,
 ) -> Result<String, ApiError> {
     let too_large = ApiError::PayloadTooLarge { limit_bytes };
-    let mut pieces = coding::decoded(headers, body)?;
+    let mut pieces = coding::decoded(headers, body, received, coding::FREE_COLLECTED)?;
     if declared_length(headers).is_some_and(|length| length > limit_bytes) {
         return Err(too_large);
     }

@@ -22,7 +22,10 @@ use futures_util::{Stream, StreamExt, TryStreamExt};
 use tokio::io::AsyncRead;
 use tokio_util::io::{ReaderStream, StreamReader};
 
-use crate::{error::ApiError, transfer};
+use crate::{
+    error::ApiError,
+    transfer::{self, Received, Share},
+};
 
 /// A coding that is understood.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,12 +39,15 @@ pub(super) const UNDERSTOOD: &str = "gzip, zstd";
 
 /// Bytes that are handed on at once: few, so that one answer of very regular text does not keep a thread for itself.
 const PIECE_BYTES: usize = 8 << 10;
-/// The window that a frame of zstd may ask for, as a power of two: what RFC 9659 has for HTTP. Each stream takes that much memory.
+/// The window that a frame of zstd may ask for, as a power of two: what RFC 9659 has for HTTP.
 const MOST_WINDOW_LOG: u32 = 23;
-/// Text of a mesh becomes 3 to 20 times smaller. More than this many bytes for one that arrived, beyond the first 16 MiB, are
+/// Text of a mesh becomes 3 to 20 times smaller. More than this many bytes for one that arrived, beyond the first ones, are
 /// no mesh, and cost their sender nothing.
 const MOST_RATIO: usize = 32;
-const FREE_BYTES: usize = 16 << 20;
+/// The first bytes of a body that is collected, and counted meanwhile: jobs that differ in few numbers become much smaller.
+pub(super) const FREE_COLLECTED: usize = 16 << 20;
+/// Those of an upload, which goes to the disk.
+pub(super) const FREE_UPLOADED: usize = 256 << 10;
 
 /// A body in pieces, as it was before it was encoded.
 pub(super) type Pieces<'a> = Pin<Box<dyn Stream<Item = Result<Bytes, ApiError>> + Send + 'a>>;
@@ -61,6 +67,30 @@ impl Coding {
         match self {
             Coding::Gzip => "gzip",
             Coding::Zstd => "zstd",
+        }
+    }
+
+    /// Memory of an encoder, as measured: of an answer of several MB.
+    pub(super) fn encoder_bytes(self) -> usize {
+        match self {
+            Coding::Gzip => 280 << 10,
+            Coding::Zstd => 1 << 20,
+        }
+    }
+
+    /// Memory of a decoder without its window, as measured.
+    fn decoder_bytes(self) -> usize {
+        match self {
+            Coding::Gzip => 48 << 10,
+            Coding::Zstd => 256 << 10,
+        }
+    }
+
+    /// The largest window of a decoder. It takes memory as it fills.
+    fn window_bytes(self) -> usize {
+        match self {
+            Coding::Gzip => 0, // a part of the decoder
+            Coding::Zstd => 1 << MOST_WINDOW_LOG,
         }
     }
 
@@ -88,25 +118,32 @@ impl Coding {
         }
     }
 
-    /// The body in this coding, as fast as it can be made.
-    pub(super) fn encoded(self, body: Body) -> Body {
+    /// The body in this coding, as fast as it can be made. The share is that of the encoder, and is given back with it.
+    pub(super) fn encoded(self, body: Body, share: Share) -> Body {
         let reader = StreamReader::new(body.into_data_stream().map_err(io::Error::other));
         match self {
-            Coding::Gzip => from_reader(GzipEncoder::with_quality(reader, Level::Fastest)),
-            Coding::Zstd => from_reader(ZstdEncoder::with_quality(reader, Level::Fastest)),
+            Coding::Gzip => from_reader(GzipEncoder::with_quality(reader, Level::Fastest), share),
+            Coding::Zstd => from_reader(ZstdEncoder::with_quality(reader, Level::Fastest), share),
         }
     }
 }
 
-fn from_reader(reader: impl AsyncRead + Send + 'static) -> Body {
-    Body::from_stream(ReaderStream::with_capacity(reader, PIECE_BYTES))
+fn from_reader(reader: impl AsyncRead + Send + 'static, share: Share) -> Body {
+    let pieces = ReaderStream::with_capacity(reader, PIECE_BYTES);
+    Body::from_stream(pieces.map(move |piece| {
+        let _held = &share;
+        piece
+    }))
 }
 
-/// The body of a request without its coding. The caller has the limit of its bytes; whatever that is, they are not many times
-/// more than those that arrived. An error if the coding is none of these, or several.
+/// The body of a request without its coding. The caller has the limit of its bytes; whatever that is, beyond the `free` ones
+/// they are not many times more than those that arrived. What the decoder needs is counted for the limit of `received` as long
+/// as there is one. An error if the coding is none of these, or several.
 pub(super) fn decoded<'a>(
     headers: &HeaderMap,
     body: &'a mut BodyDataStream,
+    received: &Received,
+    free: usize,
 ) -> Result<Pieces<'a>, ApiError> {
     let named = headers.get_all(header::CONTENT_ENCODING).iter();
     let named: Vec<_> = named
@@ -118,6 +155,8 @@ pub(super) fn decoded<'a>(
     };
     let coding = Coding::of(name.trim()).filter(|_| named.len() == 1);
     let coding = coding.ok_or_else(|| ApiError::UnsupportedEncoding(named.join(", ")))?;
+    let of_decoder = Received::new(received.limit());
+    of_decoder.count(coding.decoder_bytes())?;
     let arrived = Arc::new(AtomicUsize::new(0));
     let counted = arrived.clone();
     let body = body.inspect_ok(move |piece| {
@@ -146,8 +185,10 @@ pub(super) fn decoded<'a>(
                 coding.name()
             )),
         })?;
+        let window = |bytes: usize| bytes.min(coding.window_bytes());
+        of_decoder.count(window(bytes + piece.len()) - window(bytes))?;
         bytes += piece.len();
-        match bytes > FREE_BYTES + MOST_RATIO * arrived.load(Relaxed) {
+        match bytes > free + MOST_RATIO * arrived.load(Relaxed) {
             true => Err(ApiError::EncodedTooLarge { ratio: MOST_RATIO }),
             false => Ok(piece),
         }
@@ -165,6 +206,7 @@ fn incomplete(error: axum::Error) -> ApiError {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::transfer::Limit;
 
     #[test]
     fn an_encoding_is_chosen_as_the_rfc_specifies() {
@@ -202,16 +244,27 @@ mod tests {
         assert_eq!(Coding::accepted(&HeaderMap::new()), None);
     }
 
-    async fn all(body: Body, encoding: &str) -> Result<Vec<u8>, ApiError> {
+    /// All that is decoded, of which so many bytes are free.
+    async fn all_of(body: Body, encoding: &str, free: usize) -> Result<Vec<u8>, ApiError> {
         let mut headers = HeaderMap::new();
         headers.insert(header::CONTENT_ENCODING, encoding.parse().unwrap());
         let mut body = body.into_data_stream();
-        let mut pieces = decoded(&headers, &mut body)?;
+        let received = Received::new(&Limit::new(64 << 20));
+        let mut pieces = decoded(&headers, &mut body, &received, free)?;
         let mut found = vec![];
         while let Some(piece) = pieces.next().await {
             found.extend_from_slice(&piece?);
         }
         Ok(found)
+    }
+
+    async fn all(body: Body, encoding: &str) -> Result<Vec<u8>, ApiError> {
+        all_of(body, encoding, FREE_COLLECTED).await
+    }
+
+    fn encoded(coding: Coding, content: impl Into<Body>) -> Body {
+        let share = Limit::new(64 << 20).take(coding.encoder_bytes()).unwrap();
+        coding.encoded(content.into(), share)
     }
 
     async fn bytes(body: Body) -> Vec<u8> {
@@ -225,7 +278,7 @@ mod tests {
     async fn what_is_encoded_is_decoded_also_in_several_members() {
         let text: String = (0..20_000).map(|n| format!("{n},")).collect();
         for coding in [Coding::Gzip, Coding::Zstd] {
-            let encoded = bytes(coding.encoded(Body::from(text.clone()))).await;
+            let encoded = bytes(encoded(coding, text.clone())).await;
             assert!(
                 encoded.len() < text.len() / 2,
                 "{coding:?}: {}",
@@ -248,13 +301,18 @@ mod tests {
     #[tokio::test]
     async fn what_becomes_many_times_larger_is_refused() {
         for coding in [Coding::Gzip, Coding::Zstd] {
-            for (mib, refused) in [(15, false), (64, true)] {
-                let body = coding.encoded(Body::from(vec![b' '; mib << 20]));
-                let found = all(Body::from(bytes(body).await), coding.name()).await;
+            for (kib, free, refused) in [
+                (15 << 10, FREE_COLLECTED, false),
+                (64 << 10, FREE_COLLECTED, true),
+                (200, FREE_UPLOADED, false),
+                (1 << 10, FREE_UPLOADED, true),
+            ] {
+                let body = bytes(encoded(coding, vec![b' '; kib << 10])).await;
+                let found = all_of(Body::from(body), coding.name(), free).await;
                 assert_eq!(
                     matches!(found, Err(ApiError::EncodedTooLarge { .. })),
                     refused,
-                    "{coding:?}, {mib} MiB"
+                    "{coding:?}, {kib} KiB"
                 );
             }
         }
@@ -265,5 +323,37 @@ mod tests {
                 "{error:?}"
             );
         }
+    }
+
+    /// A frame that refers to its last 8 MiB, as it says, in blocks of four bytes that each repeat one byte 128 KiB times.
+    #[tokio::test]
+    async fn the_window_of_a_decoder_is_counted_as_it_fills() {
+        let block = [&[0x02, 0, 0x10][..], b" "].concat();
+        let frame = [&b"\x28\xb5\x2f\xfd\x00\x68"[..], &block.repeat(32)].concat();
+        let mut headers = HeaderMap::new();
+        headers.insert(header::CONTENT_ENCODING, "zstd".parse().unwrap());
+        let limit = Limit::new(6 << 20);
+        let received = Received::new(&limit);
+        let open = || {
+            // it stays open, as that of a sender who waits
+            let sent = Bytes::from(frame.clone());
+            let sent = futures_util::stream::iter([Ok::<_, axum::Error>(sent)]);
+            Body::from_stream(sent.chain(futures_util::stream::pending())).into_data_stream()
+        };
+        let (mut first, mut second) = (open(), open());
+        let mut pieces = decoded(&headers, &mut first, &received, FREE_COLLECTED).unwrap();
+        let mut bytes = 0;
+        while bytes < 4 << 20 {
+            bytes += pieces.next().await.unwrap().unwrap().len();
+        }
+        let mut others = decoded(&headers, &mut second, &received, FREE_COLLECTED).unwrap();
+        let refused = loop {
+            if let Err(error) = others.next().await.unwrap() {
+                break error;
+            }
+        };
+        assert!(matches!(refused, ApiError::Overloaded));
+        drop((pieces, others));
+        assert!(limit.take(6 << 20).is_ok());
     }
 }

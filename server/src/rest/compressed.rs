@@ -4,21 +4,26 @@
 
 use axum::{
     body::HttpBody,
-    extract::Request,
+    extract::{Request, State},
     http::{HeaderName, HeaderValue, Method, StatusCode, header},
     middleware::Next,
     response::Response,
 };
 
 use super::coding::Coding;
+use crate::transfer::{Limit, Share};
 
 /// Smaller answers are sent in a few packets anyway; jobs are among them.
 const SMALLEST: u64 = 16 << 10;
 
-/// Compresses the answer if it should be.
-pub(super) async fn compressed(request: Request, next: Next) -> Response {
-    let wanted = Coding::accepted(request.headers());
-    let head = request.method() == Method::HEAD;
+/// Compresses the answer if it should be, and there is room for an encoder among the answers: it is in memory as long as
+/// they are, also if the client reads nothing.
+pub(super) async fn compressed(
+    State(sent): State<Limit>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let wanted = Coding::accepted(request.headers()).filter(|_| request.method() != Method::HEAD);
     let mut response = next.run(request).await;
     if !is_worth_it(&response) {
         return response;
@@ -26,9 +31,10 @@ pub(super) async fn compressed(request: Request, next: Next) -> Response {
     response
         .headers_mut()
         .append(header::VARY, HeaderValue::from_static("Accept-Encoding"));
-    match wanted {
-        Some(coding) if !head => encoded(response, coding),
-        Some(_) | None => response,
+    let room = |coding: Coding| Some((coding, sent.take(coding.encoder_bytes()).ok()?));
+    match wanted.and_then(room) {
+        Some((coding, share)) => encoded(response, coding, share),
+        None => response,
     }
 }
 
@@ -59,7 +65,7 @@ fn is_worth_it(response: &Response) -> bool {
         && !headers.contains_key(header::CONTENT_ENCODING)
 }
 
-fn encoded(response: Response, coding: Coding) -> Response {
+fn encoded(response: Response, coding: Coding, share: Share) -> Response {
     let (mut parts, body) = response.into_parts();
     let headers = &mut parts.headers;
     // of the other bytes
@@ -77,5 +83,34 @@ fn encoded(response: Response, coding: Coding) -> Response {
     }
     let name = HeaderValue::from_static(coding.name());
     headers.insert(header::CONTENT_ENCODING, name);
-    Response::from_parts(parts, coding.encoded(body))
+    Response::from_parts(parts, coding.encoded(body, share))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use axum::{Router, body::Body, middleware, routing::get};
+    use tower::ServiceExt;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn an_answer_stays_as_it_is_where_there_is_no_room_for_an_encoder() {
+        let limit = Limit::new(Coding::Gzip.encoder_bytes());
+        let large = get(async || "x".repeat(20 << 10));
+        let router = Router::new().route("/", large);
+        let router = router.layer(middleware::from_fn_with_state(limit, compressed));
+        let ask = async || {
+            let request = Request::get("/").header(header::ACCEPT_ENCODING, "gzip");
+            let request = request.body(Body::empty()).unwrap();
+            router.clone().oneshot(request).await.unwrap()
+        };
+        let is_encoded =
+            |answer: &Response| answer.headers().contains_key(header::CONTENT_ENCODING);
+        let (first, second) = (ask().await, ask().await);
+        assert!(is_encoded(&first) && !is_encoded(&second));
+        assert_eq!(second.headers()[header::VARY], "Accept-Encoding");
+        drop(first);
+        assert!(is_encoded(&ask().await));
+    }
 }

@@ -1,6 +1,6 @@
-//! What a proxy changes of a request: the path below which clients reach the service, and the host that they have named,
-//! if the proxy is trusted (RFC 7239, or the older X-Forwarded-Host). Links are paths, so that neither its scheme nor the
-//! client's address is needed for them.
+//! What a proxy changes of a request: the path below which clients reach the service, and the host and scheme that they have
+//! named, if the proxy is trusted (RFC 7239, or the older X-Forwarded-Host and X-Forwarded-Proto). Links are paths, so that the
+//! client's address is not needed.
 
 use axum::{
     extract::Request,
@@ -36,8 +36,7 @@ pub(super) fn without_prefix(mut request: Request, prefix: &str) -> Request {
 /// The host that the client has named, by the account of a trusted proxy; `None` if it gives none.
 pub(super) fn host(request: &Request, trust: &ProxyTrust) -> Result<Option<Authority>, ApiError> {
     const OLDER: HeaderName = HeaderName::from_static("x-forwarded-host");
-    let peer = request.extensions().get::<Peer>();
-    if !peer.is_some_and(|Peer(address)| trust.includes(*address)) {
+    if !is_from_proxy(request, trust) {
         return Ok(None);
     }
     let wrong = |what: &str| Err(ApiError::BadRequest(what.to_owned()));
@@ -58,6 +57,23 @@ pub(super) fn host(request: &Request, trust: &ProxyTrust) -> Result<Option<Autho
         Ok(host) => Ok(Some(host)),
         Err(_) => wrong("the host that the proxy names is not a host"),
     }
+}
+
+/// Whether the client has used https, by the account of a trusted proxy; `None` if it gives none.
+pub(super) fn https(request: &Request, trust: &ProxyTrust) -> Option<bool> {
+    const OLDER: HeaderName = HeaderName::from_static("x-forwarded-proto");
+    if !is_from_proxy(request, trust) {
+        return None;
+    }
+    let headers = request.headers();
+    let named = last(headers, &header::FORWARDED).and_then(|text| parameter(&text, "proto"));
+    let scheme = named.or_else(|| last(headers, &OLDER))?;
+    Some(scheme.trim().eq_ignore_ascii_case("https"))
+}
+
+fn is_from_proxy(request: &Request, trust: &ProxyTrust) -> bool {
+    let peer = request.extensions().get::<Peer>();
+    peer.is_some_and(|Peer(address)| trust.includes(*address))
 }
 
 /// The last item of a list in a header.

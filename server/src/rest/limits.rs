@@ -1,5 +1,5 @@
-//! What holds for every request of either protocol: one host, a body that keeps arriving, and bytes of bodies and
-//! answers that are counted over all requests.
+//! What holds for every request of either protocol: a body that keeps arriving, and bytes of bodies and answers that are
+//! counted over all requests.
 
 use std::sync::Arc;
 
@@ -13,7 +13,8 @@ use axum::{
 use tonic_types::StatusExt;
 
 use super::{
-    origin, refused,
+    body::content_type,
+    refused,
     reply::{is_grpc, refusal},
     service::is_probe,
 };
@@ -32,7 +33,12 @@ pub(super) async fn limits(
     next: Next,
 ) -> Response {
     let (grpc, path) = (is_grpc(&request), request.uri().path().to_owned());
-    if let Err(error) = origin::check(&request, &service.web, &service.trust) {
+    // tonic would take it, and its bytes would not be counted
+    if !grpc && is_of_grpc(&path) {
+        let error = ApiError::UnsupportedMedia {
+            expected: "application/grpc",
+            got: content_type(request.headers()).to_owned(),
+        };
         return refusal(grpc, &path, error);
     }
     // its answer would be refused when the work is done
@@ -63,6 +69,13 @@ pub(super) async fn limits(
         Ok(body) => Response::from_parts(parts, body),
         Err(error) => refusal(grpc, &path, error),
     }
+}
+
+/// Whether a path is one of the services of gRPC.
+fn is_of_grpc(path: &str) -> bool {
+    ["/signorini.v1.", "/grpc."]
+        .iter()
+        .any(|start| path.starts_with(start))
 }
 
 /// Whether a request changes nothing, so that it may be made again.

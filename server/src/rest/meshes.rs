@@ -27,7 +27,8 @@ pub(super) async fn upload(call: Call) -> Result<Response, ApiError> {
     let found = if declared_length(&call.headers).is_some_and(|length| length > limit_bytes) {
         Err(ApiError::PayloadTooLarge { limit_bytes })
     } else {
-        match coding::decoded(&call.headers, &mut body) {
+        let free = coding::FREE_UPLOADED;
+        match coding::decoded(&call.headers, &mut body, &call.received, free) {
             Ok(pieces) => verbs::upload(&call.service, &call.caller, pieces).await,
             Err(error) => Err(error),
         }

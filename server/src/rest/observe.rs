@@ -50,8 +50,8 @@ pub(super) async fn observe(mut request: Request, next: Next) -> Response {
     response.map(|body| Body::new(ObservedBody { body, observed }))
 }
 
-/// Lines for refused requests of callers who are not identified: anyone who reaches the service could fill its disk with
-/// them. All of them are counted, in metrics and by kind (`refused`).
+/// Lines for requests of callers who are not identified: anyone who reaches the service could fill its disk with them. All of
+/// them are counted in metrics, and those that are refused by kind (`refused`).
 static BUDGET: Budget = Budget(Mutex::new(None));
 /// So many in each second.
 const LINES: u32 = 20;
@@ -110,6 +110,9 @@ impl Observed {
         if let Some(caller) = response.extensions().get::<Caller>() {
             self.owner = caller.owner().to_owned();
         }
+        if !response.status().is_success() {
+            self.code = Some(Code::Unknown); // what clients of gRPC make of an answer without a code
+        }
         self.read_code(response.headers());
     }
 
@@ -137,11 +140,7 @@ impl Observed {
             true => enabled!(target: TARGET, Level::DEBUG),
             false => enabled!(target: TARGET, Level::INFO),
         };
-        let failed = match self.asked {
-            Asked::Rpc(_) => code != Code::Ok,
-            Asked::Route(..) | Asked::NoRoute(_) => self.status.is_none_or(|status| status >= 400),
-        };
-        let stranger = self.owner.is_empty() && failed;
+        let stranger = self.owner.is_empty();
         if wanted && !(stranger && BUDGET.is_used_up(self.start)) {
             self.log(took.as_secs_f64(), code);
         }
@@ -316,7 +315,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn refused_strangers_have_some_lines_in_each_second() {
+    fn strangers_have_some_lines_in_each_second() {
         let (budget, start) = (Budget(Mutex::new(None)), Instant::now());
         let lines = |millis| {
             let now = start + Duration::from_millis(millis);

@@ -4,24 +4,42 @@
 
 use std::{
     net::{Ipv4Addr, Ipv6Addr},
-    sync::LazyLock,
+    sync::{Arc, LazyLock},
     time::Duration,
 };
 
 use axum::{
-    extract::Request,
+    extract::{Request, State},
     http::{HeaderMap, HeaderName, HeaderValue, Method, Version, header, uri::Authority},
+    middleware::Next,
+    response::Response,
 };
 use tower_http::cors::CorsLayer;
 
-use super::forwarded;
+use super::{
+    forwarded,
+    reply::{is_grpc, refusal},
+};
 use crate::{
     config::{ProxyTrust, Web},
     error::ApiError,
+    verbs::Service,
 };
 
-/// An error if the request names no host or a foreign one, or comes from a page of another site.
-pub(super) fn check(request: &Request, web: &Web, trust: &ProxyTrust) -> Result<(), ApiError> {
+/// Refuses requests that name no host or a foreign one, or come from a page of another site.
+pub(super) async fn own_site(
+    State(service): State<Arc<Service>>,
+    request: Request,
+    next: Next,
+) -> Response {
+    match check(&request, &service.web, &service.trust, service.tls) {
+        Ok(()) => next.run(request).await,
+        Err(error) => refusal(is_grpc(&request), request.uri().path(), error),
+    }
+}
+
+/// An error if the request is one of those. `tls`: the service itself speaks it.
+fn check(request: &Request, web: &Web, trust: &ProxyTrust, tls: bool) -> Result<(), ApiError> {
     // the one that is believed has talked to the browser: its account replaces the name that it calls us by
     let named = host_of(request)?;
     let Some(host) = forwarded::host(request, trust)?.or(named) else {
@@ -40,7 +58,8 @@ pub(super) fn check(request: &Request, web: &Web, trust: &ProxyTrust) -> Result<
             shortened(host.as_str())
         )));
     }
-    check_origin(request.headers(), &host, web)
+    let https = forwarded::https(request, trust).unwrap_or(tls);
+    check_origin(request.headers(), (https, &host), web)
 }
 
 /// RFC 9112, 3.2: a request over HTTP/1.1 has exactly one Host; two could mean different things to a proxy and to us.
@@ -85,13 +104,18 @@ fn is_own_host(host: &Authority, web: &Web) -> bool {
         })
 }
 
-/// A browser adds the origin of the page to all requests but the safest.
-fn check_origin(headers: &HeaderMap, host: &Authority, web: &Web) -> Result<(), ApiError> {
+/// A browser adds the origin of the page to all requests but the safest. Where clients reach the service by https, a page that
+/// came by http is not its own: anyone on the way may have written it.
+fn check_origin(
+    headers: &HeaderMap,
+    (https, host): (bool, &Authority),
+    web: &Web,
+) -> Result<(), ApiError> {
     for origin in headers.get_all(header::ORIGIN) {
         let text = String::from_utf8_lossy(origin.as_bytes()).to_ascii_lowercase();
         let own = text
-            .strip_prefix("http://")
-            .or(text.strip_prefix("https://"))
+            .strip_prefix("https://")
+            .or(text.strip_prefix("http://").filter(|_| !https))
             .is_some_and(|page| page.eq_ignore_ascii_case(host.as_str()));
         if !own && !web.allowed_origins.contains(&text) {
             return Err(ApiError::Forbidden(format!(
@@ -104,6 +128,36 @@ fn check_origin(headers: &HeaderMap, host: &Authority, web: &Web) -> Result<(), 
     Ok(())
 }
 
+/// Headers that pages of the allowed origins may send.
+const SENT: [&str; 12] = [
+    "accept",
+    "authorization",
+    "content-encoding",
+    "content-type",
+    "idempotency-key",
+    "if-match",
+    "if-none-match",
+    "last-event-id",
+    "prefer",
+    "range",
+    "traceparent",
+    "x-request-id",
+];
+/// Headers that they may read.
+const READ: [&str; 11] = [
+    "accept-ranges",
+    "content-digest",
+    "content-disposition",
+    "content-range",
+    "etag",
+    "idempotency-replayed",
+    "location",
+    "preference-applied",
+    "result-available",
+    "retry-after",
+    "x-request-id",
+];
+
 /// What tells browsers to show answers to pages of the allowed origins; `None` if there are none.
 pub(super) fn cors(web: &Web) -> Option<CorsLayer> {
     const LASTS: Duration = Duration::from_secs(3600);
@@ -115,29 +169,6 @@ pub(super) fn cors(web: &Web) -> Option<CorsLayer> {
     };
     let origins = web.allowed_origins.iter();
     let origins: Vec<HeaderValue> = origins.filter_map(|origin| origin.parse().ok()).collect();
-    let sent = [
-        "accept",
-        "authorization",
-        "content-type",
-        "idempotency-key",
-        "if-match",
-        "if-none-match",
-        "last-event-id",
-        "prefer",
-        "range",
-        "traceparent",
-        "x-request-id",
-    ];
-    let read = [
-        "content-range",
-        "etag",
-        "idempotency-replayed",
-        "location",
-        "preference-applied",
-        "result-available",
-        "retry-after",
-        "x-request-id",
-    ];
     (!origins.is_empty()).then(|| {
         CorsLayer::new()
             .allow_origin(origins)
@@ -148,8 +179,8 @@ pub(super) fn cors(web: &Web) -> Option<CorsLayer> {
                 Method::PATCH,
                 Method::DELETE,
             ])
-            .allow_headers(names(&sent))
-            .expose_headers(names(&read))
+            .allow_headers(names(&SENT))
+            .expose_headers(names(&READ))
             .max_age(LASTS)
     })
 }
@@ -164,6 +195,11 @@ mod tests {
     use axum::body::Body;
 
     use super::*;
+    use crate::{
+        caller::Peer,
+        parameters::{Description, Location},
+        rest::operations,
+    };
 
     fn request(version: Version, address: &str, headers: &[(&str, &str)]) -> Request {
         let mut request = Request::builder().version(version).uri(address);
@@ -181,6 +217,7 @@ mod tests {
                 &request(version, address, &hosts),
                 &Web::default(),
                 &ProxyTrust::default(),
+                false,
             )
             .is_ok()
         };
@@ -202,7 +239,7 @@ mod tests {
         };
         let allowed = |host: &str| {
             let request = request(Version::HTTP_11, "/", &[("host", host)]);
-            check(&request, &web, &ProxyTrust::default()).is_ok()
+            check(&request, &web, &ProxyTrust::default(), false).is_ok()
         };
         for own in [
             "127.0.0.1:8080",
@@ -240,6 +277,7 @@ mod tests {
                 &request(Version::HTTP_11, "/", &headers),
                 &web,
                 &ProxyTrust::default(),
+                false,
             )
             .is_ok()
         };
@@ -261,5 +299,58 @@ mod tests {
         ] {
             assert!(!allowed(foreign), "{foreign}");
         }
+    }
+
+    #[test]
+    fn where_clients_come_by_https_a_page_by_http_is_not_our_own() {
+        let trust = ProxyTrust::of(&["10.0.0.1"]);
+        let allowed = |origin: &str, tls: bool, peer: &str, told: &[(&str, &str)]| {
+            let headers = [&[("host", "lab.localhost"), ("origin", origin)][..], told].concat();
+            let mut request = request(Version::HTTP_11, "/", &headers);
+            let peer = Peer(peer.parse().unwrap());
+            request.extensions_mut().insert(peer);
+            check(&request, &Web::default(), &trust, tls).is_ok()
+        };
+        let forwarded = |tls: bool, peer: &str, told: &[(&str, &str)]| {
+            assert!(allowed("https://lab.localhost", tls, peer, told));
+            allowed("http://lab.localhost", tls, peer, told)
+        };
+        assert!(forwarded(false, "10.0.0.2", &[]));
+        assert!(!forwarded(true, "10.0.0.2", &[]));
+        for told in [
+            ("forwarded", "host=lab.localhost;proto=https"),
+            ("x-forwarded-proto", "https"),
+            ("x-forwarded-proto", "http, HTTPS"),
+        ] {
+            assert!(!forwarded(false, "10.0.0.1", &[told]), "{told:?}");
+            assert!(forwarded(false, "10.0.0.2", &[told]), "no proxy: {told:?}");
+        }
+        // TLS from the proxy to the service only
+        assert!(forwarded(
+            true,
+            "10.0.0.1",
+            &[("x-forwarded-proto", "http")]
+        ));
+    }
+
+    /// Those that browsers send and show anyway are not listed.
+    #[test]
+    fn pages_of_allowed_origins_may_use_every_header_of_the_operations() {
+        const ALWAYS: [&str; 3] = ["cache-control", "content-type", "content-length"];
+        for operation in operations::all() {
+            let in_header = |one: &&Description| one.location == Location::Header;
+            for sent in operation.parameters.iter().filter(in_header) {
+                let name = sent.name.to_ascii_lowercase();
+                assert!(SENT.contains(&&*name), "{} sends {name}", operation.id);
+            }
+            let answers = operation.answers.iter().flat_map(|answer| &answer.headers);
+            for (read, _) in answers {
+                let name = read.name.to_ascii_lowercase();
+                let shown = READ.contains(&&*name) || ALWAYS.contains(&&*name);
+                assert!(shown, "{} answers with {name}", operation.id);
+            }
+        }
+        // of any body, and of files
+        assert!(SENT.contains(&"content-encoding") && READ.contains(&"content-disposition"));
     }
 }

@@ -11,7 +11,10 @@ use axum::{
 };
 
 use super::{coding, refused};
-use crate::{address::link, error::ApiError};
+use crate::{
+    address::{self, link},
+    error::ApiError,
+};
 
 impl IntoResponse for ApiError {
     /// Only the status and the error itself; `errors_as_documents` writes the document, since it knows the path.
@@ -89,7 +92,8 @@ pub(super) fn refusal(grpc: bool, path: &str, error: ApiError) -> Response {
 
 /// The same for a request that is not routed.
 pub fn refuse(request: &Request, error: ApiError) -> Response {
-    refusal(is_grpc(request), request.uri().path(), error)
+    let path = address::without_prefix(request.uri().path());
+    refusal(is_grpc(request), path, error)
 }
 
 /// The answer to an unknown path: a gRPC status for a gRPC client, an error document for others.

@@ -17,7 +17,7 @@ use crate::{error::ApiError, verbs::Service};
 
 /// All routes, REST and gRPC. Unknown paths are answered by `reply::not_found`.
 pub fn router(service: Arc<Service>, grpc: Router) -> Router {
-    let prefix = service.web.path_prefix.clone();
+    let (prefix, sent) = (service.web.path_prefix.clone(), service.sent.clone());
     let routes = operations::routes()
         .method_not_allowed_fallback(async || ApiError::MethodNotAllowed)
         .with_state(AppState {
@@ -31,15 +31,17 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
             service.clone(),
             authenticate,
         ))
-        // outside of the authentication: a browser asks beforehand, without the token
-        .layer(option_layer(origin::cors(&service.web)))
         .layer(CatchPanicLayer::custom(reply::panicked))
         // `body::json_text` has a limit of its own, and answers with an error document
         .layer(DefaultBodyLimit::disable())
-        .layer(middleware::from_fn_with_state(service, limits))
+        .layer(middleware::from_fn_with_state(service.clone(), limits))
         .layer(middleware::from_fn(reply::errors_as_documents))
         // outside of the limits: the bytes that are compressed are counted, and there are never more of the others
-        .layer(middleware::from_fn(compressed))
+        .layer(middleware::from_fn_with_state(sent, compressed))
+        // outside of the authentication: a browser asks beforehand, without the token; and of the limits, whose refusals a page
+        // may read
+        .layer(option_layer(origin::cors(&service.web)))
+        .layer(middleware::from_fn_with_state(service, origin::own_site))
         // outermost: it sees what the client is answered
         .layer(middleware::from_fn(observe::observe));
     match prefix.is_empty() {

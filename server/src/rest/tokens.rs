@@ -1,7 +1,7 @@
 //! `/v1/tokens`.
 
 use axum::{
-    Json,
+    Extension, Json,
     http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
@@ -13,7 +13,7 @@ use crate::{
     address::link,
     error::ApiError,
     token::Token,
-    verbs::tokens::{self as verbs, NewToken},
+    verbs::tokens::{self as verbs, NewToken, TokensChanged},
 };
 
 /// All tokens.
@@ -37,9 +37,9 @@ pub(super) async fn list(call: Call) -> Result<Json<List>, ApiError> {
     Ok(Json(List { tokens }))
 }
 
-pub(super) async fn revoke(call: Call, id: String) -> Result<Json<Token>, ApiError> {
+pub(super) async fn revoke(call: Call, id: String) -> Result<impl IntoResponse, ApiError> {
     let revoked = verbs::revoke(&call.service.store, &call.caller, &id).await?;
-    Ok(Json(revoked))
+    Ok((Extension(TokensChanged), Json(revoked)))
 }
 
 pub(super) async fn rotate(call: Call, id: String) -> Result<Response, ApiError> {
@@ -49,5 +49,6 @@ pub(super) async fn rotate(call: Call, id: String) -> Result<Response, ApiError>
 
 /// No cache on the way may keep it.
 fn shown_once(new: NewToken) -> impl IntoResponse {
-    ([(header::CACHE_CONTROL, "no-store")], Json(new))
+    let headers = [(header::CACHE_CONTROL, "no-store")];
+    (Extension(TokensChanged), headers, Json(new))
 }

@@ -14,14 +14,30 @@ use axum::{
 use http_body::{Frame, SizeHint};
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval};
 
-use crate::{store::Store, verbs::identify::By};
+use crate::{
+    error::ApiError,
+    store::Store,
+    verbs::{identify::By, tokens::TokensChanged},
+};
 
 /// How often it is looked whether the caller is still who they were.
 const INTERVAL: Duration = Duration::from_secs(1);
+const NO_LONGER: &str = "the token was revoked or has expired";
 
-/// The answer, which is cut when what identified its caller is no longer valid.
-pub(super) fn while_valid(answer: Response, store: Arc<Store>, by: By) -> Response {
-    answer.map(|body| {
+/// The answer, which is cut when what identified its caller is no longer valid; an error if it is not already, as the handler
+/// may have waited for a minute.
+pub(super) fn while_valid(
+    answer: Response,
+    store: Arc<Store>,
+    by: By,
+) -> Result<Response, ApiError> {
+    if answer.extensions().get::<TokensChanged>().is_some() {
+        return Ok(answer);
+    }
+    if !by.is_valid(&store) {
+        return Err(ApiError::Unauthenticated(NO_LONGER));
+    }
+    Ok(answer.map(|body| {
         Body::new(WhileValid {
             body,
             store,
@@ -29,7 +45,7 @@ pub(super) fn while_valid(answer: Response, store: Arc<Store>, by: By) -> Respon
             looked: Instant::now(),
             ticks: None,
         })
-    })
+    }))
 }
 
 struct WhileValid {
@@ -63,8 +79,7 @@ impl HttpBody for WhileValid {
         loop {
             if !self.is_valid() {
                 // an error, not an end: the client must not take what it has for all there is
-                let cause = "the token was revoked or has expired";
-                return Poll::Ready(Some(Err(axum::Error::new(cause))));
+                return Poll::Ready(Some(Err(axum::Error::new(NO_LONGER))));
             }
             if let Poll::Ready(frame) = Pin::new(&mut self.body).poll_frame(context) {
                 return Poll::Ready(frame);

@@ -12,7 +12,8 @@ use super::{
 use crate::{
     address::link,
     caller::Owners,
-    job::{Job, JobId, Limits, Reason, ResultAvailable, Status, SweepId},
+    catalog::explained_at,
+    job::{Failure, Job, JobId, Limits, Reason, ResultAvailable, Status, SweepId},
     time::Time,
 };
 
@@ -115,6 +116,7 @@ fn parse(row: &SqliteRow) -> Result<Job> {
         None if status.is_terminal() => key,
         None => partial_key(key),
     };
+    let failure: Option<Failure> = failure.map(serde_json::from_str).transpose()?;
     let mut job = Job {
         key,
         result_key,
@@ -149,7 +151,11 @@ fn parse(row: &SqliteRow) -> Result<Job> {
             timeout_s: row.try_get("timeout_s")?,
             queue_ttl_s: row.try_get("queue_ttl_s")?,
         },
-        failure: failure.map(serde_json::from_str).transpose()?,
+        // the prefix may be another one than when it was stored
+        failure: failure.map(|failure| Failure {
+            r#type: explained_at(&failure.code),
+            ..failure
+        }),
         result_available: word("result_available", row.try_get("result_available")?)?,
         warnings: warnings.map_or(Ok(vec![]), serde_json::from_str)?,
         stored_bytes: None,

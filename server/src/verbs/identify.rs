@@ -35,9 +35,9 @@ pub enum By {
     /// The header of a trusted proxy.
     Proxy,
     /// Nothing, since the service needs no token.
-    Nothing,
+    NoTokensNeeded,
     /// Nothing, since the operation is open to everyone.
-    Anyone,
+    OpenOperation,
 }
 
 impl By {
@@ -45,8 +45,8 @@ impl By {
     pub fn is_valid(&self, store: &Store) -> bool {
         match self {
             By::Token(Presented { id, hash }) => store.is_valid_token(id, Some(*hash), Time::now()),
-            By::Nothing => !store.has_tokens(),
-            By::Proxy | By::Anyone => true,
+            By::NoTokensNeeded => !store.has_tokens(),
+            By::Proxy | By::OpenOperation => true,
         }
     }
 }
@@ -93,7 +93,7 @@ pub fn identify(
         )),
         false => Ok(Identified {
             caller: Caller::local(),
-            by: By::Nothing,
+            by: By::NoTokensNeeded,
         }),
     }
 }

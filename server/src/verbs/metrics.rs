@@ -86,8 +86,17 @@ pub async fn metrics(service: &Service, _caller: &Caller) -> Result<String, ApiE
     now.gauge("signorini_damaged_records", help, health.damaged as f64);
 
     let data = service.data.clone();
-    let disk = tokio::task::spawn_blocking(move || disk(&data));
-    let disk = disk.await.map_err(ApiError::internal)?;
+    // what follows reads files: those of the store, and of /proc
+    let text = tokio::task::spawn_blocking(move || {
+        add_disk(&mut now, &data);
+        METRICS.text(now)
+    });
+    let text = text.await.map_err(ApiError::internal)?;
+    text.map_err(ApiError::internal)
+}
+
+fn add_disk(now: &mut Snapshot, folder: &Path) {
+    let disk = disk(folder);
     now.gauges(
         "signorini_store_bytes",
         "Files of the store",
@@ -99,7 +108,6 @@ pub async fn metrics(service: &Service, _caller: &Caller) -> Result<String, ApiE
         now.gauge("signorini_disk_free_bytes", help, free);
         now.gauge("signorini_disk_size_bytes", "The size of its disk", size);
     }
-    METRICS.text(now).map_err(ApiError::internal)
 }
 
 struct Disk {

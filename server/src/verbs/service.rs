@@ -56,6 +56,8 @@ pub struct Service {
     pub trust: ProxyTrust,
     /// What requests from browsers may name.
     pub web: Web,
+    /// It speaks TLS itself.
+    pub tls: bool,
     /// The folder for uploads until they are read.
     pub(super) data: PathBuf,
 }
@@ -81,6 +83,7 @@ impl Service {
             fields_in_memory: FieldsInMemory::default(),
             trust: config.trust.clone(),
             web: config.web.clone(),
+            tls: config.tls.is_on(),
             data: config.data.clone(),
         }
     }

@@ -84,6 +84,11 @@ impl fmt::Debug for NewToken {
     }
 }
 
+/// In the extensions of an answer: its request has changed the tokens, that of its own caller perhaps. It is sent all the same:
+/// it may have the only copy of a secret.
+#[derive(Clone, Copy, Debug)]
+pub struct TokensChanged;
+
 /// The checked content of a request, or all that is wrong with it. `first`: there is no token yet.
 fn checked(request: &TokenRequest, first: bool) -> Result<BTreeSet<Scope>, ApiError> {
     let mut found = Findings::default();
