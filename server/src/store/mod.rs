@@ -33,6 +33,7 @@ mod clock;
 mod compact;
 mod database;
 mod migrations;
+mod pages;
 mod waiting;
 
 // A job: its row, its labels, its events, its result.
@@ -87,6 +88,8 @@ mod tests;
 
 use std::{path::Path, sync::Arc};
 
+use self::database::Rebuild;
+
 pub use self::{
     backup::{Backup, Manifest, back_up},
     database::Store,
@@ -125,7 +128,7 @@ impl Store {
 
     /// The same, without the tasks that look after it from time to time.
     async fn open_unwatched(folder: &Path) -> Result<Arc<Store>> {
-        let (store, submissions) = Store::connect(folder).await?;
+        let (store, submissions) = Store::connect(folder, Rebuild::IfItCannotGiveBack).await?;
         store.read_waiting_jobs().await?;
         store.read_settings().await?;
         store.read_tokens().await?;

@@ -6,7 +6,7 @@ use sqlx::{AssertSqlSafe, Column, Row, SqliteConnection, TypeInfo, ValueRef, sql
 
 use super::{
     checksum,
-    database::{Store, Writing, with_advice},
+    database::{Rebuild, Store, Writing, with_advice},
     error::{Result, StoreError},
     rows::seal,
     sizes,
@@ -20,7 +20,7 @@ pub(super) async fn new_store(folder: &Path) -> Result<Store> {
         let text = format!("{} is not empty; name a new folder", folder.display());
         return Err(StoreError::Folder(text));
     }
-    let connected = Store::connect(folder).await;
+    let connected = Store::connect(folder, Rebuild::Never).await;
     let (store, _) = connected.map_err(|error| with_advice(error, folder))?;
     // jobs refer to each other, and are copied in the order of their numbers
     let mut writer = store.writer.acquire().await?;
