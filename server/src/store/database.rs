@@ -241,6 +241,7 @@ impl Store {
             tracing::warn!(%error, "the write-ahead log stays and is read at the next start: {error}");
         }
         self.writer.close().await;
+        self.reserve.keep_for_a_start();
         if stopped && let Err(error) = self.progress.stop() {
             tracing::warn!(%error, "{}: {error}", progress::FILE);
         }
