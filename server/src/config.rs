@@ -174,7 +174,8 @@ pub struct RetentionLimits {
     #[arg(long, env = "SIGNORINI_RETAIN_FIELDS_DAYS", default_value_t = 0.0, value_name = "DAYS", value_parser = days)]
     pub retain_fields_days: f64,
 
-    /// Bytes of all jobs that have ended: of more, the oldest that are not pinned are removed. 0 without limit
+    /// Bytes of all jobs that have ended and are not pinned: of more, the oldest of the owners who keep most are removed. 0
+    /// without limit
     #[arg(long, env = "SIGNORINI_RETAIN_BYTES", default_value_t = 20 << 30, value_name = "BYTES")]
     pub retain_bytes: u64,
 

@@ -14,6 +14,7 @@
 
 // Input and output types, and errors.
 mod checksum;
+mod complaint;
 mod encoding;
 mod error;
 mod filter;
@@ -59,6 +60,7 @@ mod bulk;
 mod delete;
 mod edit;
 mod fields;
+mod forget;
 mod keys;
 mod retention;
 mod submit;
@@ -92,6 +94,7 @@ use self::database::Rebuild;
 
 pub use self::{
     backup::{Backup, Manifest, back_up},
+    complaint::Complaint,
     database::Store,
     database::with_advice,
     delete::Deletion,
