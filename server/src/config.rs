@@ -174,7 +174,8 @@ pub struct RetentionLimits {
     #[arg(long, env = "SIGNORINI_RETAIN_FIELDS_DAYS", default_value_t = 0.0, value_name = "DAYS", value_parser = days)]
     pub retain_fields_days: f64,
 
-    /// Most bytes that all jobs that have ended may take; beyond that the oldest that are not pinned are removed. 0: no limit
+    /// Most bytes that all jobs that have ended and are not pinned may take; beyond that the oldest ones of the owners who keep
+    /// most are removed. 0: no limit
     #[arg(long, env = "SIGNORINI_RETAIN_BYTES", default_value_t = 20 << 30, value_name = "BYTES")]
     pub retain_bytes: u64,
 

@@ -90,8 +90,8 @@ pub struct Job {
     pub failure: Option<Failure>,
     /// Whether there is a result to fetch.
     pub result_available: ResultAvailable,
-    /// Bytes that it keeps in the store, once it has ended: its result, unless that is another job's, and its events before
-    /// the last.
+    /// Bytes that it keeps in the store, once it has ended: its result, problem and events before the last. What it shares
+    /// with others is counted for one of them.
     #[serde(default)]
     pub stored_bytes: Option<u64>,
     /// Up to five warnings about its result, the worst first; all of them are in the summary of the result. A job that ended

@@ -56,6 +56,14 @@ def everything(server, jobs, mesh, sweep):
     return found
 
 
+def sizes(server):
+    """What each job keeps that has ended; its owner keeps the sum."""
+    kept = {job["id"]: job["stored_bytes"] for job in server.every_job() if job.get("stored_bytes") is not None}
+    owner, = server.json("/v1/owners")["owners"]
+    equal((owner["jobs"], owner["job_bytes"]), (len(kept), sum(kept.values())), "what the owner keeps")
+    return kept
+
+
 def fill(server):
     """All kinds of content; what is known of it."""
     jobs = {}
@@ -113,6 +121,8 @@ def older(source, fields, folder, version):
     """The store as this version would have it."""
     folder.mkdir(mode=0o700)
     store = sqlite3.connect(folder / "signorini.db", isolation_level=None)
+    # of later versions of SQLite
+    store.create_function("octet_length", 1, lambda text: None if text is None else len(text.encode()), deterministic=True)
     store.execute("attach ? as new", (str(source),))
     # as the library writes it
     (create,), = store.execute("select sql from new.sqlite_schema where name = '_sqlx_migrations'")
@@ -165,8 +175,14 @@ def command(*words):
     equal(done.returncode, 0, "signorini %s: %s" % (words, done.stderr))
 
 
-def compare(server, version, known, before):
+def compare(server, version, known, before, kept):
     jobs, mesh, sweep, gone, canceled, waiting = known
+    now = sizes(server)
+    now.pop(waiting, None)
+    if version >= COMPACT:
+        equal(now, kept, "what jobs of version %d keep" % version)
+    else:
+        check(all(now[job] > kept[job] for job in jobs), "what jobs of version %d keep: %r" % (version, now))
     after = everything(server, jobs, mesh if version >= 2 else None, sweep if version >= 8 else None)
     for path, found in after.items():
         equal(found, before[path], "%s of a store of version %d" % (path, version))
@@ -183,7 +199,7 @@ def compare(server, version, known, before):
         equal(again.json()["id"], waiting, "the repeated key, from version %d" % version)
 
 
-def killed(make, known, before, dice):
+def killed(make, known, before, kept, dice):
     """The upgrade is killed before its n-th write or sync; then it is done, from what that left."""
     kills = 0
     for version in (1, 5, 8):
@@ -206,7 +222,7 @@ def killed(make, known, before, dice):
                     break
                 kills += 1
                 server.start()
-                compare(server, version, known, before)
+                compare(server, version, known, before, kept)
                 server.kill()
                 check_database(server)
                 n += 1 if SOAK else dice.randrange(1, 12)
@@ -222,6 +238,7 @@ def main():
         with Server() as server:
             known = fill(server)
             before = everything(server, known[0], known[1], known[2])
+            kept = sizes(server)
             check(all(status == 200 for status, _ in before.values()), "before: %r" % before)
             answers = {job["id"]: server.call("GET", "/v1/jobs/%s/fields?format=json" % job["id"]) for job in server.every_job()}
             fields = {job: answer.body for job, answer in answers.items() if answer.status == 200}
@@ -232,16 +249,16 @@ def main():
             older(folder / "new.db", fields, data, version)
 
         for version in range(1, len(STEPS) + 1):
-            server, kept = Server(), folder / ("version %d" % version)
-            make(kept, version)
+            server, made = Server(), folder / ("version %d" % version)
+            make(made, version)
             # by way of a backup, which this version makes of it as it is
-            command("backup", "--data", kept, folder / ("backup %d" % version))
+            command("backup", "--data", made, folder / ("backup %d" % version))
             command("restore", folder / ("backup %d" % version), "--data", server.data)
             with server:
-                compare(server, version, known, before)
+                compare(server, version, known, before, kept)
                 server.stop()
                 server.start()
-                compare(server, version, known, before)
+                compare(server, version, known, before, kept)
         later = folder / "later"
         make(later, len(STEPS))
         with sqlite3.connect(later / "signorini.db") as store:
@@ -250,7 +267,7 @@ def main():
         done = subprocess.run([BINARY, "serve", "--listen", "127.0.0.1:0", "--data", later], capture_output=True, text=True)
         equal(done.returncode, SCHEMA, done.stderr)
         check("a later version of this program" in done.stderr and "use that version" in done.stderr, done.stderr)
-        kills = killed(make, known, before, dice)
+        kills = killed(make, known, before, kept, dice)
     print("figure: stores of %d versions of the tables are brought up to date, with the same digest of every answer; upgrades "
           "killed at %d writes and started again; a later version refused" % (len(STEPS), kills))
 

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     failpoint::{self, Point},
-    store::{Accepted, Claim, Result, StoreError, Submission},
+    store::{Accepted, Claim, Complaint, Result, Submission},
     time::Time,
 };
 
@@ -184,36 +184,6 @@ impl Queue {
                 () = self.stopping.cancelled() => return,
             }
         }
-    }
-}
-
-/// An error of what is tried again and again: told in the log once, and not each time.
-struct Complaint {
-    what: &'static str,
-    told: String,
-}
-
-impl Complaint {
-    fn new(what: &'static str) -> Complaint {
-        let told = String::new();
-        Complaint { what, told }
-    }
-
-    /// What was done; `None` if it failed, which the log is told if it is new.
-    fn note<T>(&mut self, done: Result<T>) -> Option<T> {
-        let cause = match done {
-            Ok(done) => {
-                self.told.clear();
-                return Some(done);
-            }
-            Err(StoreError::Broken(_)) => return None, // it was told that nothing is stored any more
-            Err(cause) => cause.to_string(),
-        };
-        if self.told != cause {
-            error!(cause, "{}: {cause}", self.what);
-            self.told = cause;
-        }
-        None
     }
 }
 

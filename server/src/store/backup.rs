@@ -26,6 +26,7 @@ use super::{
     folder::{DATABASE, JOURNAL, unusable},
     inspect::{absent, check_copy},
     migrations,
+    pages::Pages,
     progress::{self, Progress},
 };
 use crate::{error::size, time::Time};
@@ -98,7 +99,8 @@ async fn fill(data: &Path, partial: &Partial, check: bool) -> Result<Backup> {
     let options = SqliteConnectOptions::new().filename(data.join(DATABASE));
     let mut source = options.read_only(true).connect().await?;
     migrations::check(&mut source).await?;
-    partial.require_space(bytes(&mut source).await?)?;
+    let pages = Pages::of(&mut source).await?;
+    partial.require_space(pages.bytes_of(pages.count - pages.free))?;
     let database = partial.path.join(DATABASE);
     // SQLite takes an empty file, which is for its owner alone
     partial.named(new_file(&database))?;
@@ -149,17 +151,6 @@ async fn fill(data: &Path, partial: &Partial, check: bool) -> Result<Backup> {
     let (digest, bytes) = partial.named(digest(&database))?;
     (manifest.digest, manifest.bytes) = (digest, bytes);
     Ok(Backup { manifest, findings })
-}
-
-/// The size of the database, but for pages that are not in use.
-async fn bytes(source: &mut SqliteConnection) -> Result<u64> {
-    let bytes: i64 = sqlx::query_scalar(
-        "select (page_count - freelist_count) * page_size
-         from pragma_page_count, pragma_freelist_count, pragma_page_size",
-    )
-    .fetch_one(source)
-    .await?;
-    Ok(bytes.unsigned_abs())
 }
 
 /// The folder that becomes the backup.

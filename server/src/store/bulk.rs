@@ -3,14 +3,20 @@
 use std::time::{Duration, Instant};
 
 use super::{
+    change::Change,
     database::Store,
     delete::{Deletion, delete},
     end::end,
     error::Result,
+    fields::remove_fields,
     lifecycle::Ending,
     rows::find,
 };
-use crate::{caller::Owners, job::Status};
+use crate::{
+    caller::Owners,
+    job::{Job, Status},
+    time::Time,
+};
 
 /// How long one transaction may occupy the single writer, so that other requests are answered meanwhile.
 const LONGEST: Duration = Duration::from_millis(20);
@@ -24,8 +30,21 @@ pub struct Batch {
     pub done: usize,
     /// Those that run, and were left alone.
     pub running: Vec<i64>,
+    /// Those that were to be deleted and were not.
+    pub left: Vec<i64>,
     /// Jobs that have changed, these or others, for their watchers.
     pub changed: Vec<i64>,
+}
+
+/// Which jobs are discarded that have ended, and what of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Discard<'a> {
+    /// Those of these owners.
+    Jobs(Owners<'a>),
+    /// Those that ended before, unless they are pinned.
+    OldJobs(Time),
+    /// The fields of those.
+    OldFields(Time),
 }
 
 impl Store {
@@ -64,12 +83,19 @@ impl Store {
     }
 
     async fn try_to_delete_ended(&self, owners: Owners<'_>, keys: &[i64]) -> Result<Batch> {
+        self.try_to_discard(Discard::Jobs(owners), keys).await
+    }
+
+    /// Discards the first of these jobs.
+    pub(super) async fn try_to_discard(&self, what: Discard<'_>, keys: &[i64]) -> Result<Batch> {
         let mut change = self.control_change().await?;
         let (mut batch, start) = (Batch::default(), Instant::now());
         for key in keys {
-            let deletion = delete(&mut change, owners, *key).await;
-            let deletion = change.unless_damage_of(*key, deletion).await?;
-            batch.done += usize::from(deletion == Some(Deletion::Deleted));
+            let discarded = discard(&mut change, what, *key).await;
+            match change.unless_damage_of(*key, discarded).await? {
+                Some(true) => batch.done += 1,
+                Some(false) | None => batch.left.push(*key),
+            }
             batch.seen += 1;
             if start.elapsed() >= LONGEST {
                 break;
@@ -78,4 +104,25 @@ impl Store {
         batch.changed = change.commit().await?;
         Ok(batch)
     }
+}
+
+/// Discards a job; false if it is not one of those.
+async fn discard(change: &mut Change<'_>, what: Discard<'_>, key: i64) -> Result<bool> {
+    let (ended_before, owners) = match what {
+        Discard::Jobs(owners) => (None, owners),
+        Discard::OldJobs(before) | Discard::OldFields(before) => (Some(before), Owners::All),
+    };
+    if let Some(before) = ended_before {
+        // as it is now, and by its own record, which has a checksum: it may have been pinned
+        let job = find(change.sql(), key).await?;
+        let old = |job: &Job| !job.pinned && job.finished_at.is_some_and(|at| at < before);
+        let Some(job) = job.filter(old) else {
+            return Ok(false);
+        };
+        if matches!(what, Discard::OldFields(_)) {
+            remove_fields(change, &job).await?;
+            return Ok(true);
+        }
+    }
+    Ok(delete(change, owners, key).await? == Deletion::Deleted)
 }

@@ -188,7 +188,7 @@ impl Change<'_> {
             return Ok(true);
         }
         let mut reader = store.reader.acquire().await?;
-        let checked = intact::check_result(&mut reader, key).await;
+        let checked = intact::check_stored(&mut reader, key).await;
         let intact = self.unless_damaged(checked).await?.is_some();
         if intact {
             store.intact.insert(key, WHOLE);

@@ -21,6 +21,7 @@ use crate::{
 impl Store {
     /// Starts an attempt of the next job of the queue, in the order of `waiting`. Jobs before it for which there is a result by now are answered. Also returns all jobs that have changed.
     pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
+        self.check_result_for_next().await;
         self.writing(self.try_to_claim_next()).await
     }
 

@@ -5,12 +5,12 @@
 //! the end concerns the primary alone (if it was canceled, for example), the first of the jobs coalesced into it
 //! takes its place.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
     change::Change,
     database::Store,
-    error::Result,
+    error::{Result, StoreError},
     intact::{self, WHOLE},
     lifecycle::{self, Ending},
     results,
@@ -62,9 +62,31 @@ pub(super) async fn earlier_result(
 }
 
 impl Store {
-    /// Checks the result that may answer a job of this input, before the transaction that needs it: a large one would
-    /// occupy the single writer for tenths of a second.
-    pub(super) async fn check_earlier_result(&self, input_hash: &str) -> Result<()> {
+    /// Checks the result that may answer a job of this input, before the transaction that needs it, which would occupy the
+    /// single writer meanwhile. What is not found intact answers nobody.
+    pub(super) async fn check_earlier_result(&self, input_hash: &str) {
+        let checked = self.try_to_check_earlier_result(input_hash);
+        let _ = self.damages.noting(checked).await;
+    }
+
+    /// The same for the job that is probably claimed next.
+    pub(super) async fn check_result_for_next(&self) {
+        let read = async {
+            let most_running = self.most_running_of_owner();
+            let next = self.waiting_jobs().next(&BTreeSet::new(), most_running);
+            let Some((key, _)) = next else {
+                return Ok(None);
+            };
+            let hash = "select input_hash from job where id = ? and cache = 'use'";
+            let hash = sqlx::query_scalar(hash).bind(key);
+            Ok::<Option<String>, StoreError>(hash.fetch_optional(&self.reader).await?)
+        };
+        if let Ok(Some(input_hash)) = read.await {
+            self.check_earlier_result(&input_hash).await;
+        }
+    }
+
+    async fn try_to_check_earlier_result(&self, input_hash: &str) -> Result<()> {
         let row = sqlx::query(EARLIER_RESULT)
             .bind(input_hash)
             .bind(env!("CARGO_PKG_VERSION"))
@@ -75,7 +97,7 @@ impl Store {
         };
         if !self.intact.contains(job.result_key, WHOLE) {
             let mut connection = self.reader.acquire().await?;
-            intact::check_result(&mut connection, job.result_key).await?;
+            intact::check_stored(&mut connection, job.result_key).await?;
             self.intact.insert(job.result_key, WHOLE);
         }
         Ok(())

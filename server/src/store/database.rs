@@ -84,6 +84,15 @@ pub struct Store {
     pub(super) folder: Folder,
 }
 
+/// Whether the database is rebuilt when the store is connected to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rebuild {
+    /// If it is of an earlier version and cannot give space back.
+    IfItCannotGiveBack,
+    /// By whoever connects, if at all.
+    Never,
+}
+
 /// A transaction of the single writer; unless it is committed it is rolled back.
 pub(super) struct Writing {
     tx: Transaction<'static, Sqlite>,
@@ -125,7 +134,10 @@ impl Writing {
 impl Store {
     /// Connects to the database in `folder`, created if necessary, and brings its tables up to date. Also
     /// returns the receiver of submissions. The data kept in memory is not read yet.
-    pub(super) async fn connect(path: &Path) -> Result<(Store, mpsc::Receiver<Pending>)> {
+    pub(super) async fn connect(
+        path: &Path,
+        rebuild: Rebuild,
+    ) -> Result<(Store, mpsc::Receiver<Pending>)> {
         let folder = Folder::lock(path)?;
         folder.is_complete()?;
         let known = progress::read(path)?;
@@ -159,7 +171,10 @@ impl Store {
             .connect_with(writing)
             .await?;
         migrations::run(&writer).await?;
-        compact::enable_giving_back(&mut *writer.acquire().await?).await?;
+        if rebuild == Rebuild::IfItCannotGiveBack {
+            // before there are connections that read
+            compact::enable_giving_back(&mut *writer.acquire().await?, path).await?;
+        }
         let record = progress::in_database(&mut *writer.acquire().await?).await?;
         let record = record.ok_or_else(|| StoreError::Unexpected("no progress".into()))?;
         let progress = Progress::start(path, record).map_err(|error| {
@@ -226,6 +241,7 @@ impl Store {
             tracing::warn!(%error, "the write-ahead log stays and is read at the next start: {error}");
         }
         self.writer.close().await;
+        self.reserve.keep_for_a_start();
         if stopped && let Err(error) = self.progress.stop() {
             tracing::warn!(%error, "{}: {error}", progress::FILE);
         }

@@ -1,22 +1,14 @@
-//! Deleting jobs; their ids are remembered for a while.
+//! Deleting jobs.
 
 use std::time::Duration;
 
 use sqlx::SqliteConnection;
 
-use super::{change::Change, database::Store, error::Result, results, rows::find, sweeps};
-use crate::{caller::Owners, job::JobId, time::Time};
+use super::{change::Change, database::Store, error::Result, results, rows::find, sizes, sweeps};
+use crate::{caller::Owners, job::JobId};
 
-/// How long the id of a deleted job is answered with *deleted*; then it is unknown.
-const REMEMBERED_S: f64 = 7.0 * 86_400.0;
-
-/// How many of them are remembered, some 160 bytes each: what is removed as fast as it is solved does not fill the disk.
-pub(super) const MOST_REMEMBERED: u32 = 100_000;
-/// Between two transactions others write.
+/// Between two transactions that remove things others write.
 pub(super) const PAUSE: Duration = Duration::from_millis(20);
-
-/// Ids that are forgotten in one transaction: some milliseconds of the single writer.
-const FORGOTTEN_AT_ONCE: u32 = 1000;
 
 /// The effect of deleting a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,56 +45,6 @@ impl Store {
         };
         self.damages.noting(read).await
     }
-
-    /// Removes the ids of jobs that were deleted long ago.
-    pub async fn forget_deleted(&self, now: Time) -> Result<()> {
-        let before = now.after_s(-REMEMBERED_S).micros();
-        let forget = async {
-            let some = "select exists (select 1 from deleted_job where deleted_at < ?1)
-                        or exists (select 1 from deleted_sweep where deleted_at < ?1)";
-            let some = sqlx::query_scalar(some).bind(before);
-            if some.fetch_one(&self.reader).await? {
-                let mut tx = self.begin().await?;
-                sqlx::query("delete from deleted_job where deleted_at < ?")
-                    .bind(before)
-                    .execute(&mut *tx)
-                    .await?;
-                sweeps::forget_deleted(&mut tx, before).await?;
-                tx.commit().await?;
-            }
-            Ok(())
-        };
-        self.writing(forget).await
-    }
-
-    /// Removes the oldest ids of deleted jobs beyond so many.
-    pub(super) async fn forget_beyond(&self, most: u32) -> Result<()> {
-        let beyond = "select deleted_at from deleted_job indexed by deleted_job_by_time
-             order by deleted_at desc limit 1 offset ?";
-        loop {
-            let newest: Option<i64> = sqlx::query_scalar(beyond)
-                .bind(most)
-                .fetch_optional(&self.reader)
-                .await?;
-            let Some(newest) = newest else {
-                return Ok(());
-            };
-            let forget = async {
-                let mut tx = self.begin_control().await?;
-                sqlx::query(
-                    "delete from deleted_job where uuid in (select uuid from deleted_job indexed by deleted_job_by_time
-                     where deleted_at <= ? order by deleted_at limit ?)",
-                )
-                .bind(newest)
-                .bind(FORGOTTEN_AT_ONCE)
-                .execute(&mut *tx)
-                .await?;
-                tx.commit().await
-            };
-            self.writing(forget).await?;
-            tokio::time::sleep(PAUSE).await;
-        }
-    }
 }
 
 /// Deletes a job that has ended.
@@ -135,6 +77,7 @@ pub(super) async fn delete(
     ] {
         sqlx::query(statement).bind(key).execute(&mut *tx).await?;
     }
+    sizes::hand_on(tx, &job).await?;
     sqlx::query(
         "delete from problem where input_hash = ?1 and not exists (select 1 from job where input_hash = ?1)",
     )
@@ -142,9 +85,16 @@ pub(super) async fn delete(
     .execute(&mut *tx)
     .await?;
     for result in [key, job.result_key] {
-        if !is_in_use(tx, result).await? {
-            results::remove(tx, result).await?;
+        match is_in_use(tx, result).await? {
+            // those that have it may have deleted their fields
+            true => sizes::remove_unused_fields(tx, result).await?,
+            false => results::remove(tx, result).await?,
         }
+    }
+    if let Some(sweep) = job.sweep
+        && !sweeps::remove_without_jobs(change, sweep).await?
+    {
+        sweeps::keep_failures(change.sql(), &job).await?;
     }
     change.deleted(job.id);
     change.changed(key);

@@ -98,11 +98,16 @@ pub(super) fn memory_to_read(
     Ok(stored_bytes.saturating_add(made))
 }
 
+/// The hash of the bytes that are stored.
+pub(super) fn digest(stored: &[u8]) -> Vec<u8> {
+    Sha256::digest(stored).to_vec()
+}
+
 /// Size and hash of a JSON.
 pub(super) fn info_of_json(json: &[u8]) -> PartInfo {
     PartInfo {
         bytes: json.len() as u64,
-        digest: Sha256::digest(json).to_vec(),
+        digest: digest(json),
     }
 }
 

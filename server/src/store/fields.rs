@@ -1,6 +1,6 @@
 //! The fields of a job, which are most of its result, deleted by themselves.
 
-use super::{change::Change, database::Store, delete::Deletion, error::Result, rows::find};
+use super::{change::Change, database::Store, delete::Deletion, error::Result, rows::find, sizes};
 use crate::{caller::Owners, job::Job};
 
 impl Store {
@@ -32,26 +32,5 @@ pub(super) async fn remove_fields(change: &mut Change<'_>, job: &Job) -> Result<
         .bind(job.key)
         .execute(&mut *tx)
         .await?;
-    let needed: bool = sqlx::query_scalar(
-        "select exists (select 1 from job_size where job_id = ?1 and fields = 1)
-             or exists (select 1 from job join job_size on job_id = id where result_job = ?1 and fields = 1)",
-    )
-    .bind(job.result_key)
-    .fetch_one(&mut *tx)
-    .await?;
-    if needed {
-        return Ok(());
-    }
-    for statement in [
-        "update job_size set bytes = bytes - (select coalesce(sum(length(body)), 0) from result_part
-                                              where job_id = ?1 and name = 'fields') where job_id = ?1",
-        "delete from result_part where job_id = ? and name = 'fields'",
-        "delete from result_info where job_id = ? and name = 'fields'",
-    ] {
-        sqlx::query(statement)
-            .bind(job.result_key)
-            .execute(&mut *tx)
-            .await?;
-    }
-    Ok(())
+    sizes::remove_unused_fields(tx, job.result_key).await
 }

@@ -213,10 +213,10 @@ impl Identity {
         wrong.map_or(Ok(()), |what| Err(StoreError::Replaced(what)))
     }
 
-    /// The store is about to give space back: the database may become as small as this (bytes).
+    /// The store gives space back: the database may become as small as this (bytes), instead of what was told before.
     pub(super) fn may_shrink_to(&self, bytes: u64) {
         let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        seen.least = Some(seen.least.map_or(bytes, |least| least.min(bytes)));
+        seen.least = Some(bytes);
     }
 
     fn difference(&self, seen: &mut Seen) -> Option<String> {

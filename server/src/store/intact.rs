@@ -5,7 +5,8 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use sqlx::SqliteConnection;
+use sha2::{Digest, Sha256};
+use sqlx::{Row, SqliteConnection};
 
 use super::{
     checksum::Checksum,
@@ -52,12 +53,14 @@ pub(super) fn part_of(key: i64, name: &str) -> Record {
 pub(super) struct StoredInfo {
     pub(super) info: PartInfo,
     encoding: Encoding,
+    /// SHA-256 of its pieces together; unknown for what earlier versions wrote.
+    stored_digest: Option<Vec<u8>>,
     /// The row has a checksum, hence all others of this result.
     has_checksum: bool,
 }
 
-/// Bytes, digest, checksum and encoding.
-type InfoColumns = (i64, Vec<u8>, Option<i64>, Option<i64>);
+/// Bytes, digest, encoding and digest of what is stored.
+pub(super) type InfoColumns = (i64, Vec<u8>, Option<i64>, Option<Vec<u8>>);
 
 /// What is stored about a part; `None` if there is no such part, or if it was written by a version that did not store it.
 pub(super) async fn part_info(
@@ -65,18 +68,26 @@ pub(super) async fn part_info(
     key: i64,
     name: &str,
 ) -> Result<Option<StoredInfo>> {
-    let found: Option<InfoColumns> = sqlx::query_as(
-        "select bytes, digest, checksum, encoding from result_info where job_id = ? and name = ?",
+    let row = sqlx::query(
+        "select bytes, digest, encoding, stored_digest, checksum from result_info where job_id = ? and name = ?",
     )
     .bind(key)
     .bind(name)
     .fetch_optional(connection)
     .await?;
-    let Some((bytes, digest, checksum, encoding)) = found else {
+    let Some(row) = row else {
         return Ok(None);
     };
+    let columns: InfoColumns = (
+        row.try_get("bytes")?,
+        row.try_get("digest")?,
+        row.try_get("encoding")?,
+        row.try_get("stored_digest")?,
+    );
+    let checksum: Option<i64> = row.try_get("checksum")?;
     let record = || part_of(key, name);
-    info_checksum(key, name, bytes, &digest, encoding).verify(checksum, record)?;
+    info_checksum(key, name, &columns).verify(checksum, record)?;
+    let (bytes, digest, encoding, stored_digest) = columns;
     let unknown = || record().damaged("it is stored in a way that this program does not know");
     let info = PartInfo {
         bytes: bytes as u64,
@@ -85,21 +96,21 @@ pub(super) async fn part_info(
     Ok(Some(StoredInfo {
         info,
         encoding: Encoding::from_stored(encoding).ok_or_else(unknown)?,
+        stored_digest,
         has_checksum: checksum.is_some(),
     }))
 }
 
 /// The checksum of a row of `result_info`.
-pub(super) fn info_checksum(
-    key: i64,
-    name: &str,
-    bytes: i64,
-    digest: &[u8],
-    encoding: Option<i64>,
-) -> Checksum {
-    let sum = Checksum::new().int(key).text(name).int(bytes).bytes(digest);
-    match encoding {
-        Some(encoding) => sum.int(encoding),
+pub(super) fn info_checksum(key: i64, name: &str, columns: &InfoColumns) -> Checksum {
+    let (bytes, digest, encoding, stored_digest) = columns;
+    let mut sum = Checksum::new().int(key).text(name).int(*bytes);
+    sum = sum.bytes(digest);
+    if let Some(encoding) = encoding {
+        sum = sum.int(*encoding);
+    }
+    match stored_digest {
+        Some(digest) => sum.bytes(digest),
         None => sum,
     }
 }
@@ -131,44 +142,77 @@ async fn piece(
     Ok(Some(body))
 }
 
+/// A part as it is stored.
+pub(super) struct StoredPart {
+    record: Record,
+    known: Option<StoredInfo>,
+    bytes: Vec<u8>,
+}
+
+/// A part as it is stored; `None` if there is no such part.
+pub(super) async fn stored_part(
+    connection: &mut SqliteConnection,
+    key: i64,
+    name: &str,
+) -> Result<Option<StoredPart>> {
+    let known = part_info(connection, key, name).await?;
+    let (mut bytes, mut pieces) = (vec![], 0);
+    while let Some(body) = piece(connection, key, name, pieces).await? {
+        bytes.extend_from_slice(&body);
+        pieces += 1;
+    }
+    // a version without checksums kept size and hash of a history that it had removed
+    let has_checksum = known.as_ref().is_some_and(|known| known.has_checksum);
+    let record = part_of(key, name);
+    let stored = StoredPart {
+        record,
+        known,
+        bytes,
+    };
+    Ok((pieces > 0 || has_checksum).then_some(stored))
+}
+
+impl StoredPart {
+    /// Its content, compared with its size and hash.
+    pub(super) async fn decoded(self) -> Result<(PartInfo, Content)> {
+        let StoredPart {
+            record,
+            known,
+            bytes,
+        } = self;
+        let Some(StoredInfo { info, encoding, .. }) = known else {
+            // written by a version that did not store size and hash
+            return Ok((info_of_json(&bytes), Content::Json(bytes)));
+        };
+        let expected = info.clone();
+        let decode = move || decoded(bytes, encoding, &expected);
+        // a large one takes a second, in which its thread would answer nobody
+        let decoded = match info.bytes > INLINE_BYTES {
+            true => tokio::task::spawn_blocking(decode)
+                .await
+                .unwrap_or_else(|panic| Err(panic.to_string())),
+            false => decode(),
+        };
+        match decoded {
+            Ok((found, content)) if found == info => Ok((found, content)),
+            Ok((found, _)) => Err(record.damaged(format!(
+                "{} bytes of another hash in place of {}",
+                found.bytes, info.bytes
+            ))),
+            Err(cause) => Err(record.damaged(cause)),
+        }
+    }
+}
+
 /// A part, compared with its size and hash; `None` if there is no such part.
 pub(super) async fn read_part(
     connection: &mut SqliteConnection,
     key: i64,
     name: &str,
 ) -> Result<Option<(PartInfo, Content)>> {
-    let known = part_info(connection, key, name).await?;
-    let (mut stored, mut pieces) = (vec![], 0);
-    while let Some(body) = piece(connection, key, name, pieces).await? {
-        stored.extend_from_slice(&body);
-        pieces += 1;
-    }
-    let Some(known) = known else {
-        // written by a version that did not store size and hash
-        return Ok((pieces > 0).then(|| (info_of_json(&stored), Content::Json(stored))));
-    };
-    if !known.has_checksum && pieces == 0 {
-        // a version without checksums kept them of a history that it had removed
-        return Ok(None);
-    }
-    let StoredInfo { info, encoding, .. } = known;
-    let expected = info.clone();
-    let decode = move || decoded(stored, encoding, &expected);
-    // a large one takes a second, in which its thread would answer nobody
-    let decoded = match info.bytes > INLINE_BYTES {
-        true => tokio::task::spawn_blocking(decode)
-            .await
-            .unwrap_or_else(|panic| Err(panic.to_string())),
-        false => decode(),
-    };
-    let damaged = |cause: String| part_of(key, name).damaged(cause);
-    let (found, content) = decoded.map_err(damaged)?;
-    match found == info {
-        true => Ok(Some((found, content))),
-        false => Err(damaged(format!(
-            "{} bytes of another hash in place of {}",
-            found.bytes, info.bytes
-        ))),
+    match stored_part(connection, key, name).await? {
+        Some(stored) => stored.decoded().await.map(Some),
+        None => Ok(None),
     }
 }
 
@@ -203,17 +247,43 @@ pub(super) async fn memory_to_read(
 
 /// Reads every part of a result, to check it; an error if one is damaged or the summary is missing.
 pub(super) async fn check_result(connection: &mut SqliteConnection, key: i64) -> Result<()> {
+    for name in names(connection, key).await? {
+        read_part(connection, key, &name).await?;
+    }
+    Ok(())
+}
+
+/// The same by the bytes that are stored, piece by piece, without decoding them, which takes a hundredth of the time: what is
+/// in them is compared when it is served. What an earlier version wrote is decoded.
+pub(super) async fn check_stored(connection: &mut SqliteConnection, key: i64) -> Result<()> {
+    for name in names(connection, key).await? {
+        let known = part_info(connection, key, &name).await?;
+        let Some(expected) = known.and_then(|known| known.stored_digest) else {
+            read_part(connection, key, &name).await?;
+            continue;
+        };
+        let (mut hash, mut pieces) = (Sha256::new(), 0);
+        while let Some(body) = piece(connection, key, &name, pieces).await? {
+            hash.update(&body);
+            pieces += 1;
+        }
+        if hash.finalize()[..] != expected[..] {
+            return Err(part_of(key, &name).damaged("it is stored with another hash"));
+        }
+    }
+    Ok(())
+}
+
+/// The names of the parts of a result; an error if the summary is missing.
+async fn names(connection: &mut SqliteConnection, key: i64) -> Result<Vec<String>> {
     let names: Vec<String> = sqlx::query_scalar(
         "select name from result_info where job_id = ?1 union select name from result_part where job_id = ?1",
     )
     .bind(key)
     .fetch_all(&mut *connection)
     .await?;
-    if !names.iter().any(|name| name == "summary") {
-        return Err(part_of(key, "summary").damaged("it is missing"));
+    match names.iter().any(|name| name == "summary") {
+        true => Ok(names),
+        false => Err(part_of(key, "summary").damaged("it is missing")),
     }
-    for name in names {
-        read_part(connection, key, &name).await?;
-    }
-    Ok(())
 }

@@ -168,6 +168,17 @@ fn checksum(owner: &str, key: &RequestKey, first: i64, jobs: i64) -> Checksum {
     row.text(&key.payload).int(first).int(jobs)
 }
 
+/// Forgets the key under which this job was submitted, whose id was forgotten, unless others of its jobs are still known.
+pub(super) async fn forget(tx: &mut SqliteConnection, job: i64) -> Result<()> {
+    sqlx::query(FORGET).bind(job).execute(tx).await?;
+    Ok(())
+}
+
+pub(super) const FORGET: &str = "delete from request_key
+     where first_job = (select max(first_job) from request_key indexed by request_key_by_job where first_job <= ?)
+           and not exists (select 1 from job where id between first_job and first_job + jobs - 1)
+           and not exists (select 1 from deleted_job where id between first_job and first_job + jobs - 1)";
+
 /// Those of these jobs that still exist. If all of them were deleted, that is an error as long as their ids are
 /// kept; after that the key may be used again.
 async fn remaining(

@@ -14,6 +14,7 @@
 
 // Input and output types, and errors.
 mod checksum;
+mod complaint;
 mod encoding;
 mod error;
 mod filter;
@@ -33,6 +34,7 @@ mod clock;
 mod compact;
 mod database;
 mod migrations;
+mod pages;
 mod waiting;
 
 // A job: its row, its labels, its events, its result.
@@ -58,6 +60,7 @@ mod bulk;
 mod delete;
 mod edit;
 mod fields;
+mod forget;
 mod keys;
 mod retention;
 mod submit;
@@ -87,8 +90,11 @@ mod tests;
 
 use std::{path::Path, sync::Arc};
 
+use self::database::Rebuild;
+
 pub use self::{
     backup::{Backup, Manifest, back_up},
+    complaint::Complaint,
     database::Store,
     database::with_advice,
     delete::Deletion,
@@ -125,7 +131,7 @@ impl Store {
 
     /// The same, without the tasks that look after it from time to time.
     async fn open_unwatched(folder: &Path) -> Result<Arc<Store>> {
-        let (store, submissions) = Store::connect(folder).await?;
+        let (store, submissions) = Store::connect(folder, Rebuild::IfItCannotGiveBack).await?;
         store.read_waiting_jobs().await?;
         store.read_settings().await?;
         store.read_tokens().await?;

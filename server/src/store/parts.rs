@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use solver::solution::{ContactProfile, Fields};
 
-use super::encoding::{Encoding, PartInfo, deflated, info_of_fields, info_of_json};
+use super::encoding::{Encoding, PartInfo, deflated, digest, info_of_fields, info_of_json};
 use crate::run::Document;
 
 /// Bytes of one piece of a stored result or mesh: larger rows make SQLite chain pages, and readers need more memory.
@@ -29,6 +29,8 @@ pub struct Part {
     /// The bytes that are stored. Between processes they follow the message.
     #[serde(skip)]
     pub body: Vec<u8>,
+    /// Their SHA-256.
+    pub(super) stored_digest: Vec<u8>,
     pub(super) info: PartInfo,
 }
 
@@ -49,11 +51,13 @@ impl Part {
 
     /// A part from its JSON.
     pub(super) fn new(name: String, json: &[u8]) -> Part {
+        let body = deflated(json);
         Part {
             name,
             encoding: Encoding::Deflated,
             info: info_of_json(json),
-            body: deflated(json),
+            stored_digest: digest(&body),
+            body,
         }
     }
 
@@ -65,6 +69,7 @@ impl Part {
         Ok(Part {
             name: "fields".into(),
             encoding: Encoding::Columns,
+            stored_digest: digest(&body),
             body,
             info,
         })

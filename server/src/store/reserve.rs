@@ -81,7 +81,7 @@ impl Reserve {
         if self.held.load(Ordering::Acquire) {
             return true;
         }
-        match allocate(&self.path) {
+        match allocate(&self.path, BYTES) {
             Ok(()) => {
                 self.held.store(true, Ordering::Release);
                 true
@@ -92,12 +92,19 @@ impl Reserve {
             }
         }
     }
+
+    /// Takes what the next start needs, if there is room: this one may have needed what was there.
+    pub(super) fn keep_for_a_start(&self) {
+        if let Err(error) = allocate(&self.path, FOR_A_START) {
+            tracing::debug!(%error, "{}: {error}", self.path.display());
+        }
+    }
 }
 
-/// Gives the file its full size. If it cannot have that, it is as it was before.
-fn allocate(path: &Path) -> io::Result<()> {
+/// Gives the file this size, unless it has it. If it cannot have that, it is as it was before.
+fn allocate(path: &Path, bytes: u64) -> io::Result<()> {
     let before = fs::metadata(path).map_or(0, |found| found.len());
-    if before == BYTES {
+    if before >= bytes {
         return Ok(()); // of the last run
     }
     let mut file: File = OpenOptions::new()
@@ -106,7 +113,7 @@ fn allocate(path: &Path) -> io::Result<()> {
         .truncate(false)
         .mode(0o600)
         .open(path)?;
-    occupy(&mut file).inspect_err(|_| {
+    occupy(&mut file, bytes).inspect_err(|_| {
         let _ = match before {
             0 => fs::remove_file(path),
             _ => file.set_len(before),
@@ -114,13 +121,13 @@ fn allocate(path: &Path) -> io::Result<()> {
     })
 }
 
-fn occupy(file: &mut File) -> io::Result<()> {
-    match rustix::fs::fallocate(&*file, rustix::fs::FallocateFlags::empty(), 0, BYTES) {
+fn occupy(file: &mut File, bytes: u64) -> io::Result<()> {
+    match rustix::fs::fallocate(&*file, rustix::fs::FallocateFlags::empty(), 0, bytes) {
         Ok(()) => Ok(()),
         // the file system cannot: the space is taken by writing
         Err(rustix::io::Errno::OPNOTSUPP) => {
             let block = vec![0; 1 << 20];
-            for _ in 0..BYTES >> 20 {
+            for _ in 0..bytes >> 20 {
                 file.write_all(&block)?;
             }
             file.sync_data()
@@ -157,5 +164,17 @@ mod tests {
         assert!(reserve.retake());
         reserve.has_room().unwrap();
         assert!(occupied() >= BYTES, "{}", occupied());
+    }
+    #[test]
+    fn what_a_start_has_used_is_kept_for_the_next_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let reserve = Reserve::new(folder.path());
+        let path = folder.path().join(FILE);
+        let bytes = || fs::metadata(&path).unwrap().len();
+        reserve.keep_for_a_start();
+        assert_eq!(bytes(), BYTES, "there is more");
+        fs::remove_file(&path).unwrap(); // as a start does that finds no more
+        reserve.keep_for_a_start();
+        assert_eq!(bytes(), FOR_A_START);
     }
 }

@@ -18,6 +18,10 @@ use super::{
 };
 use crate::time::Time;
 
+/// How the name of a folder begins that has a store which was replaced, and how it ends as long as that is not complete.
+const ASIDE: &str = "replaced-";
+const PARTIAL: &str = ".partial";
+
 /// A store that was made from a backup.
 #[derive(Debug)]
 pub struct Restored {
@@ -145,16 +149,42 @@ async fn copy(
     Ok(last)
 }
 
-/// Moves the store in this folder to a folder within it, whose name is returned.
+/// Moves the store in this folder to a folder within it, whose name is returned. Until all of it is there, that folder is
+/// called `….partial`, and a restore that follows one that was killed goes on with it.
 fn put_aside(data: &Path) -> io::Result<PathBuf> {
-    let aside = data.join(format!("replaced-{}", Time::now().micros()));
-    DirBuilder::new().mode(0o700).create(&aside)?;
+    let partial = match begun(data)? {
+        Some(partial) => partial,
+        None => {
+            let partial = data.join(format!("{ASIDE}{}{PARTIAL}", Time::now().micros()));
+            DirBuilder::new().mode(0o700).create(&partial)?;
+            partial
+        }
+    };
     for name in FILES {
-        match fs::rename(data.join(name), aside.join(name)) {
+        match fs::rename(data.join(name), partial.join(name)) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
             Ok(()) | Err(_) => {}
         }
     }
-    sync_folder(&aside)?;
+    sync_folder(&partial)?;
+    let aside = partial.with_extension("");
+    fs::rename(&partial, &aside)?;
+    sync_folder(data)?;
     Ok(aside)
+}
+
+/// The folder to which a restore that was killed has moved a part of this store: what is there is not here.
+fn begun(data: &Path) -> io::Result<Option<PathBuf>> {
+    for entry in fs::read_dir(data)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let ours = name
+            .to_str()
+            .is_some_and(|name| name.starts_with(ASIDE) && name.ends_with(PARTIAL));
+        let twice = |name: &&str| data.join(name).exists() && entry.path().join(name).exists();
+        if ours && !FILES.iter().any(|name| twice(&name)) {
+            return Ok(Some(entry.path()));
+        }
+    }
+    Ok(None)
 }

@@ -137,9 +137,19 @@ async fn insert(tx: &mut SqliteConnection, key: i64, group: &[Piece<'_>]) -> Res
 async fn write_info(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
     for part in &parts.0 {
         let (bytes, encoding) = (part.info.bytes as i64, part.encoding.stored());
-        let checksum = intact::info_checksum(key, &part.name, bytes, &part.info.digest, encoding);
+        let checksum = intact::info_checksum(
+            key,
+            &part.name,
+            &(
+                bytes,
+                part.info.digest.clone(),
+                encoding,
+                Some(part.stored_digest.clone()),
+            ),
+        );
         sqlx::query(
-            "insert or replace into result_info (job_id, name, bytes, digest, checksum, encoding) values (?, ?, ?, ?, ?, ?)",
+            "insert or replace into result_info (job_id, name, bytes, digest, checksum, encoding, stored_digest)
+             values (?, ?, ?, ?, ?, ?, ?)",
         )
         .bind(key)
         .bind(&part.name)
@@ -147,6 +157,7 @@ async fn write_info(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Resul
         .bind(&part.info.digest)
         .bind(checksum.stored())
         .bind(encoding)
+        .bind(&part.stored_digest)
         .execute(&mut *tx)
         .await?;
     }

@@ -1,17 +1,20 @@
-//! Retention: what has ended is removed when it is old, or when there is too much, the oldest first. Pinned jobs never are.
+//! Retention: what has ended is removed when it is old, or when there is too much, the oldest first. Pinned jobs never are,
+//! and do not count.
+//!
+//! Sums of what owners keep have no checksums: they are compared with those of the jobs before anything is removed for being
+//! too much, and a job is removed only if its own record says that it ended so long ago.
 
-use std::{collections::HashSet, sync::Weak, time::Duration};
+use std::{collections::HashSet, num::ParseIntError, sync::Weak, time::Duration};
 
 use super::{
-    change::Change,
+    bulk::{Batch, Discard},
+    complaint::Complaint,
     database::Store,
-    delete::{self, Deletion, PAUSE},
-    error::Result,
-    fields,
-    rows::find,
-    sweeps,
+    delete::PAUSE,
+    error::{Record, Result, StoreError},
+    forget::MOST_REMEMBERED,
 };
-use crate::{caller::Owners, time::Time};
+use crate::{error::size, time::Time};
 
 /// How long and how much is kept; `None` without limit.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,7 +33,7 @@ pub struct Retention {
     pub bytes_of_owner: Option<u64>,
 }
 
-/// Jobs that are removed in one transaction: some milliseconds of the single writer.
+/// Jobs that are read at a time.
 const AT_ONCE: usize = 50;
 
 /// What has just ended is never removed for being too much: whoever waits for it must get it.
@@ -45,31 +48,60 @@ pub struct Retired {
     pub fields: usize,
 }
 
-/// Jobs to be removed, the oldest first; how many more, and how many more bytes, are too much.
-struct Excess<'a> {
-    owner: Option<&'a str>,
+/// What an owner keeps, or what is too much of that: jobs that have ended, and their bytes.
+#[derive(Clone, Debug)]
+struct Kept {
+    owner: String,
     jobs: u64,
     bytes: u64,
 }
+
+pub(super) const OLD_JOBS: &str = "select id from job indexed by job_to_retire
+     where finished_at is not null and pinned = 0 and finished_at < ? order by finished_at, id limit ?";
+
+pub(super) const OLD_FIELDS: &str =
+    "select job_id from job_size indexed by job_size_with_fields join job on job.id = job_id
+     where fields = 1 and job_size.finished_at < ? and pinned = 0 order by job_size.finished_at limit ?";
+
+pub(super) const OLDEST_OF_OWNER: &str =
+    "select id, bytes from job indexed by job_to_retire_by_owner join job_size on job_id = id
+     where job.owner = ? and job.finished_at is not null and pinned = 0 and job.finished_at < ?
+     order by job.finished_at, id limit ?";
+
+/// But for what is pinned, who keeps most first.
+pub(super) const KEPT: &str =
+    "select owner, owner_size.jobs - coalesce(pinned.jobs, 0), job_bytes - coalesce(pinned.bytes, 0)
+     from owner_size left join
+          (select job.owner as owner, count(*) as jobs, sum(bytes) as bytes
+           from job indexed by job_pinned join job_size on job_id = id
+           where pinned = 1 and job.finished_at is not null group by job.owner) pinned using (owner)
+     order by 3 desc, owner";
 
 /// How often the limits are applied.
 const INTERVAL: Duration = Duration::from_secs(10);
 
 /// Keeps a store within its limits, and gives space back to the file system, until the store is dropped or closed.
 pub async fn keep_within(store: Weak<Store>, retention: Retention) {
+    let mut retiring = Complaint::new("retention");
+    if let Some(store) = store.upgrade() {
+        retiring.note(store.announce(&retention).await);
+    }
     loop {
         tokio::time::sleep(INTERVAL).await;
-        let Some(store) = store.upgrade().filter(|store| !store.writer.is_closed()) else {
+        let Some(store) = store.upgrade() else {
             return;
         };
-        match store.retire(&retention, Time::now()).await {
-            Ok(Retired { jobs: 0, fields: 0 }) => {}
-            Ok(Retired { jobs, fields }) => tracing::info!(
+        let retired = store.retire(&retention, Time::now()).await;
+        if store.writer.is_closed() {
+            return;
+        }
+        match retiring.note(retired) {
+            None | Some(Retired { jobs: 0, fields: 0 }) => {}
+            Some(Retired { jobs, fields }) => tracing::info!(
                 jobs,
                 fields,
                 "retention: {jobs} jobs were removed, and the fields of {fields}"
             ),
-            Err(cause) => tracing::warn!(%cause, "retention: {cause}"),
         }
         match store.give_space_back().await {
             Ok(pages) if pages > 0 => {
@@ -85,108 +117,167 @@ impl Store {
     /// Removes what is no longer kept. Jobs that cannot be removed, since they are damaged, stay.
     pub async fn retire(&self, retention: &Retention, now: Time) -> Result<Retired> {
         let now = self.by_our_clock(now);
-        let (mut retired, mut left_alone) = (Retired::default(), HashSet::new());
-        loop {
-            let jobs = self.jobs_to_retire(retention, now, &left_alone).await?;
-            if jobs.is_empty() {
-                break;
-            }
-            retired.jobs += self.remove(&jobs, &mut left_alone, true).await?;
-            tokio::time::sleep(PAUSE).await;
+        let mut retired = Retired::default();
+        self.forget_beyond(MOST_REMEMBERED).await?;
+        if self.retention_begins().await?.is_some_and(|at| now < at) {
+            return Ok(retired);
         }
-        while let Some(age_s) = retention.fields_age_s {
-            let before = now.after_s(-age_s).micros();
-            let old = sqlx::query_scalar(
-                "select job_id from job_size indexed by job_size_with_fields join job on job.id = job_id
-                 where fields = 1 and job_size.finished_at < ? and pinned = 0
-                 order by job_size.finished_at limit ?",
-            );
-            let old = old.bind(before).bind((AT_ONCE + left_alone.len()) as i64);
-            let mut old: Vec<i64> = old.fetch_all(&self.reader).await?;
-            old.retain(|key| !left_alone.contains(key));
-            if old.is_empty() {
-                break;
-            }
-            retired.fields += self.remove(&old, &mut left_alone, false).await?;
-            tokio::time::sleep(PAUSE).await;
-        }
+        let mut left_alone = HashSet::new();
         if let Some(age_s) = retention.age_s {
-            self.forget_keys(now.after_s(-age_s)).await?;
+            let before = now.after_s(-age_s);
+            let old = Discard::OldJobs(before);
+            retired.jobs += self
+                .discard_old(OLD_JOBS, before, old, &mut left_alone)
+                .await?;
         }
-        self.forget_beyond(delete::MOST_REMEMBERED).await?;
-        Ok(retired)
+        if let Some(age_s) = retention.fields_age_s {
+            let before = now.after_s(-age_s);
+            let old = Discard::OldFields(before);
+            retired.fields += self
+                .discard_old(OLD_FIELDS, before, old, &mut left_alone)
+                .await?;
+        }
+        let not_young = now.after_s(-YOUNG_S);
+        let mut compared = false;
+        loop {
+            let jobs = self.too_much(retention, not_young, &left_alone).await?;
+            if jobs.is_empty() {
+                return Ok(retired);
+            }
+            if !compared {
+                self.compare_sums().await?;
+                compared = true;
+            }
+            let old = Discard::OldJobs(not_young);
+            retired.jobs += self.discard(old, &jobs, &mut left_alone).await?;
+            tokio::time::sleep(PAUSE).await;
+        }
     }
 
-    /// Some jobs that are no longer kept.
-    async fn jobs_to_retire(
+    /// Discards all that a statement finds from before this time; how many jobs.
+    async fn discard_old(
         &self,
-        retention: &Retention,
-        now: Time,
-        left_alone: &HashSet<i64>,
-    ) -> Result<Vec<i64>> {
-        if let Some(age_s) = retention.age_s {
-            let old = sqlx::query_scalar(
-                "select id from job indexed by job_to_retire
-                 where finished_at is not null and pinned = 0 and finished_at < ? order by finished_at, id limit ?",
-            );
-            let old = old.bind(now.after_s(-age_s).micros());
+        statement: &'static str,
+        before: Time,
+        what: Discard<'_>,
+        left_alone: &mut HashSet<i64>,
+    ) -> Result<usize> {
+        let mut discarded = 0;
+        loop {
+            let old = sqlx::query_scalar(statement).bind(before.micros());
             let old = old.bind((AT_ONCE + left_alone.len()) as i64);
             let mut old: Vec<i64> = old.fetch_all(&self.reader).await?;
             old.retain(|key| !left_alone.contains(key));
-            if !old.is_empty() {
-                return Ok(old);
+            if old.is_empty() {
+                return Ok(discarded);
             }
+            discarded += self.discard(what, &old, left_alone).await?;
+            tokio::time::sleep(PAUSE).await;
         }
-        let too_much =
-            |limit: Option<u64>, found: u64| limit.map_or(0, |limit| found.saturating_sub(limit));
-        let owners = self.sizes_of_owners(i64::MAX).await?;
-        let (jobs, bytes) = owners.iter().fold((0, 0), |(jobs, bytes), owner| {
-            (jobs + owner.jobs, bytes + owner.job_bytes)
-        });
-        let of_all = Excess {
-            owner: None,
-            jobs: too_much(retention.jobs, jobs),
-            bytes: too_much(retention.bytes, bytes),
-        };
-        let of_each = owners.iter().map(|owner| Excess {
-            owner: Some(&owner.owner),
-            jobs: too_much(retention.jobs_of_owner, owner.jobs),
-            bytes: too_much(retention.bytes_of_owner, owner.job_bytes),
-        });
-        for excess in of_each.chain([of_all]) {
-            let found = self.oldest(&excess, now, left_alone).await?;
-            if !found.is_empty() {
-                return Ok(found);
-            }
-        }
-        Ok(vec![])
     }
 
-    /// The oldest jobs, as many as are too many or have the bytes that are too many.
-    async fn oldest(
+    /// Discards the first of these jobs; how many. Those that it meets and cannot discard are left alone.
+    async fn discard(
         &self,
-        excess: &Excess<'_>,
-        now: Time,
+        what: Discard<'_>,
+        keys: &[i64],
+        left_alone: &mut HashSet<i64>,
+    ) -> Result<usize> {
+        let mut discarded = 0;
+        match self.control(|| self.try_to_discard(what, keys)).await {
+            Ok(Batch { done, left, .. }) => {
+                left_alone.extend(left);
+                return Ok(done);
+            }
+            // a page that cannot be read, of nobody knows which of them
+            Err(StoreError::Damaged(_)) => {}
+            Err(cause) => return Err(cause),
+        }
+        for key in keys {
+            let one = std::slice::from_ref(key);
+            match self.control(|| self.try_to_discard(what, one)).await {
+                Ok(Batch { done: 1, .. }) => discarded += 1,
+                Ok(_) | Err(StoreError::Damaged(_)) => {
+                    left_alone.insert(*key);
+                }
+                Err(cause) => return Err(cause),
+            }
+        }
+        Ok(discarded)
+    }
+
+    /// Some jobs that are too much: of one owner, or of all, and then of those who keep most.
+    async fn too_much(
+        &self,
+        retention: &Retention,
+        before: Time,
         left_alone: &HashSet<i64>,
     ) -> Result<Vec<i64>> {
+        let owners = self.kept().await?;
+        let beyond = |limit: Option<u64>, found: u64| found.saturating_sub(limit.unwrap_or(found));
+        for owner in &owners {
+            let excess = Kept {
+                owner: owner.owner.clone(),
+                jobs: beyond(retention.jobs_of_owner, owner.jobs),
+                bytes: beyond(retention.bytes_of_owner, owner.bytes),
+            };
+            let found = self.oldest(&excess, before, left_alone).await?;
+            if !found.is_empty() {
+                return Ok(found.into_iter().map(|(key, _)| key).collect());
+            }
+        }
+        let jobs: Vec<u64> = owners.iter().map(|owner| owner.jobs).collect();
+        let bytes: Vec<u64> = owners.iter().map(|owner| owner.bytes).collect();
+        let mut jobs_left = beyond(retention.jobs, jobs.iter().sum());
+        let mut bytes_left = beyond(retention.bytes, bytes.iter().sum());
+        let (jobs, bytes) = (
+            reductions(&jobs, retention.jobs),
+            reductions(&bytes, retention.bytes),
+        );
+        let mut keys = vec![];
+        for (owner, (jobs, bytes)) in owners.into_iter().zip(jobs.into_iter().zip(bytes)) {
+            let excess = Kept {
+                owner: owner.owner,
+                jobs: jobs.min(jobs_left),
+                bytes: bytes.min(bytes_left),
+            };
+            for (key, size) in self.oldest(&excess, before, left_alone).await? {
+                keys.push(key);
+                jobs_left = jobs_left.saturating_sub(1);
+                bytes_left = bytes_left.saturating_sub(size);
+            }
+            if keys.len() >= AT_ONCE {
+                break;
+            }
+        }
+        Ok(keys)
+    }
+
+    /// What every owner keeps.
+    async fn kept(&self) -> Result<Vec<Kept>> {
+        let rows: Vec<(String, i64, i64)> = sqlx::query_as(KEPT).fetch_all(&self.reader).await?;
+        let count = |count: i64| u64::try_from(count).unwrap_or(0);
+        let kept = |(owner, jobs, bytes)| Kept {
+            owner,
+            jobs: count(jobs),
+            bytes: count(bytes),
+        };
+        Ok(rows.into_iter().map(kept).collect())
+    }
+
+    /// The oldest jobs of an owner with their bytes, as many as are too many or have the bytes that are too many.
+    async fn oldest(
+        &self,
+        excess: &Kept,
+        before: Time,
+        left_alone: &HashSet<i64>,
+    ) -> Result<Vec<(i64, u64)>> {
         if excess.jobs == 0 && excess.bytes == 0 {
             return Ok(vec![]);
         }
-        let statement = match excess.owner {
-            None => sqlx::query_as(
-                "select id, bytes from job indexed by job_to_retire join job_size on job_id = id
-                 where job.finished_at is not null and pinned = 0 and job.finished_at < ?
-                 order by job.finished_at, id limit ?",
-            ),
-            Some(owner) => sqlx::query_as(
-                "select id, bytes from job indexed by job_to_retire_by_owner join job_size on job_id = id
-                 where job.owner = ? and job.finished_at is not null and pinned = 0 and job.finished_at < ?
-                 order by job.finished_at, id limit ?",
-            )
-            .bind(owner),
-        };
-        let rows: Vec<(i64, i64)> = statement
-            .bind(now.after_s(-YOUNG_S).micros())
+        let rows: Vec<(i64, i64)> = sqlx::query_as(OLDEST_OF_OWNER)
+            .bind(&excess.owner)
+            .bind(before.micros())
             .bind((AT_ONCE + left_alone.len()) as i64)
             .fetch_all(&self.reader)
             .await?;
@@ -199,90 +290,127 @@ impl Store {
             if jobs == 0 && bytes == 0 {
                 break;
             }
+            let size = u64::try_from(size).unwrap_or(0);
             jobs = jobs.saturating_sub(1);
-            bytes = bytes.saturating_sub(u64::try_from(size).unwrap_or(0));
-            found.push(key);
+            bytes = bytes.saturating_sub(size);
+            found.push((key, size));
         }
         Ok(found)
     }
 
-    /// Removes these jobs, or only their fields; how many were. What is damaged is left alone.
-    async fn remove(
-        &self,
-        keys: &[i64],
-        left_alone: &mut HashSet<i64>,
-        whole: bool,
-    ) -> Result<usize> {
-        let all = self.control(|| self.try_to_remove(keys, whole)).await;
-        if let Ok(removed) = all {
-            // one that was changed meanwhile is not met for ever
-            left_alone.extend(keys.iter().skip(removed));
-            return Ok(removed);
+    /// An error unless the sums by owner are those of the jobs.
+    async fn compare_sums(&self) -> Result<()> {
+        let differ: bool = sqlx::query_scalar(
+            "with of_jobs as (select owner, count(*) as jobs, sum(bytes) as bytes from job_size group by owner)
+             select exists (select 1 from owner_size left join of_jobs using (owner)
+                            where owner_size.jobs <> coalesce(of_jobs.jobs, 0) or job_bytes <> coalesce(bytes, 0))
+                    or exists (select 1 from of_jobs where owner not in (select owner from owner_size))",
+        )
+        .fetch_one(&self.reader)
+        .await?;
+        match differ {
+            false => Ok(()),
+            true => Err(Record::named("sum of what owners keep").damaged(
+                "it is not that of their jobs: nothing is removed for being too much; `signorini doctor --salvage` counts anew",
+            )),
         }
-        let mut removed = 0;
-        for key in keys {
-            let one = std::slice::from_ref(key);
-            match self.control(|| self.try_to_remove(one, whole)).await {
-                Ok(1) => removed += 1,
-                Ok(_) => {
-                    left_alone.insert(*key);
-                }
-                Err(cause) => {
-                    tracing::warn!(job.key = key, %cause, "a job that is no longer kept could not be removed: {cause}");
-                    left_alone.insert(*key);
-                }
-            }
-        }
-        Ok(removed)
     }
 
-    async fn try_to_remove(&self, keys: &[i64], whole: bool) -> Result<usize> {
-        let mut change = self.control_change().await?;
-        let mut removed = 0;
-        for key in keys {
-            // as it is now: it may have been pinned or deleted
-            let Some(job) = find(change.sql(), *key).await?.filter(|job| !job.pinned) else {
-                continue;
-            };
-            if !whole {
-                fields::remove_fields(&mut change, &job).await?;
-                removed += 1;
-                continue;
-            }
-            if delete::delete(&mut change, Owners::All, *key).await? == Deletion::Deleted {
-                removed += 1;
-                if let Some(sweep) = job.sweep {
-                    sweeps::remove_without_jobs(&mut change, sweep).await?;
-                }
-            }
-        }
-        change.commit().await?;
-        Ok(removed)
-    }
-
-    /// Removes request keys from before this time whose jobs are gone.
-    async fn forget_keys(&self, before: Time) -> Result<()> {
-        const OLD: &str = "select 1 from request_key where created_at < ?1
-             and not exists (select 1 from job where id between first_job and first_job + jobs - 1) limit 1";
-        let some: Option<i64> = sqlx::query_scalar(OLD)
-            .bind(before.micros())
+    /// When retention begins, if the store is from before it.
+    async fn retention_begins(&self) -> Result<Option<Time>> {
+        let begins = "select value from setting where name = 'retention_begins'";
+        let begins: Option<String> = sqlx::query_scalar(begins)
             .fetch_optional(&self.reader)
             .await?;
-        if some.is_none() {
+        let Some(text) = begins else { return Ok(None) };
+        let damaged =
+            |error: ParseIntError| Record::named("setting retention_begins").damaged(error);
+        let micros: i64 = text.parse().map_err(damaged)?;
+        Ok(Some(Time::from_micros(micros)))
+    }
+
+    /// Tells in the log what will be removed, if the store is from before retention.
+    async fn announce(&self, retention: &Retention) -> Result<()> {
+        let begins = self.retention_begins().await?;
+        let Some(begins) = begins.filter(|at| self.now() < *at) else {
             return Ok(());
-        }
-        let forget = async {
-            let mut change: Change<'_> = self.control_change().await?;
-            sqlx::query(
-                "delete from request_key where created_at < ?1
-                 and not exists (select 1 from job where id between first_job and first_job + jobs - 1)",
-            )
-            .bind(before.micros())
-            .execute(change.sql())
-            .await?;
-            change.commit().await?;
-            Ok(())
         };
-        self.writing(forget).await
+        let (jobs, bytes) = self.foreseen(retention, begins).await?;
+        if jobs > 0 {
+            tracing::warn!(
+                jobs, bytes, %begins,
+                "this store was written when everything was kept; at {begins} about {jobs} jobs with {} are removed, and from \
+                 then on what is too old or too much: to keep them, pin them, or set other limits (--retain-days, --retain-bytes \
+                 and others, 0 for none)",
+                size(bytes)
+            );
+        }
+        Ok(())
+    }
+
+    /// About how many jobs, and bytes of them, would be removed at this time of those that there are.
+    pub(super) async fn foreseen(&self, retention: &Retention, at: Time) -> Result<(u64, u64)> {
+        let oldest = retention
+            .age_s
+            .map_or(i64::MIN, |age_s| at.after_s(-age_s).micros());
+        let rows: Vec<(bool, i64, i64)> = sqlx::query_as(
+            "select job.finished_at < ? as old, count(*), sum(bytes) from job indexed by job_to_retire join job_size on job_id = id
+             where job.finished_at is not null and pinned = 0 group by old, job.owner",
+        )
+        .bind(oldest)
+        .fetch_all(&self.reader)
+        .await?;
+        let (mut gone, mut all, mut kept) = ((0, 0), (0, 0), (0, 0));
+        for (old, jobs, bytes) in rows {
+            let (jobs, bytes) = (jobs.unsigned_abs(), bytes.unsigned_abs());
+            if old {
+                gone = (gone.0 + jobs, gone.1 + bytes);
+                continue;
+            }
+            all = (all.0 + jobs, all.1 + bytes);
+            kept.0 += jobs.min(retention.jobs_of_owner.unwrap_or(jobs));
+            kept.1 += bytes.min(retention.bytes_of_owner.unwrap_or(bytes));
+        }
+        let jobs = all.0 - kept.0.min(retention.jobs.unwrap_or(kept.0));
+        let bytes = all.1 - kept.1.min(retention.bytes.unwrap_or(kept.1));
+        // of the average size
+        let of_bytes = bytes.saturating_mul(all.0).div_ceil(all.1.max(1));
+        let of_jobs = jobs.saturating_mul(all.1) / all.0.max(1);
+        Ok((gone.0 + jobs.max(of_bytes), gone.1 + bytes.max(of_jobs)))
+    }
+}
+
+/// By how much each of these amounts is reduced so that their sum is within the limit: the largest, to an even rest.
+fn reductions(amounts: &[u64], limit: Option<u64>) -> Vec<u64> {
+    let mut left = limit.unwrap_or(u64::MAX);
+    let mut rising = amounts.to_vec();
+    rising.sort_unstable();
+    let mut most = u64::MAX;
+    for (n, amount) in rising.iter().enumerate() {
+        let even = left / (rising.len() - n) as u64;
+        if *amount > even {
+            most = even;
+            break;
+        }
+        left -= amount;
+    }
+    amounts
+        .iter()
+        .map(|amount| amount.saturating_sub(most))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_are_reduced_and_the_others_are_left_alone() {
+        assert_eq!(reductions(&[20, 1, 2], Some(10)), [13, 0, 0]);
+        assert_eq!(reductions(&[20, 10, 2], Some(12)), [15, 5, 0]);
+        assert_eq!(reductions(&[3, 4], Some(7)), [0, 0]);
+        assert_eq!(reductions(&[3, 4], Some(0)), [3, 4]);
+        assert_eq!(reductions(&[3, 4], None), [0, 0]);
+        assert!(reductions(&[], Some(1)).is_empty());
     }
 }

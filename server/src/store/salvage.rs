@@ -6,7 +6,7 @@ use sqlx::{AssertSqlSafe, Column, Row, SqliteConnection, TypeInfo, ValueRef, sql
 
 use super::{
     checksum,
-    database::{Store, Writing, with_advice},
+    database::{Rebuild, Store, Writing, with_advice},
     error::{Result, StoreError},
     rows::seal,
     sizes,
@@ -20,7 +20,7 @@ pub(super) async fn new_store(folder: &Path) -> Result<Store> {
         let text = format!("{} is not empty; name a new folder", folder.display());
         return Err(StoreError::Folder(text));
     }
-    let connected = Store::connect(folder).await;
+    let connected = Store::connect(folder, Rebuild::Never).await;
     let (store, _) = connected.map_err(|error| with_advice(error, folder))?;
     // jobs refer to each other, and are copied in the order of their numbers
     let mut writer = store.writer.acquire().await?;
@@ -72,7 +72,7 @@ pub(super) async fn copy_job(
         .await?;
     }
     if job.result_available == ResultAvailable::None {
-        return sizes::count(tx, job.key).await;
+        return Ok(());
     }
     for (table, statement) in [
         ("result_info", "select * from result_info where job_id = ?"),
@@ -83,7 +83,7 @@ pub(super) async fn copy_job(
             insert(tx, table, &row).await?;
         }
     }
-    sizes::count(tx, job.key).await
+    Ok(())
 }
 
 /// Copies what can be read of the rest, and sets right what refers to jobs that were not copied.
@@ -93,6 +93,11 @@ pub(super) async fn copy_the_rest(
     last: i64,
 ) -> Result<()> {
     let mut tx = target.begin().await?;
+    let lost_fields = sqlx::query_scalar("select job_id from job_size where fields = 2");
+    let lost_fields: Vec<i64> = lost_fields
+        .fetch_all(&mut *source)
+        .await
+        .unwrap_or_default();
     let deleted = sqlx::query("select * from deleted_job").fetch_all(source);
     for row in deleted.await.unwrap_or_default() {
         insert(&mut tx, "deleted_job", &row).await?;
@@ -109,6 +114,17 @@ pub(super) async fn copy_the_rest(
     );
     for key in changed {
         seal(&mut tx, key).await?;
+    }
+    let ended = "select id from job where finished_at is not null";
+    let ended: Vec<i64> = sqlx::query_scalar(ended).fetch_all(&mut *tx).await?;
+    for key in ended {
+        sizes::count(&mut tx, key).await?;
+    }
+    for key in lost_fields {
+        sqlx::query("update job_size set fields = 2 where job_id = ?")
+            .bind(key)
+            .execute(&mut *tx)
+            .await?;
     }
     // no number is given twice
     sqlx::query("update sqlite_sequence set seq = max(seq, ?) where name = 'job'")

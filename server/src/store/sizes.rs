@@ -1,5 +1,7 @@
 //! What jobs and owners keep, in bytes.
 
+use std::collections::HashMap;
+
 use sqlx::SqliteConnection;
 
 use super::{database::Store, error::Result};
@@ -12,7 +14,7 @@ pub struct OwnerSize {
     pub owner: String,
     /// Jobs that have ended.
     pub jobs: u64,
-    /// Bytes of these: results, events, members of sweeps.
+    /// Bytes of these: results, problems, events, members of sweeps.
     pub job_bytes: u64,
     /// Bytes of the meshes that they have uploaded.
     pub mesh_bytes: u64,
@@ -38,6 +40,10 @@ fn size((owner, jobs, job_bytes, mesh_bytes): Columns) -> OwnerSize {
     }
 }
 
+pub(super) const WAITING_BYTES: &str =
+    "select coalesce(sum(octet_length(body)), 0) from problem where input_hash in
+         (select input_hash from job indexed by job_queued_by_owner where owner = ? and status = 'queued')";
+
 impl Store {
     /// What an owner keeps.
     pub async fn size_of_owner(&self, owner: &str) -> Result<OwnerSize> {
@@ -52,6 +58,15 @@ impl Store {
             ..OwnerSize::default()
         };
         Ok(row.map_or_else(nothing, size))
+    }
+
+    /// Bytes of the problems of an owner's jobs that wait, each once.
+    pub async fn waiting_bytes_of(&self, owner: &str) -> Result<u64> {
+        let bytes: i64 = sqlx::query_scalar(WAITING_BYTES)
+            .bind(owner)
+            .fetch_one(&self.reader)
+            .await?;
+        Ok(u64::try_from(bytes).unwrap_or(0))
     }
 
     /// What every owner keeps, who keeps most first: at most `limit` of them.
@@ -86,13 +101,7 @@ pub(super) async fn lost_fields(connection: &mut SqliteConnection, key: i64) -> 
 pub(super) async fn count(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     sqlx::query(
         "insert into job_size (job_id, owner, bytes, finished_at, fields)
-         select id, owner,
-                (select coalesce(sum(length(body)), 0) from result_part where job_id = job.id)
-                + (select coalesce(sum(length(body)), 0) from event where job_id = job.id and type <> 'done')
-                + (select coalesce(sum(length(body)), 0) from sweep_member where job = job.id),
-                finished_at,
-                exists (select 1 from result_part where job_id = coalesce(job.result_job, job.id) and name = 'fields')
-         from job where id = ? and finished_at is not null",
+         select job_id, owner, bytes, finished_at, fields from job_kept where job_id = ?",
     )
     .bind(key)
     .execute(tx)
@@ -100,14 +109,88 @@ pub(super) async fn count(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     Ok(())
 }
 
+/// Counts what a job that was just deleted shared with others, if it was counted for that job, for the next of them. One that
+/// has not ended yet counts it when it ends.
+pub(super) async fn hand_on(tx: &mut SqliteConnection, deleted: &Job) -> Result<()> {
+    let of_the_first_answered = "update job_size set bytes = bytes +
+             (select coalesce(sum(length(body)), 0) from result_part where job_id = ?1)
+         where job_id = (select min(id) from job where result_job = ?1) and (?2 = ?1 or job_id > ?2)
+               and not exists (select 1 from job where id = ?1)";
+    sqlx::query(of_the_first_answered)
+        .bind(deleted.result_key)
+        .bind(deleted.key)
+        .execute(&mut *tx)
+        .await?;
+    let of_the_oldest = "update job_size set bytes = bytes +
+             coalesce((select octet_length(body) from problem where input_hash = ?1), 0)
+         where job_id = (select id from job where input_hash = ?1 order by created_at, id limit 1)
+               and not exists (select 1 from job where input_hash = ?1 and (created_at, id) < (?2, ?3))";
+    sqlx::query(of_the_oldest)
+        .bind(&deleted.input_hash)
+        .bind(deleted.created_at.micros())
+        .bind(deleted.key)
+        .execute(&mut *tx)
+        .await?;
+    let Some(sweep) = deleted.sweep else {
+        return Ok(());
+    };
+    let of_the_first = "update job_size set bytes = bytes +
+             coalesce((select octet_length(body) from sweep_definition join sweep on sweep.id = sweep where uuid = ?1), 0)
+         where job_id = (select id from job where sweep = ?1 order by created_at, id limit 1)
+               and not exists (select 1 from job where sweep = ?1 and (created_at, id) < (?2, ?3))";
+    sqlx::query(of_the_first)
+        .bind(sweep.0.to_string())
+        .bind(deleted.created_at.micros())
+        .bind(deleted.key)
+        .execute(tx)
+        .await?;
+    Ok(())
+}
+
+/// Deletes the fields under this key, unless a job with that result still has them.
+pub(super) async fn remove_unused_fields(tx: &mut SqliteConnection, result: i64) -> Result<()> {
+    let needed: bool = sqlx::query_scalar(
+        "select exists (select 1 from job_size where job_id = ?1 and fields = 1)
+             or exists (select 1 from job join job_size on job_id = id where result_job = ?1 and fields = 1)",
+    )
+    .bind(result)
+    .fetch_one(&mut *tx)
+    .await?;
+    if needed {
+        return Ok(());
+    }
+    for statement in [
+        "update job_size set bytes = bytes - (select coalesce(sum(length(body)), 0) from result_part
+                                              where job_id = ?1 and name = 'fields')
+         where job_id = coalesce((select id from job where id = ?1), (select min(id) from job where result_job = ?1))",
+        "delete from result_part where job_id = ? and name = 'fields'",
+        "delete from result_info where job_id = ? and name = 'fields'",
+    ] {
+        sqlx::query(statement)
+            .bind(result)
+            .execute(&mut *tx)
+            .await?;
+    }
+    Ok(())
+}
+
 /// Fills in what jobs keep.
 pub(super) async fn add_sizes(connection: &mut SqliteConnection, jobs: &mut [Job]) -> Result<()> {
-    for job in jobs.iter_mut().filter(|job| job.status.is_terminal()) {
-        let bytes: Option<i64> = sqlx::query_scalar("select bytes from job_size where job_id = ?")
-            .bind(job.key)
-            .fetch_optional(&mut *connection)
-            .await?;
-        job.stored_bytes = bytes.and_then(|bytes| u64::try_from(bytes).ok());
+    let ended = jobs.iter().filter(|job| job.status.is_terminal());
+    let keys: Vec<i64> = ended.map(|job| job.key).collect();
+    if keys.is_empty() {
+        return Ok(());
+    }
+    let sizes: Vec<(i64, i64)> = sqlx::query_as(
+        "select job_id, bytes from job_size where job_id in (select value from json_each(?))",
+    )
+    .bind(serde_json::to_string(&keys)?)
+    .fetch_all(connection)
+    .await?;
+    let sizes: HashMap<i64, i64> = sizes.into_iter().collect();
+    for job in jobs {
+        let bytes = sizes.get(&job.key);
+        job.stored_bytes = bytes.and_then(|bytes| u64::try_from(*bytes).ok());
     }
     Ok(())
 }

@@ -49,10 +49,12 @@ impl Store {
     pub async fn fields(&self, key: i64) -> Result<Option<(PartInfo, Fields)>> {
         let read = async {
             let mut connection = self.reader.acquire().await?;
-            let Some((info, content)) = intact::read_part(&mut connection, key, FIELDS).await?
-            else {
+            let stored = intact::stored_part(&mut connection, key, FIELDS).await?;
+            drop(connection); // to decode them takes long
+            let Some(stored) = stored else {
                 return Ok(None);
             };
+            let (info, content) = stored.decoded().await?;
             let fields = match content {
                 Content::Fields(fields) => *fields,
                 Content::Json(json) => serde_json::from_slice(&json)

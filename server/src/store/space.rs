@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use sqlx::SqliteConnection;
-
 use super::{
     compact,
-    database::{Store, with_advice},
+    database::{Rebuild, Store, with_advice},
+    delete::PAUSE,
     error::{Result, StoreError},
     folder::DATABASE,
+    pages::Pages,
 };
 
 /// Free pages that stay in the file, since new rows fill them soon: 4 MiB.
@@ -28,35 +28,30 @@ pub struct Space {
 impl Store {
     /// The space of the store.
     pub async fn space(&self) -> Result<Space> {
-        let mut connection = self.reader.acquire().await?;
-        let bytes = async |connection: &mut SqliteConnection, of: &'static str| -> Result<u64> {
-            let pages: i64 = sqlx::query_scalar(of).fetch_one(&mut *connection).await?;
-            let page: i64 = sqlx::query_scalar("pragma page_size")
-                .fetch_one(connection)
-                .await?;
-            Ok(u64::try_from(pages.saturating_mul(page)).unwrap_or(0))
-        };
-        let used = bytes(&mut connection, "pragma page_count").await?;
-        let unused = bytes(&mut connection, "pragma freelist_count").await?;
+        let pages = Pages::of(&self.reader).await?;
         let folder = self.folder.path();
         let log = std::fs::metadata(folder.join(super::folder::LOG)).map_or(0, |log| log.len());
         let free = rustix::fs::statvfs(folder).map_or(0, |free| free.f_bavail * free.f_frsize);
         Ok(Space {
-            used: used + log,
-            unused,
+            used: pages.bytes_of(pages.count) + log,
+            unused: pages.bytes_of(pages.free),
             free,
         })
     }
 
     /// Gives free pages back to the file system, some at a time, as long as there are many; how many were.
     pub async fn give_space_back(&self) -> Result<i64> {
+        if !compact::gives_back(&mut *self.reader.acquire().await?).await? {
+            return Ok(0); // of an earlier version
+        }
         let mut given = 0;
         loop {
-            let free = self.free_pages().await?;
-            if free <= KEPT_PAGES {
+            let before = Pages::of(&self.reader).await?;
+            if before.free <= KEPT_PAGES {
                 return Ok(given);
             }
-            self.identity.may_shrink_to(self.least_bytes().await?);
+            // the log may be copied into the file with the commit
+            self.identity.may_shrink_to(least_bytes(before));
             let give = async {
                 let mut tx = self.begin_control().await?;
                 // 1 MiB; it takes a step for each page
@@ -66,30 +61,21 @@ impl Store {
                 tx.commit().await
             };
             self.writing(give).await?;
-            let left = self.free_pages().await?;
-            if left >= free {
-                return Ok(given); // a database that cannot
+            let after = Pages::of(&self.reader).await?;
+            self.identity.may_shrink_to(after.bytes_of(after.count));
+            given += before.free - after.free;
+            if after.free >= before.free {
+                return Ok(given); // others have written meanwhile
             }
-            given += free - left;
-            tokio::task::yield_now().await;
+            tokio::time::sleep(PAUSE).await;
         }
     }
+}
 
-    /// As small as the database can become, in bytes: without free pages, and some that tell where others are.
-    async fn least_bytes(&self) -> Result<u64> {
-        let (pages, free, page): (i64, i64, i64) = sqlx::query_as(
-            "select page_count, freelist_count, page_size from pragma_page_count(), pragma_freelist_count(), pragma_page_size()",
-        )
-        .fetch_one(&self.reader)
-        .await?;
-        let of_places = pages / 500 + 2;
-        Ok(u64::try_from((pages - free - of_places) * page).unwrap_or(0))
-    }
-
-    async fn free_pages(&self) -> Result<i64> {
-        let free = sqlx::query_scalar("pragma freelist_count");
-        Ok(free.fetch_one(&self.reader).await?)
-    }
+/// As small as the database can become, in bytes: without free pages, and some that tell where others are.
+fn least_bytes(pages: Pages) -> u64 {
+    let of_places = pages.count / 500 + 2;
+    pages.bytes_of(pages.count - pages.free - of_places)
 }
 
 /// Rebuilds the database of a store that no service uses; its size before and after, in bytes.
@@ -98,7 +84,7 @@ pub async fn compact_folder(folder: &Path) -> Result<(u64, u64)> {
         let text = format!("there is no store in {}", folder.display());
         return Err(StoreError::Folder(text));
     }
-    let connected = Store::connect(folder).await;
+    let connected = Store::connect(folder, Rebuild::Never).await;
     let (store, _) = connected.map_err(|error| with_advice(error, folder))?;
     let before = store.space().await?.used;
     // only the one that writes may be open

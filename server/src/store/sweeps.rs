@@ -17,7 +17,7 @@ use super::{
 use crate::{
     address::link,
     caller::Owners,
-    job::{Reason, Status, SweepId},
+    job::{Job, Reason, Status, SweepId},
     sweep::{MemberCounts, MemberRow, Sweep},
     time::Time,
 };
@@ -243,7 +243,12 @@ impl Store {
                 let status = <&str>::from(row.status);
                 let (n, body) = (i64::from(row.number), serde_json::to_string(row)?);
                 let seq = last + 1;
-                let sum = sum(sweep, n, job, Some((status, seq, t.micros(), &body))).stored();
+                let ended = Ended {
+                    status,
+                    event: Some((seq, t.micros())),
+                    body: &body,
+                };
+                let sum = sum(sweep, n, job, Some(ended)).stored();
                 let done = sqlx::query(
                     "update sweep_member set status = ?, seq = ?, t = ?, body = ?, checksum = ?
                      where sweep = ? and number = ? and job = ? and seq is null",
@@ -374,14 +379,48 @@ async fn delete(change: &mut Change<'_>, key: i64) -> Result<bool> {
     Ok(true)
 }
 
-/// Deletes a sweep with the last of its jobs.
-pub(super) async fn remove_without_jobs(change: &mut Change<'_>, id: SweepId) -> Result<()> {
+/// Deletes a sweep with the last of its jobs; false if there are others.
+pub(super) async fn remove_without_jobs(change: &mut Change<'_>, id: SweepId) -> Result<bool> {
     let key: Option<i64> = sqlx::query_scalar("select id from sweep where uuid = ?")
         .bind(id.0.to_string())
         .fetch_optional(change.sql())
         .await?;
-    if let Some(key) = key {
-        delete(change, key).await?;
+    match key {
+        Some(key) => delete(change, key).await,
+        None => Ok(true),
+    }
+}
+
+/// Stores how the members ended that a job has not solved, before it is forgotten: those of one that failed have failed.
+pub(super) async fn keep_failures(tx: &mut SqliteConnection, deleted: &Job) -> Result<()> {
+    if deleted.status != Status::Failed {
+        return Ok(()); // without a job they count as canceled
+    }
+    let unsolved: Vec<(i64, i64)> = sqlx::query_as(
+        "select sweep, number from sweep_member where job = ? and seq is null and body is null",
+    )
+    .bind(deleted.key)
+    .fetch_all(&mut *tx)
+    .await?;
+    let status = <&str>::from(deleted.status);
+    for (sweep, n) in unsolved {
+        let row = MemberRow::unsolved(number(n), deleted.status, deleted.reason);
+        let body = serde_json::to_string(&row)?;
+        let ended = Ended {
+            status,
+            event: None,
+            body: &body,
+        };
+        sqlx::query(
+            "update sweep_member set status = ?, body = ?, checksum = ? where sweep = ? and number = ?",
+        )
+        .bind(status)
+        .bind(&body)
+        .bind(sum(sweep, n, deleted.key, Some(ended)).stored())
+        .bind(sweep)
+        .bind(n)
+        .execute(&mut *tx)
+        .await?;
     }
     Ok(())
 }
@@ -428,11 +467,28 @@ fn number(number: i64) -> usize {
     usize::try_from(number).unwrap_or_default()
 }
 
-fn sum(sweep: i64, number: i64, job: i64, ended: Option<(&str, i64, i64, &str)>) -> Checksum {
+/// What is stored of a member that has ended.
+struct Ended<'a> {
+    status: &'a str,
+    /// Number and time of its event, if it was solved.
+    event: Option<(i64, i64)>,
+    body: &'a str,
+}
+
+fn sum(sweep: i64, number: i64, job: i64, ended: Option<Ended<'_>>) -> Checksum {
     let sum = Checksum::new().int(sweep).int(number).int(job);
-    match ended {
-        Some((status, seq, t, body)) => sum.text(status).int(seq).int(t).text(body),
-        None => sum,
+    let Some(Ended {
+        status,
+        event,
+        body,
+    }) = ended
+    else {
+        return sum;
+    };
+    let sum = sum.text(status);
+    match event {
+        Some((seq, t)) => sum.int(seq).int(t).text(body),
+        None => sum.text(body),
     }
 }
 
@@ -444,13 +500,13 @@ fn checked(row: &SqliteRow) -> Result<(i64, i64, Option<&str>)> {
         row.try_get("job")?,
     );
     let body: Option<&str> = row.try_get("body")?;
+    let event: (Option<i64>, Option<i64>) = (row.try_get("seq")?, row.try_get("t")?);
     let ended = match body {
-        Some(body) => Some((
-            row.try_get("status")?,
-            row.try_get("seq")?,
-            row.try_get("t")?,
+        Some(body) => Some(Ended {
+            status: row.try_get("status")?,
+            event: event.0.zip(event.1),
             body,
-        )),
+        }),
         None => None,
     };
     let what = || record(sweep, &format!("member {number}"));
@@ -569,8 +625,9 @@ async fn described(connection: &mut SqliteConnection, row: &SqliteRow) -> Result
     };
     if last < i64::from(members.total) {
         let unsolved: Vec<(Option<String>, i64)> = sqlx::query_as(
-            "select job.status, count(*) from sweep_member left join job on job.id = sweep_member.job
-             where sweep_member.sweep = ? and seq is null group by job.status",
+            "select coalesce(job.status, sweep_member.status), count(*)
+             from sweep_member left join job on job.id = sweep_member.job
+             where sweep_member.sweep = ? and seq is null group by 1",
         )
         .bind(key)
         .fetch_all(&mut *connection)

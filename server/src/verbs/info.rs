@@ -91,7 +91,7 @@ pub struct Me {
     pub queued: Share,
     /// Jobs that run.
     pub running: Share,
-    /// Bytes of jobs that have ended, and of meshes.
+    /// Bytes of jobs that have ended, of the problems of those that wait, and of meshes.
     pub stored_bytes: Kept,
     /// Jobs submitted; absent: as many as they like.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -144,7 +144,7 @@ pub struct Share {
 
 /// Who the caller is.
 pub async fn me(service: &Service, caller: &Caller) -> Result<Me, ApiError> {
-    let size = service.store.size_of_owner(caller.owner()).await?;
+    let stored = service.bytes_of(caller.owner()).await?;
     let rate = |rates: &Rates| {
         Some(Rate {
             per_minute: rates.per_minute?.into(),
@@ -167,7 +167,7 @@ pub async fn me(service: &Service, caller: &Caller) -> Result<Me, ApiError> {
             limit: running_limit.min(workers).into(),
         },
         stored_bytes: Kept {
-            used: size.bytes(),
+            used: stored,
             limit: service.max_bytes_of_owner(),
         },
         submissions: service.rates().and_then(rate),

@@ -109,12 +109,18 @@ impl Service {
         Some(&self.rates).filter(|rates| rates.per_minute.is_some() && self.is_shared())
     }
 
+    /// What an owner keeps, and the problems of their jobs that wait.
+    pub(super) async fn bytes_of(&self, owner: &str) -> Result<u64, ApiError> {
+        let kept = self.store.size_of_owner(owner).await?.bytes();
+        Ok(kept.saturating_add(self.store.waiting_bytes_of(owner).await?))
+    }
+
     /// An error if the owner keeps as much as they may.
     pub(super) async fn may_keep_more(&self, owner: &str) -> Result<(), ApiError> {
         let Some(limit) = self.max_bytes_of_owner() else {
             return Ok(());
         };
-        match self.store.size_of_owner(owner).await?.bytes() {
+        match self.bytes_of(owner).await? {
             used if used >= limit => Err(ApiError::QuotaExceeded(Quota {
                 owner: owner.to_owned(),
                 of: QuotaOf::StoredBytes,

@@ -90,6 +90,35 @@ async fn a_restore_that_was_interrupted_is_not_opened_but_done_again() {
 }
 
 #[tokio::test]
+async fn a_store_is_put_aside_as_a_whole_also_if_that_is_interrupted() {
+    let (_top, data, backup, _) = folders();
+    Store::open(&data).await.unwrap().close().await;
+    back_up(&data, &backup, true).await.unwrap();
+    // killed when the database was moved, and nothing else
+    let partial = data.join("replaced-1.partial");
+    fs::create_dir(&partial).unwrap();
+    fs::rename(data.join("signorini.db"), partial.join("signorini.db")).unwrap();
+    fs::write(data.join("signorini.db.restoring"), "").unwrap();
+    fs::write(data.join("signorini.db-wal"), "its log").unwrap();
+    let restored = restore(&backup, &data, true).await.unwrap();
+    let aside = data.join("replaced-1");
+    assert_eq!(restored.replaced.as_deref(), Some(&*aside));
+    assert!(aside.join("signorini.db").exists() && !partial.exists());
+    assert_eq!(
+        fs::read(aside.join("signorini.db-wal")).unwrap(),
+        b"its log"
+    );
+    Store::open(&data).await.unwrap().close().await;
+    // the next one gets a folder of its own
+    let again = restore(&backup, &data, true)
+        .await
+        .unwrap()
+        .replaced
+        .unwrap();
+    assert!(again != aside && again.join("signorini.db").exists());
+}
+
+#[tokio::test]
 async fn nobody_gets_into_a_saved_store_because_tokens_are_damaged() {
     let harms: [(&str, Option<&'static str>, usize); 4] = [
         ("nothing", None, 2),

@@ -57,6 +57,7 @@ impl parts::Part {
             name: "fields".into(),
             encoding: encoding::Encoding::Plain,
             info: encoding::info_of_json(&body),
+            stored_digest: encoding::digest(&body),
             body,
         }
     }
@@ -187,4 +188,50 @@ async fn a_job_that_another_answers_keeps_no_piece_of_its_interrupted_attempt() 
         .await
         .unwrap();
     assert_eq!(left, 0);
+}
+
+#[tokio::test]
+async fn what_answers_a_job_is_checked_before_and_by_what_is_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for owner in ["ada", "bob"] {
+        let job = NewJob {
+            cache: Cache::Use,
+            ..new("1")
+        };
+        let submission = by(owner, vec![job], None);
+        store.submit(submission, false).await.unwrap();
+    }
+    let job = store.claim_next().await.unwrap().0.unwrap().job;
+    // intact as it is stored, but not what it should decode to, which only whoever is served it needs to know
+    let body = vec![7; parts::PIECE_BYTES + 1];
+    let fields = parts::Part {
+        encoding: encoding::Encoding::Deflated,
+        ..parts::Part::plain(body)
+    };
+    let parts = Parts(vec![parts::Part::new("summary".into(), b"{}"), fields]);
+    let ending = Ending {
+        status: Status::Succeeded,
+        reason: None,
+        failure: None,
+        result: ResultAvailable::Final,
+        warnings: vec![],
+    };
+    let last = FinalBatch::default();
+    let ended = store.finish(job.key, 1, &ending, last, Some(&parts));
+    ended.await.unwrap().unwrap();
+    let is_known = || store.intact.contains(job.key, intact::WHOLE);
+    assert!(!is_known());
+    // the other owner's turn is next
+    store.check_result_for_next().await;
+    assert!(is_known());
+    assert!(store.json_of(job.key, "fields").await.is_err());
+    let missing = "delete from result_part where name = 'fields' and piece = 1";
+    sqlx::query(missing).execute(&store.writer).await.unwrap();
+    let mut connection = store.reader.acquire().await.unwrap();
+    let checked = intact::check_stored(&mut connection, job.key).await;
+    assert!(
+        matches!(checked, Err(StoreError::Damaged(_))),
+        "{checked:?}"
+    );
 }

@@ -67,3 +67,29 @@ async fn lists_of_one_owner_use_indexes() {
         "{steps:?}"
     );
 }
+
+/// What is done every few seconds reads as many rows as it changes.
+#[tokio::test]
+async fn the_queries_of_retention_use_indexes() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for question in [
+        retention::OLD_JOBS,
+        retention::OLD_FIELDS,
+        retention::OLDEST_OF_OWNER,
+        forget::BEYOND,
+        keys::FORGET,
+        sizes::WAITING_BYTES,
+    ] {
+        let steps = plan(&store, question).await;
+        let scans = steps
+            .iter()
+            .any(|step| step.starts_with("SCAN") && !step.contains("INDEX"));
+        assert!(!scans && !sorts(&steps), "{question}: {steps:?}");
+    }
+    let steps = plan(&store, retention::KEPT).await;
+    assert!(
+        steps.iter().any(|step| step.contains("job_pinned")),
+        "{steps:?}"
+    );
+}

@@ -8,9 +8,14 @@ use crate::{job::ResultAvailable, store::parts::Part, time::Time};
 
 /// Solves a job of this owner; its result has fields that cannot be compressed.
 async fn solved(store: &Store, owner: &str, input: &str, bytes: usize) -> Job {
+    solve(store, owner, new(input), bytes).await
+}
+
+/// The same with a job that may be answered by another.
+async fn solve(store: &Store, owner: &str, job: NewJob, bytes: usize) -> Job {
     let job = NewJob {
         cache: Cache::Use,
-        ..new(input)
+        ..job
     };
     store
         .submit(by(owner, vec![job], None), false)
@@ -63,6 +68,28 @@ async fn left(store: &Store) -> Vec<i64> {
     keys
 }
 
+/// What is counted is what there is.
+async fn are_right(store: &Store) -> bool {
+    let wrong = "select (select count(*) from job_kept left join job_size using (job_id)
+                         where job_size.bytes is not job_kept.bytes)
+                        + (select count(*) from job_size where job_id not in (select job_id from job_kept))";
+    let wrong: i64 = sqlx::query_scalar(wrong)
+        .fetch_one(&store.reader)
+        .await
+        .unwrap();
+    wrong == 0
+}
+
+async fn pin(store: &Store, key: i64) {
+    let edit = Edit {
+        pinned: Some(true),
+        ..Edit::default()
+    };
+    let all = jobs(store).await;
+    let job = all.iter().find(|job| job.key == key).unwrap();
+    store.edit(Owners::All, job.id, &edit, None).await.unwrap();
+}
+
 #[tokio::test]
 async fn what_jobs_and_meshes_take_is_counted_for_their_owners() {
     let folder = tempfile::tempdir().unwrap();
@@ -103,6 +130,48 @@ async fn what_jobs_and_meshes_take_is_counted_for_their_owners() {
     assert_eq!(of("bob").await.mesh_bytes, 0);
 }
 
+/// Whoever deletes the job that was solved keeps nothing less as long as others have its result.
+#[tokio::test]
+async fn what_a_deleted_job_shared_with_others_is_counted_for_the_next_of_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let job = || NewJob {
+        problem: format!("\"{}\"", "x".repeat(5000)),
+        ..new("1")
+    };
+    for owner in ["ada", "bob", "eve"] {
+        solve(&store, owner, job(), 10_000).await;
+    }
+    let bytes = async |owner| store.size_of_owner(owner).await.unwrap().bytes();
+    let all = bytes("ada").await;
+    assert!(all > 15_000 && bytes("bob").await < 3000);
+    assert!(are_right(&store).await);
+    store.delete(Owners::All, 2).await.unwrap();
+    assert!(are_right(&store).await && bytes("eve").await < 3000);
+    store.delete(Owners::All, 1).await.unwrap();
+    assert!(are_right(&store).await && bytes("eve").await > 15_000);
+    solve(&store, "bob", job(), 10_000).await;
+    assert!(bytes("bob").await < 3000);
+    store.delete(Owners::All, 3).await.unwrap();
+    assert!(are_right(&store).await && bytes("bob").await > 15_000);
+    store.delete_fields(Owners::All, 4).await.unwrap();
+    assert!(are_right(&store).await && bytes("bob").await < 8000);
+}
+
+#[tokio::test]
+async fn problems_that_wait_are_counted_once_for_each_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let job = |input: &str| NewJob {
+        problem: "x".repeat(1000),
+        ..new(input)
+    };
+    let jobs = vec![job("1"), job("1"), job("2")];
+    store.submit(by("ada", jobs, None), false).await.unwrap();
+    let waiting = async |owner| store.waiting_bytes_of(owner).await.unwrap();
+    assert_eq!((waiting("ada").await, waiting("bob").await), (2000, 0));
+}
+
 #[tokio::test]
 async fn fields_are_deleted_by_themselves_and_with_the_last_job_that_has_them() {
     let folder = tempfile::tempdir().unwrap();
@@ -128,10 +197,34 @@ async fn fields_are_deleted_by_themselves_and_with_the_last_job_that_has_them() 
     // what has lost its fields answers nobody
     let third = solved(&store, "ada", "1", 10_000).await;
     assert_eq!((third.cached_from, third.result_key), (None, third.key));
+    let ada = store.size_of_owner("ada").await.unwrap();
     store.close().await;
     drop(store);
-    let report = crate::store::inspect(folder.path(), None).await.unwrap();
+    let saved = tempfile::tempdir().unwrap();
+    let report = crate::store::inspect(folder.path(), Some(saved.path()));
+    let report = report.await.unwrap();
     assert!(report.findings.is_empty(), "{report:?}");
+    // nor does it in a store that was saved
+    let store = Store::open(saved.path()).await.unwrap();
+    for (key, lost) in [(1, true), (2, true), (3, false)] {
+        assert_eq!(store.lost_fields(key).await.unwrap(), lost, "job {key}");
+    }
+    assert!(are_right(&store).await);
+    assert_eq!(store.size_of_owner("ada").await.unwrap(), ada);
+}
+
+#[tokio::test]
+async fn fields_go_with_the_last_job_that_has_them_also_if_others_have_the_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let first = solved(&store, "ada", "1", 10_000).await;
+    let second = solved(&store, "bob", "1", 10_000).await;
+    store.delete_fields(Owners::All, first.key).await.unwrap();
+    assert!(store.json_of(first.key, "fields").await.unwrap().is_some());
+    store.delete(Owners::All, second.key).await.unwrap();
+    assert!(store.json_of(first.key, "fields").await.unwrap().is_none());
+    assert!(store.json_of(first.key, "summary").await.unwrap().is_some());
+    assert!(are_right(&store).await);
 }
 
 #[tokio::test]
@@ -147,44 +240,30 @@ async fn the_oldest_are_removed_when_they_are_old_or_too_many_and_pinned_ones_ne
     ] {
         solved(&store, owner, input, 10_000).await;
     }
-    let edit = Edit {
-        pinned: Some(true),
-        ..Edit::default()
-    };
-    let first = jobs(&store).await.pop().unwrap();
-    assert_eq!(first.key, 1);
-    store
-        .edit(Owners::All, first.id, &edit, None)
-        .await
-        .unwrap();
+    pin(&store, 1).await;
     let retire = async |retention: Retention, now| store.retire(&retention, now).await.unwrap();
     let nothing = Retired::default();
     let three = Retention {
         jobs: Some(3),
         ..Retention::default()
     };
+    assert_eq!(store.foreseen(&three, later()).await.unwrap().0, 1);
     assert_eq!(retire(three, Time::now()).await, nothing, "all are young");
     let month = Retention {
         age_s: Some(30.0 * 86_400.0),
         ..Retention::default()
     };
     assert_eq!(retire(month, later()).await, nothing);
-    let of_ada = Retention {
-        jobs_of_owner: Some(2),
+    let of_each = Retention {
+        jobs_of_owner: Some(1),
         ..Retention::default()
     };
-    assert_eq!(retire(of_ada, later()).await.jobs, 1);
+    assert_eq!(retire(of_each, later()).await.jobs, 2);
     assert_eq!(
         left(&store).await,
-        [1, 2, 4, 5],
-        "her oldest that is not pinned"
+        [1, 4, 5],
+        "but for the oldest that are not pinned"
     );
-    let bytes = Retention {
-        bytes: Some(35_000),
-        ..Retention::default()
-    };
-    assert_eq!(retire(bytes, later()).await.jobs, 1);
-    assert_eq!(left(&store).await, [1, 4, 5]);
     let fields = Retention {
         fields_age_s: Some(60.0),
         ..Retention::default()
@@ -201,6 +280,118 @@ async fn the_oldest_are_removed_when_they_are_old_or_too_many_and_pinned_ones_ne
     assert_eq!(retire(hour, later()).await.jobs, 2);
     assert_eq!(left(&store).await, [1]);
     assert_eq!(store.size_of_owner("bob").await.unwrap().bytes(), 0);
+}
+
+#[tokio::test]
+async fn pinned_jobs_do_not_count_and_one_owner_does_not_drive_out_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for (owner, input) in [("ada", "1"), ("bob", "2"), ("bob", "3")] {
+        solved(&store, owner, input, 10_000).await;
+    }
+    for input in 4..9 {
+        solved(&store, "eve", &input.to_string(), 10_000).await;
+    }
+    for key in [2, 3] {
+        pin(&store, key).await;
+    }
+    let retire = async |retention: Retention| store.retire(&retention, later()).await.unwrap();
+    let bytes = Retention {
+        bytes: Some(40_000),
+        ..Retention::default()
+    };
+    assert_eq!(retire(bytes).await.jobs, 3);
+    assert_eq!(left(&store).await, [1, 2, 3, 7, 8]);
+    let jobs = Retention {
+        jobs: Some(1),
+        ..Retention::default()
+    };
+    assert_eq!(retire(jobs).await.jobs, 2);
+    assert_eq!(left(&store).await, [1, 2, 3]);
+}
+
+#[tokio::test]
+async fn nothing_is_removed_because_of_sums_that_a_disk_has_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for input in 0..3 {
+        solved(&store, "ada", &input.to_string(), 100).await;
+    }
+    let change = async |statement: &'static str| {
+        sqlx::query(statement).execute(&store.writer).await.unwrap();
+    };
+    let most = Retention {
+        bytes: Some(100_000),
+        ..Retention::default()
+    };
+    change("update owner_size set job_bytes = job_bytes + 1000000").await;
+    let retired = store.retire(&most, later()).await;
+    assert!(
+        matches!(retired, Err(StoreError::Damaged(_))),
+        "{retired:?}"
+    );
+    change("update owner_size set job_bytes = job_bytes - 1000000").await;
+    // nor is a job that ended later than an index says
+    let begin = Time::from_micros(1);
+    let kept = store.try_to_discard(bulk::Discard::OldJobs(begin), &[1, 2]);
+    let kept = kept.await.unwrap();
+    assert_eq!((kept.done, kept.left), (0, vec![1, 2]));
+    assert_eq!(left(&store).await, [1, 2, 3]);
+}
+
+#[tokio::test]
+async fn a_damaged_job_stays_and_others_are_removed() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for input in 0..4 {
+        solved(&store, "ada", &input.to_string(), 100).await;
+    }
+    store.damage_job(2).await;
+    let all = Retention {
+        age_s: Some(1.0),
+        ..Retention::default()
+    };
+    assert_eq!(store.retire(&all, later()).await.unwrap().jobs, 3);
+    let again = store.retire(&all, later()).await.unwrap();
+    assert_eq!(again, Retired::default());
+    let everything = Filter::default();
+    let left = store.count(Owners::All, &everything, None).await.unwrap();
+    assert_eq!(left[0].1, 1);
+}
+
+#[tokio::test]
+async fn a_request_key_is_forgotten_with_the_last_of_its_jobs() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for (key, inputs) in [("a", vec!["1", "2"]), ("b", vec!["3"])] {
+        let jobs = inputs.into_iter().map(new).collect();
+        let submission = by("ada", jobs, Some(key));
+        store.submit(submission, false).await.unwrap();
+    }
+    for job in jobs(&store).await {
+        store.request_cancel(job.key).await.unwrap();
+    }
+    let known = async || {
+        let keys = sqlx::query_scalar("select key from request_key order by key");
+        let keys: Vec<String> = keys.fetch_all(&store.reader).await.unwrap();
+        keys.concat()
+    };
+    store.delete(Owners::All, 1).await.unwrap();
+    store.delete(Owners::All, 3).await.unwrap();
+    store.forget_beyond(1).await.unwrap();
+    assert_eq!(
+        known().await,
+        "ab",
+        "one of its jobs is there, and one is remembered"
+    );
+    store.delete(Owners::All, 2).await.unwrap();
+    store.forget_beyond(1).await.unwrap();
+    assert_eq!(known().await, "a");
+    store
+        .forget_deleted(later().after_s(30.0 * 86_400.0))
+        .await
+        .unwrap();
+    assert_eq!(known().await, "");
 }
 
 #[tokio::test]
@@ -226,9 +417,9 @@ async fn the_space_of_what_is_removed_is_given_back_to_the_file_system() {
     assert!(cut < 6 << 20, "{cut} bytes");
     store.identity.check().unwrap();
     solved(&store, "ada", "more", 10_000).await;
-    // unless it becomes smaller than that can make it
+    // unless it becomes smaller than that has made it
     let file = std::fs::File::options().write(true).open(&path).unwrap();
-    file.set_len(8192).unwrap();
+    file.set_len(cut / 2).unwrap();
     assert!(store.identity.check().is_err());
 }
 

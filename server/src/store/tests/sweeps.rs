@@ -100,6 +100,65 @@ async fn a_row_is_stored_once_and_by_the_current_attempt_only() {
 }
 
 #[tokio::test]
+async fn members_of_a_failed_job_have_failed_also_without_it_and_a_sweep_goes_with_its_last_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let (sweep, job) = submitted(&store).await;
+    let solved = rows(&[2]);
+    let stored = store.record_members(job.key, job.attempt, &solved);
+    stored.await.unwrap();
+    let failed = Ending::failed(Reason::WorkerLost, "so");
+    let fail = async |job: &Job| {
+        let last = FinalBatch::default();
+        let ended = store.finish(job.key, job.attempt, &failed, last, None);
+        ended.await.unwrap().unwrap();
+    };
+    fail(&job).await;
+    let other = store.claim_next().await.unwrap().0.unwrap().job;
+    fail(&other).await;
+    let members = async || store.members(sweep.key, 0, 10).await.unwrap();
+    let counts = async || {
+        let read = store.sweep(Owners::All, sweep.id).await.unwrap();
+        read.unwrap().members
+    };
+    let (before, counted) = (members().await, counts().await);
+    assert_eq!((counted.succeeded, counted.failed), (1, 3));
+    let definition = async |key| {
+        let all = store.job(Owners::All, key).await.unwrap().unwrap();
+        all.stored_bytes.unwrap()
+    };
+    let small = definition(other.id).await;
+    assert_eq!(
+        store.delete(Owners::All, job.key).await.unwrap(),
+        Deletion::Deleted
+    );
+    assert_eq!(
+        definition(other.id).await,
+        small + 2,
+        "the definition of the sweep"
+    );
+    assert_eq!((members().await, counts().await), (before, counted));
+    let events = store
+        .member_events(sweep.key, 0, 10)
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(events.events.len(), 1);
+    store.delete(Owners::All, other.key).await.unwrap();
+    assert!(store.sweep(Owners::All, sweep.id).await.unwrap().is_none());
+    assert!(
+        store
+            .sweep_was_deleted(Owners::All, sweep.id)
+            .await
+            .unwrap()
+    );
+    assert!(store.delete_sweep(sweep.key).await.unwrap(), "it is gone");
+    store.close().await;
+    let report = inspect(folder.path(), None).await.unwrap();
+    assert!(report.findings.is_empty(), "{report:?}");
+}
+
+#[tokio::test]
 async fn a_row_that_a_disk_has_changed_is_not_served() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();

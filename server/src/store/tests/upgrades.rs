@@ -98,6 +98,28 @@ async fn a_store_from_before_the_job_api_is_upgraded_with_its_content() {
     assert_eq!(store.json_of(key, "fields").await.unwrap(), None);
 }
 
+/// Everything was kept until now.
+#[tokio::test]
+async fn nothing_of_an_earlier_version_is_removed_before_a_day_has_passed() {
+    let folder = tempfile::tempdir().unwrap();
+    let migrations = ["0001_jobs.sql", "0002_meshes.sql"];
+    older_store(folder.path(), &migrations, &BEFORE_THE_JOB_API).await;
+    Store::open(folder.path()).await.unwrap().close().await;
+    // a second start makes it neither shorter nor longer
+    let store = Store::open(folder.path()).await.unwrap();
+    let retention = Retention {
+        age_s: Some(90.0 * 86_400.0),
+        ..Retention::default()
+    };
+    let in_hours = |hours: f64| crate::time::Time::now().after_s(3600.0 * hours);
+    let foreseen = store.foreseen(&retention, in_hours(24.0)).await.unwrap();
+    assert!(foreseen.0 == 1 && foreseen.1 > 0, "{foreseen:?}");
+    let early = store.retire(&retention, in_hours(23.0)).await.unwrap();
+    assert_eq!(early, Retired::default());
+    let late = store.retire(&retention, in_hours(24.1)).await.unwrap();
+    assert_eq!(late.jobs, 1);
+}
+
 #[tokio::test]
 async fn a_store_from_before_owners_keeps_its_coalesced_and_its_deleted_jobs() {
     let folder = tempfile::tempdir().unwrap();

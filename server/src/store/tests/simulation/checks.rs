@@ -136,6 +136,8 @@ impl World {
                     name: ended.name.clone(),
                     priority: ended.priority,
                     version: ended.version,
+                    // it may be handed what a deleted one shared with it
+                    stored_bytes: ended.stored_bytes,
                     ..job.clone()
                 };
                 assert_eq!(as_it_was, *ended);
@@ -256,6 +258,10 @@ impl World {
             "select count(*) from problem where not exists
                  (select 1 from job where job.input_hash = problem.input_hash)",
             "select count(*) from job where checksum is null",
+            "select count(*) from job_size where job_id not in (select job_id from job_kept)",
+            "select count(*) from job_kept left join job_size using (job_id) where job_size.bytes is not job_kept.bytes",
+            "select count(*) from owner_size where (jobs, job_bytes) <>
+                 (select count(*), coalesce(sum(bytes), 0) from job_size where job_size.owner = owner_size.owner)",
             "select count(*) from pragma_foreign_key_check",
         ] {
             let count: i64 = sqlx::query_scalar(orphans).fetch_one(&self.store.reader).await.unwrap();

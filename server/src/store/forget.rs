@@ -1,0 +1,74 @@
+//! The ids of deleted jobs and sweeps are remembered for a while, and with them the keys of the requests that submitted them.
+
+use super::{database::Store, delete::PAUSE, error::Result, keys, sweeps};
+use crate::time::Time;
+
+/// How long the id of a deleted job is answered with *deleted*; then it is unknown.
+const REMEMBERED_S: f64 = 7.0 * 86_400.0;
+
+/// How many of them are remembered, some 160 bytes each: what is removed as fast as it is solved does not fill the disk.
+pub(super) const MOST_REMEMBERED: u32 = 100_000;
+/// Ids that are forgotten in one transaction, with their request keys: some milliseconds of the single writer.
+const FORGOTTEN_AT_ONCE: u32 = 250;
+
+impl Store {
+    /// Removes the ids of jobs and sweeps that were deleted long ago.
+    pub async fn forget_deleted(&self, now: Time) -> Result<()> {
+        let before = now.after_s(-REMEMBERED_S).micros();
+        self.forget_up_to(before - 1).await?;
+        let forget = async {
+            let some = "select exists (select 1 from deleted_sweep where deleted_at < ?)";
+            let some = sqlx::query_scalar(some).bind(before);
+            if some.fetch_one(&self.reader).await? {
+                let mut tx = self.begin().await?;
+                sweeps::forget_deleted(&mut tx, before).await?;
+                tx.commit().await?;
+            }
+            Ok(())
+        };
+        self.writing(forget).await
+    }
+
+    /// Removes the oldest ids of deleted jobs beyond so many.
+    pub(super) async fn forget_beyond(&self, most: u32) -> Result<()> {
+        let newest: Option<i64> = sqlx::query_scalar(BEYOND)
+            .bind(most)
+            .fetch_optional(&self.reader)
+            .await?;
+        match newest {
+            Some(newest) => self.forget_up_to(newest).await,
+            None => Ok(()),
+        }
+    }
+
+    /// Removes the ids of jobs that were deleted until then, some at a time.
+    async fn forget_up_to(&self, last: i64) -> Result<()> {
+        let some = "select exists (select 1 from deleted_job where deleted_at <= ?)";
+        while sqlx::query_scalar(some)
+            .bind(last)
+            .fetch_one(&self.reader)
+            .await?
+        {
+            let forget = async {
+                let mut tx = self.begin_control().await?;
+                let gone: Vec<i64> = sqlx::query_scalar(
+                    "delete from deleted_job where uuid in (select uuid from deleted_job indexed by deleted_job_by_time
+                     where deleted_at <= ? order by deleted_at limit ?) returning id",
+                )
+                .bind(last)
+                .bind(FORGOTTEN_AT_ONCE)
+                .fetch_all(&mut *tx)
+                .await?;
+                for job in gone {
+                    keys::forget(&mut tx, job).await?;
+                }
+                tx.commit().await
+            };
+            self.writing(forget).await?;
+            tokio::time::sleep(PAUSE).await;
+        }
+        Ok(())
+    }
+}
+
+pub(super) const BEYOND: &str = "select deleted_at from deleted_job indexed by deleted_job_by_time order by deleted_at desc limit 1 offset ?";
