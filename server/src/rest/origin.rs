@@ -129,7 +129,7 @@ fn check_origin(
 }
 
 /// Headers that pages of the allowed origins may send.
-const SENT: [&str; 12] = [
+const SENT: [&str; 13] = [
     "accept",
     "authorization",
     "content-encoding",
@@ -137,6 +137,7 @@ const SENT: [&str; 12] = [
     "idempotency-key",
     "if-match",
     "if-none-match",
+    "if-range",
     "last-event-id",
     "prefer",
     "range",

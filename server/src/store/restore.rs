@@ -181,8 +181,8 @@ fn begun(data: &Path) -> io::Result<Option<PathBuf>> {
         let ours = name
             .to_str()
             .is_some_and(|name| name.starts_with(ASIDE) && name.ends_with(PARTIAL));
-        let twice = |name: &&str| data.join(name).exists() && entry.path().join(name).exists();
-        if ours && !FILES.iter().any(|name| twice(&name)) {
+        let twice = |name: &str| data.join(name).exists() && entry.path().join(name).exists();
+        if ours && !FILES.iter().any(|name| twice(name)) {
             return Ok(Some(entry.path()));
         }
     }
