@@ -162,7 +162,8 @@ def test_a_token_says_who_one_is(tmp_path_factory: pytest.TempPathFactory, monke
     data = tmp_path_factory.mktemp("tokens") / "data"
     def token(name: str, scope: str) -> str:
         command = [BINARY, "token", "create", "--data", data, "--name", name, "--owner", name, "--scope", scope]
-        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+        made = subprocess.run(list(map(str, command)), check=True, capture_output=True, text=True)
+        return made.stdout.strip()
 
     token("root", "admin")
     secret = token("ada", "read")

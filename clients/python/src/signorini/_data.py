@@ -15,6 +15,7 @@ from .errors import Violation
 
 if TYPE_CHECKING:
     import pandas
+    import pyarrow
     import pyvista
     from matplotlib.figure import Figure
 
@@ -183,6 +184,12 @@ class Columns:
         import pandas
 
         return pandas.DataFrame(self.columns())
+
+    def to_arrow(self) -> pyarrow.Table:
+        """As a table of Arrow (`pip install signorini[arrow]`), for Parquet, polars, DuckDB."""
+        import pyarrow
+
+        return pyarrow.table(self.columns())
 
     def __len__(self) -> int:
         return len(next(iter(self.columns().values())))

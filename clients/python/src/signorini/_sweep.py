@@ -11,6 +11,7 @@ from ._progress import sweep_line
 
 if TYPE_CHECKING:
     import pandas
+    import pyarrow
 
 
 class SweepView:
@@ -99,6 +100,12 @@ class SweepTable:
         import pandas
 
         return pandas.DataFrame(self.columns).set_index("number")
+
+    def to_arrow(self) -> pyarrow.Table:
+        """As a table of Arrow (`pip install signorini[arrow]`)."""
+        import pyarrow
+
+        return pyarrow.table(self.columns)
 
 
 def short_names(found: list[str]) -> dict[str, str]:

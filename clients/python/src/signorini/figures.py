@@ -288,6 +288,8 @@ def _limits(s: Array, values: Array, cut: float = CUT) -> tuple[float, float]:
     low, high = _quantile(values, lengths, 0.001), _quantile(values, lengths, 0.999)
     below = min(most, -float(values.min())) if low < 0 else 0.0
     above = min(most, float(values.max())) if high > 0 else 0.0
+    if not (below or above):
+        return -1.0, 1.0
     return -1.08 * below - 0.02 * above, 1.08 * above + 0.02 * below
 
 

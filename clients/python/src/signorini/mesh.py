@@ -6,6 +6,7 @@ and 3 nodes: midsides are put in, centres left out.
 
 from __future__ import annotations
 
+import collections
 import os
 import pathlib
 from collections.abc import Iterable
@@ -63,7 +64,10 @@ def from_meshio(mesh: Any, refine: Refine = 0) -> MeshInput:
         if kind in FACES:
             groups.setdefault(name, []).extend(numbers[block][member] for member in members)
         elif kind in EDGES:
-            boundaries.setdefault(name, []).extend(builder.side(*numbers[block][member]) for member in members)
+            sides = [builder.side(*numbers[block][member]) for member in members]
+            # a line inside of the body is no boundary; the service leaves it out of a file, too
+            if outer := [side for side in sides if builder.is_outer(side)]:
+                boundaries.setdefault(name, []).extend(outer)
     sets: dict[str, Any] = {name: [builder.node(int(n)) for n in np.ravel(found)] for name, found in mesh.point_sets.items()}
     inline = InlineMesh(
         nodes=builder.nodes,
@@ -84,6 +88,7 @@ class _Builder:
         self.elements: list[list[int]] = []
         self._numbers: dict[int, int] = {}
         self._midsides: dict[tuple[int, int], int] = {}
+        self._elements_at: collections.Counter[int] = collections.Counter()
 
     def node(self, point: int) -> int:
         """The new number of a point of the mesh."""
@@ -100,6 +105,7 @@ class _Builder:
         if np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) < 0:
             around = around[:1] + around[:0:-1]
             middle = middle[::-1]
+        ends = [self.node(point) for point in around]
         sides = list(zip(around, around[1:] + around[:1], strict=True))
         for number, (start, end) in enumerate(sides):
             key = (min(start, end), max(start, end))
@@ -109,8 +115,9 @@ class _Builder:
                 else:
                     self._midsides[key] = len(self.nodes)
                     self.nodes.append(((self.points[start] + self.points[end]) / 2).tolist())
-        ends = [self.node(point) for point in around]
-        self.elements.append(ends + [self._midsides[min(side), max(side)] for side in sides])
+        midsides = [self._midsides[min(side), max(side)] for side in sides]
+        self._elements_at.update(midsides)
+        self.elements.append(ends + midsides)
         return len(self.elements) - 1
 
     def side(self, start: int, end: int) -> list[int]:
@@ -119,6 +126,10 @@ class _Builder:
         if key not in self._midsides:
             raise ValueError(f"the line from point {start} to point {end} is no side of an element")
         return [self.node(start), self.node(end), self._midsides[key]]
+
+    def is_outer(self, side: list[int]) -> bool:
+        """Whether there is an element on one side only."""
+        return self._elements_at[side[2]] == 1
 
 
 def _named_cells(mesh: Any) -> Iterable[tuple[str, int, Any]]:
