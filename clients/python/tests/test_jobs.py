@@ -6,6 +6,8 @@ import datetime
 import io
 import signal
 import subprocess
+import sys
+import types
 import uuid
 
 import pytest
@@ -192,7 +194,7 @@ class Terminal(io.StringIO):
 
 def test_one_line_is_drawn_in_place_in_a_terminal() -> None:
     out = Terminal()
-    waiting = Waiting("job", None, True, "Come back.", out)
+    waiting = Waiting("job", None, True, "Come back.", None, out)
     assert waiting.seconds() == 0.5
     waiting.seen("running", "a longer line", False)
     waiting.seen("running", "a line", False)
@@ -203,12 +205,44 @@ def test_one_line_is_drawn_in_place_in_a_terminal() -> None:
 
 def test_in_a_log_there_is_a_line_for_each_status() -> None:
     out = io.StringIO()
-    waiting = Waiting("job", None, True, "Come back.", out)
+    waiting = Waiting("job", None, True, "Come back.", None, out)
     assert waiting.seconds() == 20
     for status, line in [("queued", "1"), ("queued", "2"), ("running", "3"), ("running", "4"), ("succeeded", "5")]:
         waiting.seen(status, line, status == "succeeded")
     waiting.detached()
     assert out.getvalue() == "1\n3\n5\nDetached. Come back.\n"
+
+
+def test_in_a_notebook_a_card_with_the_convergence_is_drawn(
+    client: sg.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[str] = []
+
+    class ZMQInteractiveShell:
+        pass
+
+    class Handle:
+        def update(self, html: str) -> None:
+            shown.append(html)
+
+    def display(html: str, display_id: bool) -> Handle:
+        shown.append(html)
+        return Handle()
+
+    notebook = types.ModuleType("IPython")
+    notebook.get_ipython = ZMQInteractiveShell  # type: ignore[attr-defined]
+    display_module = types.ModuleType("IPython.display")
+    display_module.display, display_module.HTML = display, str  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "IPython", notebook)
+    monkeypatch.setitem(sys.modules, "IPython.display", display_module)
+    job = client.submit(long_problem(2000), cache="off", name="card")
+    monkeypatch.setattr(Waiting, "seconds", lambda self: 0.1)
+    job.wait(60)
+    assert len(shown) >= 2 and "card</b>" in shown[0] and "succeeded" in shown[-1]
+    assert "<polyline points='0.0," in shown[-1] and "aria-label='residual while waiting'" in shown[-1]
+    sweep = client.sweep(sg.examples.rectangular_punch(refine=0), {"contacts.0.indentation": [0.1, 0.2]})
+    sweep.wait(60)
+    assert "indentation" in shown[-1]
 
 
 def test_what_the_line_says() -> None:

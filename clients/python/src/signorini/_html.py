@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -20,8 +22,8 @@ COLOURS = {
 CARD = "border:1px solid #9994;border-left:4px solid {colour};border-radius:4px;padding:.5em .8em;max-width:46em"
 
 
-def job(found: JobView) -> str:
-    """A card: name, status, progress, times."""
+def job(found: JobView, residuals: Sequence[float] = ()) -> str:
+    """A card: name, status, progress, times; with residuals that were seen on the way their curve."""
     rows = [("id", found.id)]
     if found.labels:
         rows.append(("labels", ", ".join(f"{key}={value}" for key, value in found.labels.items())))
@@ -35,7 +37,7 @@ def job(found: JobView) -> str:
     if found.run_s is not None:
         rows.append(("time", "from the cache" if found.cached_from else duration(found.run_s)))
     rows += [("warning", warning.code.replace("_", " ")) for warning in found.warnings]
-    return _card(found.title, found.status, rows)
+    return _card(found.title, found.status, rows, _curve(residuals, progress.get("tolerance")))
 
 
 def result(found: Summary) -> str:
@@ -55,7 +57,27 @@ def sweep(found: SweepView) -> str:
     return _card(found.title, found.status, rows)
 
 
-def _card(title: str, mark: str, rows: list[tuple[str, str]]) -> str:
+def _curve(residuals: Sequence[float], tolerance: float | None) -> str:
+    """Residuals as a small curve, logarithmic, with a dashed line at the tolerance."""
+    seen = [math.log10(residual) for residual in residuals if residual > 0]
+    if len(seen) < 2 or not tolerance:
+        return ""
+    goal, width, height = math.log10(tolerance), 240, 48
+    low, high = min(goal, *seen), max(goal, *seen)
+    scale = (height - 6) / ((high - low) or 1.0)
+
+    def y(value: float) -> float:
+        return 3 + (high - value) * scale
+
+    points = " ".join(f"{width * number / (len(seen) - 1):.1f},{y(value):.1f}" for number, value in enumerate(seen))
+    return (
+        f"<svg width='{width}' height='{height}' role='img' aria-label='residual while waiting'>"
+        f"<line x1='0' x2='{width}' y1='{y(goal):.1f}' y2='{y(goal):.1f}' stroke='#767676' stroke-dasharray='3 3'/>"
+        f"<polyline points='{points}' fill='none' stroke='#D55E00' stroke-width='1.5'/></svg>"
+    )
+
+
+def _card(title: str, mark: str, rows: list[tuple[str, str]], more: str = "") -> str:
     colour = COLOURS.get(mark, "#767676")
     body = "".join(
         f"<tr><td style='text-align:left;opacity:.7;white-space:nowrap;vertical-align:top'>{escape(name)}</td>"
@@ -64,5 +86,5 @@ def _card(title: str, mark: str, rows: list[tuple[str, str]]) -> str:
     )
     return (
         f"<div style='{CARD.format(colour=colour)}'><b>{escape(title)}</b> "
-        f"<span style='color:{colour};font-weight:bold'>{escape(mark)}</span><table>{body}</table></div>"
+        f"<span style='color:{colour};font-weight:bold'>{escape(mark)}</span><table>{body}</table>{more}</div>"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ._data import Warning
@@ -121,10 +121,16 @@ class JobView:
     def __str__(self) -> str:
         return self.line()
 
-    def _repr_html_(self) -> str:
+    def _residual(self) -> float | None:
+        return (self.progress or {}).get("residual")
+
+    def _card(self, residuals: Sequence[float]) -> str:
         from . import _html
 
-        return _html.job(self)
+        return _html.job(self, residuals)
+
+    def _repr_html_(self) -> str:
+        return self._card(())
 
 
 def _time(text: str) -> datetime.datetime:

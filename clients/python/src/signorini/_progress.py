@@ -1,10 +1,10 @@
-"""One line that tells how a job or sweep gets on, and how long to wait for the next one."""
+"""What tells how a job or sweep gets on while one waits: a line or, in a notebook, a card; and how long to wait for it."""
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TextIO
 
 from ._calls import LONGEST_WAIT_S
@@ -17,16 +17,28 @@ class Waiting:
     """How long to wait, and what to show meanwhile.
 
     timeout: seconds until `WaitTimeout`; None: without limit
-    progress: whether a line is shown on standard error. It is drawn in place in a terminal and in a notebook;
-        elsewhere, as in the log of a batch system, a line is written when the status changes.
+    progress: whether a line is shown on standard error. It is drawn in place in a terminal; elsewhere, as in the log
+        of a batch system, a line is written when the status changes.
+    card: in a notebook a card is shown instead of the line; it is given the residuals seen so far
     """
 
-    def __init__(self, what: str, timeout: float | None, progress: bool, back: str, out: TextIO | None = None) -> None:
+    def __init__(
+        self,
+        what: str,
+        timeout: float | None,
+        progress: bool,
+        back: str,
+        card: Callable[[Sequence[float]], str] | None = None,
+        out: TextIO | None = None,
+    ) -> None:
         self.what = what
         self.back = back
         self._progress = progress
         self._out = out or sys.stderr
-        self._in_place = self._out.isatty() or in_notebook()
+        self._card = card if in_notebook() else None
+        self._shown_card: Any = None
+        self._residuals: list[float] = []
+        self._in_place = self._out.isatty() or self._card is not None
         self._shown = ""
         self._status = ""
         self._end = None if timeout is None else time.monotonic() + timeout
@@ -40,9 +52,13 @@ class Waiting:
         """Seconds until the time-out, at most `otherwise`."""
         return otherwise if self._end is None else max(0.0, min(otherwise, self._end - time.monotonic()))
 
-    def seen(self, status: str, line: str, ended: bool) -> None:
+    def seen(self, status: str, line: str, ended: bool, residual: float | None = None) -> None:
         """Shows the line. Raises `WaitTimeout` when the time is over."""
-        if self._progress and (self._in_place or status != self._status or ended):
+        if residual is not None:
+            self._residuals.append(residual)
+        if self._progress and self._card is not None:
+            self._show_card(self._card(self._residuals))
+        elif self._progress and (self._in_place or status != self._status or ended):
             self._write(line, ended)
         self._status = status
         if not ended and self._end is not None and time.monotonic() >= self._end:
@@ -59,6 +75,14 @@ class Waiting:
             self._out.write("\n")
             self._out.flush()
         self._shown = ""
+
+    def _show_card(self, html: str) -> None:
+        from IPython.display import HTML, display
+
+        if self._shown_card is None:
+            self._shown_card = display(HTML(html), display_id=True)
+        else:
+            self._shown_card.update(HTML(html))
 
     def _write(self, line: str, ended: bool) -> None:
         if self._in_place:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import pointer as pointers
@@ -68,6 +68,9 @@ class SweepView:
 
     def __str__(self) -> str:
         return self.line()
+
+    def _card(self, residuals: Sequence[float]) -> str:
+        return self._repr_html_()
 
     def _repr_html_(self) -> str:
         from . import _html

@@ -251,12 +251,12 @@ class AsyncJob(JobView):
         """Waits until the job has ended, and returns its result; see `Job.wait`. It can be canceled like any task,
         and the job goes on."""
         back = f"The job goes on. Come back with await (await client.job({self.id!r})).wait()"
-        waiting = Waiting(self.title, timeout, progress, back)
+        waiting = Waiting(self.title, timeout, progress, back, self._card)
         try:
             while not self.ended:
                 call = calls.job(self.id, waiting.seconds())
                 self.document = await self._client._send(call, waiting.left(self._client.retry_for))
-                waiting.seen(self.status, self.line(), self.ended)
+                waiting.seen(self.status, self.line(), self.ended, self._residual())
         except asyncio.CancelledError:  # which is also what Ctrl-C becomes
             waiting.detached()
             raise
@@ -358,7 +358,7 @@ class AsyncSweep(SweepView):
 
     async def wait(self, timeout: float | None = None, progress: bool = True) -> AsyncSweep:
         back = f"The sweep goes on. Come back with await (await client.sweep({self.id!r})).wait()"
-        waiting = Waiting(self.title, timeout, progress, back)
+        waiting = Waiting(self.title, timeout, progress, back, self._card)
         try:
             while not self.ended:
                 call = calls.sweep(self.id, waiting.seconds())

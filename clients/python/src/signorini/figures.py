@@ -70,8 +70,9 @@ def profile(found: Profile, *, size: str = "page", theme: str = "light", title: 
 def convergence(found: History, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
     """Residuals by iteration, the tolerance, and how many nodes entered and left contact."""
     with style(size, theme) as (plt, width, colours):
+        height = width * (1.15 if size == "column" else 0.7)
         figure, (upper, lower) = plt.subplots(
-            2, 1, sharex=True, figsize=(width, 0.7 * width), layout="constrained", height_ratios=[3, 1]
+            2, 1, sharex=True, figsize=(width, height), layout="constrained", height_ratios=[3, 1]
         )
         k = found.k
         marker = "o" if len(k) <= 60 else ""
@@ -84,13 +85,22 @@ def convergence(found: History, *, size: str = "page", theme: str = "light", tit
         upper.semilogy(k, found.tolerance, color=colours.ink, linewidth=0.8, linestyle=":", label="tolerance")
         upper.set_ylabel("residual (dimensionless)")
         upper.grid(axis="y")
-        upper.legend(loc="best")
         lower.bar(k, found.contact_entered, color=colours.stick, label="entered")
         lower.bar(k, -found.contact_left.astype(float), color=colours.slip, hatch="///", label="left")
         lower.axhline(0, color=colours.ink, linewidth=0.5)
         lower.set_ylabel("nodes of\ncontact")
         lower.set_xlabel("iteration $k$")
-        lower.legend(loc="best", ncols=2)
+        # outside, since a long history fills its panels
+        handles = [handle for axes in (upper, lower) for handle in axes.get_legend_handles_labels()[0]]
+        columns = 2 if size == "column" else 5
+        from matplotlib.transforms import offset_copy
+
+        # below the name of the axis, by the height of letters
+        below = offset_copy(lower.transAxes, figure, 0, -3.6 * plt.rcParams["font.size"], units="points")
+        lower.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below, borderaxespad=0,
+            ncols=columns,
+        )  # fmt: skip
         lower.xaxis.get_major_locator().set_params(integer=True)
         for change in np.flatnonzero(np.diff(found.step.astype(int))):
             for axes in (upper, lower):
@@ -171,7 +181,8 @@ def deformed(
             if len(at):
                 axes.plot(*at.T, shape, color=colour, markersize=2, label=word, linestyle="none")
         if np.any(found.contact_state > 0):
-            axes.legend(loc="upper right", markerscale=2)
+            legend = axes.legend(loc="upper right", markerscale=2, frameon=True, framealpha=0.85)
+            legend.get_frame().set(facecolor=colours.ground, linewidth=0)
         beyond = {(True, True): "both", (True, False): "min", (False, True): "max", (False, False): "neither"}
         extend = beyond[bool(values.min() < low), bool(values.max() > high)]
         bar = figure.colorbar(image, ax=axes, extend=extend, shrink=0.85, pad=0.02)
@@ -300,19 +311,22 @@ def _quantile(values: Array, lengths: Array, share: float) -> float:
 
 
 def _mark_cut(axes: Any, s: Array, values: Array, colours: Theme, about: Mapping[str, Any], boundary: str) -> None:
-    """Two small strokes where the curve leaves the figure, and how far it goes."""
+    """Two small strokes wherever the curve leaves the figure, and how far it goes."""
     low, _ = axes.get_ylim()
-    if values.min() >= low:
+    beyond = np.flatnonzero(values < low)
+    if len(beyond) == 0:
         return
+    for run in np.split(beyond, np.flatnonzero(np.diff(beyond) > 1) + 1):
+        axes.annotate(
+            "≈", (s[run[np.argmin(values[run])]], 0), xycoords=("data", "axes fraction"), ha="center", va="center",
+            color=colours.normal, fontsize="large", annotation_clip=False,
+            bbox={"boxstyle": "square,pad=0", "facecolor": colours.ground, "edgecolor": "none"},
+        )  # fmt: skip
     at = int(np.argmin(values))
     peak = ((about.get("peaks") or {}).get(boundary) or {}).get("normal_stress")
-    text = f"peak {values[at]:.3g}".replace("-", "−") + (", which has no limit" if peak and peak.value.why == "no_limit" else "")
+    no_limit = peak is not None and peak.value.why == "no_limit"
+    text = f"peak {values[at]:.3g}".replace("-", "−") + (", which has no limit" if no_limit else "")
     to_left = s[at] > (s[0] + s[-1]) / 2
-    axes.annotate(
-        "≈", (s[at], 0), xycoords=("data", "axes fraction"), ha="center", va="center", color=colours.normal,
-        fontsize="large", annotation_clip=False,
-        bbox={"boxstyle": "square,pad=0", "facecolor": colours.ground, "edgecolor": "none"},
-    )  # fmt: skip
     axes.annotate(
         text, (s[at], 0), xycoords=("data", "axes fraction"), xytext=(-10 if to_left else 10, 12),
         textcoords="offset points", ha="right" if to_left else "left", va="bottom", fontsize="small",
@@ -352,6 +366,9 @@ def _head(
     line = axes.set_title(below, loc="left", fontsize="medium", color=colours.ink)
     line.set_wrap(False)
     if mark:
+        # on a line of its own where both would not fit beside each other
+        if partial or figure.get_figwidth() < 4:
+            mark += "\n"
         axes.set_title(mark, loc="right", fontsize="medium", color=colour, fontweight="bold" if partial else None)
 
 

@@ -39,12 +39,12 @@ class Job(JobView):
 
         Raises `JobFailed` or `JobCanceled` if it has no solution. While the service restarts, waiting goes on.
         """
-        waiting = Waiting(self.title, timeout, progress, self._back())
+        waiting = Waiting(self.title, timeout, progress, self._back(), self._card)
         try:
             while not self.ended:
                 call = calls.job(self.id, waiting.seconds())
                 self.document = self._client._send(call, waiting.left(self._client.retry_for))
-                waiting.seen(self.status, self.line(), self.ended)
+                waiting.seen(self.status, self.line(), self.ended, self._residual())
         except KeyboardInterrupt:
             waiting.detached()
             raise

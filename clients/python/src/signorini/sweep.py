@@ -34,7 +34,7 @@ class Sweep(SweepView):
         Arguments are those of `Job.wait`; Ctrl-C detaches.
         """
         back = f"The sweep goes on. Come back with client.sweep({self.id!r}).wait()"
-        waiting = Waiting(self.title, timeout, progress, back)
+        waiting = Waiting(self.title, timeout, progress, back, self._card)
         try:
             while not self.ended:
                 call = calls.sweep(self.id, waiting.seconds())
