@@ -198,6 +198,18 @@ def test_events_go_on_where_they_broke_off(monkeypatch: pytest.MonkeyPatch) -> N
     assert asyncio.run(the_same_with_asyncio()) == [1, 2, 3, 4, 5]
 
 
+def test_something_else_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(httpx.Response(200, text="<html>Sign in", headers={"Content-Type": "text/html"}))
+    with pytest.raises(sg.SignoriniError, match="http://service.test/v1/info is not answered as by the service: <html>"):
+        client_of(service, monkeypatch).info()
+    service = Service(httpx.Response(200, json={}))
+    with pytest.raises(sg.SignoriniError, match="is not answered as by the service: KeyError"):
+        client_of(service, monkeypatch).submit_many([sg.examples.sheet()])
+    # a proxy's own answer, without the service's words
+    service = Service(httpx.Response(503, text="busy"), httpx.Response(200, json={"name": "x"}))
+    assert client_of(service, monkeypatch).info() == {"name": "x"}
+
+
 def test_a_service_that_is_not_there() -> None:
     with sg.Client("127.0.0.1:9", retry_for=0) as client:
         assert client.url == "http://127.0.0.1:9" and repr(client) == "<Client http://127.0.0.1:9>"

@@ -59,7 +59,11 @@ class Call(Generic[T]):
             return self.decode(httpx.Response(204, request=response.request))
         if response.is_error:
             raise_error(response)
-        return self.decode(response)
+        try:
+            return self.decode(response)
+        except (ValueError, KeyError, TypeError) as error:  # the page of a proxy, or of something else at this address
+            begin = response.text[:100] if "text" in response.headers.get("Content-Type", "") else repr(error)
+            raise errors.SignoriniError(f"{response.url} is not answered as by the service: {begin}") from error
 
 
 @dataclass

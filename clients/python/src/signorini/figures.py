@@ -43,10 +43,11 @@ def profile(found: Profile, *, size: str = "page", theme: str = "light", title: 
         _shade(lower, found, colours, words=False)
         upper.plot(s, found.normal_stress, color=colours.normal)
         bound = found.friction_bound
+        signs = [sign for sign in (1, -1) if np.any(sign * found.tangential_stress > 0)] or [1]
         if np.any(bound > 0):
-            for sign, label in ((1, QUANTITIES["friction_bound"]), (-1, None)):
-                if sign == 1 or np.any(found.tangential_stress < 0):
-                    lower.plot(s, sign * bound, color=colours.faint, linestyle=(0, (4, 2)), label=label)
+            for sign in signs:
+                label = QUANTITIES["friction_bound"] if sign == signs[0] else None
+                lower.plot(s, sign * bound, color=colours.faint, linestyle=(0, (4, 2)), label=label)
         lower.plot(s, found.tangential_stress, color=colours.tangential, label=QUANTITIES["tangential_stress"])
         if np.any(bound > 0):
             lower.legend(loc="best")
@@ -58,7 +59,10 @@ def profile(found: Profile, *, size: str = "page", theme: str = "light", title: 
             axes.axhline(0, color=colours.ink, linewidth=0.5)
             axes.margins(x=0)
         upper.set_ylim(*_limits(s, found.normal_stress))
-        lower.set_ylim(*_limits(s, found.tangential_stress, np.inf))
+        # with the bound, unless it is far from being reached
+        low, high = _limits(s, found.tangential_stress, np.inf)
+        reach = 1.08 * float(bound.max())
+        lower.set_ylim(min(low, max(-reach, 1.6 * low)), max(high, min(reach, 1.6 * high)))
         _mark_cut(upper, s, found.normal_stress, colours, found.about, found.boundary)
         _position_axis(upper, found)
         _head(figure, upper, found.about, colours, found.partial, title, found.boundary)
@@ -155,9 +159,11 @@ def deformed(
         # a mesh has most of its nodes where stresses are largest: what is usual is judged by area
         (x0, y0), (x1, y1), (x2, y2) = (found.points[triangles[:, corner], :2].T for corner in range(3))
         areas = np.abs((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
+        corner, opposite = _window(points, found.contact_state) if zoom else (points.min(axis=0), points.max(axis=0))
+        middles = points[triangles].mean(axis=1)
+        areas = areas * np.all((middles >= corner) & (middles <= opposite), axis=1)
         high = _quantile(np.abs(values[triangles]).mean(axis=1), areas, 0.995) or 1.0
         low = -high if signed else 0.0
-        corner, opposite = _window(points, found.contact_state) if zoom else (points.min(axis=0), points.max(axis=0))
         span = opposite - corner
         height = float(np.clip(0.75 * width * span[1] / span[0], 0.2 * width, 1.1 * width)) + 0.25 * width
         figure, axes = plt.subplots(figsize=(width, height), layout="compressed")
@@ -283,6 +289,7 @@ def _shade(axes: Any, found: Profile, colours: Theme, words: bool) -> None:
                 axes.text(
                     (start + end) / 2, 0.5, part, color=colours.ink, alpha=0.8, ha="center", va="center",
                     transform=axes.get_xaxis_transform(), fontsize="small",
+                    bbox={"facecolor": colours.ground, "alpha": 0.6, "linewidth": 0, "pad": 1.5},
                 )  # fmt: skip
 
 
@@ -374,7 +381,7 @@ def _head(
 
 def _foot(figure: Any, about: Mapping[str, Any], colours: Theme, width: float) -> None:
     """The warnings, in words."""
-    codes = [code.replace("_", " ") for code in about.get("warnings") or []]
+    codes = [code.replace("_", " ") for code in dict.fromkeys(about.get("warnings") or [])]
     if codes:
         text = "\n".join(textwrap.wrap("Warnings: " + "; ".join(codes), 95 if width < 9 else 110))
         figure.supxlabel(text, x=0.01, ha="left", fontsize="x-small", color=colours.faint)
