@@ -7,8 +7,9 @@ import inspect
 import pathlib
 
 import pytest
-import signorini as sg
 from conftest import long_problem, unconverged_problem
+
+import signorini as sg
 
 PUNCH = sg.examples.rectangular_punch(refine=0)
 

@@ -6,12 +6,13 @@ import json
 import random
 
 import pytest
+
 from signorini import SignoriniError
 from signorini._events import Cursor, Message, Parser
 
 STREAM = (
     "\ufeff: a comment\n\n"
-    "id: 1\nevent: status\ndata: {\"seq\":1}\n\n"
+    'id: 1\nevent: status\ndata: {"seq":1}\n\n'
     ":\n\n"
     "id:2\r\nevent:no space\r\ndata: first\r\ndata:  second\r\n\r\n"
     "data: σ is two bytes\rid: 3\r\r"

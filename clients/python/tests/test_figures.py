@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import signorini as sg
 from conftest import unconverged_problem
+
+import signorini as sg
 from signorini import _shapes as shapes
 from signorini import figures
 from signorini import problem as p

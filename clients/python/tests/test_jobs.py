@@ -11,8 +11,9 @@ import types
 import uuid
 
 import pytest
-import signorini as sg
 from conftest import BINARY, long_problem, unconverged_problem
+
+import signorini as sg
 from signorini._progress import Waiting, duration, job_line
 
 
@@ -162,6 +163,7 @@ def test_the_service_tells_about_itself(client: sg.Client) -> None:
 
 def test_a_token_says_who_one_is(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     data = tmp_path_factory.mktemp("tokens") / "data"
+
     def token(name: str, scope: str) -> str:
         command = [BINARY, "token", "create", "--data", data, "--name", name, "--owner", name, "--scope", scope]
         made = subprocess.run(list(map(str, command)), check=True, capture_output=True, text=True)
@@ -213,9 +215,7 @@ def test_in_a_log_there_is_a_line_for_each_status() -> None:
     assert out.getvalue() == "1\n3\n5\nDetached. Come back.\n"
 
 
-def test_in_a_notebook_a_card_with_the_convergence_is_drawn(
-    client: sg.Client, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_in_a_notebook_a_card_with_the_convergence_is_drawn(client: sg.Client, monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[str] = []
 
     class ZMQInteractiveShell:

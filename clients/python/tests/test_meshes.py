@@ -6,8 +6,9 @@ import pathlib
 
 import numpy as np
 import pytest
-import signorini as sg
 from conftest import TOP
+
+import signorini as sg
 from signorini import problem as p
 
 MESHES = TOP / "tests/data/gmsh"
@@ -75,7 +76,10 @@ POINTS = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1,
 LINES = [[3, 4], [4, 5], [0, 1], [1, 2]]
 
 
-@pytest.mark.parametrize("cells", [[("quad", [[0, 1, 4, 3], [1, 4, 5, 2]])], [("quad", [[0, 1, 4, 3]]), ("triangle", [[1, 2, 5], [1, 4, 5]])]])
+@pytest.mark.parametrize(
+    "cells",
+    [[("quad", [[0, 1, 4, 3], [1, 4, 5, 2]])], [("quad", [[0, 1, 4, 3]]), ("triangle", [[1, 2, 5], [1, 4, 5]])]],
+)
 def test_a_mesh_of_meshio(client: sg.Client, cells: list[tuple[str, list[list[int]]]]) -> None:
     meshio = pytest.importorskip("meshio")
     blocks = len(cells)

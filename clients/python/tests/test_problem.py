@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import signorini as sg
 from conftest import BINARY, TOP
+
+import signorini as sg
 from signorini import problem as p
 from signorini._parts import hints, json_name
 

@@ -7,8 +7,9 @@ import re
 from typing import Any
 
 import pytest
-import signorini as sg
 from conftest import TOP
+
+import signorini as sg
 
 README = TOP / "clients/python/README.md"
 

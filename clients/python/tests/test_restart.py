@@ -5,8 +5,9 @@ from __future__ import annotations
 import threading
 
 import pytest
-import signorini as sg
 from conftest import long_problem
+
+import signorini as sg
 
 
 def test_waiting_and_following_go_on(monkeypatch: pytest.MonkeyPatch) -> None:

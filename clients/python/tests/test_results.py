@@ -5,11 +5,15 @@ from __future__ import annotations
 import copy
 import pathlib
 import pickle
+import sys
+from typing import Any
 
 import numpy as np
 import pytest
+
 import signorini as sg
 from signorini._data import Fields, Number, Profile, Summary, Warning, known
+from signorini._extras import load
 
 
 def test_a_number_is_shown_as_its_error_allows() -> None:
@@ -117,6 +121,35 @@ def test_the_history(punch: sg.Result) -> None:
     assert list(history.k) == list(range(1, punch.summary["iterations"] + 1))
     assert max(history.residual[-1], history.friction_residual[-1]) < history.tolerance[-1]
     assert {"contact_entered", "wall_s"} <= set(history.to_pandas().columns)
+
+
+def test_a_package_that_is_not_installed_is_named(punch: sg.Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    profile = punch.profile()
+    for module, act in [("pandas", profile.to_pandas), ("pyarrow", profile.to_arrow), ("matplotlib", profile.plot)]:
+        with monkeypatch.context() as patched:
+            for name in [name for name in sys.modules if name.partition(".")[0] == module]:
+                patched.delitem(sys.modules, name)
+            patched.setattr(sys, "meta_path", [Missing(module), *sys.meta_path])
+            with pytest.raises(ImportError, match=f'needs {module}, which is not installed: pip install "signorini'):
+                act()
+
+
+class Missing:
+    """Stands for a package that is not installed."""
+
+    def __init__(self, module: str) -> None:
+        self.module = module
+
+    def find_spec(self, name: str, path: object, target: object = None) -> None:
+        if name.partition(".")[0] == self.module:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=self.module)
+
+
+def test_an_import_that_fails_inside_of_a_package_is_told_as_it_is(tmp_path: pathlib.Path, monkeypatch: Any) -> None:
+    (tmp_path / "broken_package.py").write_text("import no_such_module")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ModuleNotFoundError, match="no_such_module"):
+        load("broken_package", "plot")
 
 
 def test_tables_of_arrow(punch: sg.Result) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import httpx
 import pytest
+
 import signorini as sg
 from signorini import _calls as calls
 from signorini._retry import Attempts
@@ -37,7 +38,9 @@ class Service:
 
 def client_of(service: Service, monkeypatch: pytest.MonkeyPatch, retry_for: float = 60) -> sg.Client:
     client = sg.Client("http://service.test", token="secret", retry_for=retry_for)
-    client._http = httpx.Client(base_url=client.url, headers=client._http.headers, transport=httpx.MockTransport(service))
+    client._http = httpx.Client(
+        base_url=client.url, headers=client._http.headers, transport=httpx.MockTransport(service)
+    )
     monkeypatch.setattr("time.sleep", service.pauses.append)
     return client
 
@@ -200,7 +203,9 @@ def test_events_go_on_where_they_broke_off(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_something_else_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
     service = Service(httpx.Response(200, text="<html>Sign in", headers={"Content-Type": "text/html"}))
-    with pytest.raises(sg.SignoriniError, match="http://service.test/v1/info is not answered as by the service: <html>"):
+    with pytest.raises(
+        sg.SignoriniError, match="http://service.test/v1/info is not answered as by the service: <html>"
+    ):
         client_of(service, monkeypatch).info()
     service = Service(httpx.Response(200, json={}))
     with pytest.raises(sg.SignoriniError, match="is not answered as by the service: KeyError"):

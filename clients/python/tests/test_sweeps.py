@@ -7,8 +7,9 @@ import signal
 
 import numpy as np
 import pytest
-import signorini as sg
 from conftest import long_problem
+
+import signorini as sg
 from signorini import _calls as calls
 from signorini._progress import Waiting, sweep_line
 from signorini._sweep import short_names
@@ -113,4 +114,7 @@ def test_names_of_columns() -> None:
 
 def test_what_the_line_says() -> None:
     counts = {"total": 4, "queued": 0, "running": 1, "succeeded": 1, "failed": 2, "canceled": 0}
-    assert sweep_line("s", {"status": "running", "members": counts}) == "s · running · ███████████████░░░░░ 3 of 4 · 2 failed"
+    assert (
+        sweep_line("s", {"status": "running", "members": counts})
+        == "s · running · ███████████████░░░░░ 3 of 4 · 2 failed"
+    )

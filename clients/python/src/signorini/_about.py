@@ -18,9 +18,7 @@ def about(result: Summary, problem: Mapping[str, Any]) -> dict[str, Any]:
         "outcome": result.outcome,
         "warnings": [warning.code for warning in result.warnings],
         "units": problem.get("units") or {},
-        "extents": {
-            name: {"stick": contact.stick, "slip": contact.slip} for name, contact in result.contacts.items()
-        },
+        "extents": {name: {"stick": contact.stick, "slip": contact.slip} for name, contact in result.contacts.items()},
         "peaks": {
             name: {
                 "normal_stress": contact.peak_normal_stress,

@@ -229,9 +229,7 @@ def delete_jobs(params: Params) -> Call[Document]:
 
 
 def retry(id: str, timeout_s: float | None, queue_ttl_s: float | None, priority: int | None) -> Call[Document]:
-    return _post(
-        _job(id) + "/retry", _envelope(None, None, priority, timeout_s, queue_ttl_s) or None, key=new_key()
-    )
+    return _post(_job(id) + "/retry", _envelope(None, None, priority, timeout_s, queue_ttl_s) or None, key=new_key())
 
 
 def edit(id: str, changes: Mapping[str, Any]) -> Call[Document]:
@@ -444,9 +442,7 @@ def validate(problem: Problem | Mapping[str, Any]) -> Call[Validation]:
     if found:
         raise errors.invalid(found)
     call = _post("/v1/problems/validate", {"problem": document})
-    return Call(
-        call.method, call.path, lambda r: Validation.from_json(r.json()), (), call.headers, call.content, True
-    )
+    return Call(call.method, call.path, lambda r: Validation.from_json(r.json()), (), call.headers, call.content, True)
 
 
 def info() -> Call[Document]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ._extras import load
 from .errors import Violation
 
 if TYPE_CHECKING:
@@ -181,15 +182,13 @@ class Columns:
 
     def to_pandas(self) -> pandas.DataFrame:
         """As a table of pandas (`pip install signorini[pandas]`)."""
-        import pandas
-
-        return pandas.DataFrame(self.columns())
+        table: pandas.DataFrame = load("pandas", "pandas").DataFrame(self.columns())
+        return table
 
     def to_arrow(self) -> pyarrow.Table:
         """As a table of Arrow (`pip install signorini[arrow]`), for Parquet, polars, DuckDB."""
-        import pyarrow
-
-        return pyarrow.table(self.columns())
+        table: pyarrow.Table = load("pyarrow", "arrow").table(self.columns())
+        return table
 
     def __len__(self) -> int:
         return len(next(iter(self.columns().values())))
@@ -298,12 +297,13 @@ class Fields:
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
         """As an unstructured grid of PyVista (`pip install signorini[pyvista]`)."""
-        import pyvista
-
+        vista = load("pyvista", "pyvista")
         blocks = [(23, self.quads), (22, self.triangles)]  # VTK's quadratic quadrilateral and triangle
         cells = [np.column_stack([np.full(len(c), c.shape[1]), c]).ravel() for _, c in blocks if len(c)]
         types = np.concatenate([np.full(len(c), kind, np.uint8) for kind, c in blocks])
-        grid = pyvista.UnstructuredGrid(np.concatenate(cells).astype(np.int64), types, self.points)
+        grid: pyvista.UnstructuredGrid = vista.UnstructuredGrid(
+            np.concatenate(cells).astype(np.int64), types, self.points
+        )
         for name in ("displacement", "stress", "principal_stress", "von_mises", "contact_state"):
             grid.point_data[name] = getattr(self, name)
         numbers = np.concatenate([self.quad_numbers, self.triangle_numbers]).astype(int)

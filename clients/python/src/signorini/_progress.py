@@ -1,4 +1,4 @@
-"""What tells how a job or sweep gets on while one waits: a line or, in a notebook, a card; and how long to wait for it."""
+"""What tells how a job or sweep gets on while one waits (a line, in a notebook a card), and how long to wait for it."""
 
 from __future__ import annotations
 

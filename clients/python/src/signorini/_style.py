@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ._extras import load
+
 SIZES = {"column": (88 / 25.4, 7.0), "page": (160 / 25.4, 9.0), "slide": (254 / 25.4, 14.0)}
 """Width in inches and size of letters in points: a column of a journal (88 mm), a page, a slide."""
 
@@ -64,15 +66,13 @@ def style(size: str, theme: str) -> Iterator[tuple[Any, float, Theme]]:
         raise ValueError(f"size is one of {', '.join(SIZES)}, not {size!r}")
     if theme not in THEMES:
         raise ValueError(f"theme is one of {', '.join(THEMES)}, not {theme!r}")
-    import matplotlib
-    import matplotlib.pyplot
-
+    pyplot = load("matplotlib.pyplot", "plot")
     width, points = SIZES[size]
-    with matplotlib.rc_context(settings(THEMES[theme], points)):
-        yield matplotlib.pyplot, width, THEMES[theme]
+    with pyplot.rc_context(settings(THEMES[theme], points)):
+        yield pyplot, width, THEMES[theme]
 
 
-def settings(theme: Theme, points: float) -> dict[Any, Any]:
+def settings(theme: Theme, points: float) -> dict[str, Any]:
     thin = points / 12
     return {
         "font.family": "sans-serif",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import pointer as pointers
 from ._data import Array
+from ._extras import load
 from ._progress import sweep_line
 
 if TYPE_CHECKING:
@@ -100,15 +101,13 @@ class SweepTable:
 
     def to_pandas(self) -> pandas.DataFrame:
         """As a table of pandas (`pip install signorini[pandas]`)."""
-        import pandas
-
-        return pandas.DataFrame(self.columns).set_index("number")
+        table: pandas.DataFrame = load("pandas", "pandas").DataFrame(self.columns).set_index("number")
+        return table
 
     def to_arrow(self) -> pyarrow.Table:
         """As a table of Arrow (`pip install signorini[arrow]`)."""
-        import pyarrow
-
-        return pyarrow.table(self.columns)
+        table: pyarrow.Table = load("pyarrow", "arrow").table(self.columns)
+        return table
 
 
 def short_names(found: list[str]) -> dict[str, str]:

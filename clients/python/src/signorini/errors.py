@@ -1,17 +1,17 @@
 """What can go wrong, one class for each family of error codes of the service.
 
-    SignoriniError
-    ├── ApiError                 the service refused a request
-    │   ├── InvalidProblem       with every violation; also raised locally, before anything is sent
-    │   ├── BadRequest, TooLarge
-    │   ├── Unauthenticated, Forbidden
-    │   ├── NotFound             ├── NoResult, Deleted
-    │   ├── Conflict             ├── JobActive, ResultNotReady, StaleVersion
-    │   ├── QuotaExceeded, RateLimited
-    │   └── ServiceError         ├── Unavailable, StorageFull
-    ├── JobFailed                with the reason and the job ─ JobCanceled
-    ├── WaitTimeout              also a TimeoutError; the job goes on
-    └── ConnectionLost           also a ConnectionError; the job goes on
+SignoriniError
+├── ApiError                 the service refused a request
+│   ├── InvalidProblem       with every violation; also raised locally, before anything is sent
+│   ├── BadRequest, TooLarge
+│   ├── Unauthenticated, Forbidden
+│   ├── NotFound             ├── NoResult, Deleted
+│   ├── Conflict             ├── JobActive, ResultNotReady, StaleVersion
+│   ├── QuotaExceeded, RateLimited
+│   └── ServiceError         ├── Unavailable, StorageFull
+├── JobFailed                with the reason and the job ─ JobCanceled
+├── WaitTimeout              also a TimeoutError; the job goes on
+└── ConnectionLost           also a ConnectionError; the job goes on
 """
 
 from __future__ import annotations

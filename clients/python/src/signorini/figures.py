@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["convergence", "deformed", "problem", "profile"]
 
 CUT = 6.0
-"""A stress is drawn up to so many times its median along the contact; a peak beyond it is cut, with a mark and its value."""
+"""A stress is drawn up to so many times its median along the contact; a peak beyond it is cut and marked."""
 
 
 def profile(found: Profile, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
@@ -67,8 +67,7 @@ def profile(found: Profile, *, size: str = "page", theme: str = "light", title: 
         _position_axis(upper, found)
         _head(figure, upper, found.about, colours, found.partial, title, found.boundary)
         _foot(figure, found.about, colours, width)
-    plt.close(figure)
-    return figure  # type: ignore[no-any-return]
+    return _finished(plt, figure)
 
 
 def convergence(found: History, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
@@ -111,8 +110,7 @@ def convergence(found: History, *, size: str = "page", theme: str = "light", tit
                 axes.axvline((k[change] + k[change + 1]) / 2, color=colours.faint, linewidth=0.6)
         _head(figure, upper, found.about, colours, found.partial, title)
         _foot(figure, found.about, colours, width)
-    plt.close(figure)
-    return figure  # type: ignore[no-any-return]
+    return _finished(plt, figure)
 
 
 def _window(points: Array, state: Array) -> tuple[Array, Array]:
@@ -201,8 +199,7 @@ def deformed(
         axes.set_ylabel("$y$" + unit(found.about, "length"))
         _head(figure, axes, found.about, colours, found.partial, title)
         _foot(figure, found.about, colours, width)
-    plt.close(figure)
-    return figure  # type: ignore[no-any-return]
+    return _finished(plt, figure)
 
 
 def problem(found: Problem, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
@@ -254,8 +251,14 @@ def problem(found: Problem, *, size: str = "page", theme: str = "light", title: 
         friction = {contact.boundary: parameters(contact.to_dict(defaults=True)) for contact in found.contacts}
         about = {"title": found.title or "", "parameters": friction}
         _head(figure, axes, about, colours, False, title)
+    return _finished(plt, figure)
+
+
+def _finished(plt: Any, figure: Any) -> Figure:
+    """Takes a figure from pyplot's list, so that a notebook shows it once and many figures take no memory."""
     plt.close(figure)
-    return figure  # type: ignore[no-any-return]
+    finished: Figure = figure
+    return finished
 
 
 def _held(names: list[str]) -> str:

@@ -68,7 +68,9 @@ def from_meshio(mesh: Any, refine: Refine = 0) -> MeshInput:
             # a line inside of the body is no boundary; the service leaves it out of a file, too
             if outer := [side for side in sides if builder.is_outer(side)]:
                 boundaries.setdefault(name, []).extend(outer)
-    sets: dict[str, Any] = {name: [builder.node(int(n)) for n in np.ravel(found)] for name, found in mesh.point_sets.items()}
+    sets: dict[str, Any] = {
+        name: [builder.node(int(n)) for n in np.ravel(found)] for name, found in mesh.point_sets.items()
+    }
     inline = InlineMesh(
         nodes=builder.nodes,
         elements=builder.elements,

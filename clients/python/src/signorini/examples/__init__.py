@@ -51,9 +51,7 @@ def sheet(
     return _example("sheet", rho, mu, epsilon, refine)
 
 
-def _example(
-    name: str, rho: float | None, mu: float | None, epsilon: float | None, refine: float | None
-) -> Problem:
+def _example(name: str, rho: float | None, mu: float | None, epsilon: float | None, refine: float | None) -> Problem:
     text = resources.files(__name__).joinpath(name + ".json").read_text(encoding="utf-8")
     problem = Problem.from_dict(json.loads(text))
     friction = problem.contacts[0].friction
