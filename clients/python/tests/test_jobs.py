@@ -256,6 +256,8 @@ def test_what_the_line_says() -> None:
     )
     queue = {"ahead": 4, "reason": "workers_busy"}
     assert job_line("punch", {"status": "queued", "queue": queue}) == "punch · queued · 4 ahead (workers busy)"
+    queue = {"ahead": 0, "reason": "paused"}
+    assert job_line("punch", {"status": "queued", "queue": queue}) == "punch · queued · next in line (paused)"
     ended = {"status": "failed", "reason": "timed_out", "run_s": 61.2, "finished_at": "now"}
     assert job_line("punch", ended) == "punch · failed (timed out) · in 1 min 1 s"
     assert [duration(s) for s in (0.04, 9.96, 59.4, 7500)] == ["0.0 s", "10.0 s", "59 s", "2 h 5 min"]

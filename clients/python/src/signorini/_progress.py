@@ -102,7 +102,9 @@ def job_line(title: str, job: Mapping[str, Any]) -> str:
     parts = [title, status if not job.get("reason") else f"{status} ({str(job['reason']).replace('_', ' ')})"]
     progress = job.get("progress") or {}
     if status == "queued" and job.get("queue"):
-        parts.append(f"{job['queue']['ahead']} ahead ({str(job['queue']['reason']).replace('_', ' ')})")
+        ahead = job["queue"]["ahead"]
+        place = f"{ahead} ahead" if ahead else "next in line"
+        parts.append(f"{place} ({str(job['queue']['reason']).replace('_', ' ')})")
     if progress.get("mesh"):
         parts.append(f"mesh {progress['mesh']}, {progress['mesh_elements']} elements")
     if progress.get("iteration"):
