@@ -1,0 +1,36 @@
+"""What figures and tables say of a result besides its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ._data import Summary
+
+
+def about(result: Summary, problem: Mapping[str, Any]) -> dict[str, Any]:
+    """Title, parameters of friction (μ, ρ, ε by contact), verdict, warnings, units, extents."""
+    contacts = {contact["boundary"]: contact for contact in problem.get("contacts") or []}
+    return {
+        "title": problem.get("title") or "",
+        "parameters": {name: parameters(contact) for name, contact in contacts.items()},
+        "verdict": result.verdict,
+        "outcome": result.outcome,
+        "warnings": [warning.code for warning in result.warnings],
+        "units": problem.get("units") or {},
+        "extents": {name: {"stick": contact.stick, "slip": contact.slip} for name, contact in result.contacts.items()},
+        "peaks": {
+            name: {
+                "normal_stress": contact.peak_normal_stress,
+                "tangential_stress": contact.peak_tangential_stress,
+            }
+            for name, contact in result.contacts.items()
+        },
+    }
+
+
+def parameters(contact: Mapping[str, Any]) -> dict[str, float]:
+    """The numbers of the friction law by their symbols; empty without friction."""
+    friction = contact.get("friction") or {}
+    symbols = {"μ": "coefficient", "ρ": "nonlocal_radius", "ε": "elastic_slip"}
+    return {symbol: friction[name] for symbol, name in symbols.items() if friction.get(name) is not None}

@@ -1,0 +1,474 @@
+"""Every request of the API: what is sent, and how the answer is read.
+
+A `Call` is data; `Client` sends it with blocking sockets, `AsyncClient` with asyncio. So that is all in which the two
+differ, and a request is written once.
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import math
+import os
+import pathlib
+import uuid
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic, NoReturn, TypeVar
+from urllib.parse import quote
+
+import httpx
+
+from . import errors
+from ._data import Array, StoredMesh, Validation, arrays
+from ._parts import plain
+from ._retry import retry_after_s
+from .errors import Violation
+from .pointer import escape, to_pointer
+from .problem import MeshInput, Problem
+
+T = TypeVar("T", covariant=True)
+Document = dict[str, Any]
+Params = tuple[tuple[str, str], ...]
+
+LONGEST_WAIT_S = 20.0
+"""How long the service is asked to hold back an answer: less than proxies usually allow."""
+
+
+@dataclass(frozen=True)
+class Call(Generic[T]):
+    """A request, and how its answer is read.
+
+    repeatable: sending it twice does no more than sending it once
+    wait_s: the service may take so many seconds longer than usual to answer
+    """
+
+    method: str
+    path: str
+    decode: Callable[[httpx.Response], T]
+    params: Params = ()
+    headers: Mapping[str, str] = field(default_factory=dict)
+    content: bytes | None = None
+    repeatable: bool = True
+    wait_s: float = 0.0
+
+    def read(self, response: httpx.Response, attempt: int) -> T:
+        """What the answer says. Raises an `ApiError` if it is an error."""
+        if attempt > 1 and self.method == "DELETE" and response.status_code == 410:
+            # an earlier attempt has deleted it, and its answer was lost
+            return self.decode(httpx.Response(204, request=response.request))
+        if response.is_error:
+            raise_error(response)
+        try:
+            return self.decode(response)
+        except (ValueError, KeyError, TypeError) as error:  # the page of a proxy, or of something else at this address
+            begin = response.text[:100] if "text" in response.headers.get("Content-Type", "") else repr(error)
+            raise errors.SignoriniError(f"{response.url} is not answered as by the service: {begin}") from error
+
+
+@dataclass
+class Submission:
+    """A problem, and how it is to be solved.
+
+    labels: names and texts by which programs find the job again
+    priority: −10 … 10; higher ones run first
+    timeout_s: seconds that solving may take; queue_ttl_s: seconds that the job may wait before it
+    cache: `use` (default) a result of the same problem, `refresh` it, or leave it `off`
+    key: two submissions with the same key are one job, also if the program runs again; made up if absent
+    """
+
+    problem: Problem | Mapping[str, Any]
+    name: str | None = None
+    labels: Mapping[str, str] = field(default_factory=dict)
+    priority: int | None = None
+    timeout_s: float | None = None
+    queue_ttl_s: float | None = None
+    cache: str | None = None
+    key: str | None = None
+
+    def to_dict(self) -> Document:
+        body = _envelope(self.name, self.labels, self.priority, self.timeout_s, self.queue_ttl_s)
+        if self.cache is not None:
+            body["cache"] = self.cache
+        return {"problem": problem_document(self.problem), **body}
+
+
+def _envelope(
+    name: str | None,
+    labels: Mapping[str, str] | None,
+    priority: int | None,
+    timeout_s: float | None,
+    queue_ttl_s: float | None,
+) -> Document:
+    limits = {"timeout_s": timeout_s, "queue_ttl_s": queue_ttl_s}
+    body = {
+        "name": name,
+        "labels": {key: str(value) for key, value in labels.items()} if labels else None,
+        "priority": priority,
+        "limits": {key: value for key, value in limits.items() if value is not None} or None,
+    }
+    return {key: value for key, value in body.items() if value is not None}
+
+
+def problem_document(problem: Problem | Mapping[str, Any], defaults: bool = False) -> Document:
+    """The problem as JSON. Raises `InvalidProblem` if it cannot be right.
+
+    A `Problem` is checked again, since its fields may have been set after it was made. A dictionary is left to the
+    service, which may know more than this client; only what JSON cannot express is found here.
+    """
+    document: Document = plain(problem, defaults)
+    if isinstance(problem, Problem):
+        Problem.from_dict(document)
+    else:
+        found: list[Violation] = []
+        _find_non_json(document, "", found)
+        if found:
+            raise errors.invalid(found)
+    return document
+
+
+def _find_non_json(value: Any, pointer: str, found: list[Violation]) -> None:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            _find_non_json(item, f"{pointer}/{escape(key)}", found)
+    elif isinstance(value, list):
+        for number, item in enumerate(value):
+            _find_non_json(item, f"{pointer}/{number}", found)
+    elif isinstance(value, float):
+        if not math.isfinite(value):
+            found.append(Violation(pointer, "not_finite", repr(value), "a finite number"))
+    elif not isinstance(value, (str, int, type(None))):
+        found.append(Violation(pointer, "wrong_type", type(value).__name__, "a value of JSON"))
+
+
+def raise_error(response: httpx.Response) -> NoReturn:
+    """Raises the error that an answer is."""
+    try:
+        document = response.json()
+    except ValueError:
+        document = None
+    if not isinstance(document, dict):  # from a proxy, or from something that is not the service
+        document = {"detail": response.text[:300]}
+    raise errors.of_answer(
+        response.status_code,
+        document,
+        retry_after_s=retry_after_s(response),
+        request_id=response.headers.get("X-Request-Id", ""),
+    )
+
+
+def _json(response: httpx.Response) -> Document:
+    document: Document = response.json()
+    return document
+
+
+def _nothing(response: httpx.Response) -> None:
+    return None
+
+
+def _get(path: str, params: Params = ()) -> Call[Document]:
+    return Call("GET", path, _json, params)
+
+
+def _post(path: str, body: Any = None, *, key: str | None = None, params: Params = ()) -> Call[Document]:
+    """A request that changes something. With a key it can be repeated: the service does it once."""
+    headers = {"Content-Type": "application/json"} if body is not None else {}
+    if key:
+        headers["Idempotency-Key"] = key
+    content = None if body is None else json.dumps(body, allow_nan=False, ensure_ascii=False).encode()
+    return Call("POST", path, _json, params, headers, content, repeatable=bool(key))
+
+
+def _safely(call: Call[Document]) -> Call[Document]:
+    """The same call, which does no harm when it is repeated."""
+    return Call(call.method, call.path, call.decode, call.params, call.headers, call.content, True, call.wait_s)
+
+
+def new_key() -> str:
+    return str(uuid.uuid4())
+
+
+# Jobs
+
+
+def submit(submission: Submission) -> Call[Document]:
+    return _post("/v1/jobs", submission.to_dict(), key=submission.key or new_key())
+
+
+def submit_many(submissions: Sequence[Submission], key: str | None) -> Call[list[Document]]:
+    if any(submission.key for submission in submissions):
+        raise ValueError("jobs that are submitted together have one key: submit_many(…, key=…)")
+    call = _post("/v1/jobs/batch", {"jobs": [s.to_dict() for s in submissions]}, key=key or new_key())
+    return Call(call.method, call.path, lambda r: list(r.json()["jobs"]), (), call.headers, call.content, True)
+
+
+def job(id: str, wait_s: float | None = None) -> Call[Document]:
+    """The job now or, with `wait_s`, when it has ended, at the latest after so many seconds."""
+    params: Params = () if wait_s is None else (("wait", f"{wait_s:.3f}"), ("until", "terminal"))
+    return Call("GET", _job(id), _json, params, wait_s=wait_s or 0.0)
+
+
+def jobs(params: Params, page_token: str) -> Call[Document]:
+    return _get("/v1/jobs", params + ((("page_token", page_token),) if page_token else ()))
+
+
+def count(params: Params) -> Call[Document]:
+    return _get("/v1/jobs/count", params)
+
+
+def cancel(id: str) -> Call[Document]:
+    return _safely(_post(_job(id) + "/cancel"))
+
+
+def cancel_jobs(params: Params) -> Call[Document]:
+    return _post("/v1/jobs/cancel", params=params)
+
+
+def delete_jobs(params: Params) -> Call[Document]:
+    return Call("DELETE", "/v1/jobs", _json, params)
+
+
+def retry(id: str, timeout_s: float | None, queue_ttl_s: float | None, priority: int | None) -> Call[Document]:
+    return _post(_job(id) + "/retry", _envelope(None, None, priority, timeout_s, queue_ttl_s) or None, key=new_key())
+
+
+def edit(id: str, changes: Mapping[str, Any]) -> Call[Document]:
+    headers = {"Content-Type": "application/merge-patch+json"}
+    return Call("PATCH", _job(id), _json, headers=headers, content=json.dumps(changes).encode())
+
+
+def delete(id: str) -> Call[None]:
+    return Call("DELETE", _job(id), _nothing)
+
+
+def problem(id: str) -> Call[Document]:
+    return _get(_job(id) + "/problem")
+
+
+def result(id: str) -> Call[Document]:
+    return _get(_job(id) + "/result")
+
+
+def profile(id: str, boundary: str, step: int | str | None, points: int | str | None) -> Call[dict[str, Array]]:
+    params = [("format", "npz")]
+    if step is not None:
+        params.append(("step", str(step)))
+    if points is not None:
+        params.append(("points", str(points)))
+    path = f"{_job(id)}/profiles/{quote(boundary, safe='')}"
+    return Call("GET", path, lambda r: arrays(r.content), tuple(params))
+
+
+def history(id: str, max_points: int | None) -> Call[dict[str, Array]]:
+    params: Params = (("format", "npz"),)
+    if max_points is not None:
+        params += (("max_points", str(max_points)),)
+    return Call("GET", _job(id) + "/history", lambda r: arrays(r.content), params)
+
+
+def fields(id: str) -> Call[dict[str, Array]]:
+    return Call("GET", _job(id) + "/fields", lambda r: arrays(r.content), (("format", "npz"),))
+
+
+def vtu(id: str) -> Call[bytes]:
+    return Call("GET", _job(id) + "/fields", lambda r: r.content, (("format", "vtu"),))
+
+
+def plot(id: str, name: str, theme: str) -> Call[str]:
+    return Call("GET", f"{_job(id)}/plots/{name}.svg", lambda r: r.text, (("theme", theme),))
+
+
+def _job(id: str) -> str:
+    return "/v1/jobs/" + quote(id, safe="")
+
+
+def filters(
+    status: str | Sequence[str] | None = None,
+    labels: Mapping[str, str] | None = None,
+    **others: str | datetime.datetime | int | None,
+) -> Params:
+    """The parameters of `GET /v1/jobs`."""
+    found = [("status", s) for s in ([status] if isinstance(status, str) else status or [])]
+    found += [(f"label.{key}", str(value)) for key, value in (labels or {}).items()]
+    for name, value in others.items():
+        if isinstance(value, datetime.datetime):
+            value = value.astimezone(datetime.timezone.utc).isoformat().replace("+00:00", "Z")
+        if value is not None:
+            found.append((name, str(value)))
+    return tuple(found)
+
+
+# Sweeps
+
+
+@dataclass(frozen=True)
+class Spaced:
+    """Numbers at equal distances or at equal ratios, as the service spaces them."""
+
+    kind: str
+    start: float
+    stop: float
+    count: int
+
+    def __iter__(self) -> Any:
+        for number in range(self.count):
+            share = number / max(self.count - 1, 1)
+            if self.kind == "linspace":
+                yield self.start + share * (self.stop - self.start)
+            else:
+                yield self.start * (self.stop / self.start) ** share
+
+
+def linspace(start: float, stop: float, count: int) -> Spaced:
+    """`count` numbers at equal distances, both ends included."""
+    return Spaced("linspace", float(start), float(stop), int(count))
+
+
+def logspace(start: float, stop: float, count: int) -> Spaced:
+    """`count` numbers at equal ratios, both ends included: the ends are values > 0, not exponents."""
+    return Spaced("logspace", float(start), float(stop), int(count))
+
+
+def submit_sweep(
+    base: Problem | Mapping[str, Any],
+    axes: Mapping[str, Any] | Sequence[Mapping[str, Any]],
+    mode: str,
+    envelope: Document,
+    key: str | None,
+) -> Call[Document]:
+    # with all defaults, so that each pointer finds the object that it leads into
+    body = {"base": problem_document(base, defaults=True), **envelope}
+    if isinstance(axes, Mapping):
+        body["axes"] = [_axis(path, values) for path, values in axes.items()]
+        body["mode"] = mode
+    else:
+        body["points"] = [{to_pointer(path): plain(v) for path, v in point.items()} for point in axes]
+        body["mode"] = "list"
+    return _post("/v1/sweeps", body, key=key or new_key())
+
+
+def _axis(path: str, values: Any) -> Document:
+    axis: Document = {"path": to_pointer(path)}
+    if isinstance(values, Spaced):
+        axis[values.kind] = {"start": values.start, "stop": values.stop, "count": values.count}
+    else:
+        axis["values"] = plain(values if isinstance(values, Sequence) else list(values))
+    return axis
+
+
+def sweep(id: str, wait_s: float | None = None) -> Call[Document]:
+    params: Params = () if wait_s is None else (("wait", f"{wait_s:.3f}"),)
+    return Call("GET", _sweep(id), _json, params, wait_s=wait_s or 0.0)
+
+
+def sweeps(page_token: str) -> Call[Document]:
+    return _get("/v1/sweeps", (("page_token", page_token),) if page_token else ())
+
+
+def sweep_table(id: str) -> Call[dict[str, Array]]:
+    return Call("GET", _sweep(id) + "/results", lambda r: arrays(r.content), (("format", "npz"),))
+
+
+def sweep_members(id: str, page_token: str) -> Call[Document]:
+    params: Params = (("page_size", "1000"),)
+    return _get(_sweep(id) + "/results", params + ((("page_token", page_token),) if page_token else ()))
+
+
+def cancel_sweep(id: str) -> Call[Document]:
+    return _safely(_post(_sweep(id) + "/cancel"))
+
+
+def delete_sweep(id: str) -> Call[None]:
+    return Call("DELETE", _sweep(id), _nothing)
+
+
+def member_job(id: str, number: int) -> Call[Document]:
+    return _post(f"{_sweep(id)}/members/{number}/job", key=new_key())
+
+
+def _sweep(id: str) -> str:
+    return "/v1/sweeps/" + quote(id, safe="")
+
+
+# Meshes
+
+
+MeshSource = str | os.PathLike[str] | bytes | MeshInput | Mapping[str, Any]
+
+
+def upload_mesh(source: MeshSource) -> Call[StoredMesh]:
+    """A mesh is stored by the hash of its content, so that sending it twice does no more than once."""
+    content = mesh_bytes(source)
+    headers = {"Content-Type": "application/octet-stream"}
+    return Call("POST", "/v1/meshes", lambda r: StoredMesh.from_json(r.json()), headers=headers, content=content)
+
+
+def mesh_bytes(source: MeshSource) -> bytes:
+    """The file that a mesh is: a path, the content of a file, or a mesh that is written out in a problem."""
+    if isinstance(source, bytes):
+        return source
+    if isinstance(source, (str, os.PathLike)):
+        return pathlib.Path(source).read_bytes()
+    document = plain(source)
+    for kind in ("gmsh", "abaqus"):
+        if document.get(kind) is not None:
+            return str(document[kind]).encode()
+    inline = document.get("inline", document)
+    if "nodes" not in inline:
+        raise ValueError("only meshes from files and inline meshes can be stored")
+    return json.dumps(inline, allow_nan=False).encode()
+
+
+def mesh(hash: str) -> Call[StoredMesh]:
+    return Call("GET", "/v1/meshes/" + quote(hash, safe=":"), lambda r: StoredMesh.from_json(r.json()))
+
+
+def meshes(page_token: str) -> Call[Document]:
+    return _get("/v1/meshes", (("page_token", page_token),) if page_token else ())
+
+
+def delete_mesh(hash: str) -> Call[None]:
+    return Call("DELETE", "/v1/meshes/" + quote(hash, safe=":"), _nothing)
+
+
+# Service
+
+
+def validate(problem: Problem | Mapping[str, Any]) -> Call[Validation]:
+    """What is wrong is the answer here, so that nothing is checked before but what JSON cannot express."""
+    document = plain(problem)
+    found: list[Violation] = []
+    _find_non_json(document, "", found)
+    if found:
+        raise errors.invalid(found)
+    call = _post("/v1/problems/validate", {"problem": document})
+    return Call(call.method, call.path, lambda r: Validation.from_json(r.json()), (), call.headers, call.content, True)
+
+
+def info() -> Call[Document]:
+    return _get("/v1/info")
+
+
+def me() -> Call[Document]:
+    return _get("/v1/me")
+
+
+def queue() -> Call[Document]:
+    return _get("/v1/queue")
+
+
+def pause_queue() -> Call[Document]:
+    return _safely(_post("/v1/queue/pause"))
+
+
+def resume_queue() -> Call[Document]:
+    return _safely(_post("/v1/queue/resume"))
+
+
+def explain(code: str) -> Call[Document]:
+    call = _get("/v1/errors/" + quote(code, safe=""))
+    return Call(call.method, call.path, _json, headers={"Accept": "application/json"})
+
+
+def submissions(problems: Iterable[Problem | Mapping[str, Any] | Submission]) -> list[Submission]:
+    return [p if isinstance(p, Submission) else Submission(p) for p in problems]

@@ -1,0 +1,89 @@
+"""Whether, and when, a request is sent again. Decisions only: nothing here sends or sleeps.
+
+A request is repeated only where that cannot do anything twice: if it never arrived (connection refused), if the
+service says that it did not do it (429, 503), or if it is repeatable by its nature (reading, deleting, a submission
+with its idempotency key).
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable
+
+import httpx
+
+from .errors import ConnectionLost
+
+FIRST_PAUSE_S = 0.1
+LONGEST_PAUSE_S = 5.0
+
+
+class Attempts:
+    """The attempts of one request.
+
+    limit_s: no attempt begins later than so many seconds after the first failure
+    """
+
+    def __init__(self, repeatable: bool, limit_s: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self.repeatable = repeatable
+        self.limit_s = limit_s
+        self.failures = 0
+        self._clock = clock
+        self._first_failure: float | None = None
+
+    def succeeded(self) -> None:
+        """The service was reached: what comes later is counted anew."""
+        self.failures = 0
+        self._first_failure = None
+
+    def after_error(self, error: httpx.TransportError) -> float:
+        """Seconds to wait before the next attempt. Raises `ConnectionLost` if there is none."""
+        never_arrived = isinstance(error, (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout))
+        pause = self._pause(None) if self.repeatable or never_arrived else None
+        if pause is None:
+            reason = str(error) or type(error).__name__
+            after = f", also after {self.failures} attempts" if self.failures > 1 else ""
+            raise ConnectionLost(f"the service at {_address(error)} cannot be reached{after}: {reason}") from error
+        return pause
+
+    def after_answer(self, response: httpx.Response) -> float | None:
+        """Seconds to wait before the next attempt; None if this answer is the last."""
+        if response.status_code in (429, 503):
+            if not _says_retryable(response):
+                return None
+        elif response.status_code not in (502, 504) or not self.repeatable:
+            return None
+        return self._pause(retry_after_s(response))
+
+    def _pause(self, wanted: float | None) -> float | None:
+        now = self._clock()
+        if self._first_failure is None:
+            self._first_failure = now
+        self.failures += 1
+        # half of the pause is left to chance, so that many clients do not come back at the same moment
+        pause = min(FIRST_PAUSE_S * 2 ** min(self.failures - 1, 10), LONGEST_PAUSE_S) * random.uniform(0.5, 1)
+        if wanted is not None:
+            pause = max(pause, wanted)
+        return pause if now + pause <= self._first_failure + self.limit_s else None
+
+
+def retry_after_s(response: httpx.Response) -> float | None:
+    """Retry-After in seconds; None without it."""
+    text = response.headers.get("Retry-After", "")
+    return float(text) if text.isdigit() else None
+
+
+def _says_retryable(response: httpx.Response) -> bool:
+    try:
+        return bool(response.json().get("retryable", True))
+    except (ValueError, AttributeError):  # not the service's own answer, but a proxy's
+        return True
+
+
+def _address(error: httpx.TransportError) -> str:
+    try:
+        url = error.request.url
+        return f"{url.scheme}://{url.netloc.decode()}"
+    except RuntimeError:  # the error came without its request
+        return "this address"

@@ -1,0 +1,127 @@
+"""How figures look: sizes, fonts, colours.
+
+The colours are those of Okabe and Ito, which people with any of the common kinds of colour blindness tell apart; what
+differs in colour differs in line style or in words besides.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ._extras import load
+
+SIZES = {"column": (88 / 25.4, 7.0), "page": (160 / 25.4, 9.0), "slide": (254 / 25.4, 14.0)}
+"""Width in inches and size of letters in points: a column of a journal (88 mm), a page, a slide."""
+
+
+@dataclass(frozen=True)
+class Theme:
+    ground: str
+    ink: str
+    faint: str
+    normal: str = "#0072B2"
+    tangential: str = "#D55E00"
+    stick: str = "#009E73"
+    slip: str = "#E69F00"
+    obstacle: str = "#999999"
+    good: str = "#009E73"
+    fair: str = "#B07A00"
+    poor: str = "#D55E00"
+
+
+THEMES = {
+    "light": Theme("#ffffff", "#1a1a1a", "#8a8a8a"),
+    "dark": Theme("#16181c", "#e8e8e8", "#8f959e", normal="#56B4E9", tangential="#FF8A3D", fair="#F0C05A"),
+}
+
+QUANTITIES = {
+    "normal_stress": r"normal stress  $\sigma_n$",
+    "tangential_stress": r"tangential stress  $\sigma_t$",
+    "friction_bound": r"friction bound  $\tau$",
+    "nonlocal_pressure": r"averaged pressure  $S_\rho$",
+    "normal_displacement": r"normal displacement  $u_n$",
+    "tangential_displacement": r"tangential displacement  $u_t$",
+    "gap": "gap before deformation",
+    "friction_ratio": r"friction ratio  $\varphi$",
+    "residual": "contact residual",
+    "friction_residual": "friction residual",
+    "von_mises": "von Mises stress",
+    "stress_xx": r"stress  $\sigma_{xx}$",
+    "stress_yy": r"stress  $\sigma_{yy}$",
+    "stress_zz": r"stress  $\sigma_{zz}$",
+    "stress_xy": r"stress  $\sigma_{xy}$",
+}
+"""The names of quantities on axes."""
+
+SYMBOLS = {"μ": r"$\mu$", "ρ": r"$\rho$", "ε": r"$\varepsilon$"}
+
+
+@contextlib.contextmanager
+def style(size: str, theme: str) -> Iterator[tuple[Any, float, Theme]]:
+    """pyplot with our settings, the width of a figure in inches, and the theme. Raises ValueError for other names."""
+    if size not in SIZES:
+        raise ValueError(f"size is one of {', '.join(SIZES)}, not {size!r}")
+    if theme not in THEMES:
+        raise ValueError(f"theme is one of {', '.join(THEMES)}, not {theme!r}")
+    pyplot = load("matplotlib.pyplot", "plot")
+    width, points = SIZES[size]
+    with pyplot.rc_context(settings(THEMES[theme], points)):
+        yield pyplot, width, THEMES[theme]
+
+
+def settings(theme: Theme, points: float) -> dict[str, Any]:
+    thin = points / 12
+    return {
+        "font.family": "sans-serif",
+        "font.size": points,
+        "mathtext.fontset": "dejavusans",
+        "axes.titlesize": points * 1.1,
+        "axes.labelsize": points,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.linewidth": 0.8 * thin,
+        "axes.edgecolor": theme.ink,
+        "axes.labelcolor": theme.ink,
+        "axes.facecolor": theme.ground,
+        "axes.axisbelow": True,
+        "figure.facecolor": theme.ground,
+        "savefig.facecolor": theme.ground,
+        "savefig.dpi": 300,
+        "text.color": theme.ink,
+        "xtick.color": theme.ink,
+        "ytick.color": theme.ink,
+        "xtick.labelsize": points * 0.9,
+        "ytick.labelsize": points * 0.9,
+        "xtick.major.width": 0.8 * thin,
+        "ytick.major.width": 0.8 * thin,
+        "lines.linewidth": 1.8 * thin,
+        "hatch.linewidth": 0.5 * thin,
+        "legend.frameon": False,
+        "legend.fontsize": points * 0.9,
+        "grid.color": theme.faint,
+        "grid.linewidth": 0.4 * thin,
+        "grid.alpha": 0.4,
+        # letters stay letters in vector files, so that a journal's editor can search and change them
+        "svg.fonttype": "none",
+        "pdf.fonttype": 42,
+    }
+
+
+def subtitle(about: Mapping[str, Any], boundary: str | None = None) -> str:
+    """The parameters by which the figures of a study differ; of all contacts, or of one."""
+    parameters = about.get("parameters") or {}
+    shown = {name: found for name, found in parameters.items() if boundary in (None, "", name)}
+    parts = []
+    for name, found in shown.items():
+        text = "   ".join(f"{SYMBOLS[symbol]} = {value:.4g}" for symbol, value in found.items()) or "no friction"
+        parts.append(f"{name}:  {text}" if len(parameters) > 1 else text)
+    return "      ".join(parts)
+
+
+def unit(about: Mapping[str, Any], kind: str) -> str:
+    """` (MPa)` where the problem names its units, else nothing."""
+    name = (about.get("units") or {}).get(kind)
+    return f"  ({name})" if name else ""

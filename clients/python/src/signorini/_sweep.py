@@ -1,0 +1,154 @@
+"""What is known of a sweep, and its table; common to `Sweep` and `AsyncSweep`, which add the verbs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from . import pointer as pointers
+from ._data import Array
+from ._extras import load
+from ._progress import sweep_line
+
+if TYPE_CHECKING:
+    import pandas
+    import pyarrow
+
+
+class SweepView:
+    """A sweep as the service last described it."""
+
+    def __init__(self, document: Mapping[str, Any]) -> None:
+        self.document = document
+
+    @property
+    def id(self) -> str:
+        return str(self.document["id"])
+
+    @property
+    def status(self) -> str:
+        """`queued`, `running`; `succeeded` if at least one member has, `failed`, `canceled`."""
+        return str(self.document["status"])
+
+    @property
+    def ended(self) -> bool:
+        return self.document.get("finished_at") is not None
+
+    @property
+    def name(self) -> str | None:
+        return self.document.get("name")
+
+    @property
+    def title(self) -> str:
+        return self.name or self.id
+
+    @property
+    def labels(self) -> dict[str, str]:
+        return dict(self.document.get("labels") or {})
+
+    @property
+    def paths(self) -> list[str]:
+        """What members differ in: JSON Pointers into the problem."""
+        return list(self.document["paths"])
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Members by their status, and their `total`."""
+        counts: Mapping[str, int] = self.document["members"]
+        return counts
+
+    def line(self) -> str:
+        """The sweep on one line."""
+        return sweep_line(self.title, self.document)
+
+    def __len__(self) -> int:
+        return self.counts["total"]
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.id}{f' {self.name!r}' if self.name else ''} {self.status}>"
+
+    def __str__(self) -> str:
+        return self.line()
+
+    def _card(self, residuals: Sequence[float]) -> str:
+        return self._repr_html_()
+
+    def _repr_html_(self) -> str:
+        from . import _html
+
+        return _html.sweep(self)
+
+
+class SweepTable:
+    """A row for each member: its parameters and what came of it. NaN where a member is not solved.
+
+    columns: arrays by name. A parameter is named by the last part of its pointer, `nonlocal_radius`, or by all of it
+        where several end alike.
+    parameters: the names of these columns
+    """
+
+    def __init__(self, found: Mapping[str, Array]) -> None:
+        pointed = [name for name in found if name.startswith("/")]
+        short = short_names(pointed)
+        self.columns: dict[str, Array] = {short.get(name, name): column for name, column in found.items()}
+        self.parameters = [short[name] for name in pointed]
+
+    def __getitem__(self, name: str) -> Array:
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        return len(self.columns["number"])
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """As a table of pandas (`pip install signorini[pandas]`)."""
+        table: pandas.DataFrame = load("pandas", "pandas").DataFrame(self.columns).set_index("number")
+        return table
+
+    def to_arrow(self) -> pyarrow.Table:
+        """As a table of Arrow (`pip install signorini[arrow]`)."""
+        table: pyarrow.Table = load("pyarrow", "arrow").table(self.columns)
+        return table
+
+
+def short_names(found: list[str]) -> dict[str, str]:
+    """The last part of each pointer, or all of it where that is not enough."""
+    last = {pointer: pointers.names(pointer)[-1] for pointer in found}
+    return {
+        pointer: name if list(last.values()).count(name) == 1 and not name.isdigit() else pointer[1:].replace("/", ".")
+        for pointer, name in last.items()
+    }
+
+
+class Member:
+    """A member of a sweep: its parameters and what came of it.
+
+    row: everything that the service says of it, such as `normal_force`, `stick_width`, `warnings`
+    """
+
+    def __init__(self, row: Mapping[str, Any]) -> None:
+        self.row = row
+
+    @property
+    def number(self) -> int:
+        return int(self.row["number"])
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Its values by JSON Pointer."""
+        found: Mapping[str, Any] = self.row["parameters"]
+        return found
+
+    @property
+    def status(self) -> str:
+        return str(self.row["status"])
+
+    @property
+    def reason(self) -> str | None:
+        """Why it failed."""
+        return self.row.get("reason")
+
+    def __getitem__(self, name: str) -> Any:
+        return self.row[name]
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.number} {self.status} {dict(self.parameters)}>"

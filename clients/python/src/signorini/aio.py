@@ -1,0 +1,417 @@
+"""The client with asyncio: the same names, awaited.
+
+Requests, answers, decisions about repetition, events, progress and data are those of the other client; only sending
+and waiting are written here once more.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import pathlib
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import httpx
+
+from . import _calls as calls
+from ._about import about
+from ._calls import Call, MeshSource, Submission
+from ._connection import Connection, request_arguments, stream_arguments
+from ._data import Event, Fields, History, Profile, StoredMesh, Summary, Validation, known
+from ._events import Cursor
+from ._job import JobView, changes
+from ._progress import Waiting
+from ._retry import Attempts
+from ._sweep import Member, SweepTable, SweepView
+from .local import LocalServer
+from .problem import Problem
+from .result import write
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+T = TypeVar("T")
+
+
+class AsyncClient:
+    """A connection to a service, for asyncio; see `Client`. It is closed by `aclose()` or `async with`."""
+
+    def __init__(self, url: str | None = None, token: str | None = None, *, retry_for: float = 60.0) -> None:
+        connection = Connection.of(url, token, retry_for)
+        self.url = connection.url
+        self.retry_for = retry_for
+        self._server: LocalServer | None = None
+        self._http = httpx.AsyncClient(**connection.settings())
+
+    @classmethod
+    def local(
+        cls,
+        data: str | os.PathLike[str] | None = None,
+        *,
+        binary: str | os.PathLike[str] | None = None,
+        workers: int | None = None,
+        options: Sequence[str] = (),
+    ) -> AsyncClient:
+        """A service of one's own; see `Client.local`."""
+        server = LocalServer(data, binary=binary, workers=workers, options=options)
+        client = cls(server.start(), token="")
+        client._server = server
+        return client
+
+    async def aclose(self) -> None:
+        await self._http.aclose()
+        if self._server is not None:
+            await asyncio.to_thread(self._server.stop)
+
+    async def __aenter__(self) -> AsyncClient:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.aclose()
+
+    def __repr__(self) -> str:
+        return f"<AsyncClient {self.url}>"
+
+    # Jobs
+
+    async def submit(
+        self,
+        problem: Problem | Mapping[str, Any],
+        *,
+        name: str | None = None,
+        labels: Mapping[str, str] | None = None,
+        priority: int | None = None,
+        timeout_s: float | None = None,
+        queue_ttl_s: float | None = None,
+        cache: str | None = None,
+        key: str | None = None,
+    ) -> AsyncJob:
+        submission = Submission(problem, name, labels or {}, priority, timeout_s, queue_ttl_s, cache, key)
+        return AsyncJob(self, await self._send(calls.submit(submission)))
+
+    async def submit_many(
+        self, problems: Iterable[Problem | Mapping[str, Any] | Submission], *, key: str | None = None
+    ) -> list[AsyncJob]:
+        documents = await self._send(calls.submit_many(calls.submissions(problems), key))
+        return [AsyncJob(self, document) for document in documents]
+
+    async def job(self, id: str) -> AsyncJob:
+        return AsyncJob(self, await self._send(calls.job(id)))
+
+    async def jobs(self, **filters: Any) -> AsyncIterator[AsyncJob]:
+        """The jobs that match all filters, which are those of `Client.jobs`."""
+        params = calls.filters(**filters)
+        token: str | None = ""
+        while token is not None:
+            page = await self._send(calls.jobs(params, token))
+            for document in page["jobs"]:
+                yield AsyncJob(self, document)
+            token = page.get("next_page_token") or None
+
+    async def count(self, *, group_by: str | None = None, **filters: Any) -> Mapping[str, Any]:
+        return await self._send(calls.count(calls.filters(**filters, group_by=group_by)))
+
+    async def cancel_jobs(self, **filters: Any) -> Mapping[str, int]:
+        return await self._send(calls.cancel_jobs(calls.filters(**filters)))
+
+    async def delete_jobs(self, **filters: Any) -> Mapping[str, int]:
+        return await self._send(calls.delete_jobs(calls.filters(**filters)))
+
+    async def validate(self, problem: Problem | Mapping[str, Any]) -> Validation:
+        return await self._send(calls.validate(problem))
+
+    # Sweeps
+
+    async def sweep(
+        self,
+        base: Problem | Mapping[str, Any] | str,
+        axes: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+        *,
+        mode: str = "grid",
+        name: str | None = None,
+        labels: Mapping[str, str] | None = None,
+        priority: int | None = None,
+        timeout_s: float | None = None,
+        queue_ttl_s: float | None = None,
+        key: str | None = None,
+    ) -> AsyncSweep:
+        """Submits a sweep, or finds it again by its id; see `Client.sweep`."""
+        if isinstance(base, str):
+            return AsyncSweep(self, await self._send(calls.sweep(base)))
+        if axes is None:
+            raise TypeError("a new sweep needs its axes")
+        envelope = calls._envelope(name, labels, priority, timeout_s, queue_ttl_s)
+        return AsyncSweep(self, await self._send(calls.submit_sweep(base, axes, mode, envelope, key)))
+
+    async def sweeps(self) -> AsyncIterator[AsyncSweep]:
+        token: str | None = ""
+        while token is not None:
+            page = await self._send(calls.sweeps(token))
+            for document in page["sweeps"]:
+                yield AsyncSweep(self, document)
+            token = page.get("next_page_token") or None
+
+    # Meshes
+
+    async def upload_mesh(self, source: MeshSource) -> StoredMesh:
+        return await self._send(calls.upload_mesh(source))
+
+    async def mesh(self, hash: str) -> StoredMesh:
+        return await self._send(calls.mesh(hash))
+
+    async def meshes(self) -> AsyncIterator[StoredMesh]:
+        token: str | None = ""
+        while token is not None:
+            page = await self._send(calls.meshes(token))
+            for document in page["meshes"]:
+                yield StoredMesh.from_json(document)
+            token = page.get("next_page_token") or None
+
+    async def delete_mesh(self, hash: str) -> None:
+        await self._send(calls.delete_mesh(hash))
+
+    # The service
+
+    async def info(self) -> Mapping[str, Any]:
+        return await self._send(calls.info())
+
+    async def me(self) -> Mapping[str, Any]:
+        return await self._send(calls.me())
+
+    async def queue(self) -> Mapping[str, Any]:
+        return await self._send(calls.queue())
+
+    async def pause_queue(self) -> Mapping[str, Any]:
+        return await self._send(calls.pause_queue())
+
+    async def resume_queue(self) -> Mapping[str, Any]:
+        return await self._send(calls.resume_queue())
+
+    async def explain(self, code: str) -> Mapping[str, Any]:
+        return await self._send(calls.explain(code))
+
+    # Sending
+
+    async def _send(self, call: Call[T], limit_s: float | None = None) -> T:
+        attempts = Attempts(call.repeatable, self.retry_for if limit_s is None else limit_s)
+        while True:
+            try:
+                response = await self._http.request(**request_arguments(call))
+            except httpx.TransportError as error:
+                pause: float | None = attempts.after_error(error)
+            else:
+                pause = attempts.after_answer(response)
+                if pause is None:
+                    return call.read(response, attempts.failures + 1)
+            await asyncio.sleep(pause or 0.0)
+
+    async def _events(self, path: str, after_seq: int) -> AsyncIterator[Event]:
+        cursor = Cursor(after_seq)
+        attempts = Attempts(True, self.retry_for)
+        while not cursor.done:
+            try:
+                async with self._http.stream(**stream_arguments(path, cursor.headers())) as response:
+                    if response.status_code != 200:
+                        await response.aread()
+                    pause = attempts.after_answer(response)
+                    if pause is None:
+                        if response.is_error:
+                            calls.raise_error(response)
+                        if response.status_code == 204:
+                            return
+                        async for content in response.aiter_raw():
+                            attempts.succeeded()
+                            for event in cursor.read(content):
+                                yield event
+                            if cursor.done:
+                                return
+                        pause = attempts.after_error(httpx.ReadError("the stream ended", request=response.request))
+            except httpx.TransportError as error:
+                pause = attempts.after_error(error)
+            await asyncio.sleep(pause)
+
+
+class AsyncJob(JobView):
+    """A job of the service; see `Job`."""
+
+    def __init__(self, client: AsyncClient, document: Mapping[str, Any]) -> None:
+        super().__init__(document)
+        self._client = client
+
+    async def refresh(self) -> AsyncJob:
+        self.document = await self._client._send(calls.job(self.id))
+        return self
+
+    async def wait(self, timeout: float | None = None, progress: bool = True) -> AsyncResult:
+        """Waits until the job has ended, and returns its result; see `Job.wait`. It can be canceled like any task,
+        and the job goes on."""
+        back = f"The job goes on. Come back with await (await client.job({self.id!r})).wait()"
+        waiting = Waiting(self.title, timeout, progress, back, self._card)
+        try:
+            while not self.ended:
+                call = calls.job(self.id, waiting.seconds())
+                self.document = await self._client._send(call, waiting.left(self._client.retry_for))
+                waiting.seen(self.status, self.line(), self.ended, self._residual())
+        except asyncio.CancelledError:  # which is also what Ctrl-C becomes
+            waiting.detached()
+            raise
+        finally:
+            waiting.close()
+        return await self.result()
+
+    def events(self, after_seq: int = 0) -> AsyncIterator[Event]:
+        """All events of the job, each once and in its order; see `Job.events`."""
+        return self._client._events(calls._job(self.id) + "/events", after_seq)
+
+    async def cancel(self) -> AsyncJob:
+        self.document = (await self._client._send(calls.cancel(self.id)))["job"]
+        return self
+
+    async def retry(
+        self, *, timeout_s: float | None = None, queue_ttl_s: float | None = None, priority: int | None = None
+    ) -> AsyncJob:
+        document = await self._client._send(calls.retry(self.id, timeout_s, queue_ttl_s, priority))
+        return AsyncJob(self._client, document)
+
+    async def edit(self, **values: Any) -> AsyncJob:
+        self.document = await self._client._send(calls.edit(self.id, changes(values)))
+        return self
+
+    async def delete(self) -> None:
+        await self._client._send(calls.delete(self.id))
+
+    async def problem(self) -> Problem:
+        return Problem.from_dict(await self.problem_document())
+
+    async def problem_document(self) -> Mapping[str, Any]:
+        return await self._client._send(calls.problem(self.id))
+
+    async def result(self, partial: bool = False) -> AsyncResult:
+        """The result; see `Job.result`."""
+        if not self.ended:
+            await self.refresh()
+        if not partial:
+            self.raise_for_status()
+        document = await self._client._send(calls.result(self.id))
+        return AsyncResult(self._client, self, document)
+
+    async def svg(self, plot: str, theme: str = "light") -> str:
+        return await self._client._send(calls.plot(self.id, plot, theme))
+
+
+class AsyncResult(Summary):
+    """A solution, or the last state of an iteration that did not end; see `Result`."""
+
+    def __init__(self, client: AsyncClient, job: AsyncJob, document: Mapping[str, Any]) -> None:
+        super().__init__(document, document.get("result_available") == "partial")
+        self._client = client
+        self._about: Mapping[str, Any] | None = None
+        self.job = job
+
+    async def profile(
+        self, boundary: str | None = None, *, step: int | str | None = None, points: int | str | None = None
+    ) -> Profile:
+        name = self._boundary(boundary)
+        found = await self._client._send(calls.profile(self.job.id, name, step, points))
+        return Profile(**known(Profile, found), boundary=name, about=await self.about(), partial=self.partial)
+
+    async def history(self) -> History:
+        found = await self._client._send(calls.history(self.job.id, None))
+        return History(**known(History, found), about=await self.about(), partial=self.partial)
+
+    async def fields(self) -> Fields:
+        found = await self._client._send(calls.fields(self.job.id))
+        return Fields(**known(Fields, found), about=await self.about(), partial=self.partial)
+
+    async def save_vtu(self, path: str | os.PathLike[str]) -> pathlib.Path:
+        return write(path, await self._client._send(calls.vtu(self.job.id)))
+
+    async def plot_profile(self, boundary: str | None = None, **options: Any) -> Figure:
+        return (await self.profile(boundary)).plot(**options)
+
+    async def about(self) -> Mapping[str, Any]:
+        if self._about is None:
+            self._about = about(self, await self._client._send(calls.problem(self.job.id)))
+        return self._about
+
+    def _repr_html_(self) -> str:
+        from . import _html
+
+        return _html.result(self)
+
+
+class AsyncSweep(SweepView):
+    """A sweep of the service; see `Sweep`."""
+
+    def __init__(self, client: AsyncClient, document: Mapping[str, Any]) -> None:
+        super().__init__(document)
+        self._client = client
+
+    async def refresh(self) -> AsyncSweep:
+        self.document = await self._client._send(calls.sweep(self.id))
+        return self
+
+    async def wait(self, timeout: float | None = None, progress: bool = True) -> AsyncSweep:
+        back = f"The sweep goes on. Come back with await (await client.sweep({self.id!r})).wait()"
+        waiting = Waiting(self.title, timeout, progress, back, self._card)
+        try:
+            while not self.ended:
+                call = calls.sweep(self.id, waiting.seconds())
+                self.document = await self._client._send(call, waiting.left(self._client.retry_for))
+                waiting.seen(self.status, self.line(), self.ended)
+        except asyncio.CancelledError:
+            waiting.detached()
+            raise
+        finally:
+            waiting.close()
+        return self
+
+    async def table(self) -> SweepTable:
+        return SweepTable(await self._client._send(calls.sweep_table(self.id)))
+
+    async def to_pandas(self) -> pandas.DataFrame:
+        return (await self.table()).to_pandas()
+
+    async def members(self) -> AsyncIterator[AsyncMember]:
+        token: str | None = ""
+        while token is not None:
+            page = await self._client._send(calls.sweep_members(self.id, token))
+            for row in page["members"]:
+                yield AsyncMember(self, row)
+            token = page.get("next_page_token") or None
+
+    async def member(self, number: int) -> AsyncMember:
+        async for member in self.members():
+            if member.number == number:
+                return member
+        raise IndexError(f"the sweep has members 0 to {len(self) - 1}")
+
+    def events(self, after_seq: int = 0) -> AsyncIterator[Event]:
+        return self._client._events(calls._sweep(self.id) + "/events", after_seq)
+
+    def jobs(self) -> AsyncIterator[AsyncJob]:
+        return self._client.jobs(sweep=self.id)
+
+    async def cancel(self) -> AsyncSweep:
+        self.document = await self._client._send(calls.cancel_sweep(self.id))
+        return self
+
+    async def delete(self) -> None:
+        await self._client._send(calls.delete_sweep(self.id))
+
+
+class AsyncMember(Member):
+    """A member of a sweep, which can be solved as a job of its own."""
+
+    def __init__(self, sweep: AsyncSweep, row: Mapping[str, Any]) -> None:
+        super().__init__(row)
+        self._sweep = sweep
+
+    async def job(self) -> AsyncJob:
+        client = self._sweep._client
+        return AsyncJob(client, await client._send(calls.member_job(self._sweep.id, self.number)))

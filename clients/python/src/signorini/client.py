@@ -1,0 +1,294 @@
+"""The client: jobs, sweeps and meshes of a service, over blocking connections."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import TracebackType
+from typing import Any, TypeVar
+
+import httpx
+
+from . import _calls as calls
+from ._calls import Call, MeshSource, Submission
+from ._connection import Connection, request_arguments, stream_arguments
+from ._data import Event, StoredMesh, Validation
+from ._events import Cursor
+from ._retry import Attempts
+from .job import Job
+from .local import LocalServer
+from .problem import Problem
+from .sweep import Sweep
+
+T = TypeVar("T")
+
+
+class Client:
+    """A connection to a service.
+
+    url: its address; absent: the environment variable SIGNORINI_URL, or http://127.0.0.1:8080
+    token: who you are; absent: SIGNORINI_TOKEN
+    retry_for: seconds for which a request is repeated while the service cannot be reached or is busy; only requests
+        that cannot do anything twice are repeated
+
+    A client may be used by several threads at once. It is closed by `close()`, or at the end of a `with` block.
+    Every method raises an `ApiError` where the service refuses, and `ConnectionLost` where it cannot be reached.
+    """
+
+    def __init__(self, url: str | None = None, token: str | None = None, *, retry_for: float = 60.0) -> None:
+        connection = Connection.of(url, token, retry_for)
+        self.url = connection.url
+        self.retry_for = retry_for
+        self._server: LocalServer | None = None
+        self._http = httpx.Client(**connection.settings())
+
+    @classmethod
+    def local(
+        cls,
+        data: str | os.PathLike[str] | None = None,
+        *,
+        binary: str | os.PathLike[str] | None = None,
+        workers: int | None = None,
+        options: Sequence[str] = (),
+    ) -> Client:
+        """A service of one's own, which starts now and stops with this client, or at the end of the program.
+
+        data: folder of its store; absent: a temporary one, so that its jobs are gone with it
+        binary: the program; absent: the environment variable SIGNORINI_BINARY, or `signorini` in PATH
+        workers: how many jobs it solves at the same time
+        options: further options of `signorini serve`
+        """
+        server = LocalServer(data, binary=binary, workers=workers, options=options)
+        client = cls(server.start(), token="")
+        client._server = server
+        return client
+
+    def close(self) -> None:
+        """Closes the connection, and stops a service of one's own."""
+        self._http.close()
+        if self._server is not None:
+            self._server.stop()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Client {self.url}>"
+
+    # Jobs
+
+    def submit(
+        self,
+        problem: Problem | Mapping[str, Any],
+        *,
+        name: str | None = None,
+        labels: Mapping[str, str] | None = None,
+        priority: int | None = None,
+        timeout_s: float | None = None,
+        queue_ttl_s: float | None = None,
+        cache: str | None = None,
+        key: str | None = None,
+    ) -> Job:
+        """Submits a job. When this returns, the job is stored, and will be solved whatever happens to this program.
+
+        The arguments are those of `Submission`. Raises `InvalidProblem` with everything that is wrong.
+        """
+        submission = Submission(problem, name, labels or {}, priority, timeout_s, queue_ttl_s, cache, key)
+        return Job(self, self._send(calls.submit(submission)))
+
+    def submit_many(
+        self, problems: Iterable[Problem | Mapping[str, Any] | Submission], *, key: str | None = None
+    ) -> list[Job]:
+        """Submits up to 1000 jobs, all or none of them. `Submission(problem, name=…)` gives a job its name."""
+        documents = self._send(calls.submit_many(calls.submissions(problems), key))
+        return [Job(self, document) for document in documents]
+
+    def job(self, id: str) -> Job:
+        """A job by its id: from another machine, or the next day."""
+        return Job(self, self._send(calls.job(id)))
+
+    def jobs(
+        self,
+        *,
+        status: str | Sequence[str] | None = None,
+        name: str | None = None,
+        labels: Mapping[str, str] | None = None,
+        owner: str | None = None,
+        sweep: str | None = None,
+        input_hash: str | None = None,
+        created_after: datetime.datetime | str | None = None,
+        created_before: datetime.datetime | str | None = None,
+        finished_after: datetime.datetime | str | None = None,
+        finished_before: datetime.datetime | str | None = None,
+        order_by: str | None = None,
+        page_size: int | None = None,
+    ) -> Iterator[Job]:
+        """The jobs that match all filters, newest first; pages are fetched as they are needed."""
+        params = calls.filters(
+            status,
+            labels,
+            name=name,
+            owner=owner,
+            sweep=sweep,
+            input_hash=input_hash,
+            created_after=created_after,
+            created_before=created_before,
+            finished_after=finished_after,
+            finished_before=finished_before,
+            order_by=order_by,
+            page_size=page_size,
+        )
+        token: str | None = ""
+        while token is not None:
+            page = self._send(calls.jobs(params, token))
+            yield from (Job(self, document) for document in page["jobs"])
+            token = page.get("next_page_token") or None
+
+    def count(self, *, group_by: str | None = None, **filters: Any) -> Mapping[str, Any]:
+        """How many jobs match the filters of `jobs`; by `group_by` also of each status, name, …"""
+        return self._send(calls.count(calls.filters(**filters, group_by=group_by)))
+
+    def cancel_jobs(self, **filters: Any) -> Mapping[str, int]:
+        """Asks all jobs that match the filters of `jobs` to stop: `{"matched", "changed"}`."""
+        return self._send(calls.cancel_jobs(calls.filters(**filters)))
+
+    def delete_jobs(self, **filters: Any) -> Mapping[str, int]:
+        """Deletes all jobs that match the filters of `jobs` and have ended: `{"matched", "changed"}`."""
+        return self._send(calls.delete_jobs(calls.filters(**filters)))
+
+    def validate(self, problem: Problem | Mapping[str, Any]) -> Validation:
+        """Everything that is wrong with a problem, and what solving it would cost; stores nothing."""
+        return self._send(calls.validate(problem))
+
+    # Sweeps
+
+    def sweep(
+        self,
+        base: Problem | Mapping[str, Any] | str,
+        axes: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+        *,
+        mode: str = "grid",
+        name: str | None = None,
+        labels: Mapping[str, str] | None = None,
+        priority: int | None = None,
+        timeout_s: float | None = None,
+        queue_ttl_s: float | None = None,
+        key: str | None = None,
+    ) -> Sweep:
+        """Submits one problem with many values, or finds a sweep again by its id.
+
+        axes: values by dotted name or JSON Pointer, `{"contacts.0.friction.coefficient": [0.1, 0.2]}`, with lists,
+            arrays, `linspace(…)` or `logspace(…)`; or a list of such dictionaries, one for each member
+        mode: with `grid` every combination is a member, with `zip` the values belong together, one of each axis
+        """
+        if isinstance(base, str):
+            return Sweep(self, self._send(calls.sweep(base)))
+        if axes is None:
+            raise TypeError("a new sweep needs its axes")
+        envelope = calls._envelope(name, labels, priority, timeout_s, queue_ttl_s)
+        return Sweep(self, self._send(calls.submit_sweep(base, axes, mode, envelope, key)))
+
+    def sweeps(self) -> Iterator[Sweep]:
+        """All sweeps, newest first."""
+        token: str | None = ""
+        while token is not None:
+            page = self._send(calls.sweeps(token))
+            yield from (Sweep(self, document) for document in page["sweeps"])
+            token = page.get("next_page_token") or None
+
+    # Meshes
+
+    def upload_mesh(self, source: MeshSource) -> StoredMesh:
+        """Stores a mesh once, for many jobs: `Problem(mesh=MeshInput(stored=mesh.hash), …)`.
+
+        source: path of a file of Gmsh, Abaqus or CalculiX; its content; or an inline mesh, as from
+            `signorini.mesh.from_meshio`
+        """
+        return self._send(calls.upload_mesh(source))
+
+    def mesh(self, hash: str) -> StoredMesh:
+        return self._send(calls.mesh(hash))
+
+    def meshes(self) -> Iterator[StoredMesh]:
+        """All stored meshes, newest first."""
+        token: str | None = ""
+        while token is not None:
+            page = self._send(calls.meshes(token))
+            yield from (StoredMesh.from_json(document) for document in page["meshes"])
+            token = page.get("next_page_token") or None
+
+    def delete_mesh(self, hash: str) -> None:
+        self._send(calls.delete_mesh(hash))
+
+    # The service
+
+    def info(self) -> Mapping[str, Any]:
+        """Version and limits of the service."""
+        return self._send(calls.info())
+
+    def me(self) -> Mapping[str, Any]:
+        """Who you are to the service, what you may do, and your share of the queue."""
+        return self._send(calls.me())
+
+    def queue(self) -> Mapping[str, Any]:
+        return self._send(calls.queue())
+
+    def pause_queue(self) -> Mapping[str, Any]:
+        """Starts no more jobs until the queue is resumed; for administrators."""
+        return self._send(calls.pause_queue())
+
+    def resume_queue(self) -> Mapping[str, Any]:
+        return self._send(calls.resume_queue())
+
+    def explain(self, code: str) -> Mapping[str, Any]:
+        """What an error code means, and what to do."""
+        return self._send(calls.explain(code))
+
+    # Sending
+
+    def _send(self, call: Call[T], limit_s: float | None = None) -> T:
+        """Sends a request, again where that is safe, and reads the answer."""
+        attempts = Attempts(call.repeatable, self.retry_for if limit_s is None else limit_s)
+        while True:
+            try:
+                response = self._http.request(**request_arguments(call))
+            except httpx.TransportError as error:
+                pause: float | None = attempts.after_error(error)
+            else:
+                pause = attempts.after_answer(response)
+                if pause is None:
+                    return call.read(response, attempts.failures + 1)
+            time.sleep(pause or 0.0)
+
+    def _events(self, path: str, after_seq: int) -> Iterator[Event]:
+        """The events at a path, each once, over as many connections as it takes."""
+        cursor = Cursor(after_seq)
+        attempts = Attempts(True, self.retry_for)
+        while not cursor.done:
+            try:
+                with self._http.stream(**stream_arguments(path, cursor.headers())) as response:
+                    if response.status_code != 200:
+                        response.read()
+                    pause = attempts.after_answer(response)
+                    if pause is None:
+                        if response.is_error:
+                            calls.raise_error(response)
+                        if response.status_code == 204:
+                            return
+                        for content in response.iter_raw():
+                            attempts.succeeded()
+                            yield from cursor.read(content)
+                            if cursor.done:
+                                return
+                        # the service stopped in good order; what is missing comes from the next one
+                        pause = attempts.after_error(httpx.ReadError("the stream ended", request=response.request))
+            except httpx.TransportError as error:
+                pause = attempts.after_error(error)
+            time.sleep(pause)

@@ -1,0 +1,68 @@
+"""The five examples of the thesis (A.C. Bolt, University of Cape Town, 1983, chapter 4), ready to submit.
+
+Each function returns a new `Problem`, which may be changed. Parameters that are not given stay as in the thesis:
+rho is the nonlocal radius ρ (length), mu the coefficient of friction μ, epsilon the elastic slip ε (length). `refine`
+replaces the refinement of the mesh: how often every element is split into four, or a tolerance below 1 to which the
+mesh is refined where errors come from; the examples have 0.002.
+"""
+
+from __future__ import annotations
+
+import json
+from importlib import resources
+
+from ..problem import AdaptiveRefine, Friction, Problem
+
+__all__ = ["annular_punch", "cylinder", "cylinder_on_end", "rectangular_punch", "sheet"]
+
+
+def rectangular_punch(
+    rho: float | None = None, mu: float | None = None, epsilon: float | None = None, refine: float | None = None
+) -> Problem:
+    """A rigid rectangular punch on an elastic block, plane strain, thesis 4.1(i)."""
+    return _example("rectangular_punch", rho, mu, epsilon, refine)
+
+
+def cylinder(
+    rho: float | None = None, mu: float | None = None, epsilon: float | None = None, refine: float | None = None
+) -> Problem:
+    """A rigid cylinder on an elastic block, plane strain, thesis 4.1(ii)."""
+    return _example("cylinder", rho, mu, epsilon, refine)
+
+
+def annular_punch(
+    rho: float | None = None, mu: float | None = None, epsilon: float | None = None, refine: float | None = None
+) -> Problem:
+    """A flat annular punch, axisymmetric, thesis 4.2(i)."""
+    return _example("annular_punch", rho, mu, epsilon, refine)
+
+
+def cylinder_on_end(
+    rho: float | None = None, mu: float | None = None, epsilon: float | None = None, refine: float | None = None
+) -> Problem:
+    """A rigid cylinder on its end, axisymmetric, thesis 4.2(ii)."""
+    return _example("cylinder_on_end", rho, mu, epsilon, refine)
+
+
+def sheet(
+    rho: float | None = None, mu: float | None = None, epsilon: float | None = None, refine: float | None = None
+) -> Problem:
+    """A thin sheet pulled through an opening, plane stress, thesis 4.3."""
+    return _example("sheet", rho, mu, epsilon, refine)
+
+
+def _example(name: str, rho: float | None, mu: float | None, epsilon: float | None, refine: float | None) -> Problem:
+    text = resources.files(__name__).joinpath(name + ".json").read_text(encoding="utf-8")
+    problem = Problem.from_dict(json.loads(text))
+    friction = problem.contacts[0].friction
+    assert isinstance(friction, Friction), "every example has friction"
+    if rho is not None:
+        friction.nonlocal_radius = rho
+    if mu is not None:
+        friction.coefficient = mu
+    if epsilon is not None:
+        friction.elastic_slip = epsilon
+    if refine is not None:
+        problem.mesh.refine = AdaptiveRefine(tolerance=refine) if 0 < refine < 1 else int(refine)
+    # once more, since these values have not been checked
+    return Problem.from_dict(problem.to_dict())

@@ -1,0 +1,399 @@
+"""Figures for papers and lectures, by matplotlib (`pip install signorini[plot]`).
+
+    profile       stresses along a contact, stick and slip shaded
+    convergence   residuals and changes of contact by iteration
+    deformed      the deformed body with a stress
+    problem       mesh, supports and obstacles of a problem, before it is solved
+
+All return a `matplotlib.figure.Figure`: `figure.savefig("punch.pdf")`. Each takes `size`, one of `column` (88 mm),
+`page` (default) and `slide`, and `theme`, `light` (default) or `dark`. Under the title stand the parameters μ, ρ, ε,
+beside it the verdict; below the figure the warnings.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _shapes as shapes
+from ._data import Array, Fields, History, Profile
+from ._style import QUANTITIES, Theme, style, subtitle, unit
+from .problem import Problem
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["convergence", "deformed", "problem", "profile"]
+
+CUT = 6.0
+"""A stress is drawn up to so many times its median along the contact; a peak beyond it is cut and marked."""
+
+
+def profile(found: Profile, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
+    """Normal and tangential stress along a contact by arc length, with the friction bound; stick and slip shaded."""
+    with style(size, theme) as (plt, width, colours):
+        # in a narrow column the words on the axes need more height
+        height = width * (1.1 if size == "column" else 0.78)
+        figure, (upper, lower) = plt.subplots(2, 1, sharex=True, figsize=(width, height), layout="constrained")
+        s = found.s
+        _shade(upper, found, colours, words=True)
+        _shade(lower, found, colours, words=False)
+        upper.plot(s, found.normal_stress, color=colours.normal)
+        bound = found.friction_bound
+        signs = [sign for sign in (1, -1) if np.any(sign * found.tangential_stress > 0)] or [1]
+        if np.any(bound > 0):
+            for sign in signs:
+                label = QUANTITIES["friction_bound"] if sign == signs[0] else None
+                lower.plot(s, sign * bound, color=colours.faint, linestyle=(0, (4, 2)), label=label)
+        lower.plot(s, found.tangential_stress, color=colours.tangential, label=QUANTITIES["tangential_stress"])
+        if np.any(bound > 0):
+            lower.legend(loc="best")
+        stress = unit(found.about, "stress")
+        upper.set_ylabel(QUANTITIES["normal_stress"] + stress)
+        lower.set_ylabel(QUANTITIES["tangential_stress"] + stress)
+        lower.set_xlabel(f"arc length $s${unit(found.about, 'length')} along “{found.boundary}”")
+        for axes in (upper, lower):
+            axes.axhline(0, color=colours.ink, linewidth=0.5)
+            axes.margins(x=0)
+        upper.set_ylim(*_limits(s, found.normal_stress))
+        # with the bound, unless it is far from being reached
+        low, high = _limits(s, found.tangential_stress, np.inf)
+        reach = 1.08 * float(bound.max())
+        lower.set_ylim(min(low, max(-reach, 1.6 * low)), max(high, min(reach, 1.6 * high)))
+        _mark_cut(upper, s, found.normal_stress, colours, found.about, found.boundary)
+        _position_axis(upper, found)
+        _head(figure, upper, found.about, colours, found.partial, title, found.boundary)
+        _foot(figure, found.about, colours, width)
+    return _finished(plt, figure)
+
+
+def convergence(found: History, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
+    """Residuals by iteration, the tolerance, and how many nodes entered and left contact."""
+    with style(size, theme) as (plt, width, colours):
+        height = width * (1.15 if size == "column" else 0.7)
+        figure, (upper, lower) = plt.subplots(
+            2, 1, sharex=True, figsize=(width, height), layout="constrained", height_ratios=[3, 1]
+        )
+        k = found.k
+        marker = "o" if len(k) <= 60 else ""
+        lines = [("residual", colours.normal, "-", "o"), ("friction_residual", colours.tangential, "--", "s")]
+        for name, colour, dashes, shape in lines:
+            values = np.where(getattr(found, name) > 0, getattr(found, name), np.nan)
+            upper.semilogy(
+                k, values, color=colour, linestyle=dashes, marker=marker and shape, markersize=3, label=QUANTITIES[name]
+            )
+        upper.semilogy(k, found.tolerance, color=colours.ink, linewidth=0.8, linestyle=":", label="tolerance")
+        upper.set_ylabel("residual (dimensionless)")
+        upper.grid(axis="y")
+        lower.bar(k, found.contact_entered, color=colours.stick, label="entered")
+        lower.bar(k, -found.contact_left.astype(float), color=colours.slip, hatch="///", label="left")
+        lower.axhline(0, color=colours.ink, linewidth=0.5)
+        lower.set_ylabel("nodes of\ncontact")
+        lower.set_xlabel("iteration $k$")
+        # outside, since a long history fills its panels
+        handles = [handle for axes in (upper, lower) for handle in axes.get_legend_handles_labels()[0]]
+        columns = 2 if size == "column" else 5
+        from matplotlib.transforms import offset_copy
+
+        # below the name of the axis, by the height of letters
+        below = offset_copy(lower.transAxes, figure, 0, -3.6 * plt.rcParams["font.size"], units="points")
+        lower.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below, borderaxespad=0,
+            ncols=columns,
+        )  # fmt: skip
+        lower.xaxis.get_major_locator().set_params(integer=True)
+        for change in np.flatnonzero(np.diff(found.step.astype(int))):
+            for axes in (upper, lower):
+                axes.axvline((k[change] + k[change + 1]) / 2, color=colours.faint, linewidth=0.6)
+        _head(figure, upper, found.about, colours, found.partial, title)
+        _foot(figure, found.about, colours, width)
+    return _finished(plt, figure)
+
+
+def _window(points: Array, state: Array) -> tuple[Array, Array]:
+    """Two corners of a box around the contact; all of the body without one."""
+    touching = points[state > 0]
+    if len(touching) == 0:
+        return points.min(axis=0), points.max(axis=0)
+    middle = (touching.min(axis=0) + touching.max(axis=0)) / 2
+    reach = 0.75 * float(np.ptp(touching, axis=0).max())
+    return np.maximum(middle - reach, points.min(axis=0)), np.minimum(middle + reach, points.max(axis=0) + 0.1 * reach)
+
+
+COMPONENTS = {"stress_xx": 0, "stress_yy": 1, "stress_zz": 2, "stress_xy": 3}
+
+
+def deformed(
+    found: Fields,
+    *,
+    quantity: str = "von_mises",
+    scale: float = 1.0,
+    zoom: bool = False,
+    size: str = "page",
+    theme: str = "light",
+    title: str | None = None,
+) -> Figure:
+    """The deformed body, coloured by a stress.
+
+    quantity: `von_mises`, `stress_xx`, `stress_yy`, `stress_zz`, `stress_xy`
+    scale: factor on the displacements
+    zoom: whether only the contact and what is near it is shown
+    """
+    if quantity == "von_mises":
+        values = found.von_mises
+    elif quantity in COMPONENTS:
+        values = found.stress[:, COMPONENTS[quantity]]
+    else:
+        raise ValueError(f"quantity is one of von_mises, {', '.join(COMPONENTS)}, not {quantity!r}")
+    with style(size, theme) as (plt, width, colours):
+        from matplotlib.collections import LineCollection
+
+        points = (found.points + scale * found.displacement)[:, :2]
+        signed = quantity != "von_mises"
+        triangles = _small_triangles(found)
+        # a mesh has most of its nodes where stresses are largest: what is usual is judged by area
+        (x0, y0), (x1, y1), (x2, y2) = (found.points[triangles[:, corner], :2].T for corner in range(3))
+        areas = np.abs((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
+        corner, opposite = _window(points, found.contact_state) if zoom else (points.min(axis=0), points.max(axis=0))
+        middles = points[triangles].mean(axis=1)
+        areas = areas * np.all((middles >= corner) & (middles <= opposite), axis=1)
+        high = _quantile(np.abs(values[triangles]).mean(axis=1), areas, 0.995) or 1.0
+        low = -high if signed else 0.0
+        span = opposite - corner
+        height = float(np.clip(0.75 * width * span[1] / span[0], 0.2 * width, 1.1 * width)) + 0.25 * width
+        figure, axes = plt.subplots(figsize=(width, height), layout="compressed")
+        image = axes.tripcolor(
+            points[:, 0],
+            points[:, 1],
+            triangles,
+            values,
+            shading="gouraud",
+            cmap="PuOr" if signed else "cividis",
+            vmin=low,
+            vmax=high,
+            rasterized=True,
+        )
+        around = [points[shapes.around(list(e))] for block in (found.quads, found.triangles) for e in block]
+        # thin enough that a graded mesh does not hide what is below it
+        thickness = 0.35 if len(around) < 500 else 0.12
+        axes.add_collection(LineCollection(around, colors=colours.ink, linewidths=thickness, alpha=0.5))
+        for state, colour, shape, word in ((1, colours.stick, "o", "stick"), (2, colours.slip, "D", "slip")):
+            at = points[found.contact_state == state]
+            if len(at):
+                axes.plot(*at.T, shape, color=colour, markersize=2, label=word, linestyle="none")
+        if np.any(found.contact_state > 0):
+            legend = axes.legend(loc="upper right", markerscale=2, frameon=True, framealpha=0.85)
+            legend.get_frame().set(facecolor=colours.ground, linewidth=0)
+        beyond = {(True, True): "both", (True, False): "min", (False, True): "max", (False, False): "neither"}
+        extend = beyond[bool(values.min() < low), bool(values.max() > high)]
+        bar = figure.colorbar(image, ax=axes, extend=extend, shrink=0.85, pad=0.02)
+        bar.set_label(QUANTITIES[quantity] + unit(found.about, "stress"))
+        bar.outline.set_visible(False)
+        axes.set_aspect("equal")
+        if zoom:
+            axes.set(xlim=(corner[0], opposite[0]), ylim=(corner[1], opposite[1]))
+        axes.set_xlabel("$x$" + unit(found.about, "length"))
+        axes.set_ylabel("$y$" + unit(found.about, "length"))
+        _head(figure, axes, found.about, colours, found.partial, title)
+        _foot(figure, found.about, colours, width)
+    return _finished(plt, figure)
+
+
+def problem(found: Problem, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
+    """Mesh, supports, loads and obstacles. Raises ValueError for a mesh in a file, which is not read here."""
+    with style(size, theme) as (plt, width, colours):
+        from matplotlib.collections import LineCollection
+
+        lines = list(shapes.mesh_lines(found.mesh))
+        every = np.concatenate(lines)
+        span = np.ptp(every, axis=0)
+        height = float(np.clip(0.6 * width * span[1] / span[0], 0.25 * width, 1.1 * width)) + 0.2 * width
+        figure, axes = plt.subplots(figsize=(width, height), layout="compressed")
+        axes.add_collection(LineCollection(lines, colors=colours.faint, linewidths=0.5))
+        reach = 0.03 * float(span.max())
+        for support in found.supports:
+            points = shapes.boundary(found.mesh, support.boundary or "")
+            if len(points):
+                held = [name for name in ("ux", "uy", "un", "ut") if getattr(support, name) is not None]
+                _hatched(axes, points, reach, colours.normal, _held(held))
+        for load in found.loads:
+            points = shapes.boundary(found.mesh, load.boundary or "")
+            if len(points):
+                axes.plot(*points.T, color=colours.slip, linewidth=2.5, label=f"load on {load.boundary}")
+        for contact in found.contacts:
+            face = shapes.boundary(found.mesh, contact.boundary)
+            if len(face):
+                axes.plot(*face.T, color=colours.tangential, linewidth=1.4, label=f"may touch: {contact.boundary}")
+            obstacle = shapes.obstacle(found.mesh, contact)
+            if len(obstacle) > 1:
+                above = obstacle + 2.5 * reach * shapes.normals(obstacle)
+                axes.fill(
+                    *np.concatenate([obstacle, above[::-1]]).T,
+                    facecolor=colours.obstacle,
+                    edgecolor=colours.ink,
+                    linewidth=0.6,
+                    alpha=0.85,
+                    label=f"obstacle, pushed by {contact.indentation:g}".replace("-", "−"),
+                )
+        axes.autoscale_view()
+        axes.margins(0.05)
+        axes.set_aspect("equal")
+        axes.set_xlabel("$x$")
+        axes.set_ylabel("$y$")
+        handles, labels = axes.get_legend_handles_labels()
+        unique = dict(zip(labels, handles, strict=True))
+        axes.legend(unique.values(), unique.keys(), loc="upper left", bbox_to_anchor=(1.0, 1.0), ncols=1)
+        from ._about import parameters
+
+        friction = {contact.boundary: parameters(contact.to_dict(defaults=True)) for contact in found.contacts}
+        about = {"title": found.title or "", "parameters": friction}
+        _head(figure, axes, about, colours, False, title)
+    return _finished(plt, figure)
+
+
+def _finished(plt: Any, figure: Any) -> Figure:
+    """Takes a figure from pyplot's list, so that a notebook shows it once and many figures take no memory."""
+    plt.close(figure)
+    finished: Figure = figure
+    return finished
+
+
+def _held(names: list[str]) -> str:
+    symbols = {"ux": "$u_x$", "uy": "$u_y$", "un": "$u_n$", "ut": "$u_t$"}
+    return "prescribed " + ", ".join(symbols[name] for name in names)
+
+
+def _hatched(axes: Any, points: Array, reach: float, colour: str, label: str) -> None:
+    """A support: a band outside of the boundary, hatched."""
+    outside = points + reach * shapes.normals(points)
+    axes.fill(
+        *np.concatenate([points, outside[::-1]]).T,
+        facecolor="none",
+        edgecolor=colour,
+        hatch="//////" if "," in label else "......",
+        linewidth=0.8,
+        label=label,
+    )
+
+
+def _shade(axes: Any, found: Profile, colours: Theme, words: bool) -> None:
+    """Stick and slip behind the curves; words on top, so that colour is not all that tells them apart."""
+    extents = (found.about.get("extents") or {}).get(found.boundary) or {}
+    length = float(found.s[-1] - found.s[0]) or 1.0
+    for part, colour, hatch in (("stick", colours.stick, None), ("slip", colours.slip, "////")):
+        for start, end in extents.get(part, []):
+            axes.axvspan(start, end, facecolor=colour, alpha=0.16, linewidth=0)
+            if hatch:
+                axes.axvspan(start, end, facecolor="none", edgecolor=colour, alpha=0.25, hatch=hatch, linewidth=0)
+            if words and (end - start) > 0.08 * length:
+                axes.text(
+                    (start + end) / 2, 0.5, part, color=colours.ink, alpha=0.8, ha="center", va="center",
+                    transform=axes.get_xaxis_transform(), fontsize="small",
+                    bbox={"facecolor": colours.ground, "alpha": 0.6, "linewidth": 0, "pad": 1.5},
+                )  # fmt: skip
+
+
+def _limits(s: Array, values: Array, cut: float = CUT) -> tuple[float, float]:
+    """Limits of an axis; a peak far beyond all else is cut, since nothing else could be seen beside it.
+
+    What is usual is judged by length, not by points: a mesh has most of its points where the peak is.
+    """
+    lengths = np.gradient(s) if len(s) > 1 else np.ones(1)
+    largest = float(np.abs(values).max()) or 1.0
+    acting = np.abs(values) > 1e-9 * largest
+    most = min(largest, cut * _quantile(np.abs(values[acting]), lengths[acting], 0.5)) if np.any(acting) else 1.0
+    # a single point may overshoot beside a peak: where nothing of length is beyond zero, the axis ends there
+    low, high = _quantile(values, lengths, 0.001), _quantile(values, lengths, 0.999)
+    below = min(most, -float(values.min())) if low < 0 else 0.0
+    above = min(most, float(values.max())) if high > 0 else 0.0
+    if not (below or above):
+        return -1.0, 1.0
+    return -1.08 * below - 0.02 * above, 1.08 * above + 0.02 * below
+
+
+def _quantile(values: Array, lengths: Array, share: float) -> float:
+    order = np.argsort(values)
+    total = np.cumsum(lengths[order])
+    return float(values[order][min(np.searchsorted(total, share * total[-1]), len(values) - 1)])
+
+
+def _mark_cut(axes: Any, s: Array, values: Array, colours: Theme, about: Mapping[str, Any], boundary: str) -> None:
+    """Two small strokes wherever the curve leaves the figure, and how far it goes."""
+    low, _ = axes.get_ylim()
+    beyond = np.flatnonzero(values < low)
+    if len(beyond) == 0:
+        return
+    for run in np.split(beyond, np.flatnonzero(np.diff(beyond) > 1) + 1):
+        axes.annotate(
+            "≈", (s[run[np.argmin(values[run])]], 0), xycoords=("data", "axes fraction"), ha="center", va="center",
+            color=colours.normal, fontsize="large", annotation_clip=False,
+            bbox={"boxstyle": "square,pad=0", "facecolor": colours.ground, "edgecolor": "none"},
+        )  # fmt: skip
+    at = int(np.argmin(values))
+    peak = ((about.get("peaks") or {}).get(boundary) or {}).get("normal_stress")
+    no_limit = peak is not None and peak.value.why == "no_limit"
+    text = f"peak {values[at]:.3g}".replace("-", "−") + (", which has no limit" if no_limit else "")
+    to_left = s[at] > (s[0] + s[-1]) / 2
+    axes.annotate(
+        text, (s[at], 0), xycoords=("data", "axes fraction"), xytext=(-10 if to_left else 10, 12),
+        textcoords="offset points", ha="right" if to_left else "left", va="bottom", fontsize="small",
+    )  # fmt: skip
+
+
+def _position_axis(axes: Any, found: Profile) -> None:
+    """x above s, where the two differ and the boundary does not turn back."""
+    if np.all(np.diff(found.x) > 0) and not np.allclose(found.x - found.x[0], found.s, rtol=1e-6):
+        above = axes.secondary_xaxis(
+            "top", functions=(lambda s: np.interp(s, found.s, found.x), lambda x: np.interp(x, found.x, found.s))
+        )
+        above.set_xlabel("position $x$" + unit(found.about, "length"))
+        above.spines["top"].set_visible(True)
+
+
+def _head(
+    figure: Any,
+    axes: Any,
+    about: Mapping[str, Any],
+    colours: Theme,
+    partial: bool,
+    title: str | None,
+    boundary: str | None = None,
+) -> None:
+    """Title, parameters below it; the verdict on the right."""
+    words = title if title is not None else about.get("title") or ""
+    below = subtitle(about, boundary)
+    verdict = about.get("verdict") or ""
+    if partial:
+        mark, colour = f"PARTIAL: {str(about.get('outcome') or '').replace('_', ' ')}", colours.poor
+    elif verdict:
+        mark, colour = f"● verdict: {verdict}", getattr(colours, verdict, colours.ink)
+    else:
+        mark, colour = "", colours.ink
+    figure.suptitle(words, x=0.01, ha="left", fontweight="bold", fontsize="large")
+    line = axes.set_title(below, loc="left", fontsize="medium", color=colours.ink)
+    line.set_wrap(False)
+    if mark:
+        # on a line of its own where both would not fit beside each other
+        if partial or figure.get_figwidth() < 4:
+            mark += "\n"
+        axes.set_title(mark, loc="right", fontsize="medium", color=colour, fontweight="bold" if partial else None)
+
+
+def _foot(figure: Any, about: Mapping[str, Any], colours: Theme, width: float) -> None:
+    """The warnings, in words."""
+    codes = [code.replace("_", " ") for code in dict.fromkeys(about.get("warnings") or [])]
+    if codes:
+        text = "\n".join(textwrap.wrap("Warnings: " + "; ".join(codes), 95 if width < 9 else 110))
+        figure.supxlabel(text, x=0.01, ha="left", fontsize="x-small", color=colours.faint)
+
+
+def _small_triangles(found: Fields) -> Array:
+    """Corners and midsides of each element as linear triangles."""
+    of_quad = [(0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 7), (5, 6, 7)]
+    of_triangle = [(0, 3, 5), (3, 1, 4), (4, 2, 5), (3, 4, 5)]
+    blocks = [found.quads[:, part] for part in of_quad if len(found.quads)]
+    blocks += [found.triangles[:, part] for part in of_triangle if len(found.triangles)]
+    return np.concatenate(blocks).astype(int)

@@ -1,0 +1,84 @@
+"""The result of a job: numbers with their errors at once, arrays when they are asked for."""
+
+from __future__ import annotations
+
+import functools
+import os
+import pathlib
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from . import _calls as calls
+from ._about import about
+from ._data import Fields, History, Profile, Summary, known
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .client import Client
+    from .job import Job
+
+
+class Result(Summary):
+    """A solution, or with `partial` the last state of an iteration that did not end.
+
+    `verdict` says how far it can be trusted, `reasons` and `warnings` why. Forces and peaks are numbers with their
+    errors. `profile()`, `history` and `fields()` are arrays, fetched when they are asked for.
+    """
+
+    def __init__(self, client: Client, job: Job, document: Mapping[str, Any]) -> None:
+        super().__init__(document, document.get("result_available") == "partial")
+        self._client = client
+        self.job = job
+
+    def profile(
+        self, boundary: str | None = None, *, step: int | str | None = None, points: int | str | None = None
+    ) -> Profile:
+        """Stresses and displacements along a contact.
+
+        boundary: name of the contact's boundary; may be left out if there is only one
+        step: load step by its name or its number from 0; absent: the last
+        points: `nodes`, `friction` (where friction acts) or a number of evenly spaced ones; absent: nodes, friction
+            points and the peaks
+        """
+        name = self._boundary(boundary)
+        found = self._client._send(calls.profile(self.job.id, name, step, points))
+        return Profile(**known(Profile, found), boundary=name, about=self.about, partial=self.partial)
+
+    @functools.cached_property
+    def history(self) -> History:
+        """A row for each iteration."""
+        found = self._client._send(calls.history(self.job.id, None))
+        return History(**known(History, found), about=self.about, partial=self.partial)
+
+    def fields(self) -> Fields:
+        """Displacements and stresses of the whole body."""
+        found = self._client._send(calls.fields(self.job.id))
+        return Fields(**known(Fields, found), about=self.about, partial=self.partial)
+
+    def save_vtu(self, path: str | os.PathLike[str]) -> pathlib.Path:
+        """Writes the fields for ParaView, completely or not at all."""
+        return write(path, self._client._send(calls.vtu(self.job.id)))
+
+    def plot_profile(self, boundary: str | None = None, **options: Any) -> Figure:
+        """Draws the stresses along a contact; see `signorini.figures.profile`."""
+        return self.profile(boundary).plot(**options)
+
+    @functools.cached_property
+    def about(self) -> Mapping[str, Any]:
+        """What a figure says besides its curves: title, parameters, verdict, units."""
+        return about(self, self._client._send(calls.problem(self.job.id)))
+
+    def _repr_html_(self) -> str:
+        from . import _html
+
+        return _html.result(self)
+
+
+def write(path: str | os.PathLike[str], content: bytes) -> pathlib.Path:
+    """Writes a file under another name first, so that what has the name is whole."""
+    target = pathlib.Path(path)
+    part = target.with_name(target.name + ".part")
+    part.write_bytes(content)
+    part.replace(target)
+    return target

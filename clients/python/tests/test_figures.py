@@ -1,0 +1,198 @@
+"""Figures: that they say what they should, in every size and theme; how they look is for eyes."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import unconverged_problem
+
+import signorini as sg
+from signorini import _shapes as shapes
+from signorini import figures
+from signorini import problem as p
+from signorini._html import job as job_card
+
+pytest.importorskip("matplotlib")
+
+
+def words(figure: Any) -> str:
+    """All text of a figure. It is not drawn for that, which would take most of the time of these tests."""
+    from matplotlib.text import Text
+
+    return "\n".join(text.get_text() for text in figure.findobj(Text))
+
+
+def test_a_figure_is_saved_in_the_formats_of_papers(punch: sg.Result) -> None:
+    figure = punch.plot_profile(size="column")
+    for kind, begin in [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")]:
+        out = io.BytesIO()
+        figure.savefig(out, format=kind, dpi=60)
+        assert out.getvalue().startswith(begin)
+
+
+@pytest.mark.parametrize(("size", "theme"), [("column", "light"), ("page", "dark"), ("slide", "light")])
+def test_a_profile_says_what_it_shows(punch: sg.Result, size: str, theme: str) -> None:
+    figure = punch.plot_profile(size=size, theme=theme)
+    text = words(figure)
+    for word in ("Rectangular punch, thesis 4.1(i)", "verdict: ", "stick", "slip", "which has no limit", "Warnings: "):
+        assert word in text, word
+    assert figure.axes[0].get_title(loc="left") == r"$\mu$ = 0.3   $\rho$ = 0.01   $\varepsilon$ = 0.0001"
+    assert figure.axes[0].get_ylabel() == r"normal stress  $\sigma_n$"
+    assert figure.get_figwidth() == pytest.approx({"column": 88, "page": 160, "slide": 254}[size] / 25.4)
+
+
+def test_the_other_figures_of_a_result(punch: sg.Result) -> None:
+    assert "friction residual" in words(punch.history.plot()) and "tolerance" in words(punch.history.plot())
+    fields = punch.fields()
+    assert "von Mises stress" in words(fields.plot(title="Another title"))
+    signed = fields.plot(quantity="stress_yy", scale=2, zoom=True)
+    assert signed.axes[1].get_ylabel() == r"stress  $\sigma_{yy}$"
+    figures.deformed(dataclasses.replace(fields, contact_state=np.full(len(fields.points), -1)), zoom=True)
+    with pytest.raises(ValueError, match="quantity is one of von_mises, stress_xx"):
+        fields.plot(quantity="stress")
+    for wrong in ({"size": "poster"}, {"theme": "blue"}):
+        with pytest.raises(ValueError, match=f"{next(iter(wrong))} is one of"):
+            punch.plot_profile(**wrong)
+
+
+def test_a_partial_result_says_so(client: sg.Client) -> None:
+    job = client.submit(unconverged_problem())
+    with pytest.raises(sg.JobFailed):
+        job.wait(60, progress=False)
+    result = job.result(partial=True)
+    for figure in (result.plot_profile(), result.history.plot(), result.fields().plot()):
+        assert "PARTIAL: not converged" in words(figure)
+    assert "Partial result: the iteration did not end" in result._repr_html_()
+    assert "failure" in job_card(job) and "not_converged" not in job_card(job).split("warning")[0]
+
+
+def test_a_sloping_boundary_has_x_beside_s_and_units(client: sg.Client) -> None:
+    problem = sg.examples.sheet(refine=1)
+    problem.units = p.Units(length="mm", stress="MPa")
+    problem.steps = [p.Step(name="a", increments=2), p.Step(name="b", indentation=1.5)]
+    result = client.submit(problem).wait(60, progress=False)
+    text = words(result.plot_profile())
+    assert "(MPa)" in text and "position" in text and "along “taper”" in text
+    result.history.plot()
+
+
+def test_without_friction(client: sg.Client) -> None:
+    problem = sg.examples.cylinder(refine=0)
+    problem.contacts[0].friction = None
+    result = client.submit(problem).wait(60, progress=False)
+    assert "no friction" in words(result.plot_profile()) and "friction bound" not in words(result.plot_profile())
+
+
+def test_several_contacts_are_told_apart(client: sg.Client) -> None:
+    problem = sg.examples.rectangular_punch(refine=0)
+    other = p.Contact(boundary="right", obstacle=p.Flat(along="arc_length"), indentation=-1)
+    problem.contacts.append(other)
+    result = client.submit(problem).wait(60, progress=False)
+    with pytest.raises(ValueError, match="which contact"):
+        result.plot_profile()
+    figure = result.plot_profile("top")
+    assert figure.axes[0].get_title(loc="left").startswith("top:  ")
+    result.plot_profile("right")
+
+
+@pytest.mark.parametrize("name", sg.examples.__all__)
+def test_the_examples_are_drawn(name: str) -> None:
+    problem = getattr(sg.examples, name)()
+    text = words(problem.plot())
+    assert "obstacle, pushed by" in text and problem.title in text
+
+
+OBSTACLES: list[p.Obstacle] = [
+    p.Flat(from_=0.2, to=0.8),
+    p.Circle(radius=0.3, center=0.5),
+    p.Parabola(radius=2),
+    p.Wedge(angle=10, center=0.5),
+    p.Cone(angle=45),
+    p.Tilted(slope=-0.1, along="arc_length"),
+    p.Power(coefficient=2, exponent=3),
+    p.RoundedFlat(half_width=0.1, radius=0.2, center=0.5),
+    p.Table(x=[0.1, 0.9], gap=[0, 0.5]),
+    p.Polyline(points=[[0, 1.1], [1, 1.2]]),
+    p.Line(point=[0.5, 1], angle=30),
+]
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES, ids=lambda obstacle: obstacle.kind)
+def test_every_obstacle_is_drawn(obstacle: p.Obstacle) -> None:
+    problem = p.Problem(
+        title="Every obstacle",
+        analysis=p.PlaneStrain(),
+        mesh=p.MeshInput(
+            grid=p.Grid(x=[0, 0.5, 1], y=[0, 1]), boundaries={"upper": p.BoundaryPart(side="right", y=[0, 1])}
+        ),
+        materials=[p.Material(youngs_modulus=1, poissons_ratio=0)],
+        contacts=[p.Contact(boundary="top", obstacle=obstacle)],
+        loads=[p.Load(boundary="upper", pressure=1)],
+        supports=[p.Support(boundary="bottom", uy=0), p.Support(nodes="unknown", ux=0)],
+    )
+    assert "obstacle, pushed by 0" in words(problem.plot(size="column"))
+    face = shapes.obstacle(problem.mesh, problem.contacts[0])
+    assert len(face) > 1 and np.all(np.isfinite(face))
+
+
+def test_profiles_of_obstacles() -> None:
+    c = np.array([-2.0, 0.0, 1.0])
+    expected: dict[int, list[float]] = {
+        0: [0, 0, 0],
+        2: [1, 0, 0.25],
+        4: [2, 0, 1],
+        5: [0.2, 0, -0.1],
+        6: [16, 0, 2],
+    }
+    for number, values in expected.items():
+        np.testing.assert_allclose(shapes.profile(OBSTACLES[number], c), values, atol=1e-12)
+    np.testing.assert_allclose(shapes.profile(p.Circle(radius=2), c), [2, 0, 2 - math.sqrt(3)])
+    rounded = p.RoundedFlat(half_width=0.5, radius=1)
+    np.testing.assert_allclose(shapes.profile(rounded, c), [np.nan, 0, 1 - math.sqrt(0.75)])
+    with pytest.raises(TypeError):
+        shapes.profile(p.Line(point=[0, 0], angle=0), c)
+
+
+def test_an_inline_mesh_is_drawn_and_a_file_is_not() -> None:
+    inline = p.InlineMesh(
+        nodes=[[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5]],
+        elements=[[0, 1, 2, 3, 4, 5, 6, 7]],
+        boundaries={"top": [[3, 2, 6]]},
+    )
+    mesh = p.MeshInput(inline=inline)
+    np.testing.assert_array_equal(shapes.boundary(mesh, "top"), [[0, 1], [0.5, 1], [1, 1]])
+    np.testing.assert_array_equal(shapes.normals(shapes.boundary(mesh, "top")), [[0, 1]] * 3)
+    part = p.MeshInput(inline=inline, boundaries={"up": p.BoundaryPart(normal=[0, 1])})
+    assert len(shapes.boundary(part, "up")) == 0
+    assert len(shapes.obstacle(part, p.Contact(boundary="up", obstacle=p.Flat()))) == 0
+    problem = sg.examples.rectangular_punch()
+    problem.mesh = mesh
+    assert "may touch: top" in words(problem.plot())
+    problem.mesh = p.MeshInput(gmsh="$MeshFormat")
+    with pytest.raises(ValueError, match="the mesh is in a file"):
+        problem.plot()
+
+
+def test_a_profile_without_peaks_is_not_cut(punch: sg.Result) -> None:
+    profile = punch.profile()
+    flat = dataclasses.replace(profile, normal_stress=np.zeros(len(profile)), about={})
+    assert "peak" not in words(flat.plot(title=""))
+
+
+def test_cards_of_notebooks(client: sg.Client, punch: sg.Result) -> None:
+    job = client.submit(sg.examples.rectangular_punch(refine=0), name="<b>bold</b>", labels={"a": "&"})
+    job.wait(60, progress=False)
+    card = job._repr_html_()
+    assert "&lt;b&gt;bold&lt;/b&gt;" in card and "a=&amp;" in card and "<b>bold" not in card
+    assert "from the cache" in card and "succeeded" in card
+    running = sg.Job(client, {**job.document, "progress": {"residual": 1e-3, "tolerance": 1e-10, "iteration": 3}})
+    assert "1.0e-03 → 1e-10" in running._repr_html_()
+    table = punch._repr_html_()
+    assert "normal force" in table and "±" in table and "peak σₙ" in table
+    sweep = client.sweep(sg.examples.rectangular_punch(refine=0), {"contacts.0.indentation": [0.1, 0.2]})
+    assert "contacts/0/indentation" in sweep.wait(60, progress=False)._repr_html_()

@@ -1,0 +1,224 @@
+"""What is repeated, when, and what never is: against answers that are made up."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable
+from typing import Any
+
+import httpx
+import pytest
+
+import signorini as sg
+from signorini import _calls as calls
+from signorini._retry import Attempts
+
+Answer = httpx.Response | Exception
+JOB = {"id": "job_1", "status": "queued", "name": None, "result_available": "none"}
+
+
+class Service:
+    """Answers one after the other, and notes what was asked."""
+
+    def __init__(self, *answers: Answer | Callable[[], Answer]) -> None:
+        self.answers = list(answers)
+        self.requests: list[httpx.Request] = []
+        self.pauses: list[float] = []
+
+    def __call__(self, request: httpx.Request) -> httpx.Response:
+        self.requests.append(request)
+        answer = self.answers.pop(0)
+        if isinstance(answer, httpx.TransportError):
+            answer.request = request
+            raise answer
+        assert isinstance(answer, httpx.Response)
+        return answer
+
+
+def client_of(service: Service, monkeypatch: pytest.MonkeyPatch, retry_for: float = 60) -> sg.Client:
+    client = sg.Client("http://service.test", token="secret", retry_for=retry_for)
+    client._http = httpx.Client(
+        base_url=client.url, headers=client._http.headers, transport=httpx.MockTransport(service)
+    )
+    monkeypatch.setattr("time.sleep", service.pauses.append)
+    return client
+
+
+def problem(status: int, code: str, retryable: bool = False, **headers: str) -> httpx.Response:
+    body = {"code": code, "title": code, "status": status, "detail": "in words", "retryable": retryable, "errors": []}
+    return httpx.Response(status, json=body, headers={k.replace("_", "-"): v for k, v in headers.items()})
+
+
+def test_a_submission_keeps_its_key_over_all_attempts(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(
+        httpx.ConnectError("refused"),
+        httpx.ReadError("reset"),
+        problem(503, "draining", True),
+        httpx.Response(502, text="bad gateway"),
+        httpx.Response(202, json=JOB),
+    )
+    client = client_of(service, monkeypatch)
+    assert client.submit(sg.examples.sheet(), name="sheet").id == "job_1"
+    keys = {request.headers["Idempotency-Key"] for request in service.requests}
+    assert len(service.requests) == 5 and len(keys) == 1 and len(keys.pop()) == 36
+    assert {request.headers["Authorization"] for request in service.requests} == {"Bearer secret"}
+    assert json.loads(service.requests[-1].content)["name"] == "sheet"
+
+
+def test_retry_after_is_honoured(monkeypatch: pytest.MonkeyPatch) -> None:
+    for status, code in [(429, "rate-limited"), (503, "queue-full")]:
+        service = Service(problem(status, code, True, Retry_After="7"), httpx.Response(200, json={"name": "x"}))
+        assert client_of(service, monkeypatch).info() == {"name": "x"}
+        assert service.pauses == [7.0]
+
+
+def test_pauses_grow_and_end_with_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    attempts = Attempts(True, 60, lambda: now[0])
+    pauses = []
+    with pytest.raises(sg.ConnectionLost, match="cannot be reached, also after"):
+        while True:
+            pauses.append(attempts.after_error(httpx.ReadError("reset")))
+            now[0] += pauses[-1]
+    assert all(0.05 <= pause <= 5 for pause in pauses) and pauses[0] <= 0.1 and 2.5 <= pauses[-1]
+    assert 50 < sum(pauses) <= 60
+    attempts.succeeded()
+    assert attempts.after_error(httpx.ReadError("reset")) <= 0.1, "what comes after an answer is counted anew"
+
+
+def test_what_might_be_done_twice_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(httpx.ReadError("reset"))
+    with pytest.raises(sg.ConnectionLost, match="http://service.test cannot be reached: reset"):
+        client_of(service, monkeypatch).cancel_jobs(status="running")
+    # but what never arrived is
+    service = Service(httpx.ConnectError("refused"), httpx.Response(200, json={"matched": 0, "changed": 0}))
+    assert client_of(service, monkeypatch).cancel_jobs(status="running")["matched"] == 0
+    service = Service(httpx.Response(504, text="too slow"))
+    with pytest.raises(sg.ServiceError, match=r"HTTP status 504 \(504 unknown\): too slow"):
+        client_of(service, monkeypatch).cancel_jobs(status="running")
+
+
+def test_what_the_service_refuses_for_good_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(problem(429, "quota-exceeded", False))
+    with pytest.raises(sg.QuotaExceeded, match=r"quota-exceeded \(429 quota-exceeded\): in words"):
+        client_of(service, monkeypatch).submit(sg.examples.sheet())
+    service = Service(problem(507, "storage-full", True))
+    with pytest.raises(sg.StorageFull) as caught:
+        client_of(service, monkeypatch).submit(sg.examples.sheet())
+    assert caught.value.retryable and caught.value.status == 507
+
+
+def test_the_last_answer_is_raised_when_the_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(problem(503, "queue-full", True, Retry_After="30"))
+    with pytest.raises(sg.Unavailable) as caught:
+        client_of(service, monkeypatch, retry_for=10).submit(sg.examples.sheet())
+    assert caught.value.retry_after_s == 30
+
+
+def test_a_job_that_an_earlier_attempt_deleted_is_deleted(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(httpx.ReadError("reset"), problem(410, "deleted"))
+    client = client_of(service, monkeypatch)
+    sg.Job(client, JOB).delete()
+    service.answers = [problem(410, "deleted")]
+    with pytest.raises(sg.Deleted):
+        sg.Job(client, JOB).delete()
+
+
+def test_every_code_has_its_class() -> None:
+    for code, kind in sg.errors.CLASSES.items():
+        with pytest.raises(kind):
+            calls.raise_error(problem(400, code))
+    with pytest.raises(sg.ApiError) as caught:
+        calls.raise_error(httpx.Response(418, json=["tea"]))
+    assert type(caught.value) is sg.ApiError
+
+
+def test_events_go_on_where_they_broke_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stream(*numbers: int, broken: bool = False) -> httpx.Response:
+        async def pieces() -> Any:
+            for piece in made():
+                yield piece
+
+        def made() -> Any:
+            for n in numbers:
+                kind = "done" if n == 5 else "iteration"
+                yield f"id: {n}\ndata: {json.dumps({'seq': n, 'type': kind})}\n\n".encode()
+            if broken:
+                raise httpx.ReadError("reset")
+
+        class Both(httpx.SyncByteStream, httpx.AsyncByteStream):
+            def __iter__(self) -> Any:
+                return made()
+
+            def __aiter__(self) -> Any:
+                return pieces()
+
+        return httpx.Response(200, stream=Both())
+
+    def answers() -> list[Answer]:
+        return [
+            stream(1, 2, broken=True),
+            httpx.ConnectError("refused"),
+            problem(503, "draining", True),
+            stream(3),
+            stream(),
+            stream(3, 4, 5),
+        ]
+
+    asked = ["0", "2", "2", "2", "3", "3"]
+    service = Service(*answers())
+    client = client_of(service, monkeypatch)
+    assert [event.seq for event in sg.Job(client, JOB).events()] == [1, 2, 3, 4, 5]
+    assert [request.headers["Last-Event-ID"] for request in service.requests] == asked
+    service.answers = [httpx.Response(204)]
+    assert list(sg.Job(client, JOB).events(after_seq=5)) == []
+    service.answers = [problem(410, "deleted")]
+    with pytest.raises(sg.Deleted):
+        list(sg.Job(client, JOB).events())
+
+    async def the_same_with_asyncio() -> list[int]:
+        twin = sg.AsyncClient("http://service.test")
+        other = Service(*answers())
+        transport = httpx.MockTransport(other)
+        twin._http = httpx.AsyncClient(base_url=twin.url, transport=transport)
+
+        async def pause(seconds: float) -> None:
+            other.pauses.append(seconds)
+
+        monkeypatch.setattr("asyncio.sleep", pause)
+        found = [event.seq async for event in sg.AsyncJob(twin, JOB).events()]
+        assert [request.headers["Last-Event-ID"] for request in other.requests] == asked
+        other.answers = [httpx.Response(204)]
+        assert [event async for event in sg.AsyncJob(twin, JOB).events(5)] == []
+        other.answers = [problem(410, "deleted")]
+        with pytest.raises(sg.Deleted):
+            [event async for event in sg.AsyncJob(twin, JOB).events()]
+        other.answers = [httpx.ReadError("reset"), problem(503, "draining", True), httpx.Response(200, json={"a": 1})]
+        assert await twin.info() == {"a": 1}
+        return found
+
+    assert asyncio.run(the_same_with_asyncio()) == [1, 2, 3, 4, 5]
+
+
+def test_something_else_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(httpx.Response(200, text="<html>Sign in", headers={"Content-Type": "text/html"}))
+    with pytest.raises(
+        sg.SignoriniError, match="http://service.test/v1/info is not answered as by the service: <html>"
+    ):
+        client_of(service, monkeypatch).info()
+    service = Service(httpx.Response(200, json={}))
+    with pytest.raises(sg.SignoriniError, match="is not answered as by the service: KeyError"):
+        client_of(service, monkeypatch).submit_many([sg.examples.sheet()])
+    # a proxy's own answer, without the service's words
+    service = Service(httpx.Response(503, text="busy"), httpx.Response(200, json={"name": "x"}))
+    assert client_of(service, monkeypatch).info() == {"name": "x"}
+
+
+def test_a_service_that_is_not_there() -> None:
+    with sg.Client("127.0.0.1:9", retry_for=0) as client:
+        assert client.url == "http://127.0.0.1:9" and repr(client) == "<Client http://127.0.0.1:9>"
+        with pytest.raises(sg.ConnectionLost, match="http://127.0.0.1:9 cannot be reached"):
+            client.info()
+        with pytest.raises(ConnectionError):
+            list(sg.Job(client, JOB).events())

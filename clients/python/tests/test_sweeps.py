@@ -1,0 +1,120 @@
+"""Sweeps: axes, the table, members, and that waiting and following see all of them."""
+
+from __future__ import annotations
+
+import json
+import signal
+
+import numpy as np
+import pytest
+from conftest import long_problem
+
+import signorini as sg
+from signorini import _calls as calls
+from signorini._progress import Waiting, sweep_line
+from signorini._sweep import short_names
+
+BASE = sg.examples.rectangular_punch(refine=0)
+MU = "contacts.0.friction.coefficient"
+RHO = "/contacts/0/friction/nonlocal_radius"
+
+
+def test_a_grid_is_every_combination(client: sg.Client, capsys: pytest.CaptureFixture[str]) -> None:
+    sweep = client.sweep(BASE, {RHO: [0.008, 0.01], MU: sg.linspace(0, 0.5, 3)}, name="grid", labels={"a": "b"})
+    assert len(sweep) == 6 and sweep.labels == {"a": "b"} and sweep.paths == [RHO, "/contacts/0/friction/coefficient"]
+    table = sweep.wait(60).table()
+    assert "grid · succeeded · ████████████████████ 6 of 6" in capsys.readouterr().err
+    assert sweep.ended and sweep.status == "succeeded" and sweep.title == "grid" and str(sweep).startswith("grid · ")
+    assert table.parameters == ["nonlocal_radius", "coefficient"] and len(table) == 6
+    np.testing.assert_allclose(table["coefficient"], [0, 0.25, 0.5] * 2)
+    np.testing.assert_allclose(table["nonlocal_radius"], [0.008] * 3 + [0.01] * 3)
+    assert table.to_arrow().num_rows == 6
+    frame = sweep.to_pandas()
+    assert list(frame.index) == list(range(6)) and (frame["status"] == "succeeded").all()
+    assert repr(client.sweep(sweep.id)) == f"<Sweep {sweep.id} 'grid' succeeded>"
+    assert sweep.id in [found.id for found in client.sweeps()]
+    # a member alone is the same within its tolerance, and has more
+    member = sweep.member(4)
+    assert (member.number, member.status, member.reason) == (4, "succeeded", None)
+    assert dict(member.parameters) == {RHO: 0.01, "/contacts/0/friction/coefficient": 0.25}
+    assert "<SweepMember 4 succeeded" in repr(member)
+    result = member.job().wait(60, progress=False)
+    assert float(result.normal_force) == pytest.approx(member["normal_force"], rel=1e-8)
+    assert result.normal_force.error is not None
+    with pytest.raises(IndexError, match="members 0 to 5"):
+        sweep.member(6)
+    assert [job.status for job in sweep.jobs()] == ["succeeded"]
+    events = list(sweep.events())
+    assert [event.seq for event in events] == list(range(1, 8))
+    assert sorted(event["member"]["number"] for event in events[:-1]) == list(range(6)) and events[-1].type == "done"
+    assert sweep.refresh().cancel().status == "succeeded"
+    sweep.delete()
+    with pytest.raises(sg.Deleted):
+        sweep.refresh()
+
+
+def test_values_that_belong_together(client: sg.Client) -> None:
+    zipped = client.sweep(BASE, {RHO: np.array([0.008, 0.01]), MU: (0.1, 0.2)}, mode="zip").wait(60, progress=False)
+    assert zipped.title == zipped.id
+    np.testing.assert_allclose(zipped.table()["coefficient"], [0.1, 0.2])
+    obstacle = sg.problem.Parabola(radius=8, to=0.5)
+    listed = client.sweep(
+        BASE, [{MU: 0.1, "solver.tolerance": 1e-9}, {"contacts.0.obstacle": obstacle}], timeout_s=60, priority=1
+    ).wait(60, progress=False)
+    first, second = listed.members()
+    assert dict(first.parameters) == {"/contacts/0/friction/coefficient": 0.1, "/solver/tolerance": 1e-9}
+    assert second.parameters["/contacts/0/obstacle"]["kind"] == "parabola"
+
+
+def test_axes_are_spaced_as_the_service_spaces_them(client: sg.Client) -> None:
+    axis = sg.logspace(0.005, 0.05, 4)
+    table = client.sweep(BASE, {RHO: axis}).wait(60, progress=False).table()
+    np.testing.assert_allclose(table["nonlocal_radius"], list(axis))
+    np.testing.assert_allclose(list(sg.linspace(1, 2, 3)), [1, 1.5, 2])
+    assert list(sg.linspace(1, 2, 1)) == [1]
+    body = json.loads(calls.submit_sweep(BASE, {MU: axis}, "grid", {}, None).content or b"")
+    assert body["axes"] == [
+        {"path": "/contacts/0/friction/coefficient", "logspace": {"start": 0.005, "stop": 0.05, "count": 4}}
+    ]
+
+
+def test_a_sweep_can_be_left_and_stopped(
+    client: sg.Client, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sweep = client.sweep(long_problem(10_000), {MU: [0.1, 0.2]}, name="long")
+    with pytest.raises(sg.WaitTimeout, match="long has not ended in time; it goes on.\n  The sweep goes on. Come back"):
+        sweep.wait(timeout=0.01, progress=False)
+    with monkeypatch.context() as patched:
+        patched.setattr(Waiting, "seconds", lambda self: 0.05)
+        patched.setattr(Waiting, "seen", lambda self, *seen: signal.raise_signal(signal.SIGINT))
+        with pytest.raises(KeyboardInterrupt):
+            sweep.wait()
+    assert "Detached. The sweep goes on." in capsys.readouterr().err
+    assert sweep.cancel().wait(30, progress=False).status == "canceled"
+    assert [member.status for member in sweep.members()] == ["canceled", "canceled"]
+
+
+def test_what_is_wrong_with_a_sweep(client: sg.Client) -> None:
+    with pytest.raises(sg.InvalidProblem):
+        client.sweep(BASE, {"contacts.3.indentation": [1, 2]})
+    with pytest.raises(TypeError, match="a new sweep needs its axes"):
+        client.sweep(BASE)
+    with pytest.raises(sg.NotFound):
+        client.sweep("sweep_nothing")
+
+
+def test_names_of_columns() -> None:
+    assert short_names([RHO, "/contacts/0/indentation", "/contacts/1/indentation", "/steps/0"]) == {
+        RHO: "nonlocal_radius",
+        "/contacts/0/indentation": "contacts.0.indentation",
+        "/contacts/1/indentation": "contacts.1.indentation",
+        "/steps/0": "steps.0",
+    }
+
+
+def test_what_the_line_says() -> None:
+    counts = {"total": 4, "queued": 0, "running": 1, "succeeded": 1, "failed": 2, "canceled": 0}
+    assert (
+        sweep_line("s", {"status": "running", "members": counts})
+        == "s · running · ███████████████░░░░░ 3 of 4 · 2 failed"
+    )
