@@ -1,4 +1,4 @@
-"""What the README and the issue show runs as it stands, against a service of its own."""
+"""What the README shows, and what a first script has, runs as it stands, against a service of its own."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import signorini as sg
 
 README = TOP / "clients/python/README.md"
 
-# As issue 16 has it, but for the id in its last line, which is that of a job that exists; and what its comments name.
+# A first script, which uses nearly all there is, and what its comments name; the id in its last line is that of a job that exists.
 ISSUE = """
 import signorini as sg
 c   = sg.Client()                                   # SIGNORINI_URL / SIGNORINI_TOKEN; sg.Client.local() starts the binary by itself
@@ -37,7 +37,7 @@ def elsewhere(server: sg.LocalServer, tmp_path: pathlib.Path, monkeypatch: pytes
     return tmp_path
 
 
-def test_the_lines_of_the_issue_run(elsewhere: pathlib.Path) -> None:
+def test_a_first_script_runs(elsewhere: pathlib.Path) -> None:
     place: dict[str, Any] = {}
     try:
         import pyvista  # noqa: F401
