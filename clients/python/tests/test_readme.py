@@ -14,7 +14,7 @@ import signorini as sg
 README = TOP / "clients/python/README.md"
 
 # A first script, which uses nearly all there is, and what its comments name; the id in its last line is that of a job that exists.
-ISSUE = """
+SCRIPT = """
 import signorini as sg
 c   = sg.Client()                                   # SIGNORINI_URL / SIGNORINI_TOKEN; sg.Client.local() starts the binary by itself
 p   = sg.examples.rectangular_punch(rho=0.01)       # typed dataclasses that validate; p.plot() shows mesh, supports, obstacle
@@ -42,9 +42,9 @@ def test_a_first_script_runs(elsewhere: pathlib.Path) -> None:
     try:
         import pyvista  # noqa: F401
     except ImportError:  # large, and not there for every version of Python
-        exec(ISSUE.replace(".to_pyvista()", ""), place)
+        exec(SCRIPT.replace(".to_pyvista()", ""), place)
     else:
-        exec(ISSUE, place)
+        exec(SCRIPT, place)
     assert place["r"].verdict == "good" and place["r"].normal_force.error < 0.2
     assert len(place["df"]) == 18 and set(place["df"]["status"]) == {"succeeded"}
     assert place["ev"].type == "done"
