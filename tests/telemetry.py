@@ -34,7 +34,8 @@ DASHBOARD = TOP / "contrib/grafana/signorini.json"
 TRACE, SPAN = "4bf92f3577b34da6a3ce929d0e0e4736", "00f067aa0ba902b7"
 TRACEPARENT = "00-%s-%s-01" % (TRACE, SPAN)
 # labels and the most values that each may have; le is that of histograms
-LABELS = {"method": 8, "route": 80, "status": 12, "rpc": 80, "code": 17, "reason": 20, "phase": 9, "file": 3, "le": 30, "version": 1}
+LABELS = {"method": 8, "route": 80, "status": 12, "rpc": 80, "code": 17, "reason": 20, "phase": 9, "file": 3, "le": 30, "version": 1,
+          "result_from": 3}
 
 
 def scraped(server, **headers):

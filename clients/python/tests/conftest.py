@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pathlib
+import signal
 from collections.abc import Iterator
 
 import pytest
@@ -17,6 +18,14 @@ BINARY = pathlib.Path(os.environ.get("SIGNORINI_BINARY", TOP / "target/release/s
 os.environ["SIGNORINI_BINARY"] = str(BINARY)
 for variable in ("SIGNORINI_URL", "SIGNORINI_TOKEN"):
     os.environ.pop(variable, None)
+
+
+@pytest.fixture(autouse=True)
+def interrupts() -> Iterator[None]:
+    """Ctrl-C interrupts, also where the tests run in the background of a shell, which has them ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="session")
