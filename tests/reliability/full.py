@@ -109,7 +109,8 @@ def control(server, ended, running, queued):
     """What works on a full disk: reads, and everything that control needs."""
     equal(server.timed("control", "GET", "/v1/jobs/%s/result" % ended).status, 200, "a result")
     equal(server.timed("control", "GET", "/v1/jobs").status, 200, "the list")
-    equal(server.json("/v1/jobs/" + queued[0])["queue"]["reason"], "low_disk", "why a job waits")
+    waits = lambda: server.json("/v1/jobs/" + queued[0])["queue"]["reason"] == "low_disk"
+    until(waits, 5, "a job that waits says that it is for the disk")
     answer = server.timed("control", "POST", "/v1/queue/pause")
     equal(answer.status, 200, "pause, %r" % answer)
     answer = server.timed("control", "POST", "/v1/jobs/%s/cancel" % queued[0])

@@ -123,6 +123,7 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
     // the same as is told of it later
     let mut ended = read(change.sql(), job.key).await?;
     sizes::count(change.sql(), job.key).await?;
+    sizes::take_over(change.sql(), job.key).await?;
     sizes::add_sizes(change.sql(), std::slice::from_mut(&mut ended)).await?;
     let done = Payload::Done {
         job: Box::new(ended),

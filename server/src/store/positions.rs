@@ -152,7 +152,7 @@ impl Store {
             let Some(primary) = job.coalesced_into else {
                 let reason = match self.is_paused() {
                     true => Waiting::Paused,
-                    false if self.has_room().is_err() => Waiting::LowDisk,
+                    false if self.reserve.was_disk_full() => Waiting::LowDisk,
                     false if self.load_of(&job.owner).1 >= self.most_running_of_owner() => {
                         Waiting::OwnerLimit
                     }

@@ -30,6 +30,8 @@ const LEAST: u64 = 256 << 10;
 pub(super) struct Reserve {
     path: PathBuf,
     held: AtomicBool,
+    /// Whether the disk was full when it was last asked.
+    full: AtomicBool,
 }
 
 impl Reserve {
@@ -38,6 +40,7 @@ impl Reserve {
         let reserve = Reserve {
             path: folder.join(FILE),
             held: AtomicBool::new(false),
+            full: AtomicBool::new(false),
         };
         if !reserve.retake() {
             let _ = fs::remove_file(&reserve.path); // the watch tells that there is no space
@@ -57,8 +60,15 @@ impl Reserve {
     pub(super) fn is_disk_full(&self) -> bool {
         let folder = self.path.parent();
         let free = folder.and_then(|folder| rustix::fs::statvfs(folder).ok());
-        self.has_room().is_err()
-            || free.is_some_and(|free| free.f_bavail.saturating_mul(free.f_frsize) < LEAST)
+        let full = self.has_room().is_err()
+            || free.is_some_and(|free| free.f_bavail.saturating_mul(free.f_frsize) < LEAST);
+        self.full.store(full, Ordering::Relaxed);
+        full
+    }
+
+    /// Whether it was full when it was last asked, a second ago; without asking the file system.
+    pub(super) fn was_disk_full(&self) -> bool {
+        self.full.load(Ordering::Relaxed)
     }
 
     /// Frees the space but for what the next start needs; false if that was done before.

@@ -109,6 +109,23 @@ pub(super) async fn count(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     Ok(())
 }
 
+/// A job that has ended later than others, but is older, may be the first of those that were answered with a result whose own job is
+/// gone: then it has the result, and the one that had it no longer does.
+pub(super) async fn take_over(tx: &mut SqliteConnection, key: i64) -> Result<()> {
+    sqlx::query(
+        "with answered(result) as (select result_job from job where id = ?1 and result_job is not null)
+         update job_size set bytes = bytes -
+             (select coalesce(sum(length(body)), 0) from result_part where job_id = (select result from answered))
+         where job_id = (select min(id) from job where result_job = (select result from answered) and id > ?1)
+               and not exists (select 1 from job where id = (select result from answered))
+               and not exists (select 1 from job where result_job = (select result from answered) and id < ?1)",
+    )
+    .bind(key)
+    .execute(tx)
+    .await?;
+    Ok(())
+}
+
 /// Counts what a job that was just deleted shared with others, if it was counted for that job, for the next of them. One that
 /// has not ended yet counts it when it ends.
 pub(super) async fn hand_on(tx: &mut SqliteConnection, deleted: &Job) -> Result<()> {

@@ -249,6 +249,16 @@ impl World {
                 Err(error) => panic!("{error}"),
             }
         }
+        let counted = "select format('job %d (input %s, result %s, created %d): counted %d, kept %d; problem %d',
+                   id, input_hash, result_job, created_at, job_size.bytes, job_kept.bytes,
+                   (select octet_length(body) from problem where problem.input_hash = job.input_hash))
+             from job_kept left join job_size using (job_id) join job on id = job_id
+             where job_size.bytes is not job_kept.bytes";
+        let otherwise: Vec<String> = sqlx::query_scalar(counted)
+            .fetch_all(&self.store.reader)
+            .await
+            .unwrap();
+        assert_eq!(otherwise, Vec::<String>::new());
         for orphans in [
             "select count(*) from result_part where not exists
                  (select 1 from job where result_available <> 'none' and coalesce(result_job, id) = result_part.job_id)",
@@ -259,7 +269,6 @@ impl World {
                  (select 1 from job where job.input_hash = problem.input_hash)",
             "select count(*) from job where checksum is null",
             "select count(*) from job_size where job_id not in (select job_id from job_kept)",
-            "select count(*) from job_kept left join job_size using (job_id) where job_size.bytes is not job_kept.bytes",
             "select count(*) from owner_size where (jobs, job_bytes) <>
                  (select count(*), coalesce(sum(bytes), 0) from job_size where job_size.owner = owner_size.owner)",
             "select count(*) from pragma_foreign_key_check",
