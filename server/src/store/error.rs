@@ -154,6 +154,8 @@ mod code {
     pub(super) const CORRUPT: u32 = 11;
     pub(super) const FULL: u32 = 13;
     pub(super) const CANNOT_OPEN: u32 = 14;
+    // a gigabyte and more: nothing that was written is so large
+    pub(super) const TOO_BIG: u32 = 18;
     pub(super) const NOT_A_DATABASE: u32 = 26;
     // of these, the details: reading failed, or ended early
     pub(super) const IOERR_READ: u32 = 266;
@@ -177,6 +179,7 @@ impl From<sqlx::Error> for StoreError {
             _ if matches!(number & 0xff, code::CORRUPT | code::NOT_A_DATABASE) => {
                 Record::database().damaged(told)
             }
+            _ if number == code::TOO_BIG => Record::named("record").damaged(told),
             _ if matches!(number, code::IOERR_READ | code::IOERR_SHORT_READ) => {
                 Record::named("page of the database").damaged(told)
             }
