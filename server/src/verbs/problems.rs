@@ -121,7 +121,7 @@ pub(super) fn too_large_at(pointer: String, estimate: &Estimate, budget_bytes: u
 
 /// The time (seconds) that a problem is estimated to take, if that is more than a bound: of adaptive refinement it is the time
 /// of the largest mesh that is allowed, which few problems need.
-pub(super) fn told(problem: &Problem, run_s: f64) -> Option<f64> {
+pub(super) fn expected_run_s(problem: &Problem, run_s: f64) -> Option<f64> {
     (!matches!(problem.mesh.refine, Refine::Adaptive(_))).then_some(run_s)
 }
 
@@ -183,7 +183,7 @@ pub(super) async fn admit(
             json,
             mesh: problem.mesh.stored().map(str::to_owned),
             memory_bytes,
-            run_s: told(&problem, run_s),
+            run_s: expected_run_s(&problem, run_s),
         })
     };
     service.work(admit).await?

@@ -18,7 +18,7 @@ use super::{
     filters::SweepIds,
     key::Key,
     page::{Page, Paging},
-    problems::{told, too_large_at},
+    problems::{expected_run_s, too_large_at},
     service::{Service, detached},
     submit::{self, Submitted},
 };
@@ -232,7 +232,7 @@ async fn admitted(
                 continue;
             }
             let of_group = limits.unwrap_or_else(|| limits_for(group.len()));
-            let run_s = estimate.and_then(|estimate| told(&problem, estimate.run_s));
+            let run_s = estimate.and_then(|estimate| expected_run_s(&problem, estimate.run_s));
             if let Some(violation) = time_violation(run_s, &of_group) {
                 found.add(violation);
                 break;
