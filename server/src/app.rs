@@ -154,14 +154,14 @@ impl App {
     pub async fn start(config: &Config) -> anyhow::Result<App> {
         address::set_prefix(&config.web.path_prefix);
         let tls = config.tls.files()?.map(Tls::read).transpose()?;
-        let store = Store::open(&config.data).await?;
+        let store = Store::open(&config.store.data).await?;
         // Before the listener opens: no client sees a job as running that no worker solves.
         match clean_up(&store).await {
             Ok(()) => {}
             Err(StoreError::Full) => warn!(
                 "the disk is full: jobs that were interrupted wait again as soon as that can be written"
             ),
-            Err(error) => return Err(store::with_advice(error, &config.data).into()),
+            Err(error) => return Err(store::with_advice(error, &config.store.data).into()),
         }
         let (bytes, of_bodies) = (config.memory.bytes(), config.body_cache_bytes());
         store.set_budget(Budget::new(bytes, config.workers, of_bodies));
@@ -194,7 +194,7 @@ impl App {
             Arc::downgrade(&store),
             retention(config),
         ));
-        let (version, data) = (env!("CARGO_PKG_VERSION"), config.data.display());
+        let (version, data) = (env!("CARGO_PKG_VERSION"), config.store.data.display());
         let (isolation, budget) = (config.isolation, size(config.memory.bytes()));
         let workers = number_of(config.workers.into(), "worker");
         info!(

@@ -29,17 +29,12 @@ pub struct Config {
     )]
     pub listen: SocketAddr,
 
-    /// Folder of the store: jobs, results, meshes
-    #[arg(
-        long,
-        env = "SIGNORINI_DATA",
-        default_value = "./signorini-data",
-        value_name = "FOLDER"
-    )]
-    pub data: PathBuf,
-
     #[command(flatten)]
     #[allow(missing_docs)] // a doc comment here would become the help of the command
+    pub store: StoreFolder,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
     pub tls: Tls,
 
     #[command(flatten)]
@@ -146,6 +141,19 @@ pub struct Config {
     #[command(flatten)]
     #[allow(missing_docs)] // a doc comment here would become the help of the command
     pub telemetry: Telemetry,
+}
+
+/// Where the store is: for the service, and for the commands that open a store themselves.
+#[derive(Clone, Debug, Args)]
+pub struct StoreFolder {
+    /// Folder of the store: jobs, results, meshes
+    #[arg(
+        long,
+        env = "SIGNORINI_DATA",
+        default_value = "./signorini-data",
+        value_name = "FOLDER"
+    )]
+    pub data: PathBuf,
 }
 
 impl Config {

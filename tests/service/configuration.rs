@@ -82,6 +82,51 @@ fn what_config_show_prints_can_be_read_again() {
 }
 
 #[test]
+fn other_commands_find_the_store_and_the_service_of_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, elsewhere) = (folder.path().join("store"), folder.path().join("other"));
+    let settings = format!("data = {data:?}\nlisten = '127.0.0.1:1'\nworkers = 3\n");
+    let file = write(folder.path(), "settings.toml", &settings);
+    let run = |arguments: &[&str], variables: &[(&str, &str)]| {
+        let mut command = Command::new(SIGNORINI);
+        command.args(arguments).current_dir(folder.path());
+        command.envs(variables.iter().copied()).output().unwrap()
+    };
+    let create = ["token", "create", "--name", "a", "--owner", "root"];
+    let create = [&create[..], &["--scope", "admin"]].concat();
+    // once by the variable and once by the flag
+    text(&run(&create, &[("SIGNORINI_CONFIG", &file)]));
+    let listed = text(&run(&["token", "list", "--config", &file], &[]));
+    assert!(listed.contains("root"), "{listed}");
+    for command in [&["doctor"][..], &["backup", "one"]] {
+        text(&run(command, &[("SIGNORINI_CONFIG", &file)]));
+    }
+    // a flag and a variable come before the file
+    let given = elsewhere.to_str().unwrap();
+    text(&run(
+        &["restore", "one", "--config", &file, "--data", given],
+        &[],
+    ));
+    std::fs::remove_dir_all(&elsewhere).unwrap();
+    let variables = [("SIGNORINI_CONFIG", &*file), ("SIGNORINI_DATA", given)];
+    text(&run(&["restore", "one"], &variables));
+    assert!(elsewhere.exists() && !folder.path().join("signorini-data").exists());
+    let asked = run(&["health", "--config", &file], &[]);
+    let told = String::from_utf8(asked.stderr).unwrap();
+    assert!(told.contains("http://127.0.0.1:1/readyz"), "{told}");
+    // a wrong file is told as `serve` tells it; a wrong variable only to a command that has it
+    let wrong = write(folder.path(), "wrong.toml", "wokers = 3\n");
+    let output = run(&["doctor", "--config", &wrong], &[]);
+    assert_eq!(output.status.code(), Some(2));
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(told.contains("did you mean workers?"), "{told}");
+    text(&run(
+        &["doctor", "--config", &file],
+        &[("SIGNORINI_WORKERS", "0")],
+    ));
+}
+
+#[test]
 fn all_invalid_settings_are_reported_together_and_nothing_starts() {
     let folder = tempfile::tempdir().unwrap();
     let settings = "wokers = 3\nmax_queued = \"many\"\n\nisolation = \"proces\"\n";

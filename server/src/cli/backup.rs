@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{exit::Exit, output};
+use super::{exit::Exit, output, settings::Folder};
 use crate::{
     error::{number_of, size},
     store::{self, Manifest},
@@ -12,14 +12,8 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Folder of the store; a server may be using it
-    #[arg(
-        long,
-        env = "SIGNORINI_DATA",
-        default_value = "./signorini-data",
-        value_name = "FOLDER"
-    )]
-    data: PathBuf,
+    #[command(flatten)]
+    folder: Folder,
 
     /// Do not read every job, result and mesh in the backup as the service would. Its digest is written all the same
     #[arg(long)]
@@ -33,11 +27,11 @@ pub(super) struct Arguments {
 /// Prints a line for each damage, and a summary as the last one.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let Arguments {
-        data,
+        folder,
         unchecked,
         target,
     } = arguments;
-    let backup = store::back_up(&data, &target, !unchecked).await?;
+    let backup = store::back_up(folder.path(), &target, !unchecked).await?;
     let mut text = String::new();
     for finding in &backup.findings {
         text += finding;

@@ -31,14 +31,13 @@ enum Command {
 
 pub(super) fn run(
     Arguments { command }: Arguments,
-    matches: Option<&ArgMatches>,
+    matches: &ArgMatches,
     lines: &Lines,
 ) -> anyhow::Result<Exit> {
     let Command::Show { origin, arguments } = command;
     arguments.settings.tls.files()?;
     let mut text = String::new();
     for arg in settings::settings() {
-        let Some(matches) = matches else { continue };
         let id = arg.get_id().as_str();
         let (line, origin_of) = match matches.value_source(id) {
             Some(source) => (value(&arg, matches)?, origin_of(&arg, source, lines)),
@@ -98,7 +97,7 @@ fn origin_of(arg: &Arg, source: ValueSource, lines: &Lines) -> String {
             name.to_string_lossy().into_owned()
         }
         _ => {
-            let line = lines.get(arg.get_id().as_str());
+            let line = lines.get(&settings::key(arg));
             let line = line.map(|line| line.replace(char::is_control, " "));
             line.unwrap_or_else(|| "default".into())
         }

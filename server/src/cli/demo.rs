@@ -14,7 +14,10 @@ use tonic::transport::Channel;
 use super::{client, examples, exit::Exit, output, report};
 use crate::{
     app::App,
-    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Telemetry, Tls, Web},
+    config::{
+        Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, StoreFolder, Telemetry, Tls,
+        Web,
+    },
     event::{Event, Payload},
     job::{Job, Status},
     pb::{self, job_service_client::JobServiceClient},
@@ -29,7 +32,9 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
     let folder = tempfile::tempdir()?;
     let config = Config {
         listen: ([127, 0, 0, 1], 0).into(),
-        data: folder.path().to_path_buf(),
+        store: StoreFolder {
+            data: folder.path().to_path_buf(),
+        },
         tls: Tls::default(),
         web: Web::default(),
         trust: ProxyTrust::default(),

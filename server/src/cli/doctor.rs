@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{exit::Exit, output};
+use super::{exit::Exit, output, settings::Folder};
 use crate::{
     error::size,
     store::{self, Report, StoreError},
@@ -12,14 +12,8 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Folder of the store; no server may be using it
-    #[arg(
-        long,
-        env = "SIGNORINI_DATA",
-        default_value = "./signorini-data",
-        value_name = "FOLDER"
-    )]
-    data: PathBuf,
+    #[command(flatten)]
+    folder: Folder,
 
     /// Copy every intact job, with its problem, events and result, and every intact mesh to a store in this new folder
     #[arg(long, value_name = "NEW_FOLDER")]
@@ -39,13 +33,14 @@ pub(super) struct Arguments {
 /// Prints a line for each finding, and a summary as the last one.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let Arguments {
-        data,
+        folder,
         salvage,
         accept,
         compact,
     } = arguments;
+    let data = folder.path();
     if compact {
-        let (before, after) = store::compact_folder(&data).await?;
+        let (before, after) = store::compact_folder(data).await?;
         let text = format!(
             "{} had {}, and has {}\n",
             data.display(),
@@ -56,7 +51,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         return Ok(Exit::Ok);
     }
     if accept {
-        let known = store::accept(&data).map_err(|error| {
+        let known = store::accept(data).map_err(|error| {
             StoreError::Folder(format!("cannot change {}: {error}", data.display()))
         })?;
         let text = match known {
@@ -66,7 +61,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         output::print(text)?;
         return Ok(Exit::Ok);
     }
-    let report = store::inspect(&data, salvage.as_deref()).await?;
+    let report = store::inspect(data, salvage.as_deref()).await?;
     let mut text = String::new();
     for finding in &report.findings {
         text += finding;

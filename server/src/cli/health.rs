@@ -1,8 +1,8 @@
 //! `signorini health`.
 
 use std::{
-    ffi::OsString,
     net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
+    path::PathBuf,
     time::Duration,
 };
 
@@ -13,6 +13,7 @@ use super::{
     client::{self, Trust},
     exit::Exit,
     output,
+    settings::File,
 };
 use crate::config::address;
 
@@ -40,7 +41,10 @@ pub(super) struct Arguments {
     /// The certificate that `serve` was told to show, if no --url is given: it is asked over TLS then. The certificate is not
     /// checked, since it need not name this machine, and nothing secret is sent
     #[arg(long, env = "SIGNORINI_TLS_CERT", value_name = "FILE")]
-    tls_cert: Option<OsString>,
+    tls_cert: Option<PathBuf>,
+
+    #[command(flatten)]
+    file: File,
 
     #[command(flatten)]
     trust: Trust,
@@ -52,9 +56,10 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         Some(url) => (arguments.trust.client(&url)?, url),
         None => {
             let address = reachable(arguments.listen);
-            // an empty variable counts as not set, as for `serve`
-            let tls = arguments.tls_cert.is_some_and(|file| !file.is_empty());
-            let scheme = if tls { "https" } else { "http" };
+            let scheme = match arguments.tls_cert {
+                Some(_) => "https",
+                None => "http",
+            };
             (client::local()?, format!("{scheme}://{address}"))
         }
     };

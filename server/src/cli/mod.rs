@@ -105,7 +105,11 @@ pub fn main() -> ExitCode {
             let written = log::start_as(&config.telemetry);
             with_runtime(serve::run(&config, written.lost()))
         }
-        Command::Config(arguments) => config::run(arguments, settings::of_serve(&matches), &lines),
+        Command::Config(arguments) => {
+            let all = Cli::command();
+            let (_, given) = settings::innermost(&all, &matches);
+            config::run(arguments, given, &lines)
+        }
         Command::Doctor(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
             with_runtime(doctor::run(arguments))

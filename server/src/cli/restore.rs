@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{backup::summed_up, exit::Exit, output};
+use super::{backup::summed_up, exit::Exit, output, settings::Folder};
 use crate::store;
 
 #[derive(Debug, Args)]
@@ -12,16 +12,11 @@ pub(super) struct Arguments {
     /// The folder that `signorini backup` has written. It is not changed
     backup: PathBuf,
 
-    /// Folder of the new store, which must be empty or missing
-    #[arg(
-        long,
-        env = "SIGNORINI_DATA",
-        default_value = "./signorini-data",
-        value_name = "FOLDER"
-    )]
-    data: PathBuf,
+    #[command(flatten)]
+    folder: Folder,
 
-    /// Replace the store in that folder, which is kept in a folder `replaced-…` within it
+    /// Replace the store that is in the folder, which is kept in a folder `replaced-…` within it. Otherwise the folder must be
+    /// empty or missing
     #[arg(long)]
     replace: bool,
 }
@@ -29,10 +24,11 @@ pub(super) struct Arguments {
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let Arguments {
         backup,
-        data,
+        folder,
         replace,
     } = arguments;
-    let restored = store::restore(&backup, &data, replace).await?;
+    let data = folder.path();
+    let restored = store::restore(&backup, data, replace).await?;
     let mut text = String::new();
     if let Some(replaced) = &restored.replaced {
         text += &format!("the store that was there is in {}\n", replaced.display());

@@ -1,4 +1,5 @@
-//! The settings of `serve`, from the command line, the environment and a file, in this order of precedence.
+//! The settings of `serve`, from the command line, the environment and a file, in this order of precedence. Other commands
+//! that need some of them, such as the folder of the store, read them in the same way.
 //!
 //! The struct `Config` is the only list of them: what is known of a setting (its flag, variable, type and values) is asked
 //! of clap's description of it. Values of the file become defaults of the command line, so that precedence is clap's own. No
@@ -25,22 +26,46 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-use crate::config::Config;
+use crate::config::{Config, StoreFolder};
 
 /// The settings, and where they are read from.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// File of settings, in TOML; each key is the name of an environment variable below without SIGNORINI_ and in small
-    /// letters. Flags and environment variables take precedence over it
-    #[arg(long = "config", env = "SIGNORINI_CONFIG", value_name = "FILE")]
-    file: Option<PathBuf>,
+    #[command(flatten)]
+    file: File,
 
     #[command(flatten)]
     pub(super) settings: Config,
 }
 
+/// The file that a command reads its settings from. Whatever command has it may also have arguments with the variables of
+/// settings, which then have their values from the file too.
+#[derive(Debug, Args)]
+pub(super) struct File {
+    /// File of settings, in TOML; each key is the name of an environment variable of `signorini serve --help` without
+    /// SIGNORINI_ and in small letters. Flags and environment variables take precedence over it
+    #[arg(id = FILE, long = "config", env = "SIGNORINI_CONFIG", value_name = "FILE")]
+    path: Option<PathBuf>,
+}
+
+/// Where a command finds the store that the service with the same settings uses.
+#[derive(Debug, Args)]
+pub(super) struct Folder {
+    #[command(flatten)]
+    file: File,
+
+    #[command(flatten)]
+    store: StoreFolder,
+}
+
+impl Folder {
+    pub(super) fn path(&self) -> &Path {
+        &self.store.data
+    }
+}
+
 /// The id of the argument that names the file; it is not itself a setting.
-const FILE: &str = "file";
+const FILE: &str = "settings_file";
 /// What the names of all variables begin with.
 const PREFIX: &str = "SIGNORINI_";
 /// A larger file is not one of settings.
@@ -61,15 +86,20 @@ impl fmt::Display for Wrong {
     }
 }
 
-/// Where each value of the file stands: `file:line`, by the id of its setting.
+/// Where each value of the file stands: `file:line`, by the key of its setting.
 pub(super) type Lines = BTreeMap<String, String>;
 
 /// The command with the values of the file as defaults, and where these stand; or all that is wrong with the file and with
-/// the environment. A command line that is wrong itself, or is no `serve`, stays as it is.
+/// the variables that the command takes. A command line that is wrong itself, or whose command reads no file, stays as it is.
 pub(super) fn with_file(
     command: Command,
     line: &[OsString],
 ) -> Result<(Command, Lines), Vec<Wrong>> {
+    let settings = settings();
+    let is_setting = |arg: &Arg| {
+        let variable = arg.get_env();
+        variable.is_some() && settings.iter().any(|known| known.get_env() == variable)
+    };
     // the environment is checked below, together with the file
     let bare = change(command.clone(), &|arg| match is_setting(&arg) {
         true => arg.env(Resettable::Reset),
@@ -78,11 +108,12 @@ pub(super) fn with_file(
     let Ok(matches) = bare.try_get_matches_from(line) else {
         return Ok((command, Lines::new()));
     };
-    let Some(matches) = of_serve(&matches) else {
+    let (innermost, matches) = innermost(&command, &matches);
+    if !reads_file(innermost) {
         return Ok((command, Lines::new()));
-    };
-    let settings = settings();
-    let mut wrong = wrong_variables(&settings);
+    }
+    let taken = innermost.get_arguments().filter(|arg| is_setting(arg));
+    let mut wrong = wrong_variables(taken);
     let mut values = BTreeMap::new();
     if let Some(path) = matches.get_one::<PathBuf>(FILE) {
         match read(path) {
@@ -101,21 +132,26 @@ pub(super) fn with_file(
             true => arg.env(Resettable::Reset),
             false => arg,
         };
-        match values.get(arg.get_id().as_str()) {
+        match values.get(&key(&arg)) {
             Some(Value { texts, .. }) if is_setting(&arg) => arg.default_values(texts),
             _ => arg,
         }
     });
-    let lines = values.into_iter().map(|(id, value)| (id, value.place));
+    let lines = values.into_iter().map(|(key, value)| (key, value.place));
     Ok((command, lines.collect()))
 }
 
-/// The matches of a command that takes settings.
-pub(super) fn of_serve(matches: &ArgMatches) -> Option<&ArgMatches> {
-    match matches.subcommand()? {
-        ("serve", matches) => Some(matches),
-        ("config", matches) => matches.subcommand_matches("show"),
-        _ => None,
+/// The subcommand that is run, which may be one of a subcommand, and what was given to it.
+pub(super) fn innermost<'a>(
+    command: &'a Command,
+    matches: &'a ArgMatches,
+) -> (&'a Command, &'a ArgMatches) {
+    let Some((name, inner)) = matches.subcommand() else {
+        return (command, matches);
+    };
+    match command.find_subcommand(name) {
+        Some(subcommand) => innermost(subcommand, inner),
+        None => (command, matches),
     }
 }
 
@@ -125,17 +161,17 @@ pub(super) fn settings() -> Vec<Arg> {
     all.get_arguments().cloned().collect()
 }
 
-/// Changes the arguments of both commands that take settings.
+/// Changes the arguments of all commands that read a file of settings.
 fn change(command: Command, with: &dyn Fn(Arg) -> Arg) -> Command {
-    command
-        .mut_subcommand("serve", |serve| serve.mut_args(with))
-        .mut_subcommand("config", |config| {
-            config.mut_subcommand("show", |show| show.mut_args(with))
-        })
+    let command = match reads_file(&command) {
+        true => command.mut_args(with),
+        false => command,
+    };
+    command.mut_subcommands(|subcommand| change(subcommand, with))
 }
 
-fn is_setting(arg: &Arg) -> bool {
-    arg.get_id() != FILE && arg.get_env().is_some()
+fn reads_file(command: &Command) -> bool {
+    command.get_arguments().any(|arg| arg.get_id() == FILE)
 }
 
 /// The key of a setting in a file.
@@ -150,7 +186,7 @@ fn is_empty_variable(arg: &Arg) -> bool {
     value.is_some_and(|value| value.is_empty())
 }
 
-fn wrong_variables(settings: &[Arg]) -> Vec<Wrong> {
+fn wrong_variables<'a>(settings: impl Iterator<Item = &'a Arg>) -> Vec<Wrong> {
     let mut wrong = vec![];
     for arg in settings {
         let Some(name) = arg.get_env() else { continue };
@@ -282,7 +318,7 @@ fn read(path: &Path) -> Result<String, String> {
     Ok(text)
 }
 
-/// The values of a file by the ids of their settings.
+/// The values of a file by the keys of their settings.
 fn values_of(
     text: &str,
     path: &Path,
@@ -324,7 +360,7 @@ fn values_of(
         };
         match texts(arg, value.get_ref()) {
             Ok(texts) => {
-                values.insert(arg.get_id().to_string(), Value { texts, place });
+                values.insert(key(arg), Value { texts, place });
             }
             Err(what) => wrong.push(Wrong {
                 place,
@@ -415,8 +451,8 @@ mod tests {
         let texts = |id| values[id].texts.join(" ");
         assert_eq!(texts("workers"), "16");
         assert_eq!(texts("allow_unauthenticated"), "true");
-        assert_eq!(texts("proxies"), "::1 10.0.0.0/8");
-        assert_eq!(texts("scopes"), "");
+        assert_eq!(texts("trusted_proxies"), "::1 10.0.0.0/8");
+        assert_eq!(texts("proxy_scopes"), "");
         assert_eq!(values["data"].place, "a.toml:2");
     }
 

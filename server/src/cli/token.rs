@@ -1,13 +1,13 @@
 //! `signorini token`: in a store that no server uses, or through a running service.
 
-use std::{path::PathBuf, sync::Arc};
+use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use reqwest::{Client, Method};
 use serde_json::{Value, json};
 
-use super::{client::Trust, exit::Exit, output};
+use super::{client::Trust, exit::Exit, output, settings::Folder};
 use crate::{
     caller::Caller,
     store::{Store, StoreError},
@@ -71,16 +71,11 @@ enum Command {
 /// Where the tokens are.
 #[derive(Debug, Args)]
 struct TokenStore {
-    /// Folder of the store, if no server is using it
-    #[arg(
-        long,
-        env = "SIGNORINI_DATA",
-        default_value = "./signorini-data",
-        value_name = "FOLDER"
-    )]
-    data: PathBuf,
+    #[command(flatten)]
+    folder: Folder,
 
-    /// Address of a running service, as http://127.0.0.1:8080. It is called with the token in SIGNORINI_TOKEN
+    /// Address of a running service, as http://127.0.0.1:8080. It is called with the token in SIGNORINI_TOKEN. Without it, no
+    /// server may be using the store
     #[arg(long, env = "SIGNORINI_URL", value_name = "URL")]
     url: Option<String>,
 
@@ -205,16 +200,17 @@ impl TokenStore {
     /// `create`: a store may be made for it.
     async fn open(&self, create: bool) -> anyhow::Result<Target> {
         let Some(url) = &self.url else {
-            if !self.data.exists() {
+            let folder = self.folder.path();
+            if !folder.exists() {
                 match create {
-                    true => eprintln!("a new store is made in {}", self.data.display()),
+                    true => eprintln!("a new store is made in {}", folder.display()),
                     false => bail!(StoreError::Folder(format!(
                         "there is no store in {}",
-                        self.data.display()
+                        folder.display()
                     ))),
                 }
             }
-            let store = Store::open(&self.data).await;
+            let store = Store::open(folder).await;
             return match store {
                 Err(StoreError::Locked(text)) => Err(StoreError::Locked(format!(
                     "{text}; while it runs, give its address with --url"

@@ -84,7 +84,7 @@ impl Service {
             trust: config.trust.clone(),
             web: config.web.clone(),
             tls: config.tls.is_on(),
-            data: config.data.clone(),
+            data: config.store.data.clone(),
         }
     }
 

@@ -23,7 +23,10 @@ use super::{
 };
 use crate::{
     caller::{Caller, Scope},
-    config::{Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, Telemetry, Tls, Web},
+    config::{
+        Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, StoreFolder, Telemetry, Tls,
+        Web,
+    },
     error::ApiError,
     fake,
     formats::Format,
@@ -37,7 +40,9 @@ use crate::{
 pub(super) async fn service(folder: &Path) -> Arc<Service> {
     let config = Config {
         listen: ([127, 0, 0, 1], 0).into(),
-        data: folder.to_path_buf(),
+        store: StoreFolder {
+            data: folder.to_path_buf(),
+        },
         tls: Tls::default(),
         web: Web::default(),
         trust: ProxyTrust::default(),
