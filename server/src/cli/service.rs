@@ -1,0 +1,210 @@
+//! A running service, as client commands call it.
+
+use std::{error::Error as _, time::Duration};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
+use serde::{Deserialize, de::DeserializeOwned};
+use serde_json::Value;
+use solver::error::Violation;
+use thiserror::Error;
+
+use super::client::Trust;
+
+/// The header that makes a repeated submission find what the first one created.
+const IDEMPOTENCY_KEY: &str = "Idempotency-Key";
+/// A request that may be repeated is sent so many times if its answer does not arrive.
+const TRIES: u32 = 4;
+/// Before the first repetition; twice as long before each further one.
+const FIRST_PAUSE: Duration = Duration::from_millis(250);
+
+/// Where the service is.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Service")]
+pub(super) struct Connection {
+    /// Address of the service; it is called with the token in SIGNORINI_TOKEN, if that is set [default:
+    /// http://127.0.0.1:8080]
+    #[arg(long, env = "SIGNORINI_URL", value_name = "URL")]
+    url: Option<String>,
+
+    #[command(flatten)]
+    trust: Trust,
+}
+
+impl Connection {
+    pub(super) fn open(&self) -> anyhow::Result<Service> {
+        // an empty variable counts as one that is not set
+        let url = self.url.as_deref().filter(|url| !url.is_empty());
+        Service::at(url.unwrap_or("http://127.0.0.1:8080"), &self.trust)
+    }
+}
+
+/// A running service.
+#[derive(Debug)]
+pub(super) struct Service {
+    client: Client,
+    url: String,
+    token: Option<String>,
+}
+
+/// Why a call has no answer that could be used.
+#[derive(Debug, Error)]
+pub(super) enum CallError {
+    /// There is no connection.
+    #[error("cannot reach {url}: {cause}. Is the service running there? --url or SIGNORINI_URL gives another address")]
+    Unreachable {
+        /// Address of the service.
+        url: String,
+        /// The innermost cause.
+        cause: String,
+    },
+    /// The service has refused it.
+    #[error("{0}")]
+    Refused(Box<Refusal>),
+}
+
+/// The document by which the service refuses a request (RFC 9457).
+#[derive(Debug, Deserialize, Error)]
+#[error("{} ({code}; `signorini explain {code}` says more)", detail.as_deref().unwrap_or(title))]
+pub(super) struct Refusal {
+    /// HTTP status.
+    pub(super) status: u16,
+    /// The kind of error.
+    pub(super) code: String,
+    title: String,
+    #[serde(default)]
+    detail: Option<String>,
+    /// All faults of the problem or of the request.
+    #[serde(default, rename = "errors")]
+    pub(super) violations: Vec<Violation>,
+}
+
+impl Service {
+    /// The service at this address.
+    pub(super) fn at(url: &str, trust: &Trust) -> anyhow::Result<Service> {
+        Ok(Service {
+            client: trust.client(url)?,
+            url: url.trim_end_matches('/').to_owned(),
+            token: std::env::var("SIGNORINI_TOKEN")
+                .ok()
+                .filter(|token| !token.is_empty()),
+        })
+    }
+
+    /// A request for this path, which begins with a slash.
+    pub(super) fn request(&self, method: Method, path: &str) -> RequestBuilder {
+        let request = self.client.request(method, format!("{}{path}", self.url));
+        match &self.token {
+            Some(token) => request.bearer_auth(token),
+            None => request,
+        }
+    }
+
+    /// Sends a request once. A refusal is a [`CallError`].
+    pub(super) async fn send(&self, request: RequestBuilder) -> anyhow::Result<Response> {
+        let answer = request.send().await;
+        let answer = answer.map_err(|error| self.unreachable(&error))?;
+        if !answer.status().is_client_error() && !answer.status().is_server_error() {
+            return Ok(answer);
+        }
+        let status = answer.status();
+        let text = answer.text().await.unwrap_or_default();
+        match serde_json::from_str::<Refusal>(&text) {
+            Ok(refusal) => bail!(CallError::Refused(Box::new(refusal))),
+            Err(_) => bail!(CallError::Refused(Box::new(foreign(&self.url, status)))),
+        }
+    }
+
+    /// Sends a request that changes nothing more when it arrives twice: again if its answer does not arrive, or the service is
+    /// for a moment not able to answer. A service that does not listen is told at once.
+    pub(super) async fn send_surely(&self, request: RequestBuilder) -> anyhow::Result<Response> {
+        let mut pause = FIRST_PAUSE;
+        for _ in 1..TRIES {
+            let Some(copy) = request.try_clone() else {
+                break;
+            };
+            let error = match self.send(copy).await {
+                Ok(answer) => return Ok(answer),
+                Err(error) => error,
+            };
+            match error.downcast_ref() {
+                Some(CallError::Refused(refusal)) if refusal.is_passing() => {}
+                Some(CallError::Unreachable { cause, .. }) if !cause.contains("refused") => {}
+                _ => return Err(error),
+            }
+            tokio::time::sleep(pause).await;
+            pause *= 2;
+        }
+        self.send(request).await
+    }
+
+    /// Asks for a document.
+    pub(super) async fn get<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
+        let answer = self.send_surely(self.request(Method::GET, path)).await?;
+        self.document(answer).await
+    }
+
+    /// Submits something. A repetition finds what the first request created.
+    pub(super) async fn submit(&self, path: &str, body: Option<&Value>, key: &str) -> anyhow::Result<Value> {
+        let mut request = self.request(Method::POST, path);
+        request = request.header(IDEMPOTENCY_KEY, key);
+        if let Some(body) = body {
+            request = request.json(body);
+        }
+        let answer = self.send_surely(request).await?;
+        self.document(answer).await
+    }
+
+    /// Calls something that has no effect when it is repeated.
+    pub(super) async fn call(&self, method: Method, path: &str) -> anyhow::Result<Value> {
+        let answer = self.send_surely(self.request(method, path)).await?;
+        match answer.status() {
+            StatusCode::NO_CONTENT => Ok(Value::Null),
+            _ => self.document(answer).await,
+        }
+    }
+
+    /// The document in an answer.
+    pub(super) async fn document<T: DeserializeOwned>(&self, answer: Response) -> anyhow::Result<T> {
+        let text = answer.bytes().await;
+        let text = text.map_err(|error| self.unreachable(&error))?;
+        serde_json::from_slice(&text).with_context(|| format!("what {} answers is not of this version of signorini", self.url))
+    }
+
+    /// There was no answer, or no whole one.
+    pub(super) fn unreachable(&self, error: &reqwest::Error) -> CallError {
+        let mut cause: &dyn std::error::Error = error;
+        while let Some(inner) = cause.source() {
+            cause = inner;
+        }
+        let cause = match (error.is_timeout(), error.source()) {
+            (true, _) => "there was no answer for too long".to_owned(),
+            _ => cause.to_string(),
+        };
+        CallError::Unreachable {
+            url: self.url.clone(),
+            cause,
+        }
+    }
+}
+
+impl Refusal {
+    /// The same request may succeed in a moment.
+    fn is_passing(&self) -> bool {
+        matches!(self.code.as_str(), "draining" | "overloaded" | "rate-limited")
+    }
+}
+
+/// Something that is not this service, or that stands before it, has answered.
+fn foreign(url: &str, status: StatusCode) -> Refusal {
+    Refusal {
+        status: status.as_u16(),
+        code: "bad-request".into(),
+        title: String::new(),
+        detail: Some(format!(
+            "{url} answers {status}, and not as a signorini service does: is the address right?"
+        )),
+        violations: vec![],
+    }
+}
