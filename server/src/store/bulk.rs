@@ -20,6 +20,9 @@ use crate::{
 
 /// How long one transaction may occupy the single writer, so that other requests are answered meanwhile.
 const LONGEST: Duration = Duration::from_millis(20);
+/// One that discards, where others occupy the writer all the time: as long as it has waited for its turn, but no longer than
+/// this. So it has a fair share of the writer, and what is removed keeps pace with what is submitted.
+const LONGEST_LATE: Duration = Duration::from_millis(150);
 
 /// What one transaction has done to the first of some jobs.
 #[derive(Debug, Default)]
@@ -88,7 +91,9 @@ impl Store {
 
     /// Discards the first of these jobs.
     pub(super) async fn try_to_discard(&self, what: Discard<'_>, keys: &[i64]) -> Result<Batch> {
+        let asked = Instant::now();
         let mut change = self.control_change().await?;
+        let longest = asked.elapsed().clamp(LONGEST, LONGEST_LATE);
         let (mut batch, start) = (Batch::default(), Instant::now());
         for key in keys {
             let discarded = discard(&mut change, what, *key).await;
@@ -97,7 +102,7 @@ impl Store {
                 Some(false) | None => batch.left.push(*key),
             }
             batch.seen += 1;
-            if start.elapsed() >= LONGEST {
+            if start.elapsed() >= longest {
                 break;
             }
         }
