@@ -31,7 +31,7 @@ def configuration(folder, store, replica):
     """The one that is documented, with other paths."""
     page = (TOP / "docs/operations.md").read_text()
     text = re.search(r"```yaml\n# /etc/litestream.yml\n(.*?)```", page, re.S).group(1)
-    for documented, here in (("/var/lib/signorini", store), ("/var/backups/signorini/litestream", replica)):
+    for documented, here in (("/var/lib/signorini", store), ("/var/backups/signorini-litestream", replica)):
         check(documented in text, "%s is not in the documented configuration" % documented)
         text = text.replace(documented, str(here))
     file = folder / "litestream.yml"
