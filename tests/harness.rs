@@ -24,6 +24,9 @@ use tokio::{
 /// No step of a test takes longer; a test that hangs says where.
 const PATIENCE: Duration = Duration::from_secs(120);
 
+/// Where a server listens whose port does not matter.
+const ANY_PORT: &str = "127.0.0.1:0";
+
 /// Tests that need the whole machine do not share it with others.
 static MACHINE: RwLock<()> = RwLock::const_new(());
 
@@ -64,7 +67,7 @@ impl Server {
     async fn start_with(binary: &'static str, arguments: &[&str], share: Share) -> Server {
         let arguments: Vec<String> = arguments.iter().map(|text| text.to_string()).collect();
         let folder = tempfile::tempdir().unwrap();
-        let (child, url) = spawn(binary, folder.path(), &arguments).await;
+        let (child, url) = spawn(binary, folder.path(), ANY_PORT, &arguments).await;
         Server {
             binary,
             arguments,
@@ -107,7 +110,13 @@ impl Server {
 
     /// Starts it again on the same store; the port may be another.
     pub async fn restart(&mut self) {
-        (self.child, self.url) = spawn(self.binary, self.folder.path(), &self.arguments).await;
+        self.restart_at(ANY_PORT).await;
+    }
+
+    /// The same at this address, where its clients look for it.
+    pub async fn restart_at(&mut self, address: &str) {
+        (self.child, self.url) =
+            spawn(self.binary, self.folder.path(), address, &self.arguments).await;
     }
 
     /// A GET.
@@ -248,14 +257,19 @@ impl Server {
     }
 }
 
-async fn spawn(binary: &str, folder: &Path, arguments: &[String]) -> (Child, String) {
+async fn spawn(
+    binary: &str,
+    folder: &Path,
+    address: &str,
+    arguments: &[String],
+) -> (Child, String) {
     let log = File::options()
         .create(true)
         .append(true)
         .open(folder.join("log"))
         .unwrap();
     let mut child = Command::new(binary)
-        .args(["serve", "--listen", "127.0.0.1:0", "--data"])
+        .args(["serve", "--listen", address, "--data"])
         .arg(folder.join("data"))
         .args(arguments)
         .stdout(Stdio::piped())

@@ -8,6 +8,8 @@ pub mod json;
 
 pub mod sweep;
 
+pub mod pointer;
+
 mod external;
 mod file;
 mod inline;

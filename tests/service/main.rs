@@ -8,6 +8,7 @@ mod bodies;
 mod by_name;
 mod cache;
 mod cancel;
+mod client_commands;
 mod configuration;
 mod control;
 mod demo;

@@ -3,9 +3,11 @@
 use std::str::FromStr;
 
 use plotters::style::RGBColor;
+use strum::IntoStaticStr;
 
 /// The background of a figure.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Theme {
     /// Paper.
     #[default]

@@ -7,7 +7,6 @@
 mod check;
 mod neighbours;
 mod numbers;
-mod parts;
 mod path;
 mod plan;
 mod read;

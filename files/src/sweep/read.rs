@@ -10,11 +10,14 @@ use strum::VariantArray;
 use super::{
     path::Path,
     plan::{MOST_BYTES, MOST_MEMBERS, MOST_VALUE_BYTES, Mode, Plan},
-    template::{Nowhere, Place, Template, locate},
+    template::Template,
     values::{Fields, axes, points},
 };
-use crate::json::parse;
-use crate::schema::{meant, quoted};
+use crate::{
+    json::parse,
+    pointer::{Nowhere, Place, locate},
+    schema::{meant, quoted},
+};
 
 /// A sweep that was read.
 #[derive(Clone, Debug)]

@@ -7,11 +7,13 @@ use serde_json::value::RawValue;
 use solver::error::{Findings, Reason, Violation, escape, shortened};
 
 use super::{
-    parts::{List, Named, list, members},
     path::{Path, are_apart, path},
     plan::{MOST_MEMBERS, MOST_PATHS, Mode, Values},
 };
-use crate::schema::{meant, quoted};
+use crate::{
+    pointer::{List, Named, list, members},
+    schema::{meant, quoted},
+};
 
 /// The fields of a definition as text, as far as they are given.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,10 +1,18 @@
 //! An HTTP client for a running service.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use anyhow::{Context, ensure};
 use clap::Args;
 use reqwest::{Certificate, Client};
+
+/// A connection is made in this time, or not at all.
+const CONNECT: Duration = Duration::from_secs(10);
+/// A service that waits for the end of a job, or streams its events, says something at least every 30 s.
+const SILENCE: Duration = Duration::from_secs(90);
 
 /// Whom a client command trusts.
 #[derive(Debug, Args)]
@@ -43,6 +51,8 @@ fn build(authorities: Option<Vec<Certificate>>) -> anyhow::Result<Client> {
         None => Client::builder(),
     };
     builder
+        .connect_timeout(CONNECT)
+        .read_timeout(SILENCE)
         .build()
         .context("a client with TLS cannot be made; --ca names the authority to trust")
 }

@@ -2,6 +2,7 @@
 
 use strum::VariantArray;
 
+use super::service::CallError;
 use crate::{
     app::{CannotListen, OpenToAll},
     config::HalfOfTls,
@@ -12,43 +13,79 @@ use crate::{
 
 /// How a command ends. A signal ends it as the system does, for a shell 128 and its number: Ctrl-C during `solve` 130;
 /// a panic with 101.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, VariantArray)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, VariantArray)]
 pub(super) enum Exit {
     /// Success.
-    Ok = 0,
+    Ok,
     /// Something failed.
-    Failed = 1,
+    Failed,
     /// The input is invalid.
-    Invalid = 2,
+    Invalid,
     /// The service cannot listen at its address.
-    Listen = 3,
+    Listen,
+    /// A job was canceled.
+    Canceled,
     /// The folder of the store cannot be used.
-    Folder = 4,
+    Folder,
+    /// The jobs that were waited for have not ended.
+    TimedOut,
     /// Another process uses the store.
-    Locked = 5,
+    Locked,
+    /// The service cannot be reached.
+    Unreachable,
     /// The store is of another program, or of a later version of this one.
-    Schema = 6,
+    Schema,
+    /// There is no such job or sweep.
+    NotFound,
     /// Something that was stored is missing or damaged.
-    Damaged = 7,
+    Damaged,
+    /// The service wants another token.
+    Denied,
+    /// The owner's share is used up, or the queue is full.
+    Quota,
     /// The solution did not converge.
-    NotConverged = 9,
+    NotConverged,
 }
 
 impl Exit {
+    /// The number that the process ends with. Commands for a store and commands for a running service share some.
+    pub(super) fn code(self) -> u8 {
+        match self {
+            Exit::Ok => 0,
+            Exit::Failed => 1,
+            Exit::Invalid => 2,
+            Exit::Listen | Exit::Canceled => 3,
+            Exit::Folder | Exit::TimedOut => 4,
+            Exit::Locked | Exit::Unreachable => 5,
+            Exit::Schema | Exit::NotFound => 6,
+            Exit::Damaged | Exit::Denied => 7,
+            Exit::Quota => 8,
+            Exit::NotConverged => 9,
+        }
+    }
+
     /// What it means, for `--help` and the README.
     fn meaning(self) -> &'static str {
         match self {
             Exit::Ok => {
-                "success; of solve and sweep: converged; of serve: stopped by SIGTERM or SIGINT"
+                "success; of solve and sweep: converged; of watch and wait: the jobs succeeded; of serve: stopped by SIGTERM or SIGINT"
             }
             Exit::Failed => {
-                "anything else: a file that cannot be read or written, a body that its contacts do not hold in the end, no memory"
+                "anything else: a file that cannot be read or written, a body that its contacts do not hold in the end, no memory; a job that failed, but for 9"
             }
             Exit::Invalid => {
                 "invalid or too large: the problem, an option, a certificate, a token, or the code to be explained"
             }
             Exit::Listen => "serve: cannot listen at the address",
+            Exit::Canceled => "client commands: the job was canceled",
             Exit::Folder => "serve, doctor, backup, restore, token: the folder cannot be used",
+            Exit::TimedOut => {
+                "client commands: the time to wait is over, and the job has not ended"
+            }
+            Exit::Unreachable => "client commands: the service cannot be reached",
+            Exit::NotFound => "client commands: there is no such job, sweep, result or token",
+            Exit::Denied => "client commands: no valid token, or one that may not do this",
+            Exit::Quota => "client commands: the owner's share is used up, or the queue is full",
             Exit::Locked => "serve, doctor, restore, token: another server uses the folder",
             Exit::Schema => {
                 "serve, doctor, backup, restore, token: the tables are of another program or version"
@@ -57,14 +94,14 @@ impl Exit {
                 "serve, doctor, backup, restore, token: stored data is missing or damaged"
             }
             Exit::NotConverged => {
-                "solve: not converged; sweep: some members failed; the result is written all the same"
+                "not converged; of a sweep: some members failed; the result is there all the same"
             }
         }
     }
 
     /// All exit codes, a line each.
     pub(super) fn list() -> String {
-        let line = |exit: &Exit| format!("\n  {}  {}", *exit as u8, exit.meaning());
+        let line = |exit: &Exit| format!("\n  {}  {}", exit.code(), exit.meaning());
         let lines: String = Exit::VARIANTS.iter().map(line).collect();
         format!("Exit codes:{lines}")
     }
@@ -78,11 +115,26 @@ impl Exit {
             Some(StoreError::Lost(_) | StoreError::Damaged(_) | StoreError::Broken(_)) => {
                 Exit::Damaged
             }
+            _ if error.is::<CallError>() => of_call(error),
             _ if error.is::<CannotListen>() => Exit::Listen,
             _ if error.is::<OpenToAll>() || is_invalid(error) => Exit::Invalid,
             _ if error.is::<HalfOfTls>() || error.is::<BadCertificate>() => Exit::Invalid,
             _ => Exit::Failed,
         }
+    }
+}
+
+/// Of a call to a running service.
+fn of_call(error: &anyhow::Error) -> Exit {
+    let Some(CallError::Refused(refusal)) = error.downcast_ref() else {
+        return Exit::Unreachable;
+    };
+    match (refusal.status, refusal.code.as_str()) {
+        (400 | 413 | 415 | 422, _) => Exit::Invalid,
+        (401 | 403, _) => Exit::Denied,
+        (404 | 410, _) => Exit::NotFound,
+        (429, _) | (_, "queue-full") => Exit::Quota,
+        _ => Exit::Failed,
     }
 }
 
@@ -100,7 +152,7 @@ mod tests {
         let readme = concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md");
         let readme = std::fs::read_to_string(readme).unwrap();
         for exit in Exit::VARIANTS {
-            let line = format!("| {} | {} |", *exit as u8, exit.meaning());
+            let line = format!("| {} | {} |", exit.code(), exit.meaning());
             assert!(readme.contains(&line), "README.md lacks the line\n{line}");
         }
     }

@@ -9,16 +9,21 @@ pub mod examples;
 mod exit;
 mod explain;
 mod health;
+mod jobs;
 mod log;
 mod log_line;
 mod notify;
 mod output;
+mod pages;
+mod progress;
 mod report;
 mod restore;
 mod serve;
+mod service;
 mod settings;
 mod solve;
 mod sweep;
+mod table;
 mod token;
 
 use std::{env, ffi::OsString, process::ExitCode};
@@ -60,7 +65,8 @@ enum Command {
     /// not, or does not answer within five seconds
     Health(health::Arguments),
     /// Create, list, revoke and rotate tokens, by which clients are identified. Exit code: 0 done, 4 the folder cannot be used,
-    /// 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else
+    /// 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else; with --url those of client
+    /// commands
     Token(token::Arguments),
     /// Solve one problem without a service. Exit code: 0 converged, 9 not converged (the result is written), 2 invalid or
     /// too large, 1 anything else, such as a file that cannot be read, or a body that its contacts do not hold
@@ -68,6 +74,8 @@ enum Command {
     /// Solve a sweep without a service: one problem with many values. Exit code: 0 all members converged, 9 some did not
     /// (the table is written), 2 invalid or too large, 1 anything else
     Sweep(sweep::Arguments),
+    #[command(flatten)]
+    Jobs(jobs::Command),
     /// Print the JSON Schema of a problem: every field with its meaning and default
     Schema,
     /// Explain an error code and what to do about it
@@ -78,6 +86,10 @@ enum Command {
         #[arg(long)]
         reference: bool,
     },
+    /// Print the script that completes commands and options in a shell
+    Completions(pages::Completions),
+    /// Print or write the manual pages of the commands
+    Man(pages::Man),
     /// Solve what the service sends over standard input, for `serve --isolation process`
     #[command(name = WORKER, hide = true)]
     Worker,
@@ -94,7 +106,7 @@ pub fn main() -> ExitCode {
             wrong
                 .iter()
                 .for_each(|wrong| eprintln!("signorini: {wrong}"));
-            return ExitCode::from(Exit::Invalid as u8);
+            return ExitCode::from(Exit::Invalid.code());
         }
     };
     let matches = command.get_matches_from(line);
@@ -138,6 +150,12 @@ pub fn main() -> ExitCode {
             let _lines = log::start(LevelFilter::WARN);
             sweep::run(&arguments)
         }
+        Command::Jobs(command) => {
+            let _lines = log::start(LevelFilter::WARN);
+            with_runtime(jobs::run(command))
+        }
+        Command::Completions(arguments) => pages::completions(&arguments, Cli::command()),
+        Command::Man(arguments) => pages::man(&arguments, Cli::command()),
         Command::Schema => solve::schema(),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Openapi { reference } => {
@@ -167,7 +185,7 @@ pub fn main() -> ExitCode {
         }
         Exit::of(&error)
     });
-    ExitCode::from(exit as u8)
+    ExitCode::from(exit.code())
 }
 
 fn with_runtime(command: impl Future<Output = anyhow::Result<Exit>>) -> anyhow::Result<Exit> {

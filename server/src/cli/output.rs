@@ -35,13 +35,14 @@ pub(super) fn help() -> String {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Output {
     /// The file; `None` is standard output.
-    path: Option<PathBuf>,
-    part: Part,
-    format: Format,
+    pub(super) path: Option<PathBuf>,
+    pub(super) part: Part,
+    pub(super) format: Format,
 }
 
+/// What of a result a file holds.
 #[derive(Clone, Debug, PartialEq)]
-enum Part {
+pub(super) enum Part {
     Everything,
     /// All but what has a row for each node, point or iteration.
     Summary,

@@ -7,7 +7,7 @@ use solver::solution::{
     Outcome, Peak, Phase, QuantityName,
 };
 
-use crate::run::Document;
+use crate::run::{Document, Summary};
 
 /// Reasons of a verdict that are shown.
 const MOST_REASONS: usize = 5;
@@ -44,19 +44,35 @@ pub(super) fn iteration(row: &Iteration) -> String {
         let _ = write!(line, "  q {q:.3}");
     }
     if row.step + row.increment > 0 {
-        let _ = write!(
-            line,
-            "  step {} increment {}",
-            row.step + 1,
-            row.increment + 1
-        );
+        let _ = write!(line, "  step {}", row.step + 1);
+    }
+    if row.increment > 0 {
+        let _ = write!(line, ", increment {}", row.increment + 1);
     }
     line
 }
 
+/// Facts, each on a line behind its name.
+pub(super) fn lines(facts: impl Iterator<Item = (impl std::fmt::Display, String)>) -> String {
+    facts
+        .map(|(name, value)| format!("{name:<20}{value}\n"))
+        .collect()
+}
+
 /// The summary of a document.
 pub(super) fn document(title: Option<&str>, document: &Document) -> String {
-    let s = &document.summary.solution;
+    let steps = document.steps.iter();
+    let steps = steps.map(|step| (step.name.as_str(), &step.summary));
+    result(title, &document.summary, steps)
+}
+
+/// A summary, and those of its load steps by their names.
+pub(super) fn result<'a>(
+    title: Option<&str>,
+    summary: &Summary,
+    steps: impl Iterator<Item = (&'a str, &'a solver::solution::Summary)>,
+) -> String {
+    let s = &summary.solution;
     let ended = match s.outcome {
         Outcome::Converged => "converged",
         Outcome::NotConverged => "NOT CONVERGED",
@@ -88,7 +104,7 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
         }
         verified_lines(accuracy, &mut line);
     }
-    let seconds: f64 = document.summary.timings.values().sum();
+    let seconds: f64 = summary.timings.values().sum();
     line(
         "outcome",
         format!("{ended} after {} iterations, {seconds:.3} s", s.iterations),
@@ -141,14 +157,14 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
             ),
         );
     }
-    for step in &document.steps {
+    for (name, step) in steps {
         line(
-            &format!("step {:?}", step.name),
+            &format!("step {name:?}"),
             format!(
                 "Y {}, T {}, {} iterations",
-                number(step.summary.normal_force),
-                number(step.summary.tangential_force),
-                step.summary.iterations
+                number(step.normal_force),
+                number(step.tangential_force),
+                step.iterations
             ),
         );
     }
@@ -172,7 +188,7 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
             format!("{}: {}", warning.pointer, warning.message),
         );
     }
-    line("digest", document.summary.digest.clone());
+    line("digest", summary.digest.clone());
     text
 }
 
@@ -205,7 +221,7 @@ fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
 }
 
 /// Six digits, plain where that is readable.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     if value == 0.0 {
         "0".to_string()
     } else if (1e-3..1e7).contains(&value.abs()) {

@@ -4,11 +4,12 @@ use std::{error::Error as _, time::Duration};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
+use reqwest::{Client, Method, RequestBuilder, Response, StatusCode, header};
 use serde::{Deserialize, de::DeserializeOwned};
 use serde_json::Value;
 use solver::error::Violation;
 use thiserror::Error;
+use uuid::Uuid;
 
 use super::client::Trust;
 
@@ -52,12 +53,16 @@ pub(super) struct Service {
 #[derive(Debug, Error)]
 pub(super) enum CallError {
     /// There is no connection.
-    #[error("cannot reach {url}: {cause}. Is the service running there? --url or SIGNORINI_URL gives another address")]
+    #[error(
+        "cannot reach {url}: {cause}. Is the service running there? --url or SIGNORINI_URL gives another address"
+    )]
     Unreachable {
         /// Address of the service.
         url: String,
         /// The innermost cause.
         cause: String,
+        /// There was a connection, which broke: something is there, or was.
+        connected: bool,
     },
     /// The service has refused it.
     #[error("{0}")]
@@ -130,7 +135,9 @@ impl Service {
             };
             match error.downcast_ref() {
                 Some(CallError::Refused(refusal)) if refusal.is_passing() => {}
-                Some(CallError::Unreachable { cause, .. }) if !cause.contains("refused") => {}
+                Some(CallError::Unreachable {
+                    connected: true, ..
+                }) => {}
                 _ => return Err(error),
             }
             tokio::time::sleep(pause).await;
@@ -146,11 +153,17 @@ impl Service {
     }
 
     /// Submits something. A repetition finds what the first request created.
-    pub(super) async fn submit(&self, path: &str, body: Option<&Value>, key: &str) -> anyhow::Result<Value> {
+    pub(super) async fn submit(
+        &self,
+        path: &str,
+        body: Option<String>,
+        key: &str,
+    ) -> anyhow::Result<Value> {
         let mut request = self.request(Method::POST, path);
         request = request.header(IDEMPOTENCY_KEY, key);
-        if let Some(body) = body {
-            request = request.json(body);
+        if let Some(json) = body {
+            request = request.header(header::CONTENT_TYPE, "application/json");
+            request = request.body(json);
         }
         let answer = self.send_surely(request).await?;
         self.document(answer).await
@@ -166,10 +179,18 @@ impl Service {
     }
 
     /// The document in an answer.
-    pub(super) async fn document<T: DeserializeOwned>(&self, answer: Response) -> anyhow::Result<T> {
+    pub(super) async fn document<T: DeserializeOwned>(
+        &self,
+        answer: Response,
+    ) -> anyhow::Result<T> {
         let text = answer.bytes().await;
         let text = text.map_err(|error| self.unreachable(&error))?;
-        serde_json::from_slice(&text).with_context(|| format!("what {} answers is not of this version of signorini", self.url))
+        serde_json::from_slice(&text).with_context(|| {
+            format!(
+                "what {} answers is not of this version of signorini",
+                self.url
+            )
+        })
     }
 
     /// There was no answer, or no whole one.
@@ -185,6 +206,7 @@ impl Service {
         CallError::Unreachable {
             url: self.url.clone(),
             cause,
+            connected: !error.is_connect(),
         }
     }
 }
@@ -192,8 +214,23 @@ impl Service {
 impl Refusal {
     /// The same request may succeed in a moment.
     fn is_passing(&self) -> bool {
-        matches!(self.code.as_str(), "draining" | "overloaded" | "rate-limited")
+        matches!(
+            self.code.as_str(),
+            "draining" | "overloaded" | "rate-limited"
+        )
     }
+}
+
+/// A key for one submission, of its own.
+pub(super) fn new_key() -> String {
+    format!("command-line-{}", Uuid::now_v7())
+}
+
+/// A name as a part of a path.
+pub(super) fn segment(name: &str) -> String {
+    let escaped: String = form_urlencoded::byte_serialize(name.as_bytes()).collect();
+    // a plus is a space in a query only
+    escaped.replace('+', "%20")
 }
 
 /// Something that is not this service, or that stands before it, has answered.

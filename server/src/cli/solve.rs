@@ -20,6 +20,7 @@ use solver::{
 use super::{
     exit::Exit,
     output::{self, Output},
+    progress::{To, View},
     report,
 };
 use crate::{
@@ -120,28 +121,30 @@ pub(super) fn run(
     let solve = |observe: &mut Observer<'_>| {
         solver::solve_on(&problem, files::external_mesh(&problem, None), observe)
     };
+    let mut view = View::new(To::Error);
     let solved = run::run(&problem, parse_s, solve, &mut |update| {
-        match update {
+        let told = match update {
             Update::SecondThread => return threads.second(),
-            Update::Phase(phase) => eprintln!("{} …", report::phase(phase)),
+            Update::Phase(phase) => view.phase(phase),
             Update::Mesh {
                 number,
                 elements,
                 error,
-            } => eprintln!("{}", report::mesh(number, elements, error)),
-            Update::Iteration(timed) => eprintln!("{}", report::iteration(&timed.row)),
-            Update::Warning(warning) => {
-                eprintln!("warning: {}: {}", warning.pointer, warning.message)
-            }
+            } => view.line(&report::mesh(number, elements, error)),
+            Update::Iteration(timed) => view.iteration(&timed.row),
+            Update::Warning(warning) => view.warning(warning),
             // Ctrl-C ends the process
             Update::Step(_)
             | Update::Pulse
             | Update::Needs { .. }
             | Update::Room { .. }
-            | Update::OutOfMemory { .. } => {}
-        }
+            | Update::OutOfMemory { .. } => Ok(()),
+        };
+        // who no longer reads what is told still wants the result
+        let _ = told;
         ControlFlow::Continue(())
     });
+    view.end();
     let document = match solved {
         Ok(document) => document,
         Err(SolveError::Invalid(violations)) => return Ok(invalid(file, &violations)),

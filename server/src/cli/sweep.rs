@@ -178,7 +178,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
 }
 
 /// The format of a table by the name of its file; an error says why there is none.
-fn format_of(path: &Path) -> Result<Format, String> {
+pub(super) fn format_of(path: &Path) -> Result<Format, String> {
     if path.as_os_str() == "-" {
         return Ok(Format::Json);
     }
@@ -205,17 +205,36 @@ fn format_of(path: &Path) -> Result<Format, String> {
     }
 }
 
+/// The base of a sweep in this file, if it names a file instead of being a problem.
+pub(super) fn base_from_file(
+    file: &Path,
+    base: Option<&RawValue>,
+) -> anyhow::Result<Option<Box<RawValue>>> {
+    let Some(named) = base.filter(|base| base.get().starts_with('"')) else {
+        return Ok(None);
+    };
+    let unread = |found: String| ApiError::InvalidProblem(malformed("/base", found));
+    let named: Cow<'_, str> = serde_json::from_str(named.get())
+        .map_err(|_| unread("a text that cannot be read".into()))?;
+    let path = file.parent().unwrap_or(Path::new("")).join(&*named);
+    let text = std::fs::read_to_string(&path)
+        .with_context(|| format!("cannot read the base {}", path.display()))?;
+    let base = RawValue::from_string(text).map_err(|error| unread(error.to_string()))?;
+    Ok(Some(base))
+}
+
+fn malformed(pointer: &str, found: String) -> Vec<Violation> {
+    vec![Violation::new(
+        pointer,
+        Reason::Malformed,
+        found,
+        "an object of base, axes or points, and mode",
+        "Check the text there; examples are in examples/sweeps.",
+    )]
+}
+
 /// Reads a sweep from a file's text; an error if the file of its base cannot be read.
 fn read(file: &Path, text: &str) -> anyhow::Result<Result<Sweep, Vec<Violation>>> {
-    let malformed = |pointer: &str, found: String| {
-        vec![Violation::new(
-            pointer,
-            Reason::Malformed,
-            found,
-            "an object of base, axes or points, and mode",
-            "Check the text there; examples are in examples/sweeps.",
-        )]
-    };
     if let Some(place) = files::json::too_deep(text) {
         return Ok(Err(malformed("", place)));
     }
@@ -223,21 +242,13 @@ fn read(file: &Path, text: &str) -> anyhow::Result<Result<Sweep, Vec<Violation>>
         Ok(definition) => definition,
         Err(error) => return Ok(Err(malformed("", error.to_string()))),
     };
-    let named = definition.base.filter(|base| base.get().starts_with('"'));
-    let from_file = match named {
-        Some(named) => {
-            let Ok(named) = serde_json::from_str::<Cow<'_, str>>(named.get()) else {
-                return Ok(Err(malformed("/base", "a text that cannot be read".into())));
-            };
-            let path = file.parent().unwrap_or(Path::new("")).join(&*named);
-            let text = std::fs::read_to_string(&path)
-                .with_context(|| format!("cannot read the base {}", path.display()))?;
-            match RawValue::from_string(text) {
-                Ok(base) => Some(base),
-                Err(error) => return Ok(Err(malformed("/base", error.to_string()))),
-            }
-        }
-        None => None,
+    let from_file = match base_from_file(file, definition.base) {
+        Ok(base) => base,
+        Err(error) => match error.downcast() {
+            Ok(ApiError::InvalidProblem(violations)) => return Ok(Err(violations)),
+            Ok(other) => return Err(other.into()),
+            Err(other) => return Err(other),
+        },
     };
     Ok(files::sweep::read(&Fields {
         base: from_file.as_deref().or(definition.base),

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
-use reqwest::{Client, Method};
+use reqwest::Method;
 use serde_json::{Value, json};
 
-use super::{client::Trust, exit::Exit, output, settings::Folder};
+use super::{client::Trust, exit::Exit, output, service::Service, settings::Folder, table::table};
 use crate::{
     caller::Caller,
     store::{Store, StoreError},
@@ -116,11 +116,8 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                     if let Some(seconds) = expires_in_s {
                         body["expires_in_s"] = json!(seconds);
                     }
-                    new_token(
-                        service
-                            .call(Method::POST, "/v1/tokens", Some(&body))
-                            .await?,
-                    )?
+                    let request = service.request(Method::POST, "/v1/tokens").json(&body);
+                    new_token(service.document(service.send(request).await?).await?)?
                 }
             };
             eprintln!("{}", told(&token));
@@ -134,11 +131,11 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                     all
                 }
                 Target::Service(service) => {
-                    let mut answer = service.call(Method::GET, "/v1/tokens", None).await?;
+                    let mut answer = service.call(Method::GET, "/v1/tokens").await?;
                     serde_json::from_value(answer["tokens"].take()).context(NOT_OURS)?
                 }
             };
-            output::print(&table(&all))?;
+            output::print(&listed(&all))?;
         }
         Command::Revoke { id, at } => {
             let token = match at.open(false).await? {
@@ -149,7 +146,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                 }
                 Target::Service(service) => {
                     let path = format!("/v1/tokens/{id}");
-                    let answer = service.call(Method::DELETE, &path, None).await?;
+                    let answer = service.call(Method::DELETE, &path).await?;
                     serde_json::from_value(answer).context(NOT_OURS)?
                 }
             };
@@ -165,7 +162,8 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                 }
                 Target::Service(service) => {
                     let path = format!("/v1/tokens/{id}/rotate");
-                    new_token(service.call(Method::POST, &path, None).await?)?
+                    let request = service.request(Method::POST, &path);
+                    new_token(service.document(service.send(request).await?).await?)?
                 }
             };
             eprintln!("{}", told(&token));
@@ -186,14 +184,7 @@ fn new_token(mut answer: Value) -> anyhow::Result<(Token, String)> {
 /// What is called for the tokens.
 enum Target {
     Store(Arc<Store>),
-    Service(Remote),
-}
-
-/// A running service.
-struct Remote {
-    client: Client,
-    url: String,
-    token: Option<String>,
+    Service(Service),
 }
 
 impl TokenStore {
@@ -219,37 +210,7 @@ impl TokenStore {
                 opened => Ok(Target::Store(opened?)),
             };
         };
-        Ok(Target::Service(Remote {
-            client: self.trust.client(url)?,
-            url: url.trim_end_matches('/').to_owned(),
-            token: std::env::var("SIGNORINI_TOKEN").ok(),
-        }))
-    }
-}
-
-impl Remote {
-    async fn call(
-        &self,
-        method: Method,
-        path: &str,
-        body: Option<&Value>,
-    ) -> anyhow::Result<Value> {
-        let mut request = self.client.request(method, format!("{}{path}", self.url));
-        if let Some(token) = &self.token {
-            request = request.bearer_auth(token);
-        }
-        if let Some(body) = body {
-            request = request.json(body);
-        }
-        let answer = request.send().await;
-        let answer = answer.with_context(|| format!("cannot reach {}", self.url))?;
-        let status = answer.status();
-        let document: Value = answer.json().await.context(NOT_OURS)?;
-        if !status.is_success() {
-            let detail = document["detail"].as_str().unwrap_or_default();
-            bail!("{}: {status}: {detail}", self.url);
-        }
-        Ok(document)
+        Ok(Target::Service(Service::at(url, &self.trust)?))
     }
 }
 
@@ -283,10 +244,9 @@ fn state(token: &Token, now: Time) -> String {
 }
 
 /// A line for each, below their headings.
-fn table(tokens: &[Token]) -> String {
+fn listed(tokens: &[Token]) -> String {
     let now = Time::now();
-    let mut rows = vec![["ID", "OWNER", "NAME", "SCOPES", "STATE"].map(String::from)];
-    rows.extend(tokens.iter().map(|token| {
+    let row = |token: &Token| {
         let Token {
             id, owner, name, ..
         } = token;
@@ -297,20 +257,9 @@ fn table(tokens: &[Token]) -> String {
             scopes(token),
             state(token, now),
         ]
-    }));
-    let width = |column: usize| {
-        let lengths = rows.iter().map(|row| row[column].chars().count());
-        lengths.max().unwrap_or_default()
     };
-    let widths: [usize; 5] = std::array::from_fn(width);
-    let line = |row: &[String; 5]| {
-        let cells = row.iter().zip(widths);
-        let cells: Vec<String> = cells
-            .map(|(cell, width)| format!("{cell:width$}"))
-            .collect();
-        cells.join("  ").trim_end().to_owned() + "\n"
-    };
-    rows.iter().map(line).collect()
+    let rows: Vec<[String; 5]> = tokens.iter().map(row).collect();
+    table(["ID", "OWNER", "NAME", "SCOPES", "STATE"], &rows)
 }
 
 /// Seconds, or a number with one of the units s, m, h, d.

@@ -9,16 +9,16 @@ use serde::{
 use serde_json::value::RawValue;
 
 /// Members of an object by their names, in their order.
-pub(super) type Named<'a> = Vec<(Cow<'a, str>, &'a RawValue)>;
+pub(crate) type Named<'a> = Vec<(Cow<'a, str>, &'a RawValue)>;
 
 /// The first items of a list, and how many it has.
-pub(super) struct List<'a> {
-    pub(super) items: Vec<&'a RawValue>,
-    pub(super) count: usize,
+pub(crate) struct List<'a> {
+    pub(crate) items: Vec<&'a RawValue>,
+    pub(crate) count: usize,
 }
 
 /// The first items of a list; none if the text is something else.
-pub(super) fn list(text: &str, most: usize) -> Option<List<'_>> {
+pub(crate) fn list(text: &str, most: usize) -> Option<List<'_>> {
     let mut reader = serde_json::Deserializer::from_str(text);
     struct Read(usize);
     impl<'de> Visitor<'de> for Read {
@@ -48,7 +48,7 @@ pub(super) fn list(text: &str, most: usize) -> Option<List<'_>> {
 }
 
 /// The first members of an object; none if the text is something else.
-pub(super) fn members(text: &str, most: usize) -> Option<Named<'_>> {
+pub(crate) fn members(text: &str, most: usize) -> Option<Named<'_>> {
     #[derive(Deserialize)]
     struct Name<'a>(#[serde(borrow)] Cow<'a, str>);
     struct Read(usize);

@@ -1,0 +1,189 @@
+//! Where a JSON Pointer leads in a text.
+
+mod parts;
+
+use std::{fmt, ops::Range};
+
+use serde::{
+    Deserializer,
+    de::{IgnoredAny, SeqAccess, Visitor},
+};
+use serde_json::value::RawValue;
+
+pub(crate) use parts::{List, Named, list, members};
+
+/// Where a pointer leads in a text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// To this value.
+    Value(Range<usize>),
+    /// To a member that the object lacks.
+    Absent {
+        /// Where it begins, after its brace.
+        inside: usize,
+        /// Whether it has no members.
+        empty: bool,
+        /// The name.
+        name: String,
+    },
+}
+
+/// Why a pointer leads nowhere.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Nowhere {
+    /// The pointer to the last value on the way.
+    pub(crate) parent: String,
+    /// What was looked for there.
+    pub(crate) token: String,
+    /// What is there: `an object`, `a list of 2`, `a value`.
+    pub(crate) found: String,
+    /// The names in it, if it is an object.
+    pub(crate) names: Vec<String>,
+}
+
+/// The line, from 1, of what a pointer leads to, or of the last value on its way that is there; none if the text is not JSON.
+pub fn line_of(text: &str, pointer: &str) -> Option<usize> {
+    serde_json::from_str::<&RawValue>(text).ok()?;
+    let unescaped = |token: &str| token.replace("~1", "/").replace("~0", "~");
+    let tokens: Vec<String> = pointer.split('/').skip(1).map(unescaped).collect();
+    let found = (0..=tokens.len())
+        .rev()
+        .find_map(|count| match locate(text, &tokens[..count]) {
+            Ok(Place::Value(range)) => Some(range.start),
+            Ok(Place::Absent { .. }) | Err(_) => None,
+        });
+    let start = found.unwrap_or_default();
+    // a whole text may begin with empty lines
+    let start = start + text[start..].len() - text[start..].trim_start().len();
+    Some(1 + text[..start].matches('\n').count())
+}
+
+/// Where a pointer (RFC 6901) leads. The text is well formed.
+pub(crate) fn locate(text: &str, tokens: &[String]) -> Result<Place, Nowhere> {
+    let mut value = text;
+    let mut parent = String::new();
+    // all parts are slices of the text
+    let offset = |part: &str| part.as_ptr() as usize - text.as_ptr() as usize;
+    for (k, token) in tokens.iter().enumerate() {
+        let trimmed = value.trim_start();
+        let nowhere = |found: String, names: Vec<String>| Nowhere {
+            parent: parent.clone(),
+            token: token.clone(),
+            found,
+            names,
+        };
+        let next = match trimmed.as_bytes().first() {
+            Some(b'{') => {
+                let members = members(trimmed.trim_end(), MOST_NAMES).unwrap_or_default();
+                let found = members.iter().find(|(name, _)| name == token);
+                match found {
+                    Some((_, raw)) => raw.get(),
+                    None if k + 1 == tokens.len() => {
+                        return Ok(Place::Absent {
+                            inside: offset(trimmed) + 1,
+                            empty: members.is_empty(),
+                            name: token.clone(),
+                        });
+                    }
+                    None => {
+                        let names = members.iter().take(20).map(|(name, _)| name.to_string());
+                        return Err(nowhere("an object".into(), names.collect()));
+                    }
+                }
+            }
+            Some(b'[') => {
+                // without a leading zero, as the RFC says
+                let place = token.parse::<usize>().ok();
+                let place = place.filter(|place| place.to_string() == *token);
+                let Found { item, count } = item(trimmed, place.unwrap_or(usize::MAX));
+                match item {
+                    Some(raw) => raw.get(),
+                    None => return Err(nowhere(format!("a list of {count}"), vec![])),
+                }
+            }
+            _ => return Err(nowhere("a single value".into(), vec![])),
+        };
+        value = next;
+        parent.push('/');
+        parent.push_str(&solver::error::escape(token));
+    }
+    let start = offset(value);
+    Ok(Place::Value(start..start + value.len()))
+}
+
+/// Most members of an object that are looked at: no object of a problem with fixed names has more, and one with free
+/// names is not read further.
+const MOST_NAMES: usize = 1 << 14;
+
+/// An item of a list; the text is one.
+fn item(text: &str, place: usize) -> Found<'_> {
+    let mut reader = serde_json::Deserializer::from_str(text.trim_end());
+    let read = serde::de::DeserializeSeed::deserialize(Item(place), &mut reader);
+    read.unwrap_or(Found {
+        item: None,
+        count: 0,
+    })
+}
+
+struct Item(usize);
+
+struct Found<'a> {
+    item: Option<&'a RawValue>,
+    count: usize,
+}
+
+impl<'de> serde::de::DeserializeSeed<'de> for Item {
+    type Value = Found<'de>;
+
+    fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<Found<'de>, D::Error> {
+        struct Read(usize);
+        impl<'de> Visitor<'de> for Read {
+            type Value = Found<'de>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a list")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Found<'de>, A::Error> {
+                let (mut item, mut count) = (None, 0);
+                loop {
+                    if count == self.0 {
+                        match list.next_element::<&RawValue>()? {
+                            Some(found) => item = Some(found),
+                            None => break,
+                        }
+                    } else if list.next_element::<IgnoredAny>()?.is_none() {
+                        break;
+                    }
+                    count += 1;
+                }
+                Ok(Found { item, count })
+            }
+        }
+        reader.deserialize_seq(Read(self.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_of_a_value_or_of_the_last_one_before_it_is_found() {
+        let text = "\n{\n \"a\": [1,\n  {\"b/c\": 2}],\n \"d\": 3\n}";
+        for (pointer, line) in [
+            ("", 2),
+            ("/a", 3),
+            ("/a/0", 3),
+            ("/a/1/b~1c", 4),
+            ("/a/7", 3),
+            ("/d", 5),
+            ("/e", 2),
+            ("/e/f", 2),
+            ("/d/x", 5),
+        ] {
+            assert_eq!(line_of(text, pointer), Some(line), "{pointer}");
+        }
+        assert_eq!(line_of("{", ""), None);
+    }
+}

@@ -1,0 +1,119 @@
+//! `signorini cancel`, `retry` and `rm`: the commands that change jobs.
+
+use clap::Args;
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use super::{
+    super::{
+        exit::Exit,
+        output,
+        service::{Connection, new_key},
+    },
+    id::Id,
+    listing::{Found, Shown},
+};
+use crate::job::JobId;
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct Cancel {
+    /// Jobs or sweeps
+    #[arg(required = true)]
+    ids: Vec<Id>,
+
+    #[command(flatten)]
+    shown: Shown,
+
+    #[command(flatten)]
+    service: Connection,
+}
+
+/// Asks each to stop. One that has ended already is no error, and is printed as it is.
+pub(super) async fn cancel(arguments: Cancel) -> anyhow::Result<Exit> {
+    let service = arguments.service.open()?;
+    let mut documents = vec![];
+    for id in arguments.ids {
+        let path = format!("{}/cancel", id.path());
+        let mut answer = service.call(Method::POST, &path).await?;
+        documents.push(match id {
+            Id::Job(_) => answer["job"].take(),
+            Id::Sweep(_) => answer,
+        });
+    }
+    arguments.shown.print(&Found::of(documents))?;
+    Ok(Exit::Ok)
+}
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct Retry {
+    /// Jobs that have ended
+    #[arg(required = true, value_parser = job)]
+    ids: Vec<JobId>,
+
+    /// Seconds that it may run, in place of the first job's
+    #[arg(long, value_name = "SECONDS")]
+    timeout: Option<f64>,
+
+    #[command(flatten)]
+    shown: Shown,
+
+    #[command(flatten)]
+    service: Connection,
+}
+
+fn job(text: &str) -> Result<JobId, String> {
+    JobId::parse(text)
+        .ok_or_else(|| "expected the id of a job, as `signorini ls` prints them: job_…".into())
+}
+
+/// Submits the problem of each anew, and prints the new jobs.
+pub(super) async fn retry(arguments: Retry) -> anyhow::Result<Exit> {
+    let service = arguments.service.open()?;
+    let mut documents: Vec<Value> = vec![];
+    for id in arguments.ids {
+        let limits = arguments
+            .timeout
+            .map(|seconds| json!({"limits": {"timeout_s": seconds}}).to_string());
+        documents.push(
+            service
+                .submit(&format!("/v1/jobs/{id}/retry"), limits, &new_key())
+                .await?,
+        );
+    }
+    arguments.shown.print(&Found::of(documents))?;
+    Ok(Exit::Ok)
+}
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct Remove {
+    /// Jobs or sweeps that have ended
+    #[arg(required = true)]
+    ids: Vec<Id>,
+
+    /// Only their meshes, displacements and stresses, which are most of what they keep: of jobs
+    #[arg(long)]
+    fields: bool,
+
+    #[command(flatten)]
+    service: Connection,
+}
+
+/// Deletes each, and prints their ids.
+pub(super) async fn remove(arguments: Remove) -> anyhow::Result<Exit> {
+    let service = arguments.service.open()?;
+    if arguments.fields && arguments.ids.iter().any(|id| matches!(id, Id::Sweep(_))) {
+        eprintln!("signorini: --fields is for jobs: a sweep keeps no fields");
+        return Ok(Exit::Invalid);
+    }
+    for id in arguments.ids {
+        let part = match arguments.fields {
+            true => "/fields",
+            false => "",
+        };
+        service
+            .call(Method::DELETE, &format!("{}{part}", id.path()))
+            .await?;
+        output::print(&format!("{id}\n"))?;
+    }
+    Ok(Exit::Ok)
+}

@@ -1,0 +1,210 @@
+//! Curves in a terminal, drawn with the dots of braille characters.
+
+use ratatui_core::{
+    buffer::Buffer,
+    layout::Rect,
+    style::{Color, Style},
+    symbols::Marker,
+    widgets::Widget,
+};
+use ratatui_widgets::chart::{self, Axis, Dataset, GraphType};
+
+/// A curve and its name.
+pub(super) struct Curve {
+    pub(super) name: &'static str,
+    pub(super) points: Vec<(f64, f64)>,
+}
+
+/// Curves over one axis.
+pub(super) struct Chart {
+    pub(super) title: String,
+    /// The quantity of the horizontal axis.
+    pub(super) across: String,
+    pub(super) curves: Vec<Curve>,
+    /// The vertical axis is one of powers of ten; values that are not positive are left out.
+    pub(super) logarithmic: bool,
+}
+
+/// Curves in their order: told apart also by who sees no red or no green.
+const COLOURS: [(Color, &str); 3] = [
+    (Color::Cyan, "36"),
+    (Color::Yellow, "33"),
+    (Color::DarkGray, "90"),
+];
+
+impl Chart {
+    /// The figure, as lines of so many characters.
+    pub(super) fn draw(&self, width: u16, height: u16, in_colour: bool) -> String {
+        let shown: Vec<(&str, Vec<(f64, f64)>)> = self
+            .curves
+            .iter()
+            .map(|curve| (curve.name, self.visible(curve)))
+            .collect();
+        let all = || shown.iter().flat_map(|(_, points)| points.iter().copied());
+        if all().next().is_none() {
+            return format!("{}: there is nothing to draw\n", self.title);
+        }
+        let across = range(all().map(|point| point.0));
+        let up = range(all().map(|point| point.1));
+        let datasets = shown
+            .iter()
+            .zip(COLOURS)
+            .map(|((name, points), (colour, _))| {
+                Dataset::default()
+                    .name(*name)
+                    .marker(Marker::Braille)
+                    .graph_type(GraphType::Line)
+                    .style(Style::new().fg(colour))
+                    .data(points)
+            });
+        let label = |value: f64| match self.logarithmic {
+            true => format!("1e{value:.0}"),
+            false => short(value),
+        };
+        let middle = |[low, high]: [f64; 2]| (low + high) / 2.0;
+        let across_labels = [across[0], middle(across), across[1]].map(short);
+        let up_labels = [up[0], middle(up), up[1]].map(label);
+        let figure = chart::Chart::new(datasets.collect())
+            .legend_position(None)
+            .x_axis(
+                Axis::default()
+                    .title(self.across.as_str())
+                    .bounds(across)
+                    .labels(across_labels),
+            )
+            .y_axis(Axis::default().bounds(up).labels(up_labels));
+        let area = Rect::new(0, 0, width, height);
+        let mut buffer = Buffer::empty(area);
+        figure.render(area, &mut buffer);
+        format!(
+            "{}\n{}",
+            self.heading(in_colour),
+            text_of(&buffer, in_colour)
+        )
+    }
+
+    /// The title, and the names of the curves in their colours.
+    fn heading(&self, in_colour: bool) -> String {
+        let names = self.curves.iter().zip(COLOURS);
+        let names =
+            names.map(|(curve, (_, code))| coloured(&format!("─ {}", curve.name), code, in_colour));
+        let names: Vec<String> = names.collect();
+        format!("{}   {}", self.title, names.join("   "))
+    }
+
+    fn visible(&self, curve: &Curve) -> Vec<(f64, f64)> {
+        let points = curve.points.iter().copied();
+        let finite = |point: &(f64, f64)| point.0.is_finite() && point.1.is_finite();
+        match self.logarithmic {
+            true => points
+                .filter(|point| point.1 > 0.0)
+                .map(|(x, y)| (x, y.log10()))
+                .filter(finite)
+                .collect(),
+            false => points.filter(finite).collect(),
+        }
+    }
+}
+
+/// From the least to the most; wider than a point.
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    let pad = if high > low {
+        0.0
+    } else {
+        0.5 * high.abs().max(1.0)
+    };
+    [low - pad, high + pad]
+}
+
+/// Three digits.
+fn short(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".into(),
+        size if (1e-2..1e4).contains(&size) => {
+            let before_point = size.log10().floor().max(0.0) as usize + 1;
+            format!("{value:.*}", 3_usize.saturating_sub(before_point))
+        }
+        _ => format!("{value:.1e}"),
+    }
+}
+
+/// A text as a terminal is told of its colour.
+fn coloured(text: &str, code: &str, in_colour: bool) -> String {
+    match in_colour {
+        true => format!("\x1b[{code}m{text}\x1b[0m"),
+        false => text.to_owned(),
+    }
+}
+
+/// The characters of a buffer, with their colours as a terminal is told of them.
+fn text_of(buffer: &Buffer, in_colour: bool) -> String {
+    let mut text = String::new();
+    for y in 0..buffer.area.height {
+        let mut line = String::new();
+        for x in 0..buffer.area.width {
+            let Some(cell) = buffer.cell((x, y)) else {
+                continue;
+            };
+            let code = COLOURS.iter().find(|(colour, _)| *colour == cell.fg);
+            match code {
+                Some((_, code)) => line += &coloured(cell.symbol(), code, in_colour),
+                None => line += cell.symbol(),
+            }
+        }
+        text += line.trim_end();
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_that_rises_begins_below_and_ends_above() {
+        let chart = Chart {
+            title: "A line".into(),
+            across: "s".into(),
+            curves: vec![Curve {
+                name: "σ_n",
+                points: vec![(0.0, -2.0), (1.0, 3.0)],
+            }],
+            logarithmic: false,
+        };
+        let drawn = chart.draw(40, 10, false);
+        let lines: Vec<&str> = drawn.lines().collect();
+        assert_eq!(lines.len(), 11);
+        assert!(lines[0] == "A line   ─ σ_n", "{drawn}");
+        assert!(lines[1].trim_start().starts_with("3.00"), "{drawn}");
+        let place = |line: &str| {
+            line.chars()
+                .position(|c| ('\u{2801}'..='\u{28ff}').contains(&c))
+        };
+        assert!(place(lines[1]) > place(lines[6]), "{drawn}");
+        assert!(
+            !drawn.contains('\x1b') && chart.draw(40, 10, true).contains("\x1b[36m"),
+            "{drawn}"
+        );
+    }
+
+    #[test]
+    fn nothing_to_draw_is_said() {
+        let none = Chart {
+            title: "Convergence".into(),
+            across: "iteration".into(),
+            curves: vec![Curve {
+                name: "residual",
+                points: vec![(1.0, 0.0)],
+            }],
+            logarithmic: true,
+        };
+        assert_eq!(
+            none.draw(40, 10, false),
+            "Convergence: there is nothing to draw\n"
+        );
+    }
+}

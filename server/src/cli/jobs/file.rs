@@ -1,0 +1,161 @@
+//! A problem or a sweep in a file, as it is submitted; and what is wrong with it, line by line.
+
+use std::{
+    collections::BTreeMap,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, bail};
+use serde::Deserialize;
+use serde_json::value::{RawValue, to_raw_value};
+use solver::error::Violation;
+
+use super::super::{
+    service::{CallError, Refusal},
+    sweep,
+};
+use crate::error::ApiError;
+
+/// Violations of which each is told.
+const MOST_TOLD: usize = 100;
+
+/// What a file asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Job,
+    Sweep,
+}
+
+/// A file that is to be submitted.
+pub(super) struct Submitted {
+    path: PathBuf,
+    /// As it stands in the file: lines are counted there.
+    text: String,
+    pub(super) kind: Kind,
+    /// The fields of the request as text, so that every number is sent as it was written.
+    pub(super) fields: BTreeMap<String, Box<RawValue>>,
+    /// What stands before the pointers of a request, and not before those of the file.
+    envelope: &'static str,
+}
+
+#[derive(Deserialize)]
+struct Names<'a> {
+    #[serde(borrow)]
+    problem: Option<&'a RawValue>,
+    #[serde(borrow)]
+    base: Option<&'a RawValue>,
+}
+
+impl Submitted {
+    /// Reads a file, or standard input as `-`: a problem as JSON, a deck (.inp), a request with a problem, or a sweep.
+    pub(super) fn read(path: &Path) -> anyhow::Result<Submitted> {
+        let mut text = String::new();
+        let read = match path.as_os_str() == "-" {
+            true => std::io::stdin().read_to_string(&mut text).map(|_| ()),
+            false => std::fs::read_to_string(path).map(|found| text = found),
+        };
+        read.with_context(|| format!("cannot read {}", path.display()))?;
+        let deck = path
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("inp"));
+        let path = path.to_path_buf();
+        if deck {
+            let problem = files::abaqus::problem(&text).map_err(ApiError::InvalidProblem)?;
+            let fields = [("problem".to_owned(), to_raw_value(&problem)?)].into();
+            return Ok(Submitted {
+                path,
+                text,
+                kind: Kind::Job,
+                fields,
+                envelope: "/problem",
+            });
+        }
+        let names: Names<'_> = match serde_json::from_str(&text) {
+            Ok(names) => names,
+            Err(error) => bail!(ApiError::InvalidProblem(vec![Violation::new(
+                "",
+                solver::error::Reason::Malformed,
+                format!("{}: {error}", path.display()),
+                "a problem or a sweep as JSON",
+                "Check the text there; examples are in examples/.",
+            )])),
+        };
+        let (kind, envelope) = match (names.problem, names.base) {
+            (Some(_), _) => (Kind::Job, ""),
+            (None, Some(_)) => (Kind::Sweep, ""),
+            (None, None) => (Kind::Job, "/problem"),
+        };
+        let fields = match (kind, envelope) {
+            (Kind::Job, "/problem") => {
+                let problem = RawValue::from_string(text.clone())?;
+                [("problem".to_owned(), problem)].into()
+            }
+            (Kind::Job, _) => serde_json::from_str(&text)?,
+            (Kind::Sweep, _) => {
+                let mut fields: BTreeMap<String, Box<RawValue>> = serde_json::from_str(&text)?;
+                if let Some(base) = sweep::base_from_file(&path, names.base)? {
+                    fields.insert("base".into(), base);
+                }
+                fields
+            }
+        };
+        Ok(Submitted {
+            path,
+            text,
+            kind,
+            fields,
+            envelope,
+        })
+    }
+
+    /// The request, as JSON.
+    pub(super) fn body(&self) -> anyhow::Result<String> {
+        Ok(serde_json::to_string(&self.fields)?)
+    }
+
+    /// A pointer into the request, as one into the file.
+    pub(super) fn in_file<'a>(&self, pointer: &'a str) -> &'a str {
+        pointer.strip_prefix(self.envelope).unwrap_or(pointer)
+    }
+
+    /// Tells what is wrong with it, with the line where each fault stands.
+    pub(super) fn tell(&self, violations: &[Violation]) {
+        let many = match violations.len() {
+            1 => "violation",
+            _ => "violations",
+        };
+        eprintln!("{}: {} {many}", self.path.display(), violations.len());
+        for violation in violations.iter().take(MOST_TOLD) {
+            let pointer = self.in_file(&violation.pointer);
+            let shown = Violation {
+                pointer: pointer.to_owned(),
+                ..violation.clone()
+            };
+            match files::pointer::line_of(&self.text, pointer) {
+                Some(line) => {
+                    eprintln!("{}:{line}: {shown}", self.path.display());
+                    let text = self.text.lines().nth(line - 1).unwrap_or_default();
+                    let text: String = text.chars().take(100).collect();
+                    eprintln!("{line:>6} | {text}");
+                }
+                // a deck has other places than the problem made of it
+                None => eprintln!("{}: {shown}", self.path.display()),
+            }
+        }
+        if let more @ 1.. = violations.len().saturating_sub(MOST_TOLD) {
+            eprintln!("and {more} more");
+        }
+    }
+
+    /// Tells the violations for which the service has refused it, and returns any other error.
+    pub(super) fn refused(&self, error: anyhow::Error) -> anyhow::Error {
+        if let Some(CallError::Refused(refusal)) = error.downcast_ref() {
+            let Refusal { violations, .. } = &**refusal;
+            if !violations.is_empty() {
+                self.tell(violations);
+            }
+        }
+        error
+    }
+}

@@ -1,0 +1,33 @@
+//! `signorini get`.
+
+use clap::Args;
+
+use super::{
+    super::{exit::Exit, service::Connection},
+    id::Id,
+    listing::{Found, Shown},
+};
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct Arguments {
+    /// Jobs or sweeps
+    #[arg(required = true)]
+    ids: Vec<Id>,
+
+    #[command(flatten)]
+    shown: Shown,
+
+    #[command(flatten)]
+    service: Connection,
+}
+
+/// Prints all that is known of each.
+pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
+    let service = arguments.service.open()?;
+    let mut documents = vec![];
+    for id in arguments.ids {
+        documents.push(service.get(&id.path()).await?);
+    }
+    arguments.shown.print_whole(&Found::of(documents))?;
+    Ok(Exit::Ok)
+}

@@ -1,0 +1,64 @@
+//! The commands for the jobs and sweeps of a running service.
+
+mod change;
+mod chart;
+mod file;
+mod follow;
+mod get;
+mod id;
+mod listing;
+mod ls;
+mod plot;
+mod result;
+mod submit;
+mod validate;
+mod wait;
+mod watch;
+
+use clap::Subcommand;
+
+use super::exit::Exit;
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Submit problems and sweeps to a running service. Exit code: 0 accepted, 2 invalid, 5 no connection, 7 no valid
+    /// token, 8 share used up or queue full
+    Submit(Box<submit::Arguments>),
+    /// Print a job's iterations as they are made, until it ends. Exit code: 0 succeeded, 1 failed, 3 canceled, 9 not
+    /// converged
+    Watch(watch::Arguments),
+    /// Wait until jobs end. Exit code: the worst of 0 succeeded, 1 failed, 3 canceled, 4 the time is over, 9 not converged
+    Wait(wait::Arguments),
+    /// Print all that is known of jobs
+    Get(get::Arguments),
+    /// List jobs, newest first
+    Ls(Box<ls::Arguments>),
+    /// Print or save the result of a job, or the table of a sweep
+    Result(Box<result::Arguments>),
+    /// Draw stresses and convergence in the terminal, or save and open figures
+    Plot(plot::Arguments),
+    /// Ask jobs to stop
+    Cancel(change::Cancel),
+    /// Submit the problem of a job again, to be solved anew
+    Retry(change::Retry),
+    /// Delete jobs and sweeps that have ended
+    Rm(change::Remove),
+    /// Check a problem without submitting it: all violations with their lines, or its cost. Exit code: 0 valid, 2 invalid
+    Validate(validate::Arguments),
+}
+
+pub(super) async fn run(command: Command) -> anyhow::Result<Exit> {
+    match command {
+        Command::Submit(arguments) => submit::run(*arguments).await,
+        Command::Watch(arguments) => watch::run(arguments).await,
+        Command::Wait(arguments) => wait::run(arguments).await,
+        Command::Get(arguments) => get::run(arguments).await,
+        Command::Ls(arguments) => ls::run(*arguments).await,
+        Command::Result(arguments) => result::run(*arguments).await,
+        Command::Plot(arguments) => plot::run(arguments).await,
+        Command::Cancel(arguments) => change::cancel(arguments).await,
+        Command::Retry(arguments) => change::retry(arguments).await,
+        Command::Rm(arguments) => change::remove(arguments).await,
+        Command::Validate(arguments) => validate::run(arguments).await,
+    }
+}

@@ -1,0 +1,222 @@
+//! `signorini plot`: figures in the terminal, or as files.
+
+use std::{
+    io::IsTerminal,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use anyhow::Context;
+use clap::Args;
+use files::plot::{Plot, Theme};
+use reqwest::Method;
+use serde_json::Value;
+use solver::solution::ContactProfile;
+
+use super::{
+    super::{
+        exit::Exit,
+        output,
+        service::{Connection, Service, segment},
+    },
+    chart::{Chart, Curve},
+    id::Id,
+    result::download,
+};
+use crate::{event::TimedIteration, job::JobId, run::Summary};
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  signorini plot job_…\n  signorini plot job_… deformed -o punch.svg\n  \
+    signorini plot job_… mesh --open"
+)]
+pub(in crate::cli) struct Arguments {
+    /// The job
+    id: Id,
+
+    /// The figure: profile, convergence, mesh or deformed; without it profile and convergence. In the terminal only these two
+    /// are drawn
+    plot: Option<Plot>,
+
+    /// Write it to this SVG file instead
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+
+    /// Open it with the program that this machine uses for SVG
+    #[arg(long)]
+    open: bool,
+
+    /// Colours of a file: light or dark
+    #[arg(long, default_value = "light")]
+    theme: Theme,
+
+    #[command(flatten)]
+    service: Connection,
+}
+
+/// Characters of a figure whose reader is no terminal.
+const SIZE: (u16, u16) = (80, 18);
+
+pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
+    let Id::Job(id) = arguments.id else {
+        eprintln!(
+            "signorini: a sweep has no figure: `signorini result {}` prints its table",
+            arguments.id
+        );
+        return Ok(Exit::Invalid);
+    };
+    let service = arguments.service.open()?;
+    let drawn = matches!(
+        arguments.plot,
+        None | Some(Plot::Profile | Plot::Convergence)
+    );
+    if arguments.output.is_some() || arguments.open || !drawn {
+        let plot = arguments.plot.unwrap_or(Plot::Profile);
+        let name = <&str>::from(plot);
+        let Some(path) = arguments.output.clone().or_else(|| {
+            let folder = std::env::temp_dir();
+            arguments
+                .open
+                .then(|| folder.join(format!("signorini-{id}.{name}.svg")))
+        }) else {
+            eprintln!(
+                "signorini: {name} is not drawn in a terminal: write it by -o FILE.svg, or look at it by --open"
+            );
+            return Ok(Exit::Invalid);
+        };
+        if path
+            .extension()
+            .is_none_or(|ending| !ending.eq_ignore_ascii_case("svg"))
+        {
+            eprintln!(
+                "signorini: -o {}: the file must have the extension .svg",
+                path.display()
+            );
+            return Ok(Exit::Invalid);
+        }
+        let route = format!(
+            "/v1/jobs/{id}/plots/{name}.svg?theme={}",
+            <&str>::from(arguments.theme)
+        );
+        let answer = service
+            .send_surely(service.request(Method::GET, &route))
+            .await?;
+        download(&service, &path, answer)?;
+        eprintln!("{}", path.display());
+        if arguments.open {
+            open(&path)?;
+        }
+        return Ok(Exit::Ok);
+    }
+    let mut figures = vec![];
+    if arguments.plot != Some(Plot::Convergence) {
+        figures.extend(profiles(&service, id).await?);
+    }
+    if arguments.plot != Some(Plot::Profile) {
+        figures.push(convergence(&service, id).await?);
+    }
+    let in_colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let width = console::Term::stdout()
+        .size_checked()
+        .map_or(SIZE.0, |(_, columns)| columns.clamp(40, 120));
+    let text: Vec<String> = figures
+        .iter()
+        .map(|figure| figure.draw(width, SIZE.1, in_colour))
+        .collect();
+    output::print(&text.join("\n"))?;
+    Ok(Exit::Ok)
+}
+
+/// The stresses along each contact boundary.
+async fn profiles(service: &Service, id: JobId) -> anyhow::Result<Vec<Chart>> {
+    let mut result: Value = service.get(&format!("/v1/jobs/{id}/result")).await?;
+    let summary: Summary = serde_json::from_value(result["summary"].take())
+        .context("the result is not that of this version of signorini")?;
+    let mut figures = vec![];
+    for boundary in summary.solution.contacts.keys() {
+        let path = format!("/v1/jobs/{id}/profiles/{}?format=json", segment(boundary));
+        let profile: ContactProfile = service.get(&path).await?;
+        let points = |values: &[f64]| {
+            profile
+                .s
+                .iter()
+                .copied()
+                .zip(values.iter().copied())
+                .collect()
+        };
+        let bound: Vec<f64> = profile
+            .friction_bound
+            .iter()
+            .zip(&profile.tangential_stress)
+            .map(|(bound, stress)| bound.copysign(*stress))
+            .collect();
+        let mut curves = vec![
+            Curve {
+                name: "σ_n",
+                points: points(&profile.normal_stress),
+            },
+            Curve {
+                name: "σ_t",
+                points: points(&profile.tangential_stress),
+            },
+        ];
+        if bound.iter().any(|bound| *bound != 0.0) {
+            curves.push(Curve {
+                name: "± bound of σ_t",
+                points: points(&bound),
+            });
+        }
+        figures.push(Chart {
+            title: format!("Stresses along {boundary:?}"),
+            across: "s".into(),
+            curves,
+            logarithmic: false,
+        });
+    }
+    Ok(figures)
+}
+
+/// The residuals by iteration.
+async fn convergence(service: &Service, id: JobId) -> anyhow::Result<Chart> {
+    let rows: Vec<TimedIteration> = service
+        .get(&format!(
+            "/v1/jobs/{id}/history?format=json&max_points=2000"
+        ))
+        .await?;
+    let curve = |name, value: fn(&TimedIteration) -> f64| Curve {
+        name,
+        points: rows
+            .iter()
+            .enumerate()
+            .map(|(place, row)| (1.0 + place as f64, value(row)))
+            .collect(),
+    };
+    Ok(Chart {
+        title: "Convergence".into(),
+        across: "iteration".into(),
+        curves: vec![
+            curve("residual", |timed| timed.row.residual),
+            curve("friction residual", |timed| timed.row.friction_residual),
+            curve("tolerance", |timed| timed.row.tolerance),
+        ],
+        logarithmic: true,
+    })
+}
+
+/// Opens a file with the desktop's program for it.
+fn open(path: &Path) -> anyhow::Result<()> {
+    let program = match cfg!(target_os = "macos") {
+        true => "open",
+        false => "xdg-open",
+    };
+    let status = Command::new(program).arg(path).status();
+    let status = status.with_context(|| {
+        format!("{program}, which opens files on this machine, cannot be started")
+    })?;
+    anyhow::ensure!(
+        status.success(),
+        "{program} could not open {}",
+        path.display()
+    );
+    Ok(())
+}

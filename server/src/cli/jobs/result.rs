@@ -1,0 +1,310 @@
+//! `signorini result`.
+
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use files::plot::Theme;
+use form_urlencoded::Serializer;
+use reqwest::{Method, Response};
+use serde::Deserialize;
+use serde_json::Value;
+use solver::solution::ContactProfile;
+use tokio::{runtime::Handle, task::block_in_place};
+
+use super::{
+    super::{
+        exit::Exit,
+        output::{self, Output, Part},
+        report,
+        service::{Connection, Service, segment},
+    },
+    id::Id,
+    listing::Format,
+};
+use crate::{event::TimedIteration, run::Summary};
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  signorini result job_…\n  signorini result job_… --profile -f csv > stresses.csv\n  \
+    signorini result job_… -o punch.vtu -o punch.profile.svg\n  signorini result sweep_… -f csv > study.csv"
+)]
+pub(in crate::cli) struct Arguments {
+    /// The job or the sweep
+    id: Id,
+
+    /// Print the stresses along the contact boundary; of several contacts, of the one with this name
+    #[arg(long, value_name = "BOUNDARY", num_args = 0..=1, default_missing_value = "")]
+    profile: Option<String>,
+
+    /// Print the iterations
+    #[arg(long, conflicts_with = "profile")]
+    history: bool,
+
+    /// Of the profile: its points, as all, nodes, friction, or a number of evenly spaced ones
+    #[arg(long, value_name = "POINTS")]
+    points: Option<String>,
+
+    /// Of the profile: the load step, by its name or its number from 0 [default: the last]
+    #[arg(long, value_name = "STEP")]
+    step: Option<String>,
+
+    /// How to print it: csv and jsonl are those of the profile, unless --history
+    #[arg(short, long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+
+    /// Write a part of the result to this file, chosen by its name as for `signorini solve -o`: punch.csv, punch.history.csv,
+    /// punch.summary.json, punch.vtu, punch.fields.npz, punch.svg, punch.convergence.svg; can be repeated
+    #[arg(short, long, value_name = "OUT")]
+    output: Vec<PathBuf>,
+
+    /// Colours of a figure: light or dark
+    #[arg(long, default_value = "light")]
+    theme: Theme,
+
+    #[command(flatten)]
+    service: Connection,
+}
+
+/// What the service answers for a result.
+#[derive(Deserialize)]
+struct Scalars {
+    summary: Summary,
+    steps: Vec<Step>,
+}
+
+#[derive(Deserialize)]
+struct Step {
+    name: String,
+    summary: solver::solution::Summary,
+}
+
+pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
+    let service = arguments.service.open()?;
+    let id = arguments.id;
+    let base = id.path();
+    if let Id::Sweep(_) = id {
+        return of_sweep(&service, &base, &arguments).await;
+    }
+    let document: Value = service.get(&format!("{base}/result")).await?;
+    let scalars: Scalars = serde_json::from_value(document.clone())
+        .context("the result is not that of this version of signorini")?;
+    let contacts: Vec<&str> = scalars
+        .summary
+        .solution
+        .contacts
+        .keys()
+        .map(String::as_str)
+        .collect();
+    if !arguments.output.is_empty() {
+        // all names are read before anything is fetched
+        let outputs = arguments
+            .output
+            .iter()
+            .map(|path| Output::parse(path, &contacts));
+        let outputs = match outputs.collect::<Result<Vec<_>, _>>() {
+            Ok(outputs) => outputs,
+            Err(problem) => {
+                eprintln!("signorini: {problem}");
+                return Ok(Exit::Invalid);
+            }
+        };
+        for output in &outputs {
+            save(&service, &base, output, &document, arguments.theme).await?;
+        }
+        return Ok(Exit::Ok);
+    }
+    let as_rows = matches!(arguments.format, Format::Csv | Format::Jsonl);
+    let asked_for_profile =
+        arguments.profile.is_some() || arguments.points.is_some() || arguments.step.is_some();
+    if arguments.history {
+        let path = format!("{base}/history?format={}", of_rows(arguments.format));
+        let rows = |text: &str| -> anyhow::Result<String> {
+            let rows: Vec<TimedIteration> = serde_json::from_str(text)?;
+            Ok(rows
+                .iter()
+                .map(|timed| report::iteration(&timed.row) + "\n")
+                .collect())
+        };
+        return print(&service, &path, arguments.format, rows).await;
+    }
+    if asked_for_profile || as_rows {
+        let named = arguments.profile.as_deref().filter(|name| !name.is_empty());
+        let boundary = match (named, contacts.as_slice()) {
+            (Some(name), _) => name,
+            (None, [only]) => only,
+            (None, []) => bail!("the problem has no contact, and so no profile"),
+            (None, several) => {
+                eprintln!(
+                    "signorini: name a contact boundary by --profile: {}",
+                    several.join(", ")
+                );
+                return Ok(Exit::Invalid);
+            }
+        };
+        let mut query = Serializer::new(String::new());
+        query.append_pair("format", of_rows(arguments.format));
+        query.extend_pairs(arguments.points.iter().map(|points| ("points", points)));
+        query.extend_pairs(arguments.step.iter().map(|step| ("step", step)));
+        let path = format!("{base}/profiles/{}?{}", segment(boundary), query.finish());
+        let columns = |text: &str| -> anyhow::Result<String> {
+            let profile: ContactProfile = serde_json::from_str(text)?;
+            Ok(report::profile(&profile))
+        };
+        return print(&service, &path, arguments.format, columns).await;
+    }
+    if arguments.format == Format::Json {
+        output::print(&format!("{document:#}\n"))?;
+        return Ok(Exit::Ok);
+    }
+    let steps = scalars
+        .steps
+        .iter()
+        .map(|step| (step.name.as_str(), &step.summary));
+    if document["result_available"] == "partial" {
+        eprintln!("signorini: the result is partial: the job has not ended, or did not converge");
+    }
+    output::print(&report::result(None, &scalars.summary, steps))?;
+    Ok(Exit::Ok)
+}
+
+/// The service's word for it; a table is made of JSON.
+fn of_rows(format: Format) -> &'static str {
+    match format {
+        Format::Table | Format::Json => "json",
+        Format::Csv => "csv",
+        Format::Jsonl => "jsonl",
+    }
+}
+
+/// Prints an answer as it comes, or as a table.
+async fn print(
+    service: &Service,
+    path: &str,
+    format: Format,
+    as_table: impl Fn(&str) -> anyhow::Result<String>,
+) -> anyhow::Result<Exit> {
+    let answer = service
+        .send_surely(service.request(Method::GET, path))
+        .await?;
+    match format {
+        Format::Table => {
+            let text = answer
+                .text()
+                .await
+                .map_err(|error| service.unreachable(&error))?;
+            let table =
+                as_table(&text).context("the answer is not that of this version of signorini")?;
+            output::print(&table)?;
+        }
+        Format::Json | Format::Jsonl | Format::Csv => {
+            write(service, answer, &mut std::io::stdout())?
+        }
+    }
+    Ok(Exit::Ok)
+}
+
+async fn of_sweep(service: &Service, base: &str, arguments: &Arguments) -> anyhow::Result<Exit> {
+    if arguments.profile.is_some()
+        || arguments.history
+        || arguments.points.is_some()
+        || arguments.step.is_some()
+    {
+        eprintln!(
+            "signorini: a sweep has a table; submit a member as a job of its own for its profile (POST …/members/N/job)"
+        );
+        return Ok(Exit::Invalid);
+    }
+    for output in &arguments.output {
+        let format = match super::super::sweep::format_of(output) {
+            Ok(format) => format,
+            Err(problem) => {
+                eprintln!("signorini: {problem}");
+                return Ok(Exit::Invalid);
+            }
+        };
+        let answer = fetch(service, &format!("{base}/results?format={}", format.name())).await?;
+        download(service, output, answer)?;
+    }
+    if arguments.output.is_empty() {
+        let format = match arguments.format {
+            // the table of a sweep has many columns: it is for a program
+            Format::Table | Format::Csv => "csv",
+            Format::Jsonl => "jsonl",
+            Format::Json => "json",
+        };
+        let answer = fetch(service, &format!("{base}/results?format={format}")).await?;
+        write(service, answer, &mut std::io::stdout())?;
+    }
+    Ok(Exit::Ok)
+}
+
+async fn fetch(service: &Service, path: &str) -> anyhow::Result<Response> {
+    service
+        .send_surely(service.request(Method::GET, path))
+        .await
+}
+
+/// Writes one part to its file.
+async fn save(
+    service: &Service,
+    base: &str,
+    output: &Output,
+    document: &Value,
+    theme: Theme,
+) -> anyhow::Result<()> {
+    let format = output.format.name();
+    let path = match &output.part {
+        Part::Summary => None,
+        Part::Everything if format == "json" => None,
+        Part::Everything => bail!(
+            "-o {}: name the part before the extension: NAME.fields.npz, NAME.profile.npz or NAME.history.npz",
+            output.path.as_deref().unwrap_or(Path::new("-")).display()
+        ),
+        Part::Profile(boundary) => Some(format!("profiles/{}?format={format}", segment(boundary))),
+        Part::History => Some(format!("history?format={format}")),
+        Part::Fields => Some(format!("fields?format={format}")),
+        Part::Plot(plot) => Some(format!(
+            "plots/{}.svg?theme={}",
+            <&str>::from(*plot),
+            <&str>::from(theme)
+        )),
+    };
+    let Some(path) = path else {
+        let text = format!("{document:#}\n");
+        return match &output.path {
+            Some(path) => output::replace(path, |out| Ok(out.write_all(text.as_bytes())?))
+                .with_context(|| format!("cannot write {}", path.display())),
+            None => Ok(output::print(&text)?),
+        };
+    };
+    let answer = fetch(service, &format!("{base}/{path}")).await?;
+    match &output.path {
+        Some(file) => download(service, file, answer),
+        None => write(service, answer, &mut std::io::stdout()),
+    }
+}
+
+/// Writes a file when the whole answer has arrived.
+pub(super) fn download(service: &Service, path: &Path, answer: Response) -> anyhow::Result<()> {
+    output::replace(path, |out| write(service, answer, out))
+        .with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Writes an answer piece by piece: fields may be larger than the memory. The writing waits, as `replace` does.
+fn write(service: &Service, mut answer: Response, out: &mut dyn Write) -> anyhow::Result<()> {
+    loop {
+        let piece = block_in_place(|| Handle::current().block_on(answer.chunk()));
+        match piece.map_err(|error| service.unreachable(&error))? {
+            Some(piece) => match out.write_all(&piece) {
+                // who read it has seen enough
+                Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => return Ok(()),
+                written => written?,
+            },
+            None => return Ok(out.flush()?),
+        }
+    }
+}

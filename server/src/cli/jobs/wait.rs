@@ -1,0 +1,60 @@
+//! `signorini wait`.
+
+use std::time::Duration;
+
+use clap::Args;
+use tokio::time::Instant;
+
+use super::{
+    super::{exit::Exit, service::Connection},
+    follow,
+    id::Id,
+    listing::{Found, Shown},
+};
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  signorini wait $(cat ids.txt) --timeout 600 && echo all succeeded"
+)]
+pub(in crate::cli) struct Arguments {
+    /// Jobs or sweeps
+    #[arg(required = true)]
+    ids: Vec<Id>,
+
+    /// Seconds to wait at most, for all of them together [default: until they end]
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    timeout: Option<Duration>,
+
+    #[command(flatten)]
+    shown: Shown,
+
+    #[command(flatten)]
+    service: Connection,
+}
+
+fn positive(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().filter(|seconds: &f64| *seconds >= 0.0);
+    let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    time.ok_or_else(|| "expected a number of seconds".into())
+}
+
+/// Prints what has ended; the exit code is the worst.
+pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
+    let service = arguments.service.open()?;
+    let deadline = arguments.timeout.map(|time| Instant::now() + time);
+    let (mut documents, mut exit) = (vec![], Exit::Ok);
+    for id in arguments.ids {
+        match follow::detached(id, follow::wait(&service, id, deadline)).await? {
+            Some(document) => {
+                exit = exit.max(follow::exit_of_document(id, &document)?);
+                documents.push(document);
+            }
+            None => {
+                exit = Exit::TimedOut;
+                documents.push(service.get(&id.path()).await?);
+            }
+        }
+    }
+    arguments.shown.print(&Found::of(documents))?;
+    Ok(exit)
+}

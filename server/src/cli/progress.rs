@@ -1,0 +1,149 @@
+//! What is told of a solution while it is made: a line for each iteration, and below them, on a terminal, its state.
+
+use std::{collections::VecDeque, io::IsTerminal, time::Duration};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use solver::solution::{Iteration, Phase, Warning};
+
+use super::{output, report};
+
+/// Residuals that the curve shows.
+const CURVE: usize = 24;
+
+/// Where the lines go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum To {
+    /// They are what the command prints.
+    Output,
+    /// They are beside what it prints.
+    Error,
+}
+
+/// The lines of one solution, and its state.
+pub(super) struct View {
+    to: To,
+    bar: ProgressBar,
+    residuals: VecDeque<f64>,
+    tolerance: f64,
+    state: String,
+    headed: bool,
+}
+
+impl View {
+    pub(super) fn new(to: To) -> View {
+        // drawn on standard error, and only if that is a terminal
+        let bar = ProgressBar::new_spinner();
+        let style = ProgressStyle::with_template("{spinner} {elapsed} {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        bar.enable_steady_tick(Duration::from_millis(120));
+        View {
+            to,
+            bar,
+            residuals: VecDeque::new(),
+            tolerance: 0.0,
+            state: String::new(),
+            headed: false,
+        }
+    }
+
+    /// A line above the state.
+    pub(super) fn line(&self, text: &str) -> std::io::Result<()> {
+        self.bar.suspend(|| match self.to {
+            To::Output => output::print(&format!("{text}\n")),
+            To::Error => {
+                eprintln!("{text}");
+                Ok(())
+            }
+        })
+    }
+
+    /// What goes on now.
+    pub(super) fn state(&mut self, state: &str) {
+        state.clone_into(&mut self.state);
+        let curve = match self.residuals.is_empty() {
+            true => String::new(),
+            false => format!(
+                "  residual {} → {:.0e}",
+                sparkline(&self.residuals),
+                self.tolerance
+            ),
+        };
+        self.bar.set_message(format!("{}{curve}", self.state));
+    }
+
+    /// A phase begins. Where there is no terminal it is a line, if nothing but lines is read there.
+    pub(super) fn phase(&mut self, phase: Phase) -> std::io::Result<()> {
+        let words = report::phase(phase);
+        if self.to == To::Error && !std::io::stderr().is_terminal() {
+            self.line(&format!("{words} …"))?;
+        }
+        self.state(words);
+        Ok(())
+    }
+
+    pub(super) fn iteration(&mut self, row: &Iteration) -> std::io::Result<()> {
+        if !self.headed {
+            self.headed = true;
+            if std::io::stderr().is_terminal() {
+                self.line("   k  stage         residuals                              contact (entered, left)")?;
+            }
+        }
+        self.residuals
+            .push_back(row.residual.max(row.friction_residual));
+        self.tolerance = row.tolerance;
+        if self.residuals.len() > CURVE {
+            self.residuals.pop_front();
+        }
+        self.line(&report::iteration(row))?;
+        let state = self.state.clone();
+        self.state(&state);
+        Ok(())
+    }
+
+    pub(super) fn warning(&self, warning: &Warning) -> std::io::Result<()> {
+        self.line(&format!(
+            "warning: {}: {}",
+            warning.pointer, warning.message
+        ))
+    }
+
+    /// It is solved anew.
+    pub(super) fn anew(&mut self) {
+        self.residuals.clear();
+    }
+
+    /// Takes the state away.
+    pub(super) fn end(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Numbers as a curve of blocks, by their logarithms: the highest block is the largest number. No crate draws one in a
+/// line of text without a whole screen around it.
+fn sparkline(numbers: &VecDeque<f64>) -> String {
+    const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let logarithms: Vec<f64> = numbers
+        .iter()
+        .map(|number| number.max(1e-300).log10())
+        .collect();
+    let least = logarithms.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let block = |logarithm: &f64| {
+        let part = (logarithm - least) / (most - least).max(f64::MIN_POSITIVE);
+        // from 0 to 1: the cast cannot fail
+        BLOCKS[((part * 7.0).round() as usize).min(7)]
+    };
+    logarithms.iter().map(block).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_residual_that_falls_is_a_curve_that_falls() {
+        let falling = VecDeque::from([1.0, 1e-2, 1e-7]);
+        assert_eq!(sparkline(&falling), "█▆▁");
+        assert_eq!(sparkline(&VecDeque::from([3.0])), "▁");
+    }
+}
