@@ -71,7 +71,7 @@ impl View {
         self.bar.set_message(format!("{}{curve}", self.state));
     }
 
-    /// A phase begins. Where there is no terminal it is a line, if nothing but lines is read there.
+    /// A phase begins: the state on a terminal, else a line, but not among lines that are what the command prints.
     pub(super) fn phase(&mut self, phase: Phase) -> std::io::Result<()> {
         let words = report::phase(phase);
         if self.to == To::Error && !std::io::stderr().is_terminal() {

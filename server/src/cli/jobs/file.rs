@@ -148,7 +148,7 @@ impl Submitted {
         }
     }
 
-    /// Tells the violations for which the service has refused it, and returns any other error.
+    /// Tells the violations for which the service has refused it, if there are any; the error is returned as it came.
     pub(super) fn refused(&self, error: anyhow::Error) -> anyhow::Error {
         if let Some(CallError::Refused(refusal)) = error.downcast_ref() {
             let Refusal { violations, .. } = &**refusal;

@@ -25,8 +25,9 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 /// Seconds that one request waits at most, of those that the service allows: a proxy may cut off what is silent for a minute.
 const WAIT_S: f64 = 30.0;
 
-/// How often in a row the service was not reached, and since when.
+/// Since when the service was not reached.
 struct Outage {
+    /// It has answered before, or a connection to it was open.
     known: bool,
     since: Option<Instant>,
     pause: Duration,
@@ -100,7 +101,7 @@ pub(super) async fn wait(
 }
 
 /// Whether a job or a sweep has ended.
-pub(super) fn has_ended(document: &Value) -> bool {
+fn has_ended(document: &Value) -> bool {
     let status = document["status"].as_str();
     status
         .and_then(|word| word.parse().ok())

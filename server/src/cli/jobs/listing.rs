@@ -206,7 +206,7 @@ fn shortened(text: &str, most: usize) -> String {
 }
 
 /// All of a job, a line for each fact.
-pub(super) fn card(job: &Job) -> String {
+fn card(job: &Job) -> String {
     let time = |time: &Option<Time>| time.map(|time| time.to_string());
     let mut lines = vec![("job", Some(job.id.to_string()))];
     lines.push(("status", Some(<&str>::from(job.status).to_owned())));
