@@ -166,18 +166,19 @@ pub(super) fn exit_of_document(id: Id, document: &Value) -> anyhow::Result<Exit>
     if let Id::Job(_) = id {
         return Ok(exit_of(&super::listing::job(document)?));
     }
+    Ok(exit_of_sweep(document))
+}
+
+/// The same of a sweep.
+pub(super) fn exit_of_sweep(document: &Value) -> Exit {
     let failed = document["members"]["failed"].as_u64().unwrap_or_default();
-    Ok(
-        match document["status"]
-            .as_str()
-            .and_then(|word| word.parse().ok())
-        {
-            Some(Status::Canceled) => Exit::Canceled,
-            Some(Status::Failed) => Exit::Failed,
-            _ if failed > 0 => Exit::NotConverged,
-            _ => Exit::Ok,
-        },
-    )
+    let status = document["status"].as_str();
+    match status.and_then(|word| word.parse().ok()) {
+        Some(Status::Canceled) => Exit::Canceled,
+        Some(Status::Failed) => Exit::Failed,
+        _ if failed > 0 => Exit::NotConverged,
+        _ => Exit::Ok,
+    }
 }
 
 /// Ends the process at Ctrl-C, as the signal itself would, and says that what was followed goes on.

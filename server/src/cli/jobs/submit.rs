@@ -9,13 +9,12 @@ use serde_json::value::{RawValue, to_raw_value};
 use super::{
     super::{
         exit::Exit,
-        service::{Connection, Service, new_key},
+        service::{Connection, new_key},
     },
     file::{Kind, Submitted},
-    follow,
     id::Id,
     listing::{Found, Shown},
-    watch,
+    wait, watch,
 };
 
 #[derive(Debug, Args)]
@@ -141,23 +140,10 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             eprintln!("{id}");
             return watch::follow(&service, *id, watch::Format::Table).await;
         }
-        _ if arguments.wait => return waited(&service, &ids, shown).await,
+        _ if arguments.wait => return wait::all(&service, &ids, None, shown).await,
         _ => shown.print(&Found::of(documents))?,
     }
     Ok(Exit::Ok)
-}
-
-/// Waits for all, prints them, and ends as the worst of them.
-async fn waited(service: &Service, ids: &[Id], shown: &Shown) -> anyhow::Result<Exit> {
-    let (mut ended, mut exit) = (vec![], Exit::Ok);
-    for id in ids {
-        let document = follow::detached(*id, follow::wait(service, *id, None)).await?;
-        let document = document.context("a wait without an end has ended")?;
-        exit = exit.max(follow::exit_of_document(*id, &document)?);
-        ended.push(document);
-    }
-    shown.print(&Found::of(ended))?;
-    Ok(exit)
 }
 
 impl Arguments {

@@ -6,7 +6,10 @@ use clap::Args;
 use tokio::time::Instant;
 
 use super::{
-    super::{exit::Exit, service::Connection},
+    super::{
+        exit::Exit,
+        service::{Connection, Service},
+    },
     follow,
     id::Id,
     listing::{Found, Shown},
@@ -38,23 +41,32 @@ fn positive(text: &str) -> Result<Duration, String> {
     time.ok_or_else(|| "expected a number of seconds".into())
 }
 
-/// Prints what has ended; the exit code is the worst.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let service = arguments.service.open()?;
     let deadline = arguments.timeout.map(|time| Instant::now() + time);
+    all(&service, &arguments.ids, deadline, &arguments.shown).await
+}
+
+/// Waits for all, prints them as they are then, and ends as the worst of them.
+pub(super) async fn all(
+    service: &Service,
+    ids: &[Id],
+    deadline: Option<Instant>,
+    shown: &Shown,
+) -> anyhow::Result<Exit> {
     let (mut documents, mut exit) = (vec![], Exit::Ok);
-    for id in arguments.ids {
-        match follow::detached(id, follow::wait(&service, id, deadline)).await? {
+    for id in ids {
+        match follow::detached(*id, follow::wait(service, *id, deadline)).await? {
             Some(document) => {
-                exit = exit.max(follow::exit_of_document(id, &document)?);
+                exit = exit.max(follow::exit_of_document(*id, &document)?);
                 documents.push(document);
             }
             None => {
-                exit = Exit::TimedOut;
+                exit = exit.max(Exit::TimedOut);
                 documents.push(service.get(&id.path()).await?);
             }
         }
     }
-    arguments.shown.print(&Found::of(documents))?;
+    shown.print(&Found::of(documents))?;
     Ok(exit)
 }

@@ -158,12 +158,7 @@ impl Watched {
                     sweep["status"].as_str().unwrap_or_default()
                 ))?;
             }
-            return Ok(Some(match (sweep["status"].as_str(), total - succeeded) {
-                (Some("canceled"), _) => Exit::Canceled,
-                (Some("failed"), _) => Exit::Failed,
-                (_, 0) => Exit::Ok,
-                (_, _) => Exit::NotConverged,
-            }));
+            return Ok(Some(follow::exit_of_sweep(sweep)));
         }
         let member = event.get("member").unwrap_or(event);
         let Ok(row) = serde_json::from_value::<MemberRow>(member.clone()) else {
