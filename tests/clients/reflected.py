@@ -14,16 +14,17 @@ SERVICE = "signorini.v1.JobService"
 class Client:
     """`client.GetJob(id=…)` calls the method of that name; fields are given as in the JSON of protobuf."""
 
-    def __init__(self, address, ca=None):
-        """`ca`: the certificate of an authority, for TLS."""
+    def __init__(self, address, ca=None, known=None):
+        """`ca`: the certificate of an authority, for TLS. `known`: another client of the same service, whose messages are used
+        instead of asking for them: gRPC's own client may wait for ever, also beyond a time-out, for an answer of
+        reflection if the server stops at that moment."""
         options = [("grpc.enable_http_proxy", 0)]
         if ca:
             trusted = grpc.ssl_channel_credentials(root_certificates=ca)
             self.channel = grpc.secure_channel(address, trusted, options=options)
         else:
             self.channel = grpc.insecure_channel(address, options=options)
-        self.database = ProtoReflectionDescriptorDatabase(self.channel)
-        self.pool = descriptor_pool.DescriptorPool(self.database)
+        self.pool = known.pool if known else descriptor_pool.DescriptorPool(ProtoReflectionDescriptorDatabase(self.channel))
         self.service = self.pool.FindServiceByName(SERVICE)
 
     def __enter__(self):

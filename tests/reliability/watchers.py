@@ -215,7 +215,7 @@ def too_dear(rounds):
 def many_watchers():
     wal = []
     # every solve is to cost the same: the body of the first is not kept for the others
-    with Attacked("--body-cache-bytes", "0") as server:
+    with Attacked("--body-cache-bytes", "0", "--memory-budget-bytes", str(2 << 30)) as server:
         asyncio.run(others_are_served(server))
         asyncio.run(solve(server, wal))  # the first of all takes memory that the others find
         with Bystander(server):
