@@ -5,6 +5,7 @@ use std::borrow::Cow;
 
 use files::{
     npz::Npz,
+    plot::image::Image,
     table::{Column, Table, Values},
 };
 use serde::Serialize;
@@ -30,8 +31,12 @@ pub enum Format {
     Npz,
     /// VTK's XML unstructured grid.
     Vtu,
-    /// A figure.
+    /// A figure of vectors.
     Svg,
+    /// A figure of pixels.
+    Png,
+    /// A figure on a page of its own.
+    Pdf,
 }
 
 impl Format {
@@ -45,6 +50,19 @@ impl Format {
     ];
     /// The formats of fields, the default first.
     pub const OF_FIELDS: &[Format] = &[Format::Vtu, Format::Npz, Format::Json];
+
+    /// The formats of figures, the default first.
+    pub const OF_FIGURES: &[Format] = &[Format::Svg, Format::Png, Format::Pdf];
+
+    /// What a figure is written as; `None` for data.
+    pub fn image(self) -> Option<Image> {
+        match self {
+            Format::Svg => Some(Image::Svg),
+            Format::Png => Some(Image::Png),
+            Format::Pdf => Some(Image::Pdf),
+            _ => None,
+        }
+    }
 
     /// The value of `format`, and the extension of a file.
     pub fn name(self) -> &'static str {
@@ -61,6 +79,8 @@ impl Format {
             Format::Npz => "application/x-npz",
             Format::Vtu => "application/vnd.vtk.unstructuredgrid+xml",
             Format::Svg => "image/svg+xml",
+            Format::Png => "image/png",
+            Format::Pdf => "application/pdf",
         }
     }
 
@@ -110,7 +130,9 @@ fn rows<T: Serialize + ?Sized>(
         Format::Jsonl => table(part).jsonl().map(String::into_bytes),
         Format::Arrow => files::arrow::file(&table(part)),
         Format::Npz => files::npz::file(&table(part)),
-        Format::Vtu | Format::Svg => Err(format!("rows are not written as {}", format.name())),
+        Format::Vtu | Format::Svg | Format::Png | Format::Pdf => {
+            Err(format!("rows are not written as {}", format.name()))
+        }
     }
 }
 
@@ -124,7 +146,9 @@ pub fn members(paths: &[String], rows: &[MemberRow], format: Format) -> Result<V
         Format::Jsonl => table().jsonl().map(String::into_bytes),
         Format::Arrow => files::arrow::file(&table()),
         Format::Npz => files::npz::file(&table()),
-        Format::Vtu | Format::Svg => Err(format!("rows are not written as {}", format.name())),
+        Format::Vtu | Format::Svg | Format::Png | Format::Pdf => {
+            Err(format!("rows are not written as {}", format.name()))
+        }
     }
 }
 
@@ -202,7 +226,7 @@ pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
         Format::Json => serde_json::to_vec(fields).map_err(|error| error.to_string()),
         Format::Npz => files::fields::npz(fields),
         Format::Vtu => files::vtu::file(fields),
-        Format::Csv | Format::Jsonl | Format::Arrow | Format::Svg => {
+        Format::Csv | Format::Jsonl | Format::Arrow | Format::Svg | Format::Png | Format::Pdf => {
             Err(format!("fields are not written as {}", format.name()))
         }
     }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::Path;
 
-use files::plot::{Curve, LineStyle, Panel, Theme, figure};
+use files::plot::{Caption, Curve, LineStyle, Panel, Theme, figure};
 use solver::problem::{AdaptiveRefine, BoundaryValue, Obstacle, Problem, Refine};
 use solver::solution::{ContactProfile, Solution, Summary};
 
@@ -200,10 +200,13 @@ fn stresses(name: &str, mesh: &str, radii: &[f64]) -> String {
         "{}, {mesh} mesh",
         frictionless.title.clone().unwrap_or_default()
     );
+    let caption = Caption {
+        title,
+        ..Caption::default()
+    };
     figure(
         Theme::Light,
-        &title,
-        None,
+        &caption,
         &[
             Panel {
                 x: x.to_owned(),
@@ -290,11 +293,9 @@ fn gauss_row() -> String {
         curves: curves.to_vec(),
         ..Panel::default()
     };
-    figure(
-        Theme::Light,
-        "Thin sheet, row of Gauss points nearest the free edge",
-        None,
-        &[panel],
-    )
-    .unwrap()
+    let caption = Caption {
+        title: "Thin sheet, row of Gauss points nearest the free edge".to_owned(),
+        ..Caption::default()
+    };
+    figure(Theme::Light, &caption, &[panel]).unwrap()
 }

@@ -154,6 +154,8 @@ async fn a_problem_is_submitted_waited_for_listed_and_its_result_printed() {
         "a.fields.npz",
         "a.svg",
         "a.convergence.svg",
+        "a.mesh.png",
+        "a.pdf",
     ];
     let mut save = vec!["result".to_owned(), id.clone()];
     save.extend(files.iter().flat_map(|file| ["-o".to_owned(), name(file)]));
@@ -193,6 +195,13 @@ async fn a_problem_is_submitted_waited_for_listed_and_its_result_printed() {
             .starts_with("<svg")
     );
     ends(url, &["plot", &id, "mesh"], 2).await;
+    let figure = name("mesh.pdf");
+    let column = ["--size", "column", "--theme", "dark"];
+    let pdf = ["plot", &id, "mesh", "-o", &figure];
+    ends(url, &[&pdf[..], &column].concat(), 0).await;
+    assert!(std::fs::read(&figure).unwrap().starts_with(b"%PDF-"));
+    let (_, said) = ends(url, &["plot", &id, "-o", &name("x.gif")], 2).await;
+    assert!(said.contains(".svg, .png, .pdf"), "{said}");
 
     let again = ends(url, &["retry", &id, "-q"], 0)
         .await

@@ -1,4 +1,4 @@
-//! /plots/{mesh,deformed,profile,convergence}.svg.
+//! /plots/{mesh,deformed,profile,convergence}.{svg,png,pdf}.
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -27,14 +27,89 @@ async fn every_plot_of_a_result_is_an_svg_in_both_themes() {
         assert_eq!(light.headers()["content-type"], "image/svg+xml");
         let light = light.text().await.unwrap();
         assert!(light.starts_with("<svg") && light.contains("Punch &amp; &lt;base&gt;"));
-        assert_eq!(light.contains("mm]"), plot != "convergence", "{plot}");
+        assert_eq!(light.contains("(mm)"), plot != "convergence", "{plot}");
+        assert!(light.contains("μ = 0.3, ρ = 0.01 mm"), "{plot}");
+        assert_eq!(light.contains("● verdict: "), plot != "mesh", "{plot}");
         let dark = server.get(&format!("{path}?theme=dark")).send().await;
         let dark = dark.unwrap().text().await.unwrap();
         assert!(dark.starts_with("<svg") && dark != light, "{plot}");
     }
     let path = format!("/v1/jobs/{id}/plots/deformed.svg?stress=yy");
     let normal = server.get(&path).send().await.unwrap();
-    assert!(normal.text().await.unwrap().contains("σ_yy [MPa]"));
+    assert!(normal.text().await.unwrap().contains(">yy</tspan>"));
+}
+
+/// Operations: GetPlot
+#[tokio::test]
+async fn a_figure_is_also_png_and_pdf_and_is_sent_once() {
+    let server = server().await;
+    let id = server.submit(&example_json("rectangular_punch")).await;
+    server.until_done(&id).await;
+    let (mut png, mut pdf) = (vec![], vec![]);
+    for (ending, media, begins, all) in [
+        ("png", "image/png", &b"\x89PNG"[..], &mut png),
+        ("pdf", "application/pdf", b"%PDF-", &mut pdf),
+    ] {
+        for plot in PLOTS {
+            let path = format!("/v1/jobs/{id}/plots/{plot}.{ending}?size=column");
+            let answer = server.get(&path).send().await.unwrap();
+            assert_eq!(answer.status(), StatusCode::OK, "{path}");
+            let headers = answer.headers().clone();
+            assert_eq!(headers["content-type"], media);
+            let shown = format!("inline; filename=\"{id}.{plot}.{ending}\"");
+            assert_eq!(headers["content-disposition"], shown.as_str());
+            let bytes = answer.bytes().await.unwrap();
+            assert!(bytes.starts_with(begins), "{path}");
+            assert!(!all.contains(&bytes), "another figure");
+            all.push(bytes);
+            let known = server.get(&path).header("if-none-match", &headers["etag"]);
+            let known = known.send().await.unwrap();
+            assert_eq!(known.status(), StatusCode::NOT_MODIFIED, "{path}");
+        }
+    }
+    let path = format!("/v1/jobs/{id}/plots/profile.svg");
+    let tag = |answer: &reqwest::Response| answer.headers()["etag"].clone();
+    let page = server.get(&path).send().await.unwrap();
+    let column = server.get(&format!("{path}?size=column")).send().await;
+    assert_ne!(tag(&page), tag(&column.unwrap()));
+}
+
+/// Operations: GetPlot
+#[tokio::test]
+async fn a_load_step_has_figures_of_its_own() {
+    let server = server().await;
+    let mut problem = example_json("rectangular_punch");
+    problem["steps"] = json!([{ "name": "half", "indentation": 0.5 }, { "name": "whole" }]);
+    let id = server.submit(&problem).await;
+    server.until_done(&id).await;
+    let at = |path: &str| format!("/v1/jobs/{id}/plots/{path}");
+    for plot in ["profile", "convergence"] {
+        let mut drawn = vec![];
+        for step in ["", "?step=half", "?step=1"] {
+            let answer = server
+                .get(&at(&format!("{plot}.svg{step}")))
+                .send()
+                .await
+                .unwrap();
+            assert_eq!(answer.status(), StatusCode::OK, "{plot}{step}");
+            drawn.push(answer.text().await.unwrap());
+        }
+        assert!(!drawn[0].contains("load step") && drawn[1].contains("load step half"));
+        assert!(drawn[2].contains("load step whole") && drawn[0] != drawn[1]);
+    }
+    for (path, status, expected) in [
+        (
+            "profile.svg?step=third",
+            StatusCode::NOT_FOUND,
+            "half, whole",
+        ),
+        ("deformed.svg?step=half", StatusCode::BAD_REQUEST, "stress"),
+        ("mesh.svg?step=half", StatusCode::BAD_REQUEST, "size"),
+    ] {
+        let answer = server.get(&at(path)).send().await.unwrap();
+        assert_eq!(answer.status(), status, "{path}");
+        assert!(answer.text().await.unwrap().contains(expected), "{path}");
+    }
 }
 
 /// Operations: GetPlot
@@ -46,6 +121,8 @@ async fn an_unknown_plot_or_theme_is_refused_with_the_known_ones() {
     for (path, status, expected) in [
         ("forces.svg", StatusCode::NOT_FOUND, "convergence.svg"),
         ("mesh", StatusCode::NOT_FOUND, "mesh.svg"),
+        ("mesh.gif", StatusCode::NOT_FOUND, "mesh.png"),
+        ("mesh.svg?size=poster", StatusCode::BAD_REQUEST, "column"),
         (
             "mesh.svg?theme=grey",
             StatusCode::BAD_REQUEST,

@@ -3,6 +3,7 @@
 use std::process::{Command, Output, Stdio};
 
 use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
 use suite::{example, example_json};
 
 use crate::SIGNORINI;
@@ -199,6 +200,8 @@ fn every_format_is_written_and_no_other_file_is_left() {
         "p.npz",
         "p.vtu",
         "p.svg",
+        "p.png",
+        "p.deformed.pdf",
         "p.history.csv",
         "p.profile.arrow",
         "p.profile.top.csv",
@@ -231,9 +234,64 @@ fn every_format_is_written_and_no_other_file_is_left() {
         ("p.npz", &b"PK"[..]),
         ("p.vtu", b"<?xml"),
         ("p.svg", b"<svg"),
+        ("p.png", b"\x89PNG"),
+        ("p.deformed.pdf", b"%PDF-"),
     ] {
         assert!(read(name).starts_with(start), "{name}");
     }
+}
+
+#[test]
+fn a_mesh_that_is_named_by_its_hash_is_read_from_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let quad = json!({
+        "nodes": [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5]],
+        "elements": [[0, 1, 2, 3, 4, 5, 6, 7]],
+        "boundaries": { "bottom": [[0, 1, 4]], "top": [[2, 3, 6]] },
+    });
+    std::fs::write(file("quad.json"), quad.to_string()).unwrap();
+    std::fs::write(file("other.json"), format!("{quad}\n")).unwrap();
+    let mut problem = json!({
+        "analysis": { "kind": "plane_strain" },
+        "mesh": { "inline": quad, "refine": 2 },
+        "materials": [{ "youngs_modulus": 1000, "poissons_ratio": 0.3 }],
+        "supports": [{ "boundary": "bottom", "ux": 0, "uy": 0 }],
+        "contacts": [{ "boundary": "top", "obstacle": { "kind": "flat" }, "indentation": 0.01 }],
+    });
+    let of_inline = solve(&problem.to_string(), &["-o", "-"]);
+    let digest = Sha256::digest(quad.to_string());
+    let hash: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    let hash = format!("sha256:{hash}");
+    problem["mesh"] = json!({ "stored": hash, "refine": 2 });
+    let problem = problem.to_string();
+    let summary = |output: &std::process::Output| {
+        let document: Value = serde_json::from_slice(&output.stdout).unwrap();
+        document["summary"]["normal_force"].clone()
+    };
+    let of_file = solve(&problem, &["-o", "-", "--mesh", &file("quad.json")]);
+    assert_eq!(of_file.status.code(), Some(0), "{of_file:?}");
+    assert_eq!(summary(&of_file), summary(&of_inline));
+    let figure = file("quad.mesh.svg");
+    let drawn = solve(&problem, &["-o", &figure, "--mesh", &file("quad.json")]);
+    assert_eq!(drawn.status.code(), Some(0), "{drawn:?}");
+    for (arguments, said) in [
+        (vec![], "give its file by --mesh"),
+        (
+            vec!["--mesh".to_owned(), file("other.json")],
+            "it has the hash",
+        ),
+        (vec!["--mesh".to_owned(), file("none.json")], "No such file"),
+    ] {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let refused = solve(&problem, &arguments);
+        assert_ne!(refused.status.code(), Some(0));
+        let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(told.contains(said), "{told}");
+    }
+    let own = solve(&example("sheet"), &["--mesh", &file("quad.json")]);
+    let told = String::from_utf8_lossy(&own.stderr).into_owned();
+    assert!(told.contains("a mesh of its own"), "{told}");
 }
 
 #[test]

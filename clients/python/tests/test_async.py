@@ -43,6 +43,7 @@ def test_jobs(server: sg.LocalServer, punch: sg.Result, tmp_path: pathlib.Path) 
             assert (await result.save_vtu(tmp_path / "a.vtu")).stat().st_size > 1000
             assert (await result.plot_profile()).axes
             assert "<svg" in await job.svg("mesh")
+            assert (await job.save_figure(tmp_path / "a.pdf", "mesh")).read_bytes().startswith(b"%PDF-")
             assert await job.problem() == sg.Problem.from_dict(PUNCH.to_dict(defaults=True))
             assert (await job.edit(name="edited")).name == "edited"
             again = await job.retry()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import io
+import pathlib
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ import signorini as sg
 from signorini._progress import Waiting, duration, job_line
 
 
-def test_a_job_from_submission_to_result(client: sg.Client) -> None:
+def test_a_job_from_submission_to_result(client: sg.Client, tmp_path: pathlib.Path) -> None:
     before = datetime.datetime.now(datetime.timezone.utc) - datetime.timedelta(seconds=5)
     job = client.submit(sg.examples.rectangular_punch(refine=1), name="first", labels={"study": "a"}, priority=3)
     result = job.wait(60, progress=False)
@@ -33,7 +34,14 @@ def test_a_job_from_submission_to_result(client: sg.Client) -> None:
     assert again.result().normal_force == result.normal_force
     assert again.wait().summary["digest"] == result.summary["digest"]
     assert again.problem() == sg.Problem.from_dict(sg.examples.rectangular_punch(refine=1).to_dict(defaults=True))
-    assert "<svg" in again.svg("profile", theme="dark")
+    assert "<svg" in again.svg("profile", theme="dark", size="column")
+    for ending, begins in ((".png", b"\x89PNG"), (".pdf", b"%PDF-")):
+        path = again.save_figure(tmp_path / f"punch{ending}", "deformed", size="column")
+        assert path.read_bytes().startswith(begins)
+    with pytest.raises(ValueError, match=r"must end with \.svg, \.png, \.pdf"):
+        again.save_figure(tmp_path / "punch.jpg")
+    with pytest.raises(sg.NotFound):
+        again.svg("profile", step="press")
 
 
 def test_a_dictionary_will_do(client: sg.Client) -> None:

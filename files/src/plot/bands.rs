@@ -4,9 +4,10 @@ use plotters::prelude::*;
 use plotters::style::RGBColor;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::Style;
 use super::body::{Frame, Path};
-use super::page::{self, Area, Fallible, WIDTH, number, px, round_up};
-use super::theme::{Theme, hex, viridis};
+use super::page::{self, Area, Fallible, number, px, round_up, rounded};
+use super::theme::{ColourMap, hex};
 use solver::element::{Element, Family};
 
 /// Most bands; there are at least about half as many.
@@ -27,12 +28,13 @@ pub(super) struct Bands {
     edges: Vec<f64>,
     /// The extremes of the field, if beyond the first and the last limit.
     beyond: [Option<f64>; 2],
+    colours: ColourMap,
 }
 
 impl Bands {
     /// For values at nodes. `near`: value and area of those in the last window. At a sharp edge a few
     /// nodes may exceed all others, and do not converge: then the bands end half their width beyond the values of
-    /// 97 % of that area, and the bar shows the extremes of the field.
+    /// 97 % of that area, and the bar shows the extremes of the field. A field of both signs has colours that differ by the sign.
     pub(super) fn of(values: &[f64], mut near: Vec<(f64, f64)>) -> Bands {
         let extreme = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick);
         let least = extreme(f64::min).unwrap_or(0.0);
@@ -74,7 +76,15 @@ impl Bands {
             (lowest > least).then_some(least).filter(|v| *v < edges[0]),
             (highest < most).then_some(most).filter(|v| *v > end),
         ];
-        Bands { edges, beyond }
+        let colours = match edges[0] < 0.0 && end > 0.0 {
+            true => ColourMap::Signed,
+            false => ColourMap::Rising,
+        };
+        Bands {
+            edges,
+            beyond,
+            colours,
+        }
     }
 
     fn count(&self) -> usize {
@@ -88,7 +98,14 @@ impl Bands {
     }
 
     fn colour(&self, band: usize) -> RGBColor {
-        viridis(band as f64 / (self.count() - 1).max(1) as f64)
+        let middle = 0.5 * (self.edges[band] + self.edges[band + 1]);
+        let (low, high) = (self.edges[0], self.edges[self.count()]);
+        let part = match self.colours {
+            ColourMap::Rising => band as f64 / (self.count() - 1).max(1) as f64,
+            // zero is in the middle of the map, and both signs have the same scale
+            ColourMap::Signed => 0.5 + 0.5 * middle / high.max(-low),
+        };
+        self.colours.at(part)
     }
 
     /// The field inside of a frame: one path per band.
@@ -195,18 +212,19 @@ impl Bands {
     }
 
     /// The colour bar with its numbers, below `top` (pixels).
-    pub(super) fn bar(&self, area: &Area<'_>, theme: Theme, name: &str, top: i32) -> Fallible<()> {
+    pub(super) fn bar(&self, area: &Area<'_>, style: Style, name: &str, top: i32) -> Fallible<()> {
         const LEFT: i32 = 80;
+        let width = style.width();
         let count = self.count() as i32;
-        let each = (WIDTH - 2 * LEFT) / count;
-        let left = (WIDTH - count * each) / 2;
+        let each = (width - 2 * LEFT) / count;
+        let left = (width - count * each) / 2;
         let edge = |k: i32| px(left + k * each);
         let centred = |y: i32, x: i32, words: &str, size: i32, v: VPos| {
-            let style = page::text(theme, size).pos(Pos::new(HPos::Center, v));
-            area.draw(&Text::new(words.to_owned(), (x, px(y)), style))
+            let text = page::text(style, size).pos(Pos::new(HPos::Center, v));
+            area.draw(&Text::new(words.to_owned(), (x, px(y)), text))
         };
-        let axis = theme.palette().axis.stroke_width(px(1) as u32);
-        centred(top + 10, px(WIDTH / 2), name, 16, VPos::Center)?;
+        let axis = style.palette().axis.stroke_width(px(1) as u32);
+        centred(top + 10, px(width / 2), name, page::LETTERS, VPos::Center)?;
         let (upper, lower) = (px(top + 24), px(top + 40));
         for k in 0..count {
             let colour = self.colour(k as usize).filled();
@@ -238,19 +256,13 @@ impl Bands {
         ];
         for ((word, side, x), value) in beyond.into_iter().zip(self.beyond) {
             let Some(value) = value else { continue };
-            for (line, text) in [(26, word.to_owned()), (40, number(rounded(value)))] {
-                let style = page::text(theme, 13).pos(Pos::new(side, VPos::Center));
-                area.draw(&Text::new(text, (x, px(top + line)), style))?;
+            for (line, text) in [(26, word.to_owned()), (40, rounded(value))] {
+                let small = page::text(style, 13).pos(Pos::new(side, VPos::Center));
+                area.draw(&Text::new(text, (x, px(top + line)), small))?;
             }
         }
         Ok(())
     }
-}
-
-/// Three digits: more would suggest an accuracy that there is not.
-fn rounded(value: f64) -> f64 {
-    let unit = 10f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 2.0);
-    (value / unit).round() * unit
 }
 
 /// A corner of a cell.

@@ -6,8 +6,9 @@ use std::fmt::Write;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::page::{self, Area, Fallible, HEAD, WIDTH, draw_text, px, tick};
-use super::theme::{Theme, hex};
+use super::Style;
+use super::page::{self, Area, Fallible, draw_text, px, tick};
+use super::theme::hex;
 use solver::element::Element;
 use solver::mesh::runs;
 
@@ -18,6 +19,8 @@ const RIGHT: i32 = 16;
 const BELOW: i32 = 46;
 const GAP: i32 = 12;
 const CAPTION: i32 = 26;
+/// A page narrower than this has no room for two windows beside one another (pixels).
+const NARROW: i32 = 640;
 /// Highest axes: one above the other and beside one another (pixels).
 const HIGHEST: [f64; 2] = [430.0, 420.0];
 
@@ -50,6 +53,14 @@ impl Window {
         self.size()[0].max(self.size()[1])
     }
 
+    /// Around both.
+    pub(super) fn with(&self, other: &Window) -> Window {
+        Window {
+            low: [0, 1].map(|a| self.low[a].min(other.low[a])),
+            high: [0, 1].map(|a| self.high[a].max(other.high[a])),
+        }
+    }
+
     pub(super) fn holds(&self, point: [f64; 2]) -> bool {
         (0..2).all(|a| self.low[a] <= point[a] && point[a] <= self.high[a])
     }
@@ -61,6 +72,21 @@ impl Window {
             low: self.low.map(|x| x - by),
             high: self.high.map(|x| x + by),
         }
+    }
+}
+
+/// A square of that side around something small, as much of it as can be between the corners of `within`.
+pub(super) fn square(around: &Window, side: f64, within: &Window) -> Window {
+    let low = [0, 1].map(|a| {
+        let middle = 0.5 * (around.low[a] + around.high[a]);
+        let edge = 0.08 * side;
+        let least = within.low[a] - edge;
+        let most = within.high[a] + edge - side;
+        (middle - 0.5 * side).max(least).min(most.max(least))
+    });
+    Window {
+        low,
+        high: low.map(|x| x + side),
     }
 }
 
@@ -90,12 +116,12 @@ impl Frame {
 }
 
 /// Frames for one window or two, and the height that they take (pixels). Two stand side by side, but
-/// below one another where the first is wide.
-pub(super) fn layout(windows: &[Window]) -> (Vec<Frame>, i32) {
+/// below one another where the first is wide, or the page narrow.
+pub(super) fn layout(style: Style, windows: &[Window]) -> (Vec<Frame>, i32) {
     let wide = |w: &Window| w.size()[0] > 1.7 * w.size()[1];
-    let beside = windows.len() > 1 && !wide(&windows[0]);
+    let beside = windows.len() > 1 && !wide(&windows[0]) && style.width() >= NARROW;
     let columns = if beside { 2 } else { 1 };
-    let column = WIDTH / columns;
+    let column = style.width() / columns;
     let space = f64::from(column - LEFT - RIGHT);
     let sizes: Vec<[i32; 2]> = windows
         .iter()
@@ -132,12 +158,12 @@ pub(super) fn layout(windows: &[Window]) -> (Vec<Frame>, i32) {
 /// Numbers, names and a caption around a frame.
 pub(super) fn axes(
     area: &Area<'_>,
-    theme: Theme,
+    style: Style,
     frame: &Frame,
     caption: &str,
     names: [&str; 2],
 ) -> Fallible<()> {
-    let palette = theme.palette();
+    let palette = style.palette();
     let [left, top] = frame.corner;
     let [w, h] = frame.size;
     let place = area.clone().shrink(
@@ -162,20 +188,19 @@ pub(super) fn axes(
         .y_labels(fits(h, 40))
         .x_label_formatter(&|value| tick(*value, high[0] - low[0]))
         .y_label_formatter(&|value| tick(*value, high[1] - low[1]))
-        .label_style(page::text(theme, page::LETTERS))
-        .axis_desc_style(page::text(theme, 16))
+        .label_style(page::text(style, page::LETTERS))
+        .axis_desc_style(page::text(style, page::LETTERS))
         .draw()?;
     let corner = (left / page::FINE, top / page::FINE - CAPTION / 2);
-    draw_text(area, theme, caption, corner)
+    draw_text(area, style, caption, corner)
 }
 
 /// The content of the axes, clipped, in a border; put on top of the page.
-pub(super) fn inside(theme: Theme, frame: &Frame, content: &str) -> String {
+pub(super) fn inside(style: Style, frame: &Frame, content: &str) -> String {
     let ([x, y], [w, h]) = (frame.corner, frame.size);
-    let y = y + px(HEAD);
     let (place, border) = (
         format!(r#"x="{x}" y="{y}" width="{w}" height="{h}""#),
-        hex(theme.palette().axis),
+        hex(style.palette().axis),
     );
     format!(
         r#"<svg {place} overflow="hidden" stroke-linejoin="round" stroke-linecap="round">
@@ -208,6 +233,15 @@ impl Path {
         }
         self.0.pop();
         self.0.push('z');
+    }
+
+    /// An open line through points.
+    pub(super) fn line(&mut self, points: &[[f64; 2]]) {
+        for (k, p) in points.iter().enumerate() {
+            let [x, y] = p.map(round);
+            // writing to a string does not fail
+            let _ = write!(self.0, "{}{x} {y}", if k == 0 { 'M' } else { 'L' });
+        }
     }
 
     /// Sides as of `Element::sides`, one after the other; `closed` where they go round.
@@ -296,13 +330,13 @@ mod tests {
             (vec![window(4.0, 4.0), window(1.0, 1.0)], true),
             (vec![window(5.0, 1.0), window(1.0, 1.0)], false),
         ] {
-            let (frames, height) = layout(&windows);
+            let (frames, height) = layout(Style::default(), &windows);
             assert_eq!(frames[0].corner[1] == frames[1].corner[1], beside);
             for frame in &frames {
                 let [w, h] = frame.window.size();
                 let [p, q] = frame.size.map(f64::from);
                 assert!((p / w - q / h).abs() < 0.01 * p / w, "{frame:?}");
-                assert!(frame.corner[0] + frame.size[0] <= px(WIDTH));
+                assert!(frame.corner[0] + frame.size[0] <= px(720));
                 assert!(frame.corner[1] + frame.size[1] <= px(height));
             }
             assert_eq!(frames[0].at([0.0, 0.0])[0], 0.0);

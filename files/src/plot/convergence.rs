@@ -1,7 +1,8 @@
 //! Residuals and the contact set by iteration.
 
+use super::Style;
+use super::caption::Caption;
 use super::figure::{Curve, LineStyle, Panel, Scale, figure};
-use super::theme::Theme;
 use solver::error::shortened;
 use solver::problem::Problem;
 use solver::solution::Iteration;
@@ -9,7 +10,8 @@ use solver::solution::Iteration;
 /// Every residual on a logarithmic axis with the tolerance above, the contact set below, against the
 /// number of the iteration; vertical lines where load steps begin. `Err`: the reason why it could not be drawn.
 pub fn convergence_svg(
-    theme: Theme,
+    style: Style,
+    caption: &Caption,
     problem: &Problem,
     history: &[Iteration],
 ) -> Result<String, String> {
@@ -30,15 +32,22 @@ pub fn convergence_svg(
         scale,
         marks,
         curves,
+        ..Panel::default()
     };
     // frictionless contact has no friction points, and often no node leaves
     let nonzero = |curve: &Curve| curve.points.iter().any(|p| p.1 != 0.0);
     let residuals = vec![
-        curve("residual", LineStyle::Marked(0), &|row| Some(row.residual)),
-        curve("friction_residual", LineStyle::Marked(1), &|row| {
+        curve("contact residual", LineStyle::Marked(0), &|row| {
+            Some(row.residual)
+        }),
+        curve("friction residual", LineStyle::Marked(1), &|row| {
             Some(row.friction_residual)
         }),
-        curve("r_f (thesis 3.5)", LineStyle::Points(3), &|row| row.r_f),
+        curve(
+            "criterion (3.5) of the thesis",
+            LineStyle::Points(3),
+            &|row| row.r_f,
+        ),
         curve("tolerance", LineStyle::Dashed, &|row| Some(row.tolerance)),
     ];
     let counts = vec![
@@ -60,12 +69,11 @@ pub fn convergence_svg(
     ];
     let residuals = residuals.into_iter().filter(nonzero).collect();
     figure(
-        theme,
-        problem.title.as_deref().unwrap_or("Convergence"),
-        None,
+        style,
+        caption,
         &[
             panel(
-                "relative residual",
+                "residual (relative)",
                 Scale::Log,
                 steps(problem, history, true),
                 residuals,

@@ -1,20 +1,28 @@
 //! The deformed body, filled with its stresses, over its undeformed outline.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::str::FromStr;
 
+use plotters::prelude::*;
+
+use super::Style;
 use super::bands::{BAR, Bands};
 use super::body::{self, Frame, Path, Sides, Window};
-use super::page::{self, number, with_unit};
-use super::theme::{Theme, hex};
+use super::caption::Caption;
+use super::obstacle::Face;
+use super::page::{self, Area, Fallible, draw_text, number, px, with_unit};
+use super::theme::hex;
 use crate::stress::von_mises;
-use solver::problem::{Analysis, Problem};
-use solver::solution::{Accuracy, ContactProfile, Fields, NodeState};
+use solver::problem::{Analysis, Condition, Problem};
+use solver::solution::{ContactProfile, Fields, NodeState};
 
 /// The largest displacement is drawn as this part of the body, or of the window at the contact.
 const VISIBLE: f64 = 0.1;
 /// A contact below this part of the body gets a window of its own, twice its size.
 const SMALL: f64 = 0.2;
+/// Height of the legend (pixels), and width of the line along the contact.
+const LEGEND: i32 = 24;
+const LINE: i32 = 4;
 
 /// The stress that the contours show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,16 +85,15 @@ impl Stress {
     }
 }
 
-/// The deformed body with contours of a stress and its undeformed outline; a second panel shows the
-/// contact where it is small. Displacements are scaled so that they are visible, and each panel shows
+/// The deformed body with contours of a stress and its undeformed outline, the obstacle on it, and the contact in the
+/// colours of stick and slip; a second panel shows the contact where it is small. Displacements are scaled so that they are visible, and each panel shows
 /// the factor. `Err`: the reason why it could not be drawn.
 pub fn deformed_svg(
-    theme: Theme,
+    style: Style,
+    caption: &Caption,
     problem: &Problem,
     profiles: &BTreeMap<String, ContactProfile>,
     fields: &Fields,
-    accuracy: Option<&Accuracy>,
-    stress: Stress,
 ) -> Result<String, String> {
     let body = Body { fields };
     if fields.elements.is_empty() {
@@ -103,15 +110,16 @@ pub fn deformed_svg(
         .ok_or("there are no nodes")?
         .grown(0.04);
     let mut views = vec![(window, factor)];
-    let near = body.contact(profiles);
+    let surfaces = body.surfaces(problem, profiles);
+    let near = body.contact(&surfaces);
     let touching = Window::around(near.iter().map(|&n| body.place(n, 0.0)));
     if let Some(touching) = touching.filter(|w| w.largest() < SMALL * whole.largest()) {
         views.push(body.near(&near, &touching, &whole));
     }
 
     let windows: Vec<Window> = views.iter().map(|view| view.0).collect();
-    let (frames, height) = body::layout(&windows);
-    let values: Vec<f64> = (0..nodes).map(|n| stress.at(fields, n)).collect();
+    let (frames, height) = body::layout(style, &windows);
+    let values: Vec<f64> = (0..nodes).map(|n| style.stress.at(fields, n)).collect();
     // the last panel is the one at the contact
     let areas = body.areas();
     let near = views.last().map_or(vec![], |(window, factor)| {
@@ -123,30 +131,160 @@ pub fn deformed_svg(
     let sides = Sides::of(&fields.elements, nodes);
     let mut over = String::new();
     for (frame, (_, factor)) in frames.iter().zip(&views) {
-        let content = body.drawn(theme, frame, *factor, &sides, &bands, &values);
-        over += &body::inside(theme, frame, &content);
+        let mut content = body.drawn(style, frame, *factor, &sides, &bands, &values);
+        for surface in &surfaces {
+            content += &surface.face(&body, *factor).drawn(style, frame);
+            content += &surface.states(&body, style, frame, *factor);
+        }
+        over += &body::inside(style, frame, &content);
     }
 
     let unit = page::length(&problem.units);
     let names = body::coordinates(&problem.analysis).map(|name| with_unit(name, unit));
-    let bar = with_unit(stress.name(&problem.analysis), page::stress(&problem.units));
-    let title = problem.title.as_deref().unwrap_or("Deformed body");
-    let note = page::verdict(accuracy);
-    page::page(theme, title, note.as_deref(), height + BAR, |area| {
+    let stress = style.stress.name(&problem.analysis);
+    let bar = with_unit(stress, page::stress(&problem.units));
+    let legend = if profiles.is_empty() { 0 } else { LEGEND };
+    page::page(style, caption, height + legend + BAR, |area| {
         for (k, (frame, (_, factor))) in frames.iter().zip(&views).enumerate() {
             let scale = match *factor {
                 1.0 => "displacements to scale".to_owned(),
+                // the distance of the obstacle is drawn as they are
                 factor => format!("displacements × {}", number(factor)),
             };
             let caption = match k {
                 0 => scale,
                 _ => format!("contact, {scale}"),
             };
-            body::axes(area, theme, frame, &caption, [&names[0], &names[1]])?;
+            body::axes(area, style, frame, &caption, [&names[0], &names[1]])?;
         }
-        bands.bar(area, theme, &bar, height)?;
+        if legend > 0 {
+            draw_legend(area, style, &surfaces, height + LEGEND / 2 - 6)?;
+        }
+        bands.bar(area, style, &bar, height + legend)?;
         Ok(over)
     })
+}
+
+/// A contact boundary: the nodes of its profile that the body has.
+struct Surface<'a> {
+    profile: &'a ContactProfile,
+    /// The row of the profile, and the node.
+    nodes: Vec<(usize, u32)>,
+    /// There is an obstacle: the contact is more than a prescribed friction.
+    faces: bool,
+    /// Its states are stick and slip.
+    rough: bool,
+}
+
+impl Surface<'_> {
+    fn face(&self, body: &Body<'_>, factor: f64) -> Face {
+        if !self.faces {
+            return Face::default();
+        }
+        let gap = |row: usize| {
+            let of = |column: &[f64]| column.get(row).copied().unwrap_or(f64::NAN);
+            of(&self.profile.gap) - of(&self.profile.normal_displacement)
+        };
+        let nodes = self.nodes.iter();
+        let surface: Vec<_> = nodes
+            .map(|&(row, n)| (body.place(n, 0.0), body.place(n, factor), factor * gap(row)))
+            .collect();
+        Face::after(&surface)
+    }
+
+    /// The surface in contact, in the colours of its states.
+    fn states(&self, body: &Body<'_>, style: Style, frame: &Frame, factor: f64) -> String {
+        let nodes: Vec<([f64; 2], NodeState)> = self
+            .nodes
+            .iter()
+            .filter_map(|&(row, n)| {
+                let state = *self.profile.state.get(row)?;
+                Some((frame.at(body.place(n, factor)), state))
+            })
+            .collect();
+        let mut drawn = String::new();
+        for (states, colour) in looks(style, self.rough) {
+            let is = |state: NodeState| states.contains(&state);
+            let mut path = Path::default();
+            for pair in nodes.windows(2) {
+                let ((a, of_a), (b, of_b)) = (pair[0], pair[1]);
+                let middle = [0, 1].map(|c| 0.5 * (a[c] + b[c]));
+                // each node has half of the way to its neighbours
+                match (is(of_a), is(of_b)) {
+                    (true, true) => path.line(&[a, b]),
+                    (true, false) => path.line(&[a, middle]),
+                    (false, true) => path.line(&[middle, b]),
+                    (false, false) => {}
+                }
+            }
+            let (colour, width) = (hex(colour), px(LINE));
+            drawn += &path.drawn(&format!(
+                r#"fill="none" stroke="{colour}" stroke-width="{width}" stroke-linecap="butt""#
+            ));
+        }
+        drawn
+    }
+}
+
+/// The states that have a colour of their own; without friction contact is contact.
+fn looks(style: Style, rough: bool) -> Vec<(&'static [NodeState], RGBColor)> {
+    let palette = style.palette();
+    match rough {
+        true => vec![
+            (&[NodeState::Stick], palette.stick),
+            (&[NodeState::Slip], palette.slip),
+        ],
+        false => vec![(&[NodeState::Stick, NodeState::Slip], palette.curves[0])],
+    }
+}
+
+/// What the colours along the contacts mean.
+fn draw_legend(
+    area: &Area<'_>,
+    style: Style,
+    surfaces: &[Surface<'_>],
+    middle: i32,
+) -> Fallible<()> {
+    let palette = style.palette();
+    let is = |rough: bool, states: &[NodeState]| {
+        let mut of_kind = surfaces.iter().filter(|surface| surface.rough == rough);
+        of_kind.any(|surface| {
+            surface
+                .profile
+                .state
+                .iter()
+                .any(|state| states.contains(state))
+        })
+    };
+    let line = |colour: RGBColor| colour.stroke_width(px(LINE) as u32);
+    let both = [NodeState::Stick, NodeState::Slip];
+    let entries = [
+        (
+            surfaces.iter().any(|s| s.faces),
+            "obstacle",
+            palette.obstacle.filled(),
+            6,
+        ),
+        (is(true, &both[..1]), "stick", line(palette.stick), 0),
+        (is(true, &both[1..]), "slip", line(palette.slip), 0),
+        (is(false, &both), "in contact", line(palette.curves[0]), 0),
+    ];
+    let mut x = 84;
+    for (_, word, look, half) in entries.into_iter().filter(|entry| entry.0) {
+        match half {
+            0 => area.draw(&PathElement::new(
+                [(px(x), px(middle)), (px(x + 22), px(middle))],
+                look,
+            ))?,
+            half => area.draw(&Rectangle::new(
+                [(px(x), px(middle - half)), (px(x + 22), px(middle + half))],
+                look,
+            ))?,
+        }
+        draw_text(area, style, word, (x + 28, middle))?;
+        x += 28 + page::width(word) + 20;
+    }
+    Ok(())
 }
 
 /// The factor on displacements, 1, 2 or 5 times a power of ten, that makes the largest one about
@@ -207,32 +345,52 @@ impl Body<'_> {
         areas
     }
 
-    /// The nodes in contact and beside it; profiles identify them by their positions.
-    fn contact(&self, profiles: &BTreeMap<String, ContactProfile>) -> Vec<u32> {
+    /// The contact boundaries; profiles identify nodes by their positions.
+    fn surfaces<'b>(
+        &self,
+        problem: &Problem,
+        profiles: &'b BTreeMap<String, ContactProfile>,
+    ) -> Vec<Surface<'b>> {
         let bits = |x: f64, y: f64| (x.to_bits(), y.to_bits());
-        let touching: BTreeSet<(u64, u64)> = profiles
-            .values()
-            .flat_map(|profile| {
-                // with a neighbour on each side, so that one node has an extent too
-                let near = |i: usize| {
-                    let states = profile.state.get(i.saturating_sub(1)..).unwrap_or_default();
-                    let three = if i == 0 { 2 } else { 3 };
-                    states
-                        .iter()
-                        .take(three)
-                        .any(|state| *state != NodeState::Open)
-                };
-                let places = profile.x.iter().zip(&profile.y).enumerate();
-                places
-                    .filter(move |(i, _)| near(*i))
-                    .map(|(_, place)| place)
-            })
-            .map(|(&x, &y)| bits(x, y))
+        let places = self.fields.x.iter().zip(&self.fields.y);
+        let known: HashMap<(u64, u64), u32> = places
+            .zip(0..)
+            .map(|((&x, &y), n)| (bits(x, y), n))
             .collect();
-        let (x, y) = (&self.fields.x, &self.fields.y);
-        (0..x.len() as u32)
-            .filter(|&n| touching.contains(&bits(x[n as usize], y[n as usize])))
-            .collect()
+        let surface = |(name, profile): (&String, &'b ContactProfile)| {
+            let rows = profile.x.iter().zip(&profile.y).enumerate();
+            let nodes = rows.filter_map(|(row, (&x, &y))| Some((row, *known.get(&bits(x, y))?)));
+            let mut contacts = problem.contacts.iter();
+            let contact = contacts.find(|contact| contact.boundary == *name);
+            Surface {
+                profile,
+                nodes: nodes.collect(),
+                faces: contact.is_some_and(|contact| contact.condition != Condition::None),
+                rough: contact.is_some_and(|contact| contact.friction.is_some()),
+            }
+        };
+        profiles.iter().map(surface).collect()
+    }
+
+    /// The nodes in contact, with a neighbour on each side, so that one node has an extent too.
+    fn contact(&self, surfaces: &[Surface<'_>]) -> Vec<u32> {
+        let mut found = BTreeSet::new();
+        for surface in surfaces {
+            let touches = |place: usize| {
+                let state = surface
+                    .nodes
+                    .get(place)
+                    .and_then(|(row, _)| surface.profile.state.get(*row));
+                state.is_some_and(|state| *state != NodeState::Open)
+            };
+            for (place, (_, node)) in surface.nodes.iter().enumerate() {
+                let from = place.saturating_sub(1);
+                if (from..=place + 1).any(touches) {
+                    found.insert(*node);
+                }
+            }
+        }
+        found.into_iter().collect()
     }
 
     /// A square around the contact, twice its size, as much of it in the body as can be.
@@ -248,24 +406,14 @@ impl Body<'_> {
         let body = places(&mut (0..self.fields.x.len() as u32), factor);
         let (deformed, body) = (deformed.unwrap_or(*touching), body.unwrap_or(*whole));
         let side = side.max(1.1 * deformed.largest());
-        let low = [0, 1].map(|a| {
-            let middle = 0.5 * (deformed.low[a] + deformed.high[a]);
-            let edge = 0.08 * side;
-            // both the deformed and the undeformed surface stay in sight
-            let least = body.low[a].min(whole.low[a]) - edge;
-            let most = body.high[a].max(whole.high[a]) + edge - side;
-            (middle - 0.5 * side).max(least).min(most.max(least))
-        });
-        let window = Window {
-            low,
-            high: low.map(|x| x + side),
-        };
+        // both the deformed and the undeformed surface stay in sight
+        let window = body::square(&deformed, side, &body.with(whole));
         (window, factor)
     }
 
     fn drawn(
         &self,
-        theme: Theme,
+        style: Style,
         frame: &Frame,
         factor: f64,
         sides: &Sides,
@@ -275,10 +423,10 @@ impl Body<'_> {
         let place = |n: u32| self.place(n, factor);
         let value = |n: u32| values[n as usize];
         let mut content = bands.fill(frame, &self.fields.elements, &place, &value);
-        let palette = theme.palette();
+        let palette = style.palette();
         let outlines = [
             (factor, palette.text, 10, ""),
-            (0.0, palette.reference, 10, r#" stroke-dasharray="50 40""#),
+            (0.0, palette.faint, 10, r#" stroke-dasharray="50 40""#),
         ];
         for (factor, colour, width, dashes) in outlines {
             let mut path = Path::default();
@@ -301,6 +449,19 @@ mod tests {
     use super::*;
     use crate::plot::tests::{problem, solution};
 
+    fn drawn(
+        problem: &Problem,
+        profiles: &BTreeMap<String, ContactProfile>,
+        fields: &Fields,
+        stress: Stress,
+    ) -> Result<String, String> {
+        let style = Style {
+            stress,
+            ..Style::default()
+        };
+        deformed_svg(style, &Caption::default(), problem, profiles, fields)
+    }
+
     #[test]
     fn displacements_are_scaled_by_round_factors_or_not_at_all() {
         for (wanted, largest, factor) in [
@@ -321,27 +482,19 @@ mod tests {
     fn a_deformed_body_has_contours_a_colour_bar_and_its_scale() {
         let problem = problem();
         let solution = solution(&problem);
-        let drawn = |stress| {
-            deformed_svg(
-                Theme::Light,
-                &problem,
-                &solution.profiles,
-                &solution.fields,
-                None,
-                stress,
-            )
-            .unwrap()
-        };
+        let drawn = |stress| drawn(&problem, &solution.profiles, &solution.fields, stress).unwrap();
         let svg = drawn(Stress::VonMises);
         for text in [
-            "von Mises stress [MPa]",
+            "von Mises stress (MPa)",
             "displacements",
-            "y [mm]",
+            "y (mm)",
             "stroke-dasharray",
+            "obstacle",
+            "slip",
         ] {
             assert!(svg.contains(text), "{text}");
         }
-        assert!(drawn(Stress::Yy).contains("stress σ_yy [MPa]"));
+        assert!(drawn(Stress::Yy).contains(r#"font-size="108">yy</tspan>"#));
         assert_eq!("zz".parse(), Ok(Stress::Zz));
     }
 
@@ -352,42 +505,14 @@ mod tests {
         grid.x = (0..=40).map(f64::from).collect();
         grid.y = vec![-40.0, -20.0, -10.0, -5.0, -2.0, 0.0];
         let solution = solution(&problem);
-        let svg = deformed_svg(
-            Theme::Dark,
-            &problem,
-            &solution.profiles,
-            &solution.fields,
-            None,
-            Stress::Xx,
-        )
-        .unwrap();
+        let of = |fields: &Fields| drawn(&problem, &solution.profiles, fields, Stress::Xx);
+        let svg = of(&solution.fields).unwrap();
         assert_eq!(svg.matches("<svg").count(), 3, "page, body and contact");
         assert!(svg.contains("contact, displacements"));
-        let empty = Fields::default();
-        assert!(
-            deformed_svg(
-                Theme::Dark,
-                &problem,
-                &solution.profiles,
-                &empty,
-                None,
-                Stress::Xx
-            )
-            .is_err()
-        );
+        assert!(of(&Fields::default()).is_err());
         let mut short = solution.fields.clone();
         short.ux.pop();
-        assert!(
-            deformed_svg(
-                Theme::Dark,
-                &problem,
-                &solution.profiles,
-                &short,
-                None,
-                Stress::Xx
-            )
-            .is_err()
-        );
+        assert!(of(&short).is_err());
     }
 
     /// Five thousand elements are a large mesh here, and still a figure that a browser shows at once.
@@ -414,17 +539,11 @@ mod tests {
             elements: mesh.elements.clone(),
             ..Fields::default()
         };
-        let svg = deformed_svg(
-            Theme::Light,
-            &problem,
-            &BTreeMap::new(),
-            &fields,
-            None,
-            Stress::Xx,
-        )
-        .unwrap();
+        let svg = drawn(&problem, &BTreeMap::new(), &fields, Stress::Xx).unwrap();
         assert!(svg.len() < 2_000_000, "{}", svg.len());
-        let svg = crate::plot::mesh_svg(Theme::Light, &problem, None, &fields).unwrap();
+        let style = Style::default();
+        let svg =
+            crate::plot::mesh_svg(style, &Caption::default(), &problem, None, &fields).unwrap();
         assert!(svg.len() < 2_000_000, "{}", svg.len());
     }
 }

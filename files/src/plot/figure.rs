@@ -1,32 +1,45 @@
-//! Panels of curves over one another, drawn as SVG.
+//! Panels with axes, curves and a legend.
 
 use std::ops::Range;
 
+use plotters::coord::ranged1d::Ranged;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::page::{self, Area, Fallible, LETTERS, WIDTH, draw_text, number, px, tick};
-use super::theme::{Palette, Theme};
+use super::Style;
+use super::caption::Caption;
+use super::page::{self, Area, Fallible, LETTERS, draw_text, number, px, rounded, tick};
+use super::theme::Palette;
 
-/// Of a panel without its legend (pixels).
-const PANEL: i32 = 264;
+/// Of the axes of a panel, without names and legend (pixels).
+const PANEL: i32 = 198;
 /// Height of one line of the legend above a panel (pixels).
 const LEGEND: i32 = 22;
+/// Above and below the axes (pixels): a margin; numbers, and the name of the axis.
+const MARGIN: i32 = 8;
+const NUMBERS: i32 = 26;
+const NAME: i32 = 24;
 /// Left of the names of axes, and of the axes (pixels).
 const EDGE: i32 = 4;
 const LEFT: i32 = 92;
+const RIGHT: i32 = 20;
 /// Decades that a logarithmic axis spans at most, from the largest value down.
 const DECADES: f64 = 18.0;
+/// A stress is drawn up to so many times what half of the contact stays below; a peak beyond that is cut off and marked.
+const CUT: f64 = 6.0;
 
 /// The style of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineStyle {
     /// A line in one of six colours, counted from 0.
     Line(usize),
-    /// A line with a mark at every value.
+    /// A line with a mark at every value: a circle, or a square in every other colour.
     Marked(usize),
-    /// A thin grey line: a bound, a reference.
+    /// A thin grey line: a reference.
     Reference,
+    /// Thin grey dashes: a bound, which does not decide how far the axis reaches.
+    Bound,
     /// A dashed line: a limit.
     Dashed,
     /// Small circles in one of the colours: single values.
@@ -47,19 +60,64 @@ pub struct Curve {
 /// The scale of the vertical axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// Linear; a peak that does not converge is cut off, with a note in the legend.
+    /// Linear; a peak far beyond all else is cut off, since nothing else could be seen beside it, and marked.
     #[default]
-    Stress,
+    Peaked,
+    /// Linear.
+    Linear,
     /// Linear from 0, over whole numbers.
     Count,
     /// Logarithmic, over whole numbers; values ≤ 0 are left out.
     Log,
 }
 
+/// A part of the x axis in a colour of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shade {
+    /// What it is.
+    pub kind: ShadeKind,
+    /// From and to.
+    pub extent: [f64; 2],
+}
+
+/// What a shaded part is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShadeKind {
+    /// Contact that sticks.
+    Stick,
+    /// Contact that slips; hatched, so that the two differ also in grey.
+    Slip,
+}
+
+impl ShadeKind {
+    fn word(self) -> &'static str {
+        match self {
+            ShadeKind::Stick => "stick",
+            ShadeKind::Slip => "slip",
+        }
+    }
+
+    fn colour(self, palette: &Palette) -> RGBColor {
+        match self {
+            ShadeKind::Stick => palette.stick,
+            ShadeKind::Slip => palette.slip,
+        }
+    }
+}
+
+/// A second axis above a panel: another coordinate along the same line.
+#[derive(Clone, Debug, Default)]
+pub struct Above {
+    /// Its name.
+    pub name: String,
+    /// The value of the axis below and its own, both monotone.
+    pub places: Vec<(f64, f64)>,
+}
+
 /// One pair of axes.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
-    /// Name of the x axis.
+    /// Name of the x axis; empty: it has numbers only, since the panel below has the same axis.
     pub x: String,
     /// Name of the y axis.
     pub y: String,
@@ -69,72 +127,82 @@ pub struct Panel {
     pub curves: Vec<Curve>,
     /// Vertical lines with a word each at their top, in order of x.
     pub marks: Vec<(f64, String)>,
+    /// Behind the curves; the legend names them where no curve has a name.
+    pub shades: Vec<Shade>,
+    /// Another coordinate along x.
+    pub above: Option<Above>,
+    /// What is said of a peak that is cut off, after its value.
+    pub of_peak: String,
 }
 
-/// Panels below one another under a title, with a note under it if there is one. `Err`: the reason why the figure could
-/// not be drawn.
+impl Panel {
+    fn height(&self, style: Style) -> i32 {
+        let name = if self.x.is_empty() { 0 } else { NAME };
+        let legend = LEGEND * rows(style, self);
+        legend + self.room_above() + PANEL + NUMBERS + name + MARGIN
+    }
+
+    /// Between legend and axes.
+    fn room_above(&self) -> i32 {
+        match self.above {
+            Some(_) => NUMBERS + NAME + MARGIN,
+            None => MARGIN,
+        }
+    }
+}
+
+/// Panels below one another, with a caption. `Err`: the reason why the figure could not be drawn.
 pub fn figure(
-    theme: Theme,
-    title: &str,
-    note: Option<&str>,
+    style: impl Into<Style>,
+    caption: &Caption,
     panels: &[Panel],
 ) -> Result<String, String> {
+    let style = style.into();
     if panels
         .iter()
         .all(|panel| panel.curves.iter().all(|c| c.points.is_empty()))
     {
         return Err("there is nothing to draw".to_owned());
     }
-    let heights: Vec<i32> = panels.iter().map(|p| LEGEND * rows(p) + PANEL).collect();
-    page::page(theme, title, note, heights.iter().sum(), |area| {
+    let heights: Vec<i32> = panels.iter().map(|panel| panel.height(style)).collect();
+    page::page(style, caption, heights.iter().sum(), |area| {
         let mut rest = area.clone();
         for (panel, height) in panels.iter().zip(&heights) {
             let (place, below) = rest.split_vertically(px(*height));
             rest = below;
-            draw_panel(&place, theme, panel)?;
+            draw_panel(&place, style, panel)?;
         }
         Ok(String::new())
     })
 }
 
-fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
-    let palette = theme.palette();
-    let limit = readable_limit(panel);
+fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
+    let palette = style.palette();
+    let up = up(panel);
     let shown = |curve: &Curve| -> Vec<(f64, f64)> {
         let place = |&(x, y): &(f64, f64)| match panel.scale {
-            Scale::Stress => Some((x, y.clamp(-limit, limit))),
-            Scale::Count => Some((x, y)),
             Scale::Log => (y > 0.0).then(|| (x, y.log10())),
+            _ => Some((x, y)),
         };
         curve.points.iter().filter_map(place).collect()
     };
     let curves: Vec<Vec<(f64, f64)>> = panel.curves.iter().map(shown).collect();
-    let all = curves.iter().flatten();
-    let whole = panel.scale != Scale::Stress;
-    let places = all.clone().map(|p| p.0);
+    let whole = matches!(panel.scale, Scale::Count | Scale::Log);
+    let places = curves.iter().flatten().map(|p| p.0);
     let across = match whole {
         // the first and the last whole number stand clear of the ends
-        true => extent(places.flat_map(|x| [x - 0.5, x + 0.5]), 0.0),
-        false => extent(places, 0.0),
+        true => extent(places.flat_map(|x| [x - 0.5, x + 0.5])),
+        false => extent(places),
     };
-    let up = match panel.scale {
-        Scale::Log => {
-            let range = decades(all.map(|p| p.1));
-            // words at the marks stand above the curves
-            let room = if panel.marks.is_empty() { 0.0 } else { 0.1 };
-            range.start..range.end + room * (range.end - range.start)
-        }
-        Scale::Count => extent(all.map(|p| p.1).chain(std::iter::once(1.0)), 0.06),
-        _ => extent(all.map(|p| p.1), 0.06),
-    };
-    let (head, body) = area.split_vertically(px(LEGEND * rows(panel)));
+    let (head, body) = area.split_vertically(px(LEGEND * rows(style, panel)));
+    let name = if panel.x.is_empty() { 0 } else { NAME };
     let mut chart: ChartContext<'_, _, Cartesian2d<RangedCoordf64, RangedCoordf64>> =
         ChartBuilder::on(&body)
-            .margin_top(px(6))
-            .margin_right(px(20))
-            .margin_bottom(px(14))
+            .margin_top(px(panel.room_above()))
+            .margin_right(px(RIGHT))
+            .margin_bottom(px(MARGIN))
             .margin_left(px(EDGE))
-            .x_label_area_size(px(46))
+            .x_label_area_size(px(NUMBERS + name))
             .y_label_area_size(px(LEFT - EDGE))
             .build_cartesian_2d(across.clone(), up.clone())?;
     let whole_number = |value: f64| match value.round() {
@@ -148,8 +216,10 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
     let y_label = |value: &f64| match panel.scale {
         Scale::Log => power_of_ten(*value),
         Scale::Count => whole_number(*value),
-        Scale::Stress => tick(*value, up.end - up.start),
+        Scale::Peaked | Scale::Linear => tick(*value, up.end - up.start),
     };
+    let room = style.width() - LEFT - RIGHT;
+    let fit = (room / 66).clamp(4, 9) as usize;
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -158,47 +228,61 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
         .set_all_tick_mark_size(px(4))
         .x_desc(&panel.x)
         .y_desc(&panel.y)
-        .x_labels(if whole { ticks(&across) } else { 9 })
-        .y_labels(if whole { ticks(&up).min(7) } else { 9 })
+        .x_labels(if whole {
+            ticks(&across).min(fit + 3)
+        } else {
+            fit
+        })
+        .y_labels(if whole { ticks(&up).min(7) } else { 7 })
         .x_label_formatter(&x_label)
         .y_label_formatter(&y_label)
-        .label_style(page::text(theme, LETTERS))
-        .axis_desc_style(page::text(theme, 16))
+        .label_style(page::text(style, LETTERS))
+        .axis_desc_style(page::text(style, LETTERS))
         .draw()?;
-    let thin = palette.reference.stroke_width(px(1) as u32);
-    let pixels = chart.plotting_area().get_x_axis_pixel_range();
+    let frame = Frame::of(&body, &chart, &across);
+    for shade in &panel.shades {
+        draw_shade(&body, &palette, &frame, shade)?;
+    }
+    if up.start < 0.0 && up.end > 0.0 && !whole {
+        let zero = LineSeries::new(
+            [(across.start, 0.0), (across.end, 0.0)],
+            palette.axis.mix(0.5).stroke_width(6),
+        );
+        chart.draw_series(zero)?;
+    }
+    let thin = palette.faint.stroke_width(px(1) as u32);
     let mut free = i32::MIN; // where the next word may start
     for (x, word) in &panel.marks {
         chart.draw_series(LineSeries::new([(*x, up.start), (*x, up.end)], thin))?;
-        let part = (x - across.start) / (across.end - across.start);
-        let place = pixels.start + (part * f64::from(pixels.end - pixels.start)) as i32 + px(4);
+        let place = frame.x(*x) + px(4);
         let end = place + px(page::width(word));
-        if place >= free && end <= pixels.end {
-            let text = Text::new(word.clone(), (px(4), px(3)), page::text(theme, 13));
+        if place >= free && end <= frame.right {
+            let text = Text::new(word.clone(), (px(4), px(3)), page::text(style, 13));
             chart.draw_series([EmptyElement::at((*x, up.end)) + text])?;
             free = end + px(6);
         }
     }
     for (curve, points) in panel.curves.iter().zip(&curves) {
-        let style = style(&palette, curve.style);
-        let points = points.iter().copied();
-        let dots = |k: f64| {
-            let radius = (k * f64::from(px(1))) as i32;
-            move |p| Circle::new(p, radius, style.filled())
+        let line = stroke(&palette, curve.style);
+        let dots = || {
+            let shown = points.iter().copied();
+            shown.filter(|p| up.start <= p.1 && p.1 <= up.end)
         };
         match curve.style {
             LineStyle::Points(_) => {
-                chart.draw_series(points.map(|p| Circle::new(p, px(3), style)))?;
+                chart.draw_series(dots().map(|p| Circle::new(p, px(3), line)))?;
             }
-            LineStyle::Marked(_) => {
-                chart.draw_series(LineSeries::new(points.clone(), style))?;
-                chart.draw_series(points.map(dots(2.6)))?;
+            LineStyle::Marked(k) => {
+                for part in within(points, &up) {
+                    chart.draw_series(LineSeries::new(part, line))?;
+                }
+                chart.draw_series(dots().map(|p| EmptyElement::at(p) + dot((0, 0), k, line)))?;
             }
             LineStyle::Dashed => {
                 // from edge to edge: also one iteration has a limit
-                let ends = points.clone().next().zip(points.clone().next_back());
+                let ends = dots().next().zip(dots().next_back());
                 let points: Vec<_> = ends.map_or(vec![], |(first, last)| {
-                    let inner = points.collect::<Vec<_>>();
+                    let inner = dots().collect::<Vec<_>>();
                     [
                         vec![(across.start, first.1)],
                         inner,
@@ -206,87 +290,474 @@ fn draw_panel(area: &Area<'_>, theme: Theme, panel: &Panel) -> Fallible<()> {
                     ]
                     .concat()
                 });
-                chart.draw_series(DashedLineSeries::new(points, px(7), px(5), style))?;
+                chart.draw_series(DashedLineSeries::new(points, px(7), px(5), line))?;
+            }
+            LineStyle::Bound => {
+                for part in within(points, &up) {
+                    chart.draw_series(DashedLineSeries::new(part, px(4), px(3), line))?;
+                }
             }
             LineStyle::Line(_) | LineStyle::Reference => {
-                chart.draw_series(LineSeries::new(points, style))?;
+                for part in within(points, &up) {
+                    chart.draw_series(LineSeries::new(part, line))?;
+                }
             }
         }
     }
-    legend(&head, theme, panel, limit)
+    if panel.scale == Scale::Peaked {
+        draw_cuts(&body, style, &frame, panel, &up)?;
+    }
+    if let Some(above) = &panel.above {
+        draw_above(&body, style, &frame, above, fit)?;
+    }
+    legend(&head, style, panel)
 }
 
-fn style(palette: &Palette, style: LineStyle) -> ShapeStyle {
+/// Where the axes of a panel are, in the units of the drawing, and what they show.
+struct Frame {
+    left: i32,
+    right: i32,
+    top: i32,
+    bottom: i32,
+    across: Range<f64>,
+}
+
+impl Frame {
+    fn of(
+        body: &Area<'_>,
+        chart: &ChartContext<'_, SVGBackend<'_>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
+        across: &Range<f64>,
+    ) -> Frame {
+        let (x, y) = chart.plotting_area().get_pixel_range();
+        let (left, top) = body.get_base_pixel();
+        Frame {
+            left: x.start - left,
+            right: x.end - left,
+            top: y.start - top,
+            bottom: y.end - top,
+            across: across.clone(),
+        }
+    }
+
+    fn x(&self, x: f64) -> i32 {
+        let part = (x - self.across.start) / (self.across.end - self.across.start);
+        self.left + (part * f64::from(self.right - self.left)).round() as i32
+    }
+}
+
+/// A part of the axis in its colour, and hatched where the contact slips.
+fn draw_shade(area: &Area<'_>, palette: &Palette, frame: &Frame, shade: &Shade) -> Fallible<()> {
+    let [from, to] = shade
+        .extent
+        .map(|x| frame.x(x).clamp(frame.left, frame.right));
+    if to <= from {
+        return Ok(());
+    }
+    let colour = shade.kind.colour(palette);
+    let place = [(from, frame.top), (to, frame.bottom)];
+    area.draw(&Rectangle::new(place, colour.mix(0.16).filled()))?;
+    // a narrow one would be all hatching, and where stick and slip alternate there are thousands
+    if shade.kind == ShadeKind::Slip && to - from > px(4) {
+        hatch(area, place, colour)?;
+    }
+    Ok(())
+}
+
+/// Thin lines at 45° in a rectangle.
+fn hatch(
+    area: &Area<'_>,
+    [(left, top), (right, bottom)]: [(i32, i32); 2],
+    colour: RGBColor,
+) -> Fallible<()> {
+    const APART: i32 = px(9);
+    let thin = colour.mix(0.45).stroke_width(6);
+    let height = bottom - top;
+    // each goes up from its start at the bottom; all start at the same places, whatever the rectangle
+    let mut start = (left - height).div_euclid(APART) * APART;
+    while start < right {
+        let (low, high) = ((left - start).max(0), (right - start).min(height));
+        if high > low {
+            let at = |along: i32| (start + along, bottom - along);
+            area.draw(&PathElement::new([at(low), at(high)], thin))?;
+        }
+        start += APART;
+    }
+    Ok(())
+}
+
+/// Two strokes through the axis wherever a curve leaves the panel, and how far the largest peak goes.
+fn draw_cuts(
+    area: &Area<'_>,
+    style: Style,
+    frame: &Frame,
+    panel: &Panel,
+    up: &Range<f64>,
+) -> Fallible<()> {
+    let palette = style.palette();
+    let mut largest: Option<(f64, f64, bool)> = None; // x, value, whether at the top
+    for curve in panel.curves.iter().filter(|curve| decides(curve.style)) {
+        let line = stroke(&palette, curve.style)
+            .color
+            .to_rgba()
+            .stroke_width(px(1) as u32 + 6);
+        for (x, y, over) in peaks(&curve.points, up) {
+            let (x_at, y_at) = (frame.x(x), if over { frame.top } else { frame.bottom });
+            let back = [(x_at - px(7), y_at - px(4)), (x_at + px(7), y_at + px(4))];
+            area.draw(&Rectangle::new(back, palette.background.filled()))?;
+            for off in [-px(3), px(3)] {
+                let wave = [(-7, 2), (-3, -1), (3, 1), (7, -2)];
+                let wave = wave.map(|(dx, dy)| (x_at + px(dx), y_at + off + px(dy)));
+                area.draw(&PathElement::new(wave, line))?;
+            }
+            if largest.is_none_or(|(_, most, _)| y.abs() > most.abs()) {
+                largest = Some((x, y, over));
+            }
+        }
+    }
+    let Some((x, peak, over)) = largest else {
+        return Ok(());
+    };
+    let words = format!("peak {}{}", rounded(peak), panel.of_peak);
+    let x_at = frame.x(x);
+    let (side, gap) = match x_at > (frame.left + frame.right) / 2 {
+        true => (HPos::Right, -px(12)),
+        false => (HPos::Left, px(12)),
+    };
+    let (vertical, lift) = match over {
+        true => (VPos::Top, px(6)),
+        false => (VPos::Bottom, -px(6)),
+    };
+    let place = (
+        x_at + gap,
+        if over { frame.top } else { frame.bottom } + lift,
+    );
+    let text = page::text(style, 13).pos(Pos::new(side, vertical));
+    area.draw(&Text::new(words, place, text))?;
+    Ok(())
+}
+
+/// The second axis.
+fn draw_above(
+    area: &Area<'_>,
+    style: Style,
+    frame: &Frame,
+    above: &Above,
+    fit: usize,
+) -> Fallible<()> {
+    let axis = style.palette().axis.stroke_width(px(1) as u32);
+    area.draw(&PathElement::new(
+        [(frame.left, frame.top), (frame.right, frame.top)],
+        axis,
+    ))?;
+    // what of it is shown
+    let inside = |c: f64| {
+        place_of(&above.places, c).filter(|s| frame.across.contains(s) || *s == frame.across.end)
+    };
+    let own = |s: f64| interpolated(above.places.iter().copied(), s);
+    let ends = [frame.across.start, frame.across.end].map(own);
+    let [Some(a), Some(b)] = ends else {
+        return Ok(());
+    };
+    let range: RangedCoordf64 = (a.min(b)..a.max(b)).into();
+    for value in range.key_points(fit) {
+        let Some(s) = inside(value) else { continue };
+        let x = frame.x(s);
+        area.draw(&PathElement::new(
+            [(x, frame.top), (x, frame.top - px(4))],
+            axis,
+        ))?;
+        let text = page::text(style, LETTERS).pos(Pos::new(HPos::Center, VPos::Bottom));
+        area.draw(&Text::new(tick(value, b - a), (x, frame.top - px(7)), text))?;
+    }
+    let text = page::text(style, LETTERS).pos(Pos::new(HPos::Center, VPos::Bottom));
+    let middle = (frame.left + frame.right) / 2;
+    area.draw(&Text::new(
+        above.name.clone(),
+        (middle, frame.top - px(NUMBERS)),
+        text,
+    ))?;
+    Ok(())
+}
+
+/// Linear between points whose first coordinate rises.
+fn interpolated(points: impl Iterator<Item = (f64, f64)> + Clone, at: f64) -> Option<f64> {
+    let mut pairs = points.clone().zip(points.skip(1));
+    pairs.find_map(|((a, p), (b, q))| {
+        let inside = a <= at && at <= b && a < b;
+        inside.then(|| p + (at - a) / (b - a) * (q - p))
+    })
+}
+
+/// Where on the first axis the second has a value.
+fn place_of(places: &[(f64, f64)], value: f64) -> Option<f64> {
+    let turned = places.iter().map(|&(s, c)| (c, s));
+    match places.first()?.1 <= places.last()?.1 {
+        true => interpolated(turned, value),
+        false => interpolated(turned.rev(), value),
+    }
+}
+
+/// Whether a curve decides how far its axis reaches.
+fn decides(style: LineStyle) -> bool {
+    style != LineStyle::Bound
+}
+
+/// What the vertical axis shows; of a logarithmic one the exponents.
+fn up(panel: &Panel) -> Range<f64> {
+    let values = || {
+        panel
+            .curves
+            .iter()
+            .flat_map(|curve| curve.points.iter().map(|p| p.1))
+    };
+    match panel.scale {
+        Scale::Log => {
+            let range = decades(values().filter(|y| *y > 0.0).map(f64::log10));
+            // words at the marks stand above the curves
+            let room = if panel.marks.is_empty() { 0.0 } else { 0.1 };
+            range.start..range.end + room * (range.end - range.start)
+        }
+        Scale::Count => {
+            let most = values().fold(1.0, f64::max);
+            -0.06 * most..1.06 * most
+        }
+        Scale::Peaked => limits(panel, CUT),
+        Scale::Linear => {
+            let Range { start, end } = limits(panel, f64::INFINITY);
+            // with the bounds, unless they are far from being reached
+            let bounds = panel.curves.iter().filter(|curve| !decides(curve.style));
+            let bounds = bounds.flat_map(|curve| curve.points.iter().map(|p| 1.08 * p.1));
+            let (low, high) = bounds.fold((0.0_f64, 0.0_f64), |(l, h), y| (l.min(y), h.max(y)));
+            start.min(low.max(1.6 * start))..end.max(high.min(1.6 * end))
+        }
+    }
+}
+
+/// Of stresses: from the least to the largest with zero, but up to `cut` times what half of the length stays below. What is
+/// usual is judged by length, not by points: a mesh has most of its points where the peak is.
+fn limits(panel: &Panel, cut: f64) -> Range<f64> {
+    let mut parts: Vec<(f64, f64)> = Vec::new(); // value, length
+    for curve in panel.curves.iter().filter(|curve| decides(curve.style)) {
+        let points = &curve.points;
+        for (k, &(_, y)) in points.iter().enumerate() {
+            let before = points[k.saturating_sub(1)].0;
+            let after = points[(k + 1).min(points.len() - 1)].0;
+            parts.push((y, (after - before) / 2.0));
+        }
+    }
+    let (least, most) = parts
+        .iter()
+        .fold((0.0_f64, 0.0_f64), |(l, h), p| (l.min(p.0), h.max(p.0)));
+    let largest = most.max(-least);
+    let sizes = parts.iter().map(|&(y, length)| (y.abs(), length));
+    let acting = sizes.filter(|(y, _)| *y > 1e-9 * largest).collect();
+    let reach = match quantile(acting, 0.5) {
+        Some(usual) if usual * cut < largest => usual * cut,
+        _ => largest,
+    };
+    // a single point may overshoot beside a peak: where nothing of length is beyond zero, the axis ends there
+    let (low, high) = (quantile(parts.clone(), 0.001), quantile(parts, 0.999));
+    let below = if low.is_some_and(|low| low < 0.0) {
+        reach.min(-least)
+    } else {
+        0.0
+    };
+    let above = if high.is_some_and(|high| high > 0.0) {
+        reach.min(most)
+    } else {
+        0.0
+    };
+    match below + above > 0.0 {
+        true => -1.08 * below - 0.02 * above..1.08 * above + 0.02 * below,
+        false => -1.0..1.0,
+    }
+}
+
+/// The value that a share of the length stays below.
+fn quantile(mut parts: Vec<(f64, f64)>, share: f64) -> Option<f64> {
+    parts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let whole: f64 = parts.iter().map(|p| p.1).sum();
+    let mut length = 0.0;
+    let reached = parts.iter().find(|part| {
+        length += part.1;
+        length >= share * whole
+    });
+    reached.or(parts.last()).map(|part| part.0)
+}
+
+/// The parts of a curve that an axis shows, each ending where it leaves.
+fn within(points: &[(f64, f64)], up: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
+    let inside = |y: f64| up.start <= y && y <= up.end;
+    let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
+    let mut part: Vec<(f64, f64)> = Vec::new();
+    for (k, &(x, y)) in points.iter().enumerate() {
+        if let Some(&(x0, y0)) = k.checked_sub(1).and_then(|k| points.get(k)) {
+            // where the line from the point before crosses the ends of the axis, in order
+            let mut crossings: Vec<(f64, f64)> = [up.start, up.end]
+                .into_iter()
+                .filter(|limit| (y0 < *limit) != (y < *limit) && y0 != *limit && y != *limit)
+                .map(|limit| (x0 + (limit - y0) / (y - y0) * (x - x0), limit))
+                .collect();
+            if y < y0 {
+                crossings.reverse();
+            }
+            for crossing in crossings {
+                part.push(crossing);
+                if part.len() > 1 {
+                    parts.push(std::mem::take(&mut part));
+                }
+            }
+        }
+        if inside(y) {
+            part.push((x, y));
+        }
+    }
+    if part.len() > 1 {
+        parts.push(part);
+    }
+    parts
+}
+
+/// Where a curve is farthest beyond the axis, each time that it leaves it: x, the value, and whether it leaves at the top.
+fn peaks(points: &[(f64, f64)], up: &Range<f64>) -> Vec<(f64, f64, bool)> {
+    let mut found: Vec<(f64, f64, bool)> = Vec::new();
+    let mut before = None;
+    for &(x, y) in points {
+        let side = match y {
+            y if y > up.end => Some(true),
+            y if y < up.start => Some(false),
+            _ => None,
+        };
+        if let Some(over) = side {
+            match found.last_mut().filter(|_| before == side) {
+                Some(peak) if y.abs() > peak.1.abs() => (peak.0, peak.1) = (x, y),
+                Some(_) => {}
+                None => found.push((x, y, over)),
+            }
+        }
+        before = side;
+    }
+    found
+}
+
+fn stroke(palette: &Palette, style: LineStyle) -> ShapeStyle {
     let colour = |k: usize| palette.curves[k % palette.curves.len()];
     match style {
         LineStyle::Line(k) | LineStyle::Marked(k) => colour(k).stroke_width(px(2) as u32),
         LineStyle::Points(k) => colour(k).stroke_width(px(1) as u32),
-        LineStyle::Reference => palette.reference.stroke_width(px(1) as u32),
+        LineStyle::Reference | LineStyle::Bound => palette.faint.stroke_width(px(1) as u32),
         LineStyle::Dashed => palette.text.stroke_width(px(1) as u32),
     }
 }
 
-/// The text of a curve in the legend, and its width (pixels).
-fn entry(curve: &Curve, limit: f64) -> (String, i32) {
-    let larger = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
-    let peak = curve.points.iter().map(|p| p.1).fold(0.0, larger);
-    let cut = if peak.abs() > limit {
-        format!(" (cut off, peak {})", number(peak))
-    } else {
-        String::new()
+/// The mark of a value: a circle, or a square.
+fn dot((x, y): (i32, i32), k: usize, line: ShapeStyle) -> Polygon<(i32, i32)> {
+    let size = 2.7 * f64::from(px(1));
+    let corners: Vec<(i32, i32)> = match k % 2 {
+        0 => (0..16)
+            .map(|j| {
+                let angle = f64::from(j) * std::f64::consts::TAU / 16.0;
+                let [dx, dy] = [angle.cos(), angle.sin()].map(|part| (part * size).round() as i32);
+                (x + dx, y + dy)
+            })
+            .collect(),
+        _ => {
+            let half = size.round() as i32;
+            [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+                .map(|(a, b)| (x + a * half, y + b * half))
+                .to_vec()
+        }
     };
-    let text = format!("{}{cut}", curve.label);
-    let width = 28 + page::width(&text) + 18;
-    (text, width)
+    Polygon::new(corners, line.filled())
 }
 
-/// Where each entry of the legend stands: its line and its place in it (pixels).
-fn places(panel: &Panel, limit: f64) -> Vec<(i32, i32)> {
-    let (mut x, mut row) = (LEFT, 0);
+/// An entry of the legend.
+enum Entry<'a> {
+    Curve(&'a Curve),
+    Shade(ShadeKind),
+}
+
+impl Entry<'_> {
+    fn words(&self) -> &str {
+        match self {
+            Entry::Curve(curve) => &curve.label,
+            Entry::Shade(kind) => kind.word(),
+        }
+    }
+}
+
+/// The entries of a panel's legend, each with its line and its place in it (pixels).
+fn entries(style: Style, panel: &Panel) -> Vec<(Entry<'_>, i32, i32)> {
     let named = panel.curves.iter().filter(|curve| !curve.label.is_empty());
-    named
-        .map(|curve| {
-            let width = entry(curve, limit).1;
-            if x > LEFT && x + width > WIDTH {
-                (x, row) = (LEFT, row + 1);
-            }
-            let place = (row, x);
-            x += width;
-            place
-        })
-        .collect()
+    let mut entries: Vec<Entry<'_>> = named.map(Entry::Curve).collect();
+    // they are the same in the panels of one contact, and named in that whose curve needs no name
+    let named = entries.is_empty();
+    for kind in [ShadeKind::Stick, ShadeKind::Slip] {
+        if named && panel.shades.iter().any(|shade| shade.kind == kind) {
+            entries.push(Entry::Shade(kind));
+        }
+    }
+    let (mut x, mut row) = (LEFT, 0);
+    let placed = entries.into_iter().map(|entry| {
+        let width = 28 + page::width(entry.words()) + 14;
+        if x > LEFT && x + width > style.width() {
+            (x, row) = (LEFT, row + 1);
+        }
+        let place = (entry, row, x);
+        x += width;
+        place
+    });
+    placed.collect()
 }
 
 /// Lines of the legend.
-fn rows(panel: &Panel) -> i32 {
-    let places = places(panel, readable_limit(panel));
-    places.last().map_or(1, |(row, _)| row + 1)
+fn rows(style: Style, panel: &Panel) -> i32 {
+    entries(style, panel)
+        .last()
+        .map_or(0, |(_, row, _)| row + 1)
 }
 
 /// Samples of the curves, above the panel so that they cover no curve.
-fn legend(area: &Area<'_>, theme: Theme, panel: &Panel, limit: f64) -> Fallible<()> {
-    let palette = theme.palette();
-    let named = panel.curves.iter().filter(|curve| !curve.label.is_empty());
-    for (curve, (row, x)) in named.zip(places(panel, limit)) {
+fn legend(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
+    let palette = style.palette();
+    for (entry, row, x) in entries(style, panel) {
         let middle = LEGEND * row + LEGEND / 2;
-        let style = style(&palette, curve.style);
-        let line = |from: i32, to: i32| {
-            PathElement::new([(px(from), px(middle)), (px(to), px(middle))], style)
+        draw_text(area, style, entry.words(), (x + 28, middle))?;
+        let curve = match entry {
+            Entry::Shade(kind) => {
+                let place = [(px(x + 2), px(middle - 6)), (px(x + 22), px(middle + 6))];
+                let colour = kind.colour(&palette);
+                area.draw(&Rectangle::new(place, colour.mix(0.16).filled()))?;
+                if kind == ShadeKind::Slip {
+                    hatch(area, place, colour)?;
+                }
+                area.draw(&Rectangle::new(place, colour.stroke_width(px(1) as u32)))?;
+                continue;
+            }
+            Entry::Curve(curve) => curve,
         };
-        let dot = (px(x + 11), px(middle));
+        let line = stroke(&palette, curve.style);
+        let part = |from: i32, to: i32| {
+            PathElement::new([(px(from), px(middle)), (px(to), px(middle))], line)
+        };
+        let place = (px(x + 11), px(middle));
         match curve.style {
-            LineStyle::Points(_) => area.draw(&Circle::new(dot, px(3), style))?,
-            LineStyle::Marked(_) => {
-                area.draw(&line(x, x + 22))?;
-                area.draw(&Circle::new(dot, px(3), style.filled()))?;
+            LineStyle::Points(_) => area.draw(&Circle::new(place, px(3), line))?,
+            LineStyle::Marked(k) => {
+                area.draw(&part(x, x + 22))?;
+                area.draw(&dot(place, k, line))?;
             }
             LineStyle::Dashed => {
-                area.draw(&line(x, x + 8))?;
-                area.draw(&line(x + 14, x + 22))?;
+                area.draw(&part(x, x + 8))?;
+                area.draw(&part(x + 14, x + 22))?;
             }
-            LineStyle::Line(_) | LineStyle::Reference => area.draw(&line(x, x + 22))?,
+            LineStyle::Bound => {
+                for from in [x, x + 9, x + 18] {
+                    area.draw(&part(from, from + 5))?;
+                }
+            }
+            LineStyle::Line(_) | LineStyle::Reference => area.draw(&part(x, x + 22))?,
         }
-        draw_text(area, theme, &entry(curve, limit).0, (x + 28, middle))?;
     }
     Ok(())
 }
@@ -331,46 +802,12 @@ fn decades(exponents: impl Iterator<Item = f64>) -> Range<f64> {
     (low - 0.1).floor().max(top - DECADES).min(top - 2.0)..top
 }
 
-/// The largest |stress| that is drawn. At a sharp edge one node may exceed all others, and does not
-/// converge: what exceeds the value that 97 % of the contact stays below is cut off at twice that.
-fn readable_limit(panel: &Panel) -> f64 {
-    if panel.scale != Scale::Stress {
-        return f64::INFINITY;
-    }
-    let mut pieces: Vec<(f64, f64)> = Vec::new(); // |stress|, length
-    for curve in &panel.curves {
-        for pair in curve.points.windows(2) {
-            pieces.push((pair[0].1.abs().max(pair[1].1.abs()), pair[1].0 - pair[0].0));
-        }
-    }
-    pieces.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let whole: f64 = pieces.iter().map(|p| p.1).sum();
-    let mut length = 0.0;
-    for &(stress, piece) in &pieces {
-        length += piece;
-        if length > 0.97 * whole {
-            let largest = pieces[pieces.len() - 1].0;
-            return if largest > 3.0 * stress {
-                2.0 * stress
-            } else {
-                largest
-            };
-        }
-    }
-    f64::INFINITY
-}
-
-/// From the least to the largest value, zero included where a margin is asked for; never empty.
-fn extent(values: impl Iterator<Item = f64> + Clone, margin: f64) -> Range<f64> {
-    let base = if margin > 0.0 {
-        (0.0, 0.0)
-    } else {
-        (f64::INFINITY, f64::NEG_INFINITY)
-    };
-    let (low, high) = values.fold(base, |(low, high), v| (low.min(v), high.max(v)));
-    let pad = margin * (high - low);
+/// From the least to the largest value; never empty.
+fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let start = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = values.fold(start, |(low, high), v| (low.min(v), high.max(v)));
     if low < high {
-        low - pad..high + pad
+        low..high
     } else if low == high {
         low - 1.0..low + 1.0
     } else {
@@ -381,28 +818,37 @@ fn extent(values: impl Iterator<Item = f64> + Clone, margin: f64) -> Range<f64> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plot::Theme;
+
+    fn curve(label: &str, points: &[(f64, f64)]) -> Curve {
+        Curve {
+            label: label.to_owned(),
+            style: LineStyle::Line(0),
+            points: points.to_vec(),
+        }
+    }
 
     #[test]
     fn a_long_legend_takes_more_lines_and_a_figure_needs_a_curve() {
-        let curve = |label: &str| Curve {
-            label: label.to_owned(),
-            style: LineStyle::Line(0),
-            points: vec![(0.0, 1.0), (1.0, 2.0)],
-        };
+        let line = [(0.0, 1.0), (1.0, 2.0)];
         let mut panel = Panel {
             x: "x".to_owned(),
             y: "y".to_owned(),
-            curves: vec![curve("short")],
+            curves: vec![curve("short", &line)],
             ..Panel::default()
         };
-        assert_eq!(rows(&panel), 1);
-        panel
-            .curves
-            .extend((0..6).map(|_| curve("a rather long label of a curve")));
-        assert!(rows(&panel) > 1);
-        let svg = figure(Theme::Light, "Title", None, std::slice::from_ref(&panel)).unwrap();
+        let style = Style::default();
+        assert_eq!(rows(style, &panel), 1);
+        let label = "a rather long label of a curve";
+        panel.curves.extend((0..6).map(|_| curve(label, &line)));
+        assert!(rows(style, &panel) > 1);
+        let caption = Caption {
+            title: "Title".into(),
+            ..Caption::default()
+        };
+        let svg = figure(Theme::Light, &caption, std::slice::from_ref(&panel)).unwrap();
         assert!(svg.contains("Title"));
-        assert!(figure(Theme::Light, "", None, &[]).is_err());
+        assert!(figure(Theme::Light, &caption, &[]).is_err());
     }
 
     #[test]
@@ -414,5 +860,66 @@ mod tests {
         assert_eq!(decades([-300.0, 0.3].into_iter()), -17.0..1.0);
         assert_eq!(decades([0.5].into_iter()), -1.0..1.0);
         assert_eq!(decades(std::iter::empty()), -1.0..1.0);
+    }
+
+    #[test]
+    fn a_peak_is_cut_and_marked_and_a_point_that_overshoots_does_not_widen_the_axis() {
+        let mut points: Vec<(f64, f64)> = (0..1000).map(|k| (f64::from(k), -100.0)).collect();
+        points[998] = (997.5, 4000.0);
+        points[999] = (997.6, -186_869.0);
+        let panel = Panel {
+            curves: vec![curve("", &points)],
+            of_peak: ", which grows on finer meshes".into(),
+            ..Panel::default()
+        };
+        let up = up(&panel);
+        assert_eq!((up.start, up.end), (-648.0, 12.0));
+        let found = peaks(&points, &up);
+        assert_eq!(found, [(997.5, 4000.0, true), (997.6, -186_869.0, false)]);
+        let svg = figure(Theme::Light, &Caption::default(), &[panel]).unwrap();
+        assert!(svg.contains("peak −187000, which grows on finer meshes"));
+    }
+
+    #[test]
+    fn a_curve_ends_where_it_leaves_the_axis() {
+        let points = [(0.0, 0.0), (1.0, 2.0), (2.0, -2.0), (3.0, 0.5)];
+        let parts = within(&points, &(-1.0..1.0));
+        assert_eq!(
+            parts,
+            [
+                vec![(0.0, 0.0), (0.5, 1.0)],
+                vec![(1.25, 1.0), (1.75, -1.0)],
+                vec![(2.4, -1.0), (3.0, 0.5)],
+            ]
+        );
+        assert!(within(&[(0.0, 5.0), (1.0, 6.0)], &(-1.0..1.0)).is_empty());
+    }
+
+    #[test]
+    fn a_bound_far_away_does_not_hide_the_curve() {
+        let line = |y: f64| vec![(0.0, 0.0), (1.0, y), (2.0, 0.0)];
+        let mut panel = Panel {
+            scale: Scale::Linear,
+            curves: vec![curve("", &line(10.0))],
+            ..Panel::default()
+        };
+        let alone = up(&panel);
+        for (bound, end) in [(12.0, 12.96), (500.0, 1.6 * alone.end)] {
+            panel.curves.push(Curve {
+                style: LineStyle::Bound,
+                ..curve("bound", &line(bound))
+            });
+            assert!((up(&panel).end - end).abs() < 1e-9);
+            panel.curves.pop();
+        }
+    }
+
+    #[test]
+    fn the_second_axis_may_run_either_way() {
+        let rising = [(0.0, 5.0), (2.0, 9.0)];
+        let falling = [(0.0, 9.0), (2.0, 5.0)];
+        assert_eq!(place_of(&rising, 6.0), Some(0.5));
+        assert_eq!(place_of(&falling, 6.0), Some(1.5));
+        assert_eq!(place_of(&falling, 60.0), None);
     }
 }

@@ -10,27 +10,40 @@ use solver::model::Model;
 use solver::problem::Problem;
 use solver::solution::Fields;
 
-use super::body::{self, Path, Sides, Window};
-use super::page::{self, WIDTH, draw_text, px, with_unit};
-use super::theme::{Theme, hex};
+use super::Style;
+use super::body::{self, Frame, Path, Sides, Window};
+use super::caption::Caption;
+use super::obstacle::Face;
+use super::page::{self, draw_text, px, with_unit};
+use super::theme::hex;
 use crate::external::external_mesh;
 
 /// Height of one line of the legend (pixels).
 const LEGEND: i32 = 22;
 const LEFT: i32 = 84;
-/// Lines of boundaries that lie over one another, the first below (pixels).
-const WIDTHS: [f64; 3] = [5.0, 2.4, 1.2];
+/// How far outside of the body a boundary is marked, each further one on the same side by that much more, and how wide
+/// (pixels): the elements at a graded edge stay visible.
+const OUTSIDE: f64 = 3.5;
+const WIDE: f64 = 2.0;
+/// Boundaries beside one another at most; further ones lie over the last.
+const BESIDE: usize = 3;
 /// With more elements than this only the outline is drawn: the lines would cover the body, and viewers refuse
 /// files of some ten megabytes.
 const DRAWN: usize = 30_000;
 /// Most boundaries with a name.
-const MOST: usize = 24;
+const MOST: usize = 12;
+/// The obstacle is in the picture as far as it is this near to the body, as a part of the body's size.
+const NEAR: f64 = 0.12;
+/// A contact below this part of the body has a window of its own, at least so large.
+const SMALL: f64 = 0.2;
+const CLOSE: f64 = 0.1;
 
-/// Elements between equal axes, each named boundary in a colour of its own. The elements are those of
-/// `fields`, which adaptive refinement makes, or without them those of the problem. `Err`: the reason why it
-/// could not be drawn.
+/// Elements between equal axes, each named boundary in a colour of its own, and the obstacles before they are pushed; a
+/// small contact has a panel of its own. The elements are those of `fields`, which adaptive refinement makes, or without them
+/// those of the problem. `Err`: the reason why it could not be drawn.
 pub fn mesh_svg(
-    theme: Theme,
+    style: Style,
+    caption: &Caption,
     problem: &Problem,
     stored: Option<&Mesh>,
     fields: &Fields,
@@ -41,7 +54,8 @@ pub fn mesh_svg(
             .map_or_else(String::new, |v| v.to_string())
     };
     let external = external_mesh(problem, stored.cloned());
-    let mesh = Model::new(problem, external).map_err(refused)?.mesh;
+    let model = Model::new(problem, external).map_err(refused)?;
+    let mesh = &model.mesh;
     let refined: Vec<[f64; 2]> = fields
         .x
         .iter()
@@ -58,63 +72,63 @@ pub fn mesh_svg(
     {
         return Err("an element has a node that is not there".to_owned());
     }
-    let window = Window::around(nodes.iter().copied()).ok_or("there is no mesh to draw")?;
-    let (frames, height) = body::layout(&[window.grown(0.04)]);
-    let frame = frames.first().ok_or("there is nothing to draw")?;
-    let palette = theme.palette();
+    let faces: Vec<Face> = model.contacts.iter().map(Face::before).collect();
+    let body = Window::around(nodes.iter().copied()).ok_or("there is no mesh to draw")?;
+    let reach = body.grown(NEAR);
+    let near = faces.iter().flat_map(|face| &face.points).copied();
+    let near = Window::around(near.filter(|p| reach.holds(*p)));
+    let whole = near.map_or(body, |near| body.with(&near));
+    let mut windows = vec![whole.grown(0.05)];
+    windows.extend(
+        at_contact(&model, &body).map(|(around, side)| body::square(&around, side, &whole)),
+    );
+    let (frames, height) = body::layout(style, &windows);
+    let palette = style.palette();
 
-    let on_page = |side: &[u32; 3]| side.map(|n| frame.at(nodes[n as usize]));
-    let sides = Sides::of(elements, nodes.len());
+    let names = in_order(problem, mesh.boundaries.keys().cloned().collect());
     let each = elements.len() <= DRAWN;
-    let (mut inside, mut lines) = (Path::default(), Path::default());
-    if each {
-        for element in elements {
+    let sides = Sides::of(elements, nodes.len());
+    // boundaries are those of the problem's own mesh
+    let own = Sides::of(&mesh.elements, mesh.nodes.len());
+    let content = |frame: &Frame| {
+        let on_page = |side: &[u32; 3]| side.map(|n| frame.at(nodes[n as usize]));
+        let visible = |side: &[[f64; 2]; 3]| {
+            let corners = |pick: fn(f64, f64) -> f64| {
+                [0, 1].map(|a| side.iter().map(|p| p[a]).reduce(pick).unwrap_or(0.0))
+            };
+            frame.shows(corners(f64::min), corners(f64::max))
+        };
+        let (mut inside, mut lines) = (Path::default(), Path::default());
+        if each {
+            for element in elements {
+                let around = element.sides().map(|s| on_page(&s)).collect::<Vec<_>>();
+                if around.iter().any(visible) {
+                    inside.sides(&around, true);
+                }
+            }
+        } else {
+            // the area between its outline and its holes
             inside.sides(
-                &element.sides().map(|s| on_page(&s)).collect::<Vec<_>>(),
-                true,
+                &sides.surface.iter().map(on_page).collect::<Vec<_>>(),
+                false,
             );
         }
-    } else {
-        // the area between its outline and its holes
-        inside.sides(
-            &sides.surface.iter().map(on_page).collect::<Vec<_>>(),
-            false,
-        );
-    }
-    let drawn = if each { &sides.all } else { &sides.surface };
-    lines.sides(&drawn.iter().map(on_page).collect::<Vec<_>>(), false);
-    let finest = if each && elements.len() > 4000 { 3 } else { 7 };
-    let (fill, line) = (hex(palette.body), hex(palette.reference));
-    let mut content = inside.drawn(&format!(r#"fill="{fill}" fill-rule="evenodd""#));
-    content += &lines.drawn(&format!(
-        r#"fill="none" stroke="{line}" stroke-width="{finest}""#
-    ));
-
-    // a boundary on top of another one is drawn thinner, so that both are visible
-    let mut covered: BTreeMap<u32, usize> = BTreeMap::new();
-    let names = in_order(problem, mesh.boundaries.keys().cloned().collect());
-    for (k, name) in names.iter().take(MOST).enumerate() {
-        let edges = &mesh.boundaries[name];
-        let over = edges.iter().map(|edge| {
-            let count = covered.entry(edge[2]).or_default();
-            *count += 1;
-            *count
-        });
-        let depth = over.max().unwrap_or(1).min(WIDTHS.len());
-        let mut path = Path::default();
-        let on_page = |edge: &[u32; 3]| edge.map(|n| frame.at(mesh.nodes[n as usize]));
-        path.sides(&edges.iter().map(on_page).collect::<Vec<_>>(), false);
-        let colour = hex(palette.curves[k % palette.curves.len()]);
-        let width = f64::from(page::FINE) * WIDTHS[depth - 1];
-        let dashes = if k < palette.curves.len() {
-            ""
-        } else {
-            r#" stroke-dasharray="80 60""#
-        };
-        content += &path.drawn(&format!(
-            r#"fill="none" stroke="{colour}" stroke-width="{width}"{dashes}"#
+        let drawn = if each { &sides.all } else { &sides.surface };
+        let drawn: Vec<_> = drawn.iter().map(on_page).filter(visible).collect();
+        lines.sides(&drawn, false);
+        let finest = if each && elements.len() > 4000 { 3 } else { 6 };
+        let (fill, line) = (hex(palette.body), hex(palette.faint));
+        let mut content = inside.drawn(&format!(r#"fill="{fill}" fill-rule="evenodd""#));
+        content += &lines.drawn(&format!(
+            r#"fill="none" stroke="{line}" stroke-width="{finest}""#
         ));
-    }
+        content.extend(faces.iter().map(|face| face.drawn(style, frame)));
+        content + &marks(style, frame, mesh, &own, &names)
+    };
+    let over: Vec<String> = frames
+        .iter()
+        .map(|frame| body::inside(style, frame, &content(frame)))
+        .collect();
 
     let mut labels: Vec<String> = names
         .iter()
@@ -124,36 +138,105 @@ pub fn mesh_svg(
     if names.len() > MOST {
         labels.push(format!("and {} more", names.len() - MOST));
     }
-    let places = places(&labels);
+    if faces.iter().any(|face| face.points.len() > 1) {
+        labels.push("obstacle".to_owned());
+    }
+    let places = places(style, &labels);
     let legend = LEGEND * places.last().map_or(1, |(row, _)| row + 1) + 6;
-    let title = problem.title.as_deref().unwrap_or("Mesh");
     let unit = page::length(&problem.units);
     let axes = body::coordinates(&problem.analysis).map(|name| with_unit(name, unit));
-    let mut caption = format!("{} elements, {} nodes", elements.len(), nodes.len());
+    let mut count = format!("{} elements, {} nodes", elements.len(), nodes.len());
     if !each {
-        caption += "; too many to be drawn one by one";
+        count += " (outline)";
     }
-    page::page(theme, title, None, height + legend, |area| {
-        body::axes(area, theme, frame, &caption, [&axes[0], &axes[1]])?;
+    page::page(style, caption, height + legend, |area| {
+        for (k, frame) in frames.iter().enumerate() {
+            let said = if k == 0 { &count } else { "near the contact" };
+            body::axes(area, style, frame, said, [&axes[0], &axes[1]])?;
+        }
         for (k, (label, (row, x))) in labels.iter().zip(&places).enumerate() {
             let middle = height + LEGEND * row + LEGEND / 2 - 4;
-            if k < MOST {
+            if label == "obstacle" && k + 1 == labels.len() {
+                let place = [(px(*x), px(middle - 6)), (px(x + 22), px(middle + 6))];
+                area.draw(&Rectangle::new(place, palette.obstacle.filled()))?;
+            } else if k < names.len().min(MOST) {
                 let colour = palette.curves[k % palette.curves.len()];
                 let sample = [(px(*x), px(middle)), (px(x + 22), px(middle))];
-                let style = colour.stroke_width(px(4) as u32);
+                let line = colour.stroke_width(px(3) as u32);
                 if k < palette.curves.len() {
-                    area.draw(&PathElement::new(sample, style))?;
+                    area.draw(&PathElement::new(sample, line))?;
                 } else {
                     for from in [*x, x + 13] {
                         let dash = [(px(from), px(middle)), (px(from + 8), px(middle))];
-                        area.draw(&PathElement::new(dash, style))?;
+                        area.draw(&PathElement::new(dash, line))?;
                     }
                 }
             }
-            draw_text(area, theme, label, (x + 28, middle))?;
+            draw_text(area, style, label, (x + 28, middle))?;
         }
-        Ok(body::inside(theme, frame, &content))
+        Ok(over.concat())
     })
+}
+
+/// Around the nodes that the obstacles are pushed to, or that are nearest to them, where those are a small part of the body; and
+/// the side of a window for them.
+fn at_contact(model: &Model, body: &Window) -> Option<(Window, f64)> {
+    let mut reached = Vec::new();
+    for contact in &model.contacts {
+        let gap = |i: usize| contact.gap(i, 1.0);
+        let nodes = 0..contact.boundary.positions.len();
+        let least = nodes.clone().map(gap).fold(f64::INFINITY, f64::min);
+        let touches = nodes.filter(|&i| gap(i) <= least.max(0.0));
+        reached.extend(touches.map(|i| contact.boundary.positions[i]));
+    }
+    let around = Window::around(reached.into_iter())?;
+    let small = around.largest() < SMALL * body.largest();
+    small.then(|| (around, (2.0 * around.largest()).max(CLOSE * body.largest())))
+}
+
+/// The boundaries, outside of the body.
+fn marks(style: Style, frame: &Frame, mesh: &Mesh, own: &Sides, names: &[String]) -> String {
+    let palette = style.palette();
+    // each side of the surface as its element goes round, by its midside node
+    let surface: BTreeMap<u32, [u32; 3]> =
+        own.surface.iter().map(|side| (side[2], *side)).collect();
+    let mut beside: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut drawn = String::new();
+    for (k, name) in names.iter().take(MOST).enumerate() {
+        let edges = &mesh.boundaries[name];
+        let deepest = edges.iter().map(|edge| {
+            let count = beside.entry(edge[2]).or_default();
+            *count += 1;
+            *count
+        });
+        let depth = deepest.max().unwrap_or(1).min(BESIDE);
+        let out = f64::from(page::FINE) * OUTSIDE * depth as f64;
+        let shifted = edges.iter().map(|edge| {
+            let Some(side) = surface.get(&edge[2]) else {
+                // inside of the body
+                return edge.map(|n| frame.at(mesh.nodes[n as usize]));
+            };
+            let [a, b, m] = side.map(|n| frame.at(mesh.nodes[n as usize]));
+            let along = [b[0] - a[0], b[1] - a[1]];
+            let length = along[0].hypot(along[1]).max(f64::MIN_POSITIVE);
+            // an element is on the left of its sides; on the page, where down is positive, outside is here
+            let by = [-along[1] / length * out, along[0] / length * out];
+            [a, b, m].map(|p| [p[0] + by[0], p[1] + by[1]])
+        });
+        let mut path = Path::default();
+        path.sides(&shifted.collect::<Vec<_>>(), false);
+        let colour = hex(palette.curves[k % palette.curves.len()]);
+        let width = f64::from(page::FINE) * WIDE;
+        let dashes = if k < palette.curves.len() {
+            ""
+        } else {
+            r#" stroke-dasharray="80 60""#
+        };
+        drawn += &path.drawn(&format!(
+            r#"fill="none" stroke="{colour}" stroke-width="{width}"{dashes}"#
+        ));
+    }
+    drawn
 }
 
 /// First the boundaries that the mesh has by itself, then those that name parts of them.
@@ -176,7 +259,7 @@ fn label(problem: &Problem, name: &str) -> String {
         .filter(|(is, _)| *is)
         .map(|(_, role)| role)
         .collect();
-    let name = shortened(name, 30);
+    let name = shortened(name, 24);
     match roles.is_empty() {
         true => name,
         false => format!("{name} ({})", roles.join(", ")),
@@ -184,13 +267,13 @@ fn label(problem: &Problem, name: &str) -> String {
 }
 
 /// Line and place of each entry of the legend (pixels).
-fn places(labels: &[String]) -> Vec<(i32, i32)> {
+fn places(style: Style, labels: &[String]) -> Vec<(i32, i32)> {
     let (mut x, mut row) = (LEFT, 0);
     labels
         .iter()
         .map(|label| {
             let width = 28 + page::width(label) + 20;
-            if x > LEFT && x + width > WIDTH {
+            if x > LEFT && x + width > style.width() {
                 (x, row) = (LEFT, row + 1);
             }
             let place = (row, x);
@@ -206,12 +289,17 @@ mod tests {
     use crate::plot::tests::problem;
     use solver::problem::{MeshInput, MeshSource, Refine};
 
+    fn drawn(problem: &Problem, fields: &Fields) -> Result<String, String> {
+        let caption = Caption::of_problem(problem, "Mesh");
+        mesh_svg(Style::default(), &caption, problem, None, fields)
+    }
+
     #[test]
     fn a_very_fine_mesh_is_drawn_as_its_outline() {
         let mut problem = problem();
         let size = |problem: &Problem| {
-            let svg = mesh_svg(Theme::Light, problem, None, &Fields::default()).unwrap();
-            (svg.len(), svg.contains("too many to be drawn"))
+            let svg = drawn(problem, &Fields::default()).unwrap();
+            (svg.len(), svg.contains("(outline)"))
         };
         problem.mesh.refine = Refine::Times(6);
         let (fine, outlined) = size(&problem);
@@ -224,12 +312,13 @@ mod tests {
     #[test]
     fn a_mesh_has_its_elements_and_the_names_of_its_boundaries() {
         let problem = problem();
-        let svg = mesh_svg(Theme::Light, &problem, None, &Fields::default()).unwrap();
+        let svg = drawn(&problem, &Fields::default()).unwrap();
         for text in [
             "2 elements, 13 nodes",
             "top (contact)",
             "bottom (support)",
-            "x [mm]",
+            "x (mm)",
+            "near the contact",
         ] {
             assert!(svg.contains(text), "{text}");
         }
@@ -241,7 +330,7 @@ mod tests {
         let mut problem = problem();
         problem.mesh = MeshInput::new(MeshSource::Stored("sha256:0".to_owned()));
         assert!(
-            mesh_svg(Theme::Light, &problem, None, &Fields::default())
+            drawn(&problem, &Fields::default())
                 .unwrap_err()
                 .contains("/mesh")
         );
@@ -250,6 +339,6 @@ mod tests {
             ..Fields::default()
         };
         let problem = crate::plot::tests::problem();
-        assert!(mesh_svg(Theme::Light, &problem, None, &wrong).is_err());
+        assert!(drawn(&problem, &wrong).is_err());
     }
 }

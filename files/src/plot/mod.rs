@@ -1,31 +1,38 @@
-//! Figures as SVG, for use in a paper: 720 pixels wide, light or dark.
+//! Figures for papers and lectures, light or dark, for a column, a page or a slide; as SVG, and `image` makes PNG and PDF
+//! of it. The Python client's look the same.
 //!
 //! Axes, text and curves are drawn by plotters; bodies (`body`) are paths written here, since plotters
 //! neither clips nor joins shapes.
 
 mod bands;
 mod body;
+mod caption;
 mod convergence;
 mod deformed;
 mod figure;
+pub mod image;
 mod mesh;
+mod obstacle;
 mod page;
 mod profile;
 mod theme;
 
 use std::collections::BTreeMap;
+use std::str::FromStr;
 
+pub use caption::{Caption, Mark};
 pub use convergence::convergence_svg;
 pub use deformed::{Stress, deformed_svg};
-pub use figure::{Curve, LineStyle, Panel, Scale, figure};
+pub use figure::{Above, Curve, LineStyle, Panel, Scale, Shade, ShadeKind, figure};
 pub use mesh::mesh_svg;
 pub use profile::profile_svg;
 pub use theme::Theme;
 
 use solver::mesh::Mesh;
 use solver::problem::Problem;
-use solver::solution::{Accuracy, ContactProfile, Fields, Iteration};
+use solver::solution::{ContactProfile, Fields, Iteration, Summary};
 use strum::{EnumString, IntoStaticStr, VariantArray};
+use theme::Palette;
 
 /// The figures of a problem and its solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
@@ -56,8 +63,12 @@ impl Plot {
 pub struct Parts<'a> {
     /// For `convergence`.
     pub history: &'a [Iteration],
-    /// For `profile` and `deformed`: the verdict is under their titles; absent of a result that is not the last.
-    pub accuracy: Option<&'a Accuracy>,
+    /// Verdict, outcome and warnings stand on every figure of a result.
+    pub summary: Option<&'a Summary>,
+    /// The result is not that of the end of its job.
+    pub partial: bool,
+    /// The load step at whose end the result is, if it is not the last.
+    pub step: Option<&'a str>,
     /// For `profile`, at all points, so that the peaks are seen; for `deformed`.
     pub profiles: &'a BTreeMap<String, ContactProfile>,
     /// For `deformed`; `mesh` draws the problem's own mesh without them.
@@ -66,13 +77,69 @@ pub struct Parts<'a> {
     pub stored: Option<&'a Mesh>,
 }
 
+/// What a figure is for: how wide it is beside its letters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "snake_case")]
+pub enum Size {
+    /// A column of a journal, 88 mm: letters of 7 pt.
+    Column,
+    /// A page, 160 mm: letters of 9 pt.
+    #[default]
+    Page,
+    /// A slide, 254 mm: letters of 15 pt.
+    Slide,
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = Size::VARIANTS.iter().find(|size| size.as_str() == text);
+        named
+            .copied()
+            .ok_or_else(|| "expected column, page or slide".to_owned())
+    }
+}
+
+impl Size {
+    /// Its name in queries.
+    pub fn as_str(self) -> &'static str {
+        self.into()
+    }
+
+    /// The width on paper.
+    fn millimetres(self) -> f64 {
+        match self {
+            Size::Column => 88.0,
+            Size::Page => 160.0,
+            Size::Slide => 254.0,
+        }
+    }
+}
+
 /// How a figure is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Style {
     /// Its colours.
     pub theme: Theme,
+    /// Its width.
+    pub size: Size,
     /// The stress that the contours of `deformed` show.
     pub stress: Stress,
+}
+
+impl Style {
+    fn palette(self) -> Palette {
+        self.theme.palette()
+    }
+
+    /// In pixels, of which letters have 15.
+    fn width(self) -> i32 {
+        match self.size {
+            Size::Column => 520,
+            Size::Page | Size::Slide => 720,
+        }
+    }
 }
 
 impl From<Theme> for Style {
@@ -91,20 +158,27 @@ pub fn draw(
     problem: &Problem,
     parts: &Parts<'_>,
 ) -> Result<String, String> {
-    let Style { theme, stress } = style.into();
+    let style = style.into();
+    let default = match plot {
+        Plot::Mesh => "Mesh",
+        Plot::Deformed => "Deformed body",
+        Plot::Profile => "Contact stresses",
+        Plot::Convergence => "Convergence",
+    };
+    let mut caption = Caption::of_problem(problem, default);
+    if let Some(step) = parts.step {
+        let step = solver::error::shortened(step, 40);
+        caption.parameters.push(format!("load step {step}"));
+    }
+    // the mesh is that of the problem, whatever became of the result
+    if plot != Plot::Mesh {
+        caption = caption.with_result(parts.summary, parts.partial);
+    }
     match plot {
-        Plot::Mesh => mesh_svg(theme, problem, parts.stored, parts.fields),
-        Plot::Deformed => {
-            let Parts {
-                profiles,
-                fields,
-                accuracy,
-                ..
-            } = *parts;
-            deformed_svg(theme, problem, profiles, fields, accuracy, stress)
-        }
-        Plot::Profile => profile_svg(theme, problem, parts.profiles, parts.accuracy),
-        Plot::Convergence => convergence_svg(theme, problem, parts.history),
+        Plot::Mesh => mesh_svg(style, &caption, problem, parts.stored, parts.fields),
+        Plot::Deformed => deformed_svg(style, &caption, problem, parts.profiles, parts.fields),
+        Plot::Profile => profile_svg(style, &caption, problem, parts.profiles, parts.summary),
+        Plot::Convergence => convergence_svg(style, &caption, problem, parts.history),
     }
 }
 
@@ -144,7 +218,9 @@ mod tests {
         let solution = solution(&problem);
         let parts = Parts {
             history: &solution.history,
-            accuracy: solution.summary.accuracy.as_ref(),
+            summary: Some(&solution.summary),
+            partial: false,
+            step: None,
             profiles: &solution.profiles,
             fields: &solution.fields,
             stored: None,
@@ -155,6 +231,14 @@ mod tests {
             let (light, dark) = (drawn(Theme::Light), drawn(Theme::Dark));
             assert!(light.contains("Punch") && light.starts_with(r#"<svg width="720""#));
             assert_ne!(light, dark);
+            assert!(light.contains("μ = 0.3, ρ = 0.01 mm, ε = 1e−4 mm"));
+            assert_eq!(light.contains("● verdict: "), plot != Plot::Mesh);
+            let style = Style {
+                size: Size::Column,
+                ..Style::default()
+            };
+            let column = draw(plot, style, &problem, &parts).unwrap();
+            assert!(column.starts_with(r#"<svg width="520""#));
             assert_eq!(light, drawn(Theme::Light), "the same figure, the same text");
         }
         assert!("elements".parse::<Plot>().is_err() && "grey".parse::<Theme>().is_err());
@@ -178,10 +262,19 @@ mod tests {
         ]))
         .unwrap();
         let history = solution(&problem).history;
-        let svg = convergence_svg(Theme::Light, &problem, &history).unwrap();
-        for text in ["indent", "step 1", "tolerance", "nodes in contact", "10⁻¹⁰"] {
+        let caption = Caption::default();
+        let light = Theme::Light.into();
+        let svg = convergence_svg(light, &caption, &problem, &history).unwrap();
+        for text in [
+            "indent",
+            "step 1",
+            "tolerance",
+            "friction residual",
+            "nodes in contact",
+            "10⁻¹⁰",
+        ] {
             assert!(svg.contains(text), "{text}");
         }
-        assert!(convergence_svg(Theme::Light, &problem, &[]).is_err());
+        assert!(convergence_svg(light, &caption, &problem, &[]).is_err());
     }
 }

@@ -1,29 +1,34 @@
-//! The page of a figure: size, background, title, and how numbers and names are written.
-
-use std::collections::BTreeSet;
+//! The page of a figure: size, background, the texts around it, and how numbers and names are written.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::theme::Theme;
+use super::Style;
+use super::caption::{Caption, Mark};
+use super::theme::hex;
 use solver::error::shortened;
 use solver::problem::Units;
-use solver::solution::{Accuracy, ErrorMethod, Verdict};
+use solver::solution::Verdict;
 
-/// Width of every figure (pixels).
-pub(super) const WIDTH: i32 = 720;
-/// Height of the title (pixels).
-pub(super) const HEAD: i32 = 40;
-/// Height of a note under the title (pixels).
-const NOTE: i32 = 22;
+/// Height of the title, and of a line below it (pixels).
+const TITLE: i32 = 34;
+const LINE: i32 = 22;
+/// Height of a line of warnings (pixels), and of their letters.
+const FOOT: i32 = 17;
+const SMALL: i32 = 12;
+/// Left of title and warnings, and right of the verdict (pixels).
+const MARGIN: i32 = 8;
 /// plotters draws in whole units: a tenth of a pixel keeps curves smooth.
 pub(super) const FINE: i32 = 10;
 const FONT: &str = "sans-serif";
-/// Height of numbers, legends and names (pixels): 5 pt or more in a column of 9 cm.
+/// Height of numbers, legends and names (pixels): 7 pt in a column of 88 mm.
 pub(super) const LETTERS: i32 = 15;
-/// Characters of a title that are shown; in smaller letters where it is long.
-const TITLE: usize = 84;
+/// Height of the letters of a title (pixels), and how many of them are shown; in smaller letters where there are many.
+const LARGE: i32 = 19;
+const LONGEST: usize = 84;
+/// Lines of warnings and of parameters at most.
+const LINES: usize = 6;
 
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(super) type Fallible<T> = Result<T, Box<dyn std::error::Error>>;
@@ -33,40 +38,57 @@ pub(super) const fn px(pixels: i32) -> i32 {
     pixels * FINE
 }
 
-/// A page `height` pixels high below its title, and the note under it if there is one. `draw` gets the area below the title, and returns
-/// further SVG that is put on top, in the units of the drawing; its origin is the title's height above the area.
+/// A page with a figure `height` pixels high between the texts of its caption. `draw` gets the area of the figure, and
+/// returns further SVG that is put on top of it, in the units of the drawing, from the area's left upper corner.
 pub(super) fn page(
-    theme: Theme,
-    title: &str,
-    note: Option<&str>,
+    style: Style,
+    caption: &Caption,
     height: i32,
     draw: impl FnOnce(&Area<'_>) -> Fallible<String>,
 ) -> Result<String, String> {
-    let head = HEAD + note.map_or(0, |_| NOTE);
-    let size = (WIDTH, head + height);
+    let width = style.width();
+    let above = above(style, caption);
+    let head = TITLE + LINE * above.len() as i32;
+    let foot = foot(style, caption);
+    let below = match foot.is_empty() {
+        true => 0,
+        false => FOOT * foot.len() as i32 + MARGIN,
+    };
+    let size = (width, head + height + below);
     let mut svg = String::new();
     let drawn = || -> Fallible<String> {
         let fine = (px(size.0) as u32, px(size.1) as u32);
         let root = SVGBackend::with_string(&mut svg, fine).into_drawing_area();
-        let palette = theme.palette();
+        let palette = style.palette();
         root.fill(&palette.background)?;
-        let middle = (px(WIDTH / 2), px(HEAD / 2));
-        let at = Pos::new(HPos::Center, VPos::Center);
-        let title = shortened(title, TITLE);
-        // a line holds 62 letters of 19 pixels
-        let letters = (19 * 62 / title.chars().count().max(62)) as i32;
-        let style = text(theme, letters).pos(at);
-        root.draw(&Text::new(title, middle, style))?;
-        if let Some(note) = note {
-            let under = (px(WIDTH / 2), px(HEAD + NOTE / 2 - 4));
-            root.draw(&Text::new(
-                note.to_owned(),
-                under,
-                text(theme, LETTERS).pos(at),
-            ))?;
+        let title = shortened(&caption.title, LONGEST);
+        let fits = bold_letters(width);
+        let letters = (LARGE as usize * fits / title.chars().count().max(fits)) as i32;
+        let font = (FONT, plotters_size(letters), FontStyle::Bold).into_font();
+        let bold = font.color(&palette.text).pos(at(HPos::Left));
+        root.draw(&Text::new(title, (px(MARGIN), px(TITLE / 2 + 2)), bold))?;
+        for (k, line) in (0..).zip(&above) {
+            let middle = px(TITLE + LINE * k + LINE / 2 - 3);
+            let left = text(style, LETTERS).pos(at(HPos::Left));
+            root.draw(&Text::new(line.left.clone(), (px(MARGIN), middle), left))?;
+            if let Some(mark) = line.right {
+                let colour = colour(style, mark);
+                let right = text(style, LETTERS).pos(at(HPos::Right)).color(&colour);
+                root.draw(&Text::new(
+                    mark.words(),
+                    (px(width - MARGIN), middle),
+                    right,
+                ))?;
+            }
         }
-        let (_, below) = root.split_vertically(px(head));
-        let over = draw(&below)?;
+        for (k, line) in (0..).zip(&foot) {
+            let middle = px(head + height + FOOT * k + FOOT / 2);
+            let faint = text(style, SMALL).color(&palette.faint).pos(at(HPos::Left));
+            root.draw(&Text::new(line.clone(), (px(MARGIN), middle), faint))?;
+        }
+        let (_, rest) = root.split_vertically(px(head));
+        let (figure, _) = rest.split_vertically(px(height));
+        let over = draw(&figure)?;
         root.present()?;
         Ok(over)
     };
@@ -77,66 +99,180 @@ pub(super) fn page(
     let mut svg = svg.replacen(&fine, &size, 1);
     // names come from clients, and XML does not allow these characters
     svg.retain(|c| c == '\n' || !(c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}')));
-    // it knows of the title alone
-    let over = match note {
-        Some(_) => format!(r#"<g transform="translate(0 {})">{over}</g>"#, px(NOTE)),
-        None => over,
-    };
+    let svg = with_subscripts(&svg);
     match svg.rfind("</svg>") {
-        Some(end) => Ok(format!("{}{over}{}", &svg[..end], &svg[end..])),
+        Some(end) => Ok(format!(
+            "{}<g transform=\"translate(0 {})\">{over}</g>{}",
+            &svg[..end],
+            px(head),
+            &svg[end..]
+        )),
         None => Err("the drawing has no end".to_owned()),
     }
 }
 
+fn at(side: HPos) -> Pos {
+    Pos::new(side, VPos::Center)
+}
+
+fn colour(style: Style, mark: Mark) -> RGBColor {
+    let palette = style.palette();
+    match mark {
+        Mark::Verdict(Verdict::Good) => palette.good,
+        Mark::Verdict(Verdict::Fair) => palette.fair,
+        Mark::Verdict(Verdict::Poor) | Mark::Partial(_) => palette.poor,
+    }
+}
+
+/// A line below the title.
+struct Line {
+    left: String,
+    right: Option<Mark>,
+}
+
+/// The lines below the title: the parameters, as many contacts in a line as fit, and the mark at the right of the first one
+/// that has room for it.
+fn above(style: Style, caption: &Caption) -> Vec<Line> {
+    let room = style.width() - 2 * MARGIN;
+    let parameters = wrapped(&caption.parameters, ";  ", room, width);
+    let mut lines: Vec<Line> = parameters
+        .into_iter()
+        .filter(|left| !left.is_empty())
+        .map(|left| Line { left, right: None })
+        .collect();
+    if let Some(mark) = caption.mark {
+        let wide = width(&mark.words()) + 16;
+        match lines
+            .iter_mut()
+            .find(|line| width(&line.left) + wide <= room)
+        {
+            Some(line) => line.right = Some(mark),
+            None => lines.push(Line {
+                left: String::new(),
+                right: Some(mark),
+            }),
+        }
+    }
+    lines
+}
+
+/// The lines of the warnings.
+fn foot(style: Style, caption: &Caption) -> Vec<String> {
+    if caption.warnings.is_empty() {
+        return vec![];
+    }
+    let mut words: Vec<String> = caption.warnings.clone();
+    let last = words.len() - 1;
+    words[..last].iter_mut().for_each(|word| word.push(';'));
+    words[0].insert_str(0, "Warnings: ");
+    let small = |text: &str| width(text) * SMALL / LETTERS;
+    wrapped(&words, " ", style.width() - 2 * MARGIN, small)
+}
+
+/// Texts one after another in as many lines as they need, and at most `LINES`.
+fn wrapped(texts: &[String], between: &str, room: i32, width: impl Fn(&str) -> i32) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for text in texts {
+        match lines.last_mut() {
+            Some(line) if width(line) + width(between) + width(text) <= room => {
+                line.push_str(between);
+                line.push_str(text);
+            }
+            _ => lines.push(text.clone()),
+        }
+    }
+    if lines.len() > LINES {
+        lines.truncate(LINES);
+        if let Some(last) = lines.last_mut() {
+            last.push_str(" …");
+        }
+    }
+    lines
+}
+
 /// Text of a height in pixels.
-pub(super) fn text(theme: Theme, pixels: i32) -> TextStyle<'static> {
-    // plotters writes a font of size s as s/1.24
-    (FONT, 1.24 * f64::from(px(pixels)))
+pub(super) fn text(style: Style, pixels: i32) -> TextStyle<'static> {
+    (FONT, plotters_size(pixels))
         .into_font()
-        .color(&theme.palette().text)
+        .color(&style.palette().text)
+}
+
+/// plotters writes a font of size s as s/1.24.
+fn plotters_size(pixels: i32) -> f64 {
+    1.24 * f64::from(px(pixels))
 }
 
 /// A line of text with its left end and its middle at a place (pixels).
 pub(super) fn draw_text(
     area: &Area<'_>,
-    theme: Theme,
+    style: Style,
     words: &str,
     (x, y): (i32, i32),
 ) -> Fallible<()> {
-    let style = text(theme, LETTERS).pos(Pos::new(HPos::Left, VPos::Center));
+    let style = text(style, LETTERS).pos(at(HPos::Left));
     area.draw(&Text::new(words.to_owned(), (px(x), px(y)), style))?;
     Ok(())
 }
 
-/// How wide a text of that height is at most, without asking a font (pixels).
+/// How wide a text of that height is about, without asking a font (pixels): fonts differ, and this is a wide one.
 pub(super) fn width(words: &str) -> i32 {
-    8 * words.chars().count() as i32
+    43 * words.chars().count() as i32 / 5
 }
 
-/// The verdict on a result, for the note of a figure.
-pub(super) fn verdict(accuracy: Option<&Accuracy>) -> Option<String> {
-    let accuracy = accuracy?;
-    let unlimited = accuracy.quantities.iter();
-    let unlimited = unlimited.filter(|q| q.method == ErrorMethod::NoLimit);
-    let names: BTreeSet<&str> = unlimited.map(|q| <&str>::from(q.quantity)).collect();
-    let names: Vec<String> = names.iter().map(|name| name.replace('_', " ")).collect();
-    let without = match &names[..] {
-        [] => String::new(),
-        names => format!("; no limit: {}", names.join(", ")),
-    };
-    let verdict = match accuracy.verdict {
-        // the note has one line
-        Verdict::Good if !names.is_empty() => "good",
-        Verdict::Fair if !names.is_empty() => "fair",
-        other => other.in_words(),
-    };
-    Some(format!("accuracy: {verdict}{without}"))
+/// How many large bold letters a line holds.
+fn bold_letters(width: i32) -> usize {
+    ((width - 2 * MARGIN) / 13).max(1) as usize
+}
+
+/// `σ_xx` with letters below the line in place of the underscore. Sizes are numbers: not every program reads those that are
+/// relative.
+fn with_subscripts(svg: &str) -> String {
+    let mut out = String::with_capacity(svg.len());
+    let mut rest = svg;
+    while let Some(place) = rest.find("σ_") {
+        let (before, from) = rest.split_at(place);
+        out.push_str(before);
+        let after = &from["σ_".len()..];
+        let end = after
+            .find(|c: char| !c.is_alphabetic())
+            .unwrap_or(after.len());
+        let (index, tail) = after.split_at(end);
+        // only inside of a text, and only an index
+        let Some(close) = tail.find('<').filter(|_| (1..=4).contains(&index.len())) else {
+            out.push_str("σ_");
+            rest = after;
+            continue;
+        };
+        let letters = font_size(&out).unwrap_or(f64::from(px(LETTERS)));
+        let (small, down) = ((0.72 * letters).round(), (0.2 * letters).round());
+        out.push_str(&format!(
+            r#"σ<tspan dy="{down}" font-size="{small}">{index}</tspan>"#
+        ));
+        let stop = tail[..close].find("σ_").unwrap_or(close);
+        let (following, tail) = tail.split_at(stop);
+        match following.trim().is_empty() && stop == close {
+            true => out.push_str(following),
+            // back to the line
+            false => out.push_str(&format!(r#"<tspan dy="-{down}">{following}</tspan>"#)),
+        }
+        rest = tail;
+    }
+    out.push_str(rest);
+    out
+}
+
+/// That of the last text that begins here.
+fn font_size(svg: &str) -> Option<f64> {
+    const NAME: &str = "font-size=\"";
+    let text = &svg[svg.rfind("<text")?..];
+    let value = &text[text.find(NAME)? + NAME.len()..];
+    value.split('"').next()?.parse().ok()
 }
 
 /// A quantity with its unit, where there is one.
 pub(super) fn with_unit(name: &str, unit: Option<&str>) -> String {
     match unit {
-        Some(unit) if !unit.is_empty() => format!("{name} [{unit}]"),
+        Some(unit) if !unit.is_empty() => format!("{name} ({unit})"),
         _ => name.to_owned(),
     }
 }
@@ -156,6 +292,12 @@ pub(super) fn number(value: f64) -> String {
     digits(value).replace('-', "−")
 }
 
+/// A number of three digits: more would suggest an accuracy that there is not.
+pub(super) fn rounded(value: f64) -> String {
+    let unit = 10f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 2.0);
+    number((value / unit).round() * unit)
+}
+
 /// The number of a tick on an axis of some length: a rounding error beside zero is zero.
 pub(super) fn tick(value: f64, length: f64) -> String {
     let small = value.abs() < 1e-9 * length.abs();
@@ -166,7 +308,10 @@ fn digits(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
         let text = format!("{value:.3e}");
         let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
-        let digits = digits.trim_end_matches('0').trim_end_matches('.');
+        let digits = match digits.contains('.') {
+            true => digits.trim_end_matches('0').trim_end_matches('.'),
+            false => digits,
+        };
         return format!("{digits}e{power}");
     }
     let digits = 5 - (value.abs().max(1.0).log10().floor() as usize).min(5);
@@ -186,9 +331,15 @@ pub(super) fn round_up(value: f64, steps: &[f64]) -> f64 {
     fits.unwrap_or(10.0 * power)
 }
 
+/// A rectangle of a colour that lets what is behind it be seen, as SVG.
+pub(super) fn tinted(colour: RGBColor, opacity: f64) -> String {
+    format!(r#"fill="{}" fill-opacity="{opacity}""#, hex(colour))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plot::{Size, Theme};
 
     #[test]
     fn axis_numbers_are_short() {
@@ -202,6 +353,8 @@ mod tests {
         ] {
             assert_eq!(number(value), text);
         }
+        assert_eq!(rounded(-186_868.83), "−187000");
+        assert_eq!(rounded(0.0), "0");
     }
 
     #[test]
@@ -219,22 +372,70 @@ mod tests {
 
     #[test]
     fn a_title_is_escaped_and_shortened() {
-        let title = format!("<script>&\u{1}{}", "x".repeat(200));
-        let svg = page(Theme::Dark, &title, None, 50, |_| Ok("<g/>".to_owned())).unwrap();
+        let caption = Caption {
+            title: format!("<script>&\u{1}{}", "x".repeat(200)),
+            ..Caption::default()
+        };
+        let svg = page(Theme::Dark.into(), &caption, 50, |_| Ok("<g/>".to_owned())).unwrap();
         assert!(
             !svg.contains("<script>")
                 && !svg.contains('\u{1}')
                 && svg.contains("&lt;script&gt;&amp;")
         );
-        assert!(svg.contains('…') && svg.trim_end().ends_with("<g/></svg>"));
-        assert!(svg.starts_with(r#"<svg width="720" height="90" viewBox="0 0 7200 900""#));
-        let noted = page(Theme::Dark, &title, Some("accuracy: good"), 50, |_| {
-            Ok(String::new())
-        });
-        let noted = noted.unwrap();
-        assert!(
-            noted.starts_with(r#"<svg width="720" height="112""#)
-                && noted.contains("accuracy: good")
+        assert!(svg.contains('…') && svg.trim_end().ends_with("<g/></g></svg>"));
+        assert!(svg.starts_with(r#"<svg width="720" height="84" viewBox="0 0 7200 840""#));
+    }
+
+    #[test]
+    fn texts_take_as_many_lines_as_they_need() {
+        let caption = |contacts: usize| Caption {
+            title: "Title".into(),
+            parameters: vec![
+                "a contact:  μ = 0.3   ρ = 0.01 mm   ε = 1e−4 mm".into();
+                contacts
+            ],
+            mark: Some(Mark::Verdict(Verdict::Good)),
+            warnings: vec!["an assumption is violated".into(); 9],
+        };
+        let style = |size| Style {
+            size,
+            ..Style::default()
+        };
+        let lines = |size, contacts| {
+            let lines = above(style(size), &caption(contacts));
+            let marked = lines.iter().position(|line| line.right.is_some());
+            (lines.len(), marked)
+        };
+        assert_eq!(lines(Size::Page, 1), (1, Some(0)));
+        assert_eq!(lines(Size::Column, 1), (2, Some(1)), "no room beside it");
+        assert_eq!(lines(Size::Page, 3).0, 3);
+        assert_eq!(
+            lines(Size::Page, 30).0,
+            LINES + 1,
+            "and the mark is not lost"
         );
+        let foot = foot(style(Size::Column), &caption(1));
+        assert!(
+            foot.len() > 2 && foot[0].starts_with("Warnings: an assumption"),
+            "{foot:?}"
+        );
+    }
+
+    #[test]
+    fn an_index_stands_below_the_line_and_nothing_else_does() {
+        assert_eq!(
+            with_subscripts("<text font-size=\"100\">\nstress σ_xx (MPa)\n</text>"),
+            "<text font-size=\"100\">\nstress σ<tspan dy=\"20\" font-size=\"72\">xx</tspan><tspan dy=\"-20\"> (MPa)\n</tspan></text>"
+        );
+        assert_eq!(
+            with_subscripts("<text>\nσ_n\n</text>"),
+            "<text>\nσ<tspan dy=\"30\" font-size=\"108\">n</tspan>\n</text>"
+        );
+        let two = with_subscripts("<text font-size=\"100\">σ_n and σ_t</text>");
+        assert_eq!(two.matches("font-size=\"72\"").count(), 2, "{two}");
+        assert!(!two.contains('_'));
+        for plain in ["<text>σ_ of</text>", "<text>my_σ_experiment</text>", "σ_n"] {
+            assert_eq!(with_subscripts(plain), plain);
+        }
     }
 }

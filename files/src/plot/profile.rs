@@ -3,64 +3,172 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::figure::{Curve, LineStyle, Panel, figure};
+use super::Style;
+use super::body::coordinates;
+use super::caption::Caption;
+use super::figure::{Above, Curve, LineStyle, Panel, Scale, Shade, ShadeKind, figure};
 use super::page::{self, with_unit};
-use super::theme::Theme;
 use solver::error::shortened;
 use solver::problem::{Contact, Problem};
-use solver::solution::{Accuracy, ContactProfile};
+use solver::solution::{ContactProfile, ErrorMethod, NodeState, QuantityName, Summary};
 
 /// For each contact boundary: σ_n above, and where there is friction σ_t with its bound ±τ below, against arc
-/// length. Stresses are negative in compression. Under the title is the verdict on the accuracy, where there is one. `Err`: the reason why a figure could not be drawn.
+/// length and position, with stick and slip behind them. Stresses are negative in compression. `Err`: the reason why a figure
+/// could not be drawn.
 pub fn profile_svg(
-    theme: Theme,
+    style: Style,
+    caption: &Caption,
     problem: &Problem,
     profiles: &BTreeMap<String, ContactProfile>,
-    accuracy: Option<&Accuracy>,
+    summary: Option<&Summary>,
 ) -> Result<String, String> {
     if profiles.is_empty() {
         return Err("there is no contact boundary to draw".to_owned());
     }
     let panels: Vec<Panel> = profiles
         .iter()
-        .flat_map(|(name, profile)| panels(problem, name, profile))
+        .flat_map(|(name, profile)| panels(problem, name, profile, summary))
         .collect();
-    let title = problem.title.as_deref().unwrap_or("Contact stresses");
-    figure(theme, title, page::verdict(accuracy).as_deref(), &panels)
+    figure(style, caption, &panels)
 }
 
-fn panels(problem: &Problem, name: &str, profile: &ContactProfile) -> Vec<Panel> {
+fn panels(
+    problem: &Problem,
+    name: &str,
+    profile: &ContactProfile,
+    summary: Option<&Summary>,
+) -> Vec<Panel> {
     let shown = stressed(profile);
     let curve = |label: &str, style: LineStyle, values: &[f64]| Curve {
         label: label.to_owned(),
         style,
         points: shown.clone().map(|i| (profile.s[i], values[i])).collect(),
     };
-    let opposite: Vec<f64> = profile.friction_bound.iter().map(|tau| -tau).collect();
-    let panel = |curves: Vec<Curve>| Panel {
-        x: with_unit(
-            &format!("arc length s along `{}`", shortened(name, 40)),
-            page::length(&problem.units),
-        ),
-        y: with_unit("stress", page::stress(&problem.units)),
-        curves,
+    let unit = page::length(&problem.units);
+    let along = format!("arc length s along “{}”", shortened(name, 40));
+    let along = with_unit(&along, unit);
+    let stress = |name: &str| with_unit(name, page::stress(&problem.units));
+    let rough = |contact: &Contact| contact.boundary == name && contact.friction.is_some();
+    let rough = problem.contacts.iter().any(rough);
+    let shades = match rough {
+        true => shades(profile, shown.clone()),
+        false => vec![],
+    };
+    let no_limit = summary.and_then(|summary| summary.accuracy.as_ref());
+    let no_limit = no_limit.is_some_and(|accuracy| {
+        accuracy.quantities.iter().any(|q| {
+            q.contact == name
+                && q.quantity == QuantityName::PeakNormalStress
+                && q.method == ErrorMethod::NoLimit
+        })
+    });
+    let normal = Panel {
+        x: if rough { String::new() } else { along.clone() },
+        y: stress("normal stress σ_n"),
+        curves: vec![curve("", LineStyle::Line(0), &profile.normal_stress)],
+        shades: shades.clone(),
+        above: position(profile, coordinates(&problem.analysis), unit, shown.clone()),
+        of_peak: match no_limit {
+            true => ", which grows on finer meshes",
+            false => "",
+        }
+        .to_owned(),
         ..Panel::default()
     };
-    let normal = vec![curve("σ_n", LineStyle::Line(0), &profile.normal_stress)];
-    let tangential = vec![
-        curve(
-            "±τ, friction bound",
-            LineStyle::Reference,
-            &profile.friction_bound,
-        ),
-        curve("", LineStyle::Reference, &opposite),
-        curve("σ_t", LineStyle::Line(1), &profile.tangential_stress),
-    ];
-    let rough = |contact: &Contact| contact.boundary == name && contact.friction.is_some();
-    match problem.contacts.iter().any(rough) {
-        true => vec![panel(normal), panel(tangential)],
-        false => vec![panel(normal)],
+    if !rough {
+        return vec![normal];
     }
+    let bound = &profile.friction_bound;
+    let opposite: Vec<f64> = bound.iter().map(|tau| -tau).collect();
+    // the bound on the sides where there is stress
+    let reached = |sign: f64| profile.tangential_stress.iter().any(|t| sign * t > 0.0);
+    let (above, below) = match (reached(1.0), reached(-1.0)) {
+        (false, true) => (vec![], vec![("friction bound −τ", &opposite)]),
+        (true, true) => (vec![("friction bound ±τ", bound)], vec![("", &opposite)]),
+        (_, false) => (vec![("friction bound τ", bound)], vec![]),
+    };
+    let bounds = above.into_iter().chain(below);
+    let bounds = bounds.map(|(label, values)| curve(label, LineStyle::Bound, values));
+    let own = curve(
+        "tangential stress σ_t",
+        LineStyle::Line(1),
+        &profile.tangential_stress,
+    );
+    let tangential = Panel {
+        x: along,
+        y: stress("tangential stress σ_t"),
+        scale: Scale::Linear,
+        curves: bounds.chain([own]).collect(),
+        shades,
+        ..Panel::default()
+    };
+    vec![normal, tangential]
+}
+
+/// Stick and slip: each reaches half of the way to a neighbour in another state.
+fn shades(profile: &ContactProfile, shown: Range<usize>) -> Vec<Shade> {
+    let kind = |i: usize| match profile.state.get(i)? {
+        NodeState::Open => None,
+        NodeState::Stick => Some(ShadeKind::Stick),
+        NodeState::Slip => Some(ShadeKind::Slip),
+    };
+    let s = &profile.s;
+    let middle = |i: usize, k: usize| 0.5 * (s[i] + s[k]);
+    let mut shades: Vec<Shade> = Vec::new();
+    for i in shown.clone() {
+        let Some(kind) = kind(i) else { continue };
+        let from = if i > shown.start {
+            middle(i - 1, i)
+        } else {
+            s[i]
+        };
+        let to = if i + 1 < shown.end {
+            middle(i, i + 1)
+        } else {
+            s[i]
+        };
+        match shades.last_mut() {
+            Some(last) if last.kind == kind && last.extent[1] == from => last.extent[1] = to,
+            _ => shades.push(Shade {
+                kind,
+                extent: [from, to],
+            }),
+        }
+    }
+    shades
+}
+
+/// The position along the boundary: x, or y where x does not run along it. `None` where neither does, and where it is s itself.
+fn position(
+    profile: &ContactProfile,
+    [x, y]: [&str; 2],
+    unit: Option<&str>,
+    shown: Range<usize>,
+) -> Option<Above> {
+    let s = profile.s.get(shown.clone())?;
+    let axis = |name: &str, values: &[f64]| {
+        let values = values.get(shown.clone())?;
+        let runs = |sign: f64| {
+            values
+                .windows(2)
+                .all(|pair| sign * (pair[1] - pair[0]) > 0.0)
+        };
+        if values.len() < 2 || !(runs(1.0) || runs(-1.0)) {
+            return None;
+        }
+        let places: Vec<(f64, f64)> = s.iter().copied().zip(values.iter().copied()).collect();
+        let length = s[s.len() - 1] - s[0];
+        let same = places
+            .iter()
+            .all(|(s, value)| (s - value).abs() <= 1e-6 * length);
+        Some((!same).then(|| Above {
+            name: with_unit(&format!("position {name}"), unit),
+            places,
+        }))
+    };
+    axis(x, &profile.x)
+        .or_else(|| axis(y, &profile.y))
+        .flatten()
 }
 
 /// The nodes under stress and a margin of a fifth on each side: a contact is often a small part of
@@ -91,9 +199,12 @@ mod tests {
     fn a_figure_has_its_curves_also_for_a_flat_profile() {
         let profile = ContactProfile {
             s: vec![0.0, 0.5, 1.0],
+            x: vec![2.0, 2.5, 3.0],
+            y: vec![0.0; 3],
             normal_stress: vec![-1.0, -2.0, -4.0],
-            tangential_stress: vec![0.0, 0.3, 0.5],
+            tangential_stress: vec![-0.1, 0.3, 0.5],
             friction_bound: vec![0.3, 0.6, 1.2],
+            state: vec![NodeState::Stick, NodeState::Slip, NodeState::Slip],
             ..ContactProfile::default()
         };
         let two = BTreeMap::from([
@@ -101,16 +212,21 @@ mod tests {
             ("top".to_owned(), profile),
         ]);
         let mut problem = problem();
-        let smooth = profile_svg(Theme::Light, &problem, &two, None).unwrap();
+        let drawn = |problem: &Problem, profiles: &BTreeMap<String, ContactProfile>| {
+            let caption = Caption::of_problem(problem, "Contact");
+            profile_svg(Style::default(), &caption, problem, profiles, None)
+        };
+        let smooth = drawn(&problem, &two).unwrap();
         let mut left = problem.contacts[0].clone();
         left.boundary = "left".into();
         problem.contacts.push(left);
-        let svg = profile_svg(Theme::Light, &problem, &two, None).unwrap();
+        let svg = drawn(&problem, &two).unwrap();
         assert_eq!(svg.matches("±τ").count(), 2);
         assert_eq!(smooth.matches("±τ").count(), 1, "no friction, no bound");
-        assert!(svg.starts_with("<svg") && svg.contains("Punch") && svg.contains("`left` [mm]"));
-        assert!(svg.contains("stress [MPa]"));
-        assert!(svg.matches("<polyline").count() >= 8);
+        assert!(svg.starts_with("<svg") && svg.contains("Punch") && svg.contains("“left” (mm)"));
+        assert!(svg.contains("position x (mm)") && svg.contains("stick") && svg.contains("slip"));
+        assert!(svg.contains(r#"σ<tspan dy="30" font-size="108">n</tspan>"#));
+        assert!(svg.matches("<polyline").count() >= 6);
         let flat = ContactProfile {
             s: vec![0.0, 1.0],
             normal_stress: vec![0.0; 2],
@@ -119,8 +235,43 @@ mod tests {
             ..ContactProfile::default()
         };
         let flat = BTreeMap::from([("top".to_owned(), flat)]);
-        assert!(profile_svg(Theme::Dark, &problem, &flat, None).is_ok());
-        assert!(profile_svg(Theme::Light, &problem, &BTreeMap::new(), None).is_err());
+        assert!(drawn(&problem, &flat).is_ok());
+        assert!(drawn(&problem, &BTreeMap::new()).is_err());
+    }
+
+    #[test]
+    fn stick_and_slip_meet_between_the_points() {
+        use NodeState::{Open, Slip, Stick};
+        let profile = ContactProfile {
+            s: vec![0.0, 1.0, 2.0, 4.0, 5.0],
+            state: vec![Stick, Stick, Slip, Open, Slip],
+            ..ContactProfile::default()
+        };
+        let found: Vec<[f64; 2]> = shades(&profile, 0..5).iter().map(|s| s.extent).collect();
+        assert_eq!(found, [[0.0, 1.5], [1.5, 3.0], [4.5, 5.0]]);
+    }
+
+    #[test]
+    fn the_position_is_shown_where_it_is_not_the_arc_length() {
+        let mut profile = ContactProfile {
+            s: vec![0.0, 1.0, 2.0],
+            x: vec![0.0, 1.0, 2.0],
+            y: vec![3.0, 3.0, 3.0],
+            ..ContactProfile::default()
+        };
+        assert_eq!(
+            position(&profile, ["x", "y"], None, 0..3).map(|above| above.name),
+            None
+        );
+        profile.x = vec![1.0; 3];
+        profile.y = vec![2.0, 1.0, 0.0];
+        let name = position(&profile, ["x", "y"], Some("mm"), 0..3).map(|above| above.name);
+        assert_eq!(name.as_deref(), Some("position y (mm)"));
+        profile.y = vec![2.0, 1.0, 3.0];
+        assert!(
+            position(&profile, ["x", "y"], None, 0..3).is_none(),
+            "it turns back"
+        );
     }
 
     #[test]

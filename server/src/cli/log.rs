@@ -28,22 +28,34 @@ pub(super) struct Log {
 /// may have been meant for another program.
 pub(super) fn start(default: LevelFilter) -> Log {
     let filter = of_variable("SIGNORINI_LOG").or_else(|| of_variable("RUST_LOG"));
-    let filter = filter.unwrap_or_else(|| Targets::new().with_default(default));
-    write(filter, LogFormat::Text)
+    // a certificate that is not accepted is the command's own message
+    let usual = || {
+        let usual = quiet(Targets::new().with_default(default));
+        usual.with_target("rustls_platform_verifier", LevelFilter::OFF)
+    };
+    write(filter.unwrap_or_else(usual), LogFormat::Text)
 }
 
 /// Starts the log of a worker process, which is a part of that of the service.
 pub(super) fn start_of_worker() -> Log {
     let asked = std::env::var("SIGNORINI_LOG_FORMAT").unwrap_or_default();
     let format = LogFormat::from_str(&asked, true).unwrap_or_default();
-    write(Targets::new().with_default(LevelFilter::WARN), format)
+    write(
+        quiet(Targets::new().with_default(LevelFilter::WARN)),
+        format,
+    )
 }
 
 /// Starts the log of the service.
 pub(super) fn start_as(settings: &Telemetry) -> Log {
     let filter = settings.log.clone().or_else(|| of_variable("RUST_LOG"));
-    let filter = filter.unwrap_or_else(|| Targets::new().with_default(LevelFilter::INFO));
-    write(filter, settings.log_format)
+    let usual = || quiet(Targets::new().with_default(LevelFilter::INFO));
+    write(filter.unwrap_or_else(usual), settings.log_format)
+}
+
+/// Without what a figure's letters, which are a client's, make the library that draws them say.
+fn quiet(filter: Targets) -> Targets {
+    filter.with_target("usvg", LevelFilter::OFF)
 }
 
 fn of_variable(name: &str) -> Option<Targets> {

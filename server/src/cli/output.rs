@@ -7,8 +7,9 @@ use std::{
 };
 
 use anyhow::Context;
-use files::plot::{self, Parts, Plot, Theme};
-use solver::{problem::Problem, solution::Iteration};
+use clap::Args;
+use files::plot::{self, Parts, Plot, Size, Style, Theme, image};
+use solver::{mesh::Mesh, problem::Problem, solution::Iteration};
 use strum::VariantArray;
 
 use crate::{
@@ -23,12 +24,43 @@ pub(super) fn help() -> String {
     tables.retain(|format| !whole.contains(format));
     format!(
         "Write the result to this file, in the format of its extension: .json everything; {} the profile of the \
-         contact; .npz fields, profiles and history; .vtu the fields; .svg the profile as a figure. Put a part before \
+         contact; .npz fields, profiles and history; .vtu the fields; .svg, .png and .pdf the profile as a figure. Put a part before \
          the extension to choose it: punch.summary.json, punch.history.csv, punch.fields.npz, punch.mesh.svg, punch.deformed.svg, \
          punch.convergence.svg; with several contacts name the boundary: punch.profile.top.csv. Can be repeated; - \
          writes JSON to standard output. Without it a summary is printed",
         Format::endings(&tables)
     )
+}
+
+/// How the figures look.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct Look {
+    /// Colours of a figure: light or dark
+    #[arg(long, default_value = "light")]
+    theme: Theme,
+
+    /// What a figure is for: a column of 88 mm, a page of 160 mm, or a slide of 254 mm
+    #[arg(long, default_value = "page", value_name = "column|page|slide")]
+    size: Size,
+}
+
+impl Look {
+    fn style(self) -> Style {
+        Style {
+            theme: self.theme,
+            size: self.size,
+            ..Style::default()
+        }
+    }
+
+    /// As parameters of a request.
+    pub(super) fn query(self) -> String {
+        format!(
+            "theme={}&size={}",
+            <&str>::from(self.theme),
+            self.size.as_str()
+        )
+    }
 }
 
 /// One file to write.
@@ -92,25 +124,25 @@ impl Output {
         })
     }
 
-    /// Writes it; `theme` is that of a figure.
+    /// Writes it; `problem` with the mesh that it names by a hash, `look` is that of a figure.
     pub(super) fn write(
         &self,
-        problem: &Problem,
-        theme: Theme,
+        problem: (&Problem, Option<&Mesh>),
+        look: Look,
         document: &Document,
     ) -> anyhow::Result<()> {
         let Some(path) = &self.path else {
-            return self.write_to(&mut std::io::stdout().lock(), problem, theme, document);
+            return self.write_to(&mut std::io::stdout().lock(), problem, look, document);
         };
-        replace(path, |out| self.write_to(out, problem, theme, document))
+        replace(path, |out| self.write_to(out, problem, look, document))
             .with_context(|| format!("cannot write {}", path.display()))
     }
 
     fn write_to(
         &self,
         out: &mut dyn Write,
-        problem: &Problem,
-        theme: Theme,
+        (problem, stored): (&Problem, Option<&Mesh>),
+        look: Look,
         document: &Document,
     ) -> anyhow::Result<()> {
         let mut out = BufWriter::new(out);
@@ -139,12 +171,16 @@ impl Output {
                     .collect();
                 let parts = Parts {
                     history: &history,
-                    accuracy: document.summary.solution.accuracy.as_ref(),
+                    summary: Some(&document.summary.solution),
+                    partial: false,
+                    step: None,
                     profiles: &document.profiles,
                     fields: &document.fields,
-                    stored: None,
+                    stored,
                 };
-                plot::draw(*plot, theme, problem, &parts).map(String::into_bytes)
+                let image = self.format.image().unwrap_or_default();
+                let drawn = plot::draw(*plot, look.style(), problem, &parts);
+                drawn.and_then(|svg| image::write(svg, look.size, image))
             }
         };
         out.write_all(&bytes.map_err(anyhow::Error::msg)?)?;
@@ -159,7 +195,7 @@ impl Output {
 fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
     let words: Vec<&str> = stem.split('.').collect();
     let last = words.last().copied().unwrap_or_default();
-    if format == Format::Svg {
+    if format.image().is_some() {
         return Ok(Part::Plot(last.parse().unwrap_or(Plot::Profile)));
     }
     // a boundary may have any name, also with dots or one of the words below: an existing name takes precedence
@@ -285,6 +321,8 @@ mod tests {
             ("punch.svg", Part::Plot(Plot::Profile), Format::Svg),
             ("punch.profile.svg", Part::Plot(Plot::Profile), Format::Svg),
             ("punch.mesh.svg", Part::Plot(Plot::Mesh), Format::Svg),
+            ("punch.mesh.png", Part::Plot(Plot::Mesh), Format::Png),
+            ("punch.pdf", Part::Plot(Plot::Profile), Format::Pdf),
         ] {
             assert_eq!(asked(name, &["top"]).unwrap(), (part, format), "{name}");
         }

@@ -7,6 +7,7 @@ use solver::solution::{
     Outcome, Peak, Phase, QuantityName,
 };
 
+use super::table::harmless;
 use crate::run::{Document, Summary};
 
 /// Reasons of a verdict that are shown.
@@ -44,7 +45,8 @@ pub(super) fn iteration(row: &Iteration) -> String {
         let _ = write!(line, "  q {q:.3}");
     }
     if row.step + row.increment > 0 {
-        let _ = write!(line, "  step {}", row.step + 1);
+        // as `?step=` and `--step` count them
+        let _ = write!(line, "  step {}", row.step);
     }
     if row.increment > 0 {
         let _ = write!(line, ", increment {}", row.increment + 1);
@@ -55,7 +57,7 @@ pub(super) fn iteration(row: &Iteration) -> String {
 /// Facts, each on a line behind its name.
 pub(super) fn lines(facts: impl Iterator<Item = (impl std::fmt::Display, String)>) -> String {
     facts
-        .map(|(name, value)| format!("{name:<20}{value}\n"))
+        .map(|(name, value)| format!("{name:<20}{}\n", harmless(&value)))
         .collect()
 }
 

@@ -1,6 +1,10 @@
 //! A running service, as client commands call it.
 
-use std::{error::Error as _, time::Duration};
+use std::{
+    error::Error as _,
+    fmt::{self, Display, Formatter},
+    time::Duration,
+};
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -70,12 +74,11 @@ pub(super) enum CallError {
 }
 
 /// The document by which the service refuses a request (RFC 9457).
-#[derive(Debug, Deserialize, Error)]
-#[error("{} ({code}; `signorini explain {code}` says more)", detail.as_deref().unwrap_or(title))]
+#[derive(Debug, Deserialize)]
 pub(super) struct Refusal {
     /// HTTP status.
     pub(super) status: u16,
-    /// The kind of error.
+    /// The kind of error; empty if it is not this service that has answered.
     pub(super) code: String,
     title: String,
     #[serde(default)]
@@ -84,6 +87,19 @@ pub(super) struct Refusal {
     #[serde(default, rename = "errors")]
     pub(super) violations: Vec<Violation>,
 }
+
+impl Display for Refusal {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let code = &self.code;
+        f.write_str(self.detail.as_deref().unwrap_or(&self.title))?;
+        match code.is_empty() {
+            true => Ok(()),
+            false => write!(f, " ({code}; `signorini explain {code}` says more)"),
+        }
+    }
+}
+
+impl std::error::Error for Refusal {}
 
 impl Service {
     /// The service at this address.
@@ -146,9 +162,14 @@ impl Service {
         self.send(request).await
     }
 
+    /// Asks for something.
+    pub(super) async fn fetch(&self, path: &str) -> anyhow::Result<Response> {
+        self.send_surely(self.request(Method::GET, path)).await
+    }
+
     /// Asks for a document.
     pub(super) async fn get<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
-        let answer = self.send_surely(self.request(Method::GET, path)).await?;
+        let answer = self.fetch(path).await?;
         self.document(answer).await
     }
 
@@ -237,7 +258,7 @@ pub(super) fn segment(name: &str) -> String {
 fn foreign(url: &str, status: StatusCode) -> Refusal {
     Refusal {
         status: status.as_u16(),
-        code: "bad-request".into(),
+        code: String::new(),
         title: String::new(),
         detail: Some(format!(
             "{url} answers {status}, and not as a signorini service does: is the address right?"

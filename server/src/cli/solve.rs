@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::Read,
+    io::{BufReader, Read, Seek},
     ops::ControlFlow,
     path::{Path, PathBuf},
     time::Instant,
@@ -10,9 +10,11 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
-use files::{ReadError, plot::Theme};
+use files::ReadError;
+use sha2::{Digest, Sha256};
 use solver::{
     error::{Reason, SolveError, Violation},
+    mesh::Mesh,
     problem::Problem,
     solution::Observer,
 };
@@ -25,7 +27,9 @@ use super::{
 };
 use crate::{
     config::MemoryBudget,
+    digest,
     error::ApiError,
+    mesh::MeshInfo,
     run::{self, Update},
 };
 
@@ -37,9 +41,12 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "OUT", help = output::help())]
     output: Vec<PathBuf>,
 
-    /// Colours of a figure: light or dark
-    #[arg(long, default_value = "light")]
-    theme: Theme,
+    /// The file of the mesh that the problem names by its hash (mesh.stored), as it was uploaded
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+
+    #[command(flatten)]
+    look: output::Look,
 
     #[command(flatten)]
     memory: MemoryBudget,
@@ -71,7 +78,8 @@ pub(super) fn run(
     Arguments {
         file,
         output,
-        theme,
+        mesh,
+        look,
         memory,
         threads,
     }: &Arguments,
@@ -105,8 +113,23 @@ pub(super) fn run(
             return Ok(Exit::Invalid);
         }
     };
+    let (size, stored) = match stored_mesh(&problem, mesh.as_deref()) {
+        Ok(None) => (None, None),
+        Ok(Some((info, mesh))) => (Some(info.size()), Some(mesh)),
+        Err(Unusable::Reason(reason)) => {
+            eprintln!("signorini: {}: {reason}", file.display());
+            return Ok(Exit::Invalid);
+        }
+        Err(Unusable::Read(ReadError::Invalid(violations))) => {
+            return Ok(invalid(mesh.as_deref().unwrap_or(file), &violations));
+        }
+        Err(Unusable::Read(ReadError::Io(error))) => {
+            let mesh = mesh.as_deref().unwrap_or(file);
+            return Err(error).with_context(|| format!("cannot read {}", mesh.display()));
+        }
+    };
     let budget_bytes = memory.bytes();
-    let estimate = match solver::estimate(&problem, None) {
+    let estimate = match solver::estimate(&problem, size.as_ref()) {
         Ok(estimate) => estimate,
         Err(violation) => return Ok(invalid(file, &[violation])),
     };
@@ -119,7 +142,8 @@ pub(super) fn run(
         return Ok(Exit::Invalid);
     }
     let solve = |observe: &mut Observer<'_>| {
-        solver::solve_on(&problem, files::external_mesh(&problem, None), observe)
+        let external = files::external_mesh(&problem, stored.clone());
+        solver::solve_on(&problem, external, observe)
     };
     let mut view = View::new(To::Error);
     let solved = run::run(&problem, parse_s, solve, &mut |update| {
@@ -151,8 +175,16 @@ pub(super) fn run(
         Err(error) => return Err(error.into()),
     };
     let title = problem.title.as_deref();
-    for output in &outputs {
-        output.write(&problem, *theme, &document)?;
+    // what cannot be drawn must not cost the other files of a long solution
+    let written = outputs
+        .iter()
+        .map(|output| output.write((&problem, stored.as_ref()), *look, &document));
+    let failed: Vec<anyhow::Error> = written.filter_map(Result::err).collect();
+    for error in failed.iter().skip(1) {
+        eprintln!("signorini: {error:#}");
+    }
+    if let Some(first) = failed.into_iter().next() {
+        return Err(first);
     }
     if outputs.is_empty() {
         output::print(&report::document(title, &document))?;
@@ -162,6 +194,67 @@ pub(super) fn run(
     } else {
         Exit::NotConverged
     })
+}
+
+/// Why a file is not the mesh that a problem names.
+enum Unusable {
+    Reason(String),
+    Read(ReadError),
+}
+
+impl From<std::io::Error> for Unusable {
+    fn from(error: std::io::Error) -> Self {
+        Unusable::Read(ReadError::Io(error))
+    }
+}
+
+/// The mesh that a problem names by the hash of its file, from that file; `None` if it names none.
+fn stored_mesh(
+    problem: &Problem,
+    file: Option<&Path>,
+) -> Result<Option<(MeshInfo, Mesh)>, Unusable> {
+    let (named, file) = match (problem.mesh.stored(), file) {
+        (Some(named), Some(file)) => (named, file),
+        (None, None) => return Ok(None),
+        (Some(_), None) => {
+            return Err(Unusable::Reason(
+                "the problem names its mesh by a hash (mesh.stored): give its file by --mesh FILE, or have a service \
+                 solve it that has the mesh: signorini submit"
+                    .into(),
+            ));
+        }
+        (None, Some(_)) => {
+            return Err(Unusable::Reason(
+                "the problem has a mesh of its own; --mesh is for one that names its mesh by a hash (mesh.stored)"
+                    .into(),
+            ));
+        }
+    };
+    let mut hash = Sha256::new();
+    let mut opened = File::open(file)?;
+    let (mut piece, mut bytes) = (vec![0; 1 << 16], 0);
+    loop {
+        match opened.read(&mut piece)? {
+            0 => break,
+            read => {
+                hash.update(&piece[..read]);
+                bytes += read as u64;
+            }
+        }
+    }
+    let found = digest::sha256_text(hash);
+    if found != named {
+        return Err(Unusable::Reason(format!(
+            "--mesh {}: it has the hash {found}, and the problem names {named}",
+            file.display()
+        )));
+    }
+    // the bytes that were hashed, whatever has that name by now
+    opened.rewind()?;
+    let reader = BufReader::new(opened);
+    let (format, mesh, warnings) = files::read_mesh(reader).map_err(Unusable::Read)?;
+    let info = MeshInfo::new(found, bytes, (format, &mesh, warnings));
+    Ok(Some((info, mesh)))
 }
 
 /// Reads a problem by the ending of its file: of a JSON file with a mesh only the mesh is held, not its text.

@@ -2,8 +2,17 @@
 
 use unicode_width::UnicodeWidthStr;
 
+/// A text of somebody else for a terminal: without characters that would do something there.
+pub(super) fn harmless(text: &str) -> String {
+    text.replace(char::is_control, "\u{fffd}")
+}
+
 /// A line for each row, below the headings. Columns are as wide as their widest cell.
 pub(super) fn table<const N: usize>(headings: [&str; N], rows: &[[String; N]]) -> String {
+    let rows: Vec<[String; N]> = rows
+        .iter()
+        .map(|row| std::array::from_fn(|column| harmless(&row[column])))
+        .collect();
     let widths: [usize; N] = std::array::from_fn(|column| {
         let cells = rows.iter().map(|row| row[column].width());
         cells
@@ -33,5 +42,7 @@ mod tests {
         let rows = [["σ_n", "1"], ["接触", "22"]].map(|row| row.map(String::from));
         let shown = table(["NAME", "N"], &rows);
         assert_eq!(shown, "NAME  N\nσ_n   1\n接触  22\n");
+        let rows = [["a\n\x1b[2Jb".to_owned()]];
+        assert_eq!(table(["NAME"], &rows), "NAME\na\u{fffd}\u{fffd}[2Jb\n");
     }
 }

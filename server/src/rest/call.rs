@@ -88,7 +88,7 @@ macro_rules! functions {
         }
     )*};
 }
-functions!(() (A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E G));
+functions!(() (A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E G) (A B C D E G H));
 
 /// The route of an operation. A `strict` one refuses unknown parameters.
 pub(super) fn route<T, H>(

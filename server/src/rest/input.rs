@@ -163,7 +163,7 @@ macro_rules! tuples {
         }
     )*};
 }
-tuples!((A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E F));
+tuples!((A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E F) (A B C D E F G));
 
 impl Input for () {
     type Value = ();

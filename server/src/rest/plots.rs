@@ -1,45 +1,89 @@
-//! `/v1/jobs/{id}/plots/{plot}.svg`.
+//! `/v1/jobs/{id}/plots/{plot}.svg`, `.png`, `.pdf`.
 
 use axum::{
-    http::{HeaderName, header},
-    response::IntoResponse,
+    http::{HeaderName, HeaderValue, header},
+    response::Response,
 };
-use files::plot::{Plot, Stress, Style, Theme};
+use files::plot::{Plot, Size, Stress, Style, Theme};
 
-use super::{call::Call, data::marked};
+use super::{
+    call::Call,
+    data::{self, Part, marked},
+};
 use crate::{
     error::ApiError,
+    formats::Format,
     job::JobId,
-    verbs::plots::{self as verbs, STRESS, THEME},
+    verbs::{
+        plots::{self as verbs, Figure, SIZE, STRESS, THEME},
+        profiles::STEP,
+    },
 };
 
+#[expect(
+    clippy::too_many_arguments,
+    reason = "each is a parameter of the request"
+)]
 pub(super) async fn plot(
     call: Call,
     id: JobId,
-    plot: Plot,
+    (plot, format): (Plot, Format),
     theme: Option<Theme>,
+    size: Option<Size>,
     stress: Option<Stress>,
-) -> Result<impl IntoResponse, ApiError> {
-    // it has no effect on the other plots
-    if stress.is_some() && plot != Plot::Deformed {
+    step: Option<String>,
+    part: Part,
+) -> Result<Response, ApiError> {
+    // parameters that have no effect on this figure
+    let vain = [
+        (stress.is_some() && plot != Plot::Deformed, STRESS.name),
+        // fields are those of the last step, and the mesh is that of none
+        (
+            step.is_some() && matches!(plot, Plot::Deformed | Plot::Mesh),
+            STEP.name,
+        ),
+    ];
+    if let Some((_, name)) = vain.into_iter().find(|(vain, _)| *vain) {
+        let mut known = vec![THEME.name, SIZE.name];
+        match plot {
+            Plot::Deformed => known.push(STRESS.name),
+            Plot::Profile | Plot::Convergence => known.push(STEP.name),
+            Plot::Mesh => {}
+        }
         return Err(ApiError::UnknownParameter {
-            name: STRESS.name.into(),
-            known: THEME.name.into(),
+            name: name.into(),
+            known: known.join(", "),
         });
     }
-    let style = Style {
-        theme: theme.unwrap_or_default(),
-        stress: stress.unwrap_or_default(),
+    let figure = Figure {
+        plot,
+        format,
+        style: Style {
+            theme: theme.unwrap_or_default(),
+            size: size.unwrap_or_default(),
+            stress: stress.unwrap_or_default(),
+        },
+        step,
     };
-    let found = verbs::plot(&call.service, &call.caller, id, plot, style).await?;
-    Ok(marked((HEADERS, found.content), found.available))
+    let found = verbs::plot(&call.service, &call.caller, id, figure).await?;
+    let name = format!("{id}.{}", plot.as_str());
+    let mut answer = data::whole(&part, format, name, found.content)?;
+    let headers = answer.headers_mut();
+    // a browser shows it
+    if let Some(shown) = headers.get(header::CONTENT_DISPOSITION).and_then(inline) {
+        headers.insert(header::CONTENT_DISPOSITION, shown);
+    }
+    headers.extend(HEADERS);
+    Ok(marked(answer, found.available))
+}
+
+fn inline(saved: &HeaderValue) -> Option<HeaderValue> {
+    let shown = saved.to_str().ok()?.replacen("attachment", "inline", 1);
+    HeaderValue::from_str(&shown).ok()
 }
 
 /// A figure may not run scripts or load anything: its texts come from clients.
-const HEADERS: [(HeaderName, &str); 2] = [
-    (header::CONTENT_TYPE, "image/svg+xml"),
-    (
-        header::CONTENT_SECURITY_POLICY,
-        "default-src 'none'; style-src 'unsafe-inline'",
-    ),
-];
+const HEADERS: [(HeaderName, HeaderValue); 1] = [(
+    header::CONTENT_SECURITY_POLICY,
+    HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'"),
+)];

@@ -35,6 +35,9 @@ pub(super) enum AccessPath<'a> {
 /// A filter that matches no more jobs than this is the access path, whatever the order of the list: to read and sort
 /// all of them costs less than a page may.
 const FEW: i64 = 1000;
+/// Matches are counted up to so many, which takes a millisecond: of several filters that match more than a few, that with the
+/// fewest is the access path, since a page may have to pass over all of them.
+const MANY: i64 = 20_000;
 
 impl Store {
     /// At most `limit` jobs of a list, after `cursor`.
@@ -156,7 +159,7 @@ pub(super) fn keys_of_jobs(
     query
 }
 
-/// The access path by a filter that matches few jobs, if there is such a filter and more than one path.
+/// The access path by a filter that matches few jobs, or the fewest, if there is such a filter and more than one path.
 async fn selective_path<'a>(
     connection: &mut SqliteConnection,
     filter: &'a Filter,
@@ -177,6 +180,8 @@ async fn selective_path<'a>(
     if by_creation && candidates.len() == 1 && !matches!(candidates[0], AccessPath::Ended) {
         return Ok(None);
     }
+    let counted = if by_creation { MANY } else { FEW };
+    let mut fewest = None;
     for path in candidates {
         let mut query = QueryBuilder::<Sqlite>::new("select count(*) from (select 1 from ");
         match path {
@@ -208,7 +213,7 @@ async fn selective_path<'a>(
             }
             AccessPath::All => continue,
         }
-        query.push(" limit ").push_bind(FEW + 1).push(")");
+        query.push(" limit ").push_bind(counted + 1).push(")");
         let jobs: i64 = query
             .build_query_scalar()
             .fetch_one(&mut *connection)
@@ -216,8 +221,13 @@ async fn selective_path<'a>(
         if jobs <= FEW {
             return Ok(Some(path));
         }
+        // the others have the order of the list
+        let ordered = by_creation && !matches!(path, AccessPath::Ended);
+        if ordered && jobs <= MANY && fewest.is_none_or(|(_, least)| jobs < least) {
+            fewest = Some((path, jobs));
+        }
     }
-    Ok(None)
+    Ok(fewest.map(|(path, _)| path))
 }
 
 /// The access path if every filter matches many jobs: an index in the order of the list. It is one path, or one

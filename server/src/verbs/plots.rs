@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use files::plot::{self, Parts, Plot, Stress, Style, Theme};
+use files::plot::{self, Parts, Plot, Size, Stress, Style, Theme, image};
 use solver::{
     mesh::Mesh,
     problem::Problem,
@@ -13,27 +13,36 @@ use super::{
     fields,
     history::StoredHistory,
     jobs, profiles,
-    results::{self, Found, read},
+    results::{self, Found, StepResult, read},
     service::Service,
 };
 use crate::{
     caller::Caller,
     error::ApiError,
-    job::{Job, JobId},
+    formats::Format,
+    job::{Job, JobId, ResultAvailable},
     parameters::{Parameter, Variable, Words},
 };
 
-/// A figure in a path.
-pub const PLOT: Variable<Words<Plot>> = Variable {
+/// A figure in a path, and its format.
+pub const PLOT: Variable<Words<(Plot, Format)>> = Variable {
     name: "plot",
     kind: "plot",
-    meaning: "Which figure",
+    meaning: "Which figure, as which kind of file",
     values: Words(|| {
         vec![
-            ("mesh.svg", Plot::Mesh),
-            ("deformed.svg", Plot::Deformed),
-            ("profile.svg", Plot::Profile),
-            ("convergence.svg", Plot::Convergence),
+            ("mesh.svg", (Plot::Mesh, Format::Svg)),
+            ("mesh.png", (Plot::Mesh, Format::Png)),
+            ("mesh.pdf", (Plot::Mesh, Format::Pdf)),
+            ("deformed.svg", (Plot::Deformed, Format::Svg)),
+            ("deformed.png", (Plot::Deformed, Format::Png)),
+            ("deformed.pdf", (Plot::Deformed, Format::Pdf)),
+            ("profile.svg", (Plot::Profile, Format::Svg)),
+            ("profile.png", (Plot::Profile, Format::Png)),
+            ("profile.pdf", (Plot::Profile, Format::Pdf)),
+            ("convergence.svg", (Plot::Convergence, Format::Svg)),
+            ("convergence.png", (Plot::Convergence, Format::Png)),
+            ("convergence.pdf", (Plot::Convergence, Format::Pdf)),
         ]
     }),
 };
@@ -45,10 +54,23 @@ pub const THEME: Parameter<Words<Theme>> = Parameter {
     values: Words(|| vec![("light", Theme::Light), ("dark", Theme::Dark)]),
 };
 
+/// What a figure is for.
+pub const SIZE: Parameter<Words<Size>> = Parameter {
+    name: "size",
+    meaning: "What the figure is for, and so how large its letters are beside it: a column of 88 mm, a page of 160 mm, a slide of 254 mm; PNG and PDF have that width; default page",
+    values: Words(|| {
+        vec![
+            ("column", Size::Column),
+            ("page", Size::Page),
+            ("slide", Size::Slide),
+        ]
+    }),
+};
+
 /// The stress shown on a deformed body.
 pub const STRESS: Parameter<Words<Stress>> = Parameter {
     name: "stress",
-    meaning: "Stress shown in deformed.svg (no other plot); default von_mises",
+    meaning: "Stress shown in the figure `deformed` (no other); default von_mises",
     values: Words(|| {
         vec![
             ("von_mises", Stress::VonMises),
@@ -60,14 +82,32 @@ pub const STRESS: Parameter<Words<Stress>> = Parameter {
     }),
 };
 
-/// One figure as SVG, drawn from the stored data. Only the parts that it needs are read.
+/// What is asked for.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// Which figure.
+    pub plot: Plot,
+    /// As which kind of file.
+    pub format: Format,
+    /// How it looks.
+    pub style: Style,
+    /// At the end of this load step, by its name or its number from 0, instead of the last one.
+    pub step: Option<String>,
+}
+
+/// One figure, drawn from the stored data. Only the parts that it needs are read.
 pub async fn plot(
     service: &Arc<Service>,
     caller: &Caller,
     id: JobId,
-    plot: Plot,
-    style: Style,
-) -> Result<Found<String>, ApiError> {
+    figure: Figure,
+) -> Result<Found<Vec<u8>>, ApiError> {
+    let Figure {
+        plot,
+        format,
+        style,
+        step,
+    } = figure;
     // loaded once there is a permit, so that waiting requests use no memory
     let load = async {
         let mut found = match plot {
@@ -75,15 +115,25 @@ pub async fn plot(
             Plot::Mesh | Plot::Convergence => jobs::snapshot(service, caller, id).await?,
             Plot::Profile | Plot::Deformed => results::with_result(service, caller, id).await?,
         };
+        if step.is_some() && found.job.result_available == ResultAvailable::None {
+            return Err(results::no_result(&found.job));
+        }
+        let step = match &step {
+            None => None,
+            Some(wanted) => profiles::find_step(&mut found, wanted, id).await?,
+        };
+        let number = step.as_ref().map(|(number, _)| *number);
         let mut columns: Vec<(String, Vec<u8>)> = vec![];
-        let mut summary = None;
         if matches!(plot, Plot::Profile | Plot::Deformed) {
             for boundary in found.profiled_boundaries().await? {
-                let bytes = profiles::at_all_points(&mut found, &boundary, None).await?;
+                let bytes = profiles::at_all_points(&mut found, &boundary, number).await?;
                 columns.extend(bytes.map(|bytes| (boundary, bytes)));
             }
-            summary = found.part("summary").await?;
         }
+        let summary = match plot {
+            Plot::Mesh => None,
+            _ => found.part("summary").await?,
+        };
         let history = match plot {
             Plot::Convergence => Some(StoredHistory::load(service, &mut found).await?),
             _ => None,
@@ -120,49 +170,77 @@ pub async fn plot(
             }
             _ => None,
         };
-        Ok((job, problem, columns, summary, history, fields, stored))
-    };
-    let draw = move |(job, problem, columns, summary, history, fields, stored): Loaded| {
-        let summary: Option<Summary> = summary.map(|bytes| read(&bytes)).transpose()?;
-        let mut profiles: BTreeMap<String, ContactProfile> = BTreeMap::new();
-        for (boundary, bytes) in columns {
-            profiles.insert(boundary, read(&bytes)?);
-        }
-        let history = history.map_or(Ok(vec![]), StoredHistory::read)?;
-        let history: Vec<Iteration> = history.into_iter().map(|timed| timed.row).collect();
-        if plot == Plot::Convergence && history.is_empty() {
-            return Err(results::no_result(&job));
-        }
-        let fields = fields.unwrap_or_default();
-        let stored: Option<Mesh> = stored
-            .map(|bytes| postcard::from_bytes(&bytes).map_err(ApiError::internal))
-            .transpose()?;
-        let parts = Parts {
-            history: &history,
-            accuracy: summary.as_ref().and_then(|s| s.accuracy.as_ref()),
-            profiles: &profiles,
-            fields: &fields,
-            stored: stored.as_ref(),
-        };
-        let drawn = plot::draw(plot, style, &problem, &parts).map_err(|reason| {
-            ApiError::NotFound(format!("{id} has no plot {}: {reason}", plot.as_str()))
-        });
-        Ok(Found {
-            available: job.result_available,
-            content: drawn?,
+        Ok(Loaded {
+            job,
+            problem,
+            step,
+            columns,
+            summary,
+            history,
+            fields,
+            stored,
         })
+    };
+    let draw = move |loaded: Loaded| {
+        let available = loaded.job.result_available;
+        let drawn = loaded.draw(plot, style)?;
+        let image = format.image().unwrap_or_default();
+        let content = drawn.and_then(|svg| image::write(svg, style.size, image));
+        let content = content.map_err(|reason| {
+            ApiError::NotFound(format!("{id} has no plot {}: {reason}", plot.as_str()))
+        })?;
+        Ok(Found { available, content })
     };
     service.work_on(load, draw).await?
 }
 
-/// Job, problem, profiles, summary, history, fields and stored mesh, most in their stored form; the parts that a figure does
-/// not need are absent.
-type Loaded = (
-    Job,
-    Problem,
-    Vec<(String, Vec<u8>)>,
-    Option<Vec<u8>>,
-    Option<StoredHistory>,
-    Option<Fields>,
-    Option<Vec<u8>>,
-);
+/// What figures are drawn from, most in its stored form; the parts that a figure does not need are absent.
+struct Loaded {
+    job: Job,
+    problem: Problem,
+    /// The load step that was asked for, and its number.
+    step: Option<(usize, StepResult)>,
+    columns: Vec<(String, Vec<u8>)>,
+    summary: Option<Vec<u8>>,
+    history: Option<StoredHistory>,
+    fields: Option<Fields>,
+    stored: Option<Vec<u8>>,
+}
+
+impl Loaded {
+    /// As SVG; the inner `Err` is the reason why there is no such figure.
+    fn draw(self, plot: Plot, style: Style) -> Result<Result<String, String>, ApiError> {
+        let summary: Option<Summary> = self.summary.map(|bytes| read(&bytes)).transpose()?;
+        let mut profiles: BTreeMap<String, ContactProfile> = BTreeMap::new();
+        for (boundary, bytes) in self.columns {
+            profiles.insert(boundary, read(&bytes)?);
+        }
+        let history = self.history.map_or(Ok(vec![]), StoredHistory::read)?;
+        let mut history: Vec<Iteration> = history.into_iter().map(|timed| timed.row).collect();
+        if let Some((number, _)) = &self.step {
+            history.retain(|row| row.step as usize == *number);
+        }
+        if plot == Plot::Convergence && history.is_empty() {
+            return Err(results::no_result(&self.job));
+        }
+        let fields = self.fields.unwrap_or_default();
+        let stored: Option<Mesh> = self
+            .stored
+            .map(|bytes| postcard::from_bytes(&bytes).map_err(ApiError::internal))
+            .transpose()?;
+        let parts = Parts {
+            history: &history,
+            summary: match &self.step {
+                Some((_, step)) => Some(&step.summary),
+                None => summary.as_ref(),
+            },
+            // a load step that has ended is what it is, whatever becomes of the job
+            partial: self.step.is_none() && self.job.result_available != ResultAvailable::Final,
+            step: self.step.as_ref().map(|(_, step)| step.name.as_str()),
+            profiles: &profiles,
+            fields: &fields,
+            stored: stored.as_ref(),
+        };
+        Ok(plot::draw(plot, style, &self.problem, &parts))
+    }
+}

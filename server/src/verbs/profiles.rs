@@ -100,7 +100,7 @@ pub async fn profile(
     let available = found.job.result_available;
     let step = match step {
         None => None,
-        Some(wanted) => Some(step_number(&steps(&mut found).await?, wanted, id)?),
+        Some(wanted) => find_step(&mut found, wanted, id).await?.map(|step| step.0),
     };
     let here = match points {
         Points::All => ProfilePoints::All,
@@ -157,6 +157,21 @@ pub(super) async fn at_all_points(
         None => Ok(found.profile(boundary, ProfilePoints::Nodes, step).await?),
         all => Ok(all),
     }
+}
+
+/// A finished load step and its number, by its name or that number. `None`: the only step of a problem that has none, which is
+/// the last.
+pub(super) async fn find_step(
+    found: &mut Snapshot,
+    wanted: &str,
+    id: JobId,
+) -> Result<Option<(usize, StepResult)>, ApiError> {
+    let mut steps = steps(found).await?;
+    if steps.is_empty() && wanted == "0" {
+        return Ok(None);
+    }
+    let number = step_number(&steps, wanted, id)?;
+    Ok(Some((number, steps.swap_remove(number))))
 }
 
 fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, ApiError> {

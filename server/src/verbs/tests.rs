@@ -13,7 +13,7 @@ use super::{
     key::IDEMPOTENCY_KEY,
     lists,
     page::Paging,
-    plots,
+    plots::{self, Figure},
     profiles::{self, Points},
     results, retry,
     service::Service,
@@ -124,14 +124,13 @@ async fn a_job_of_another_is_not_found_by_any_verb() {
     unknown("fields", fields::fields(service, bob, id).await);
     let npz = fields::converted_fields(service, bob, id, Format::Npz);
     unknown("fields", npz.await);
-    let plot = plots::plot(
-        service,
-        bob,
-        id,
-        files::plot::Plot::Mesh,
-        Default::default(),
-    );
-    unknown("plot", plot.await);
+    let figure = Figure {
+        plot: files::plot::Plot::Mesh,
+        format: Format::Svg,
+        style: Default::default(),
+        step: None,
+    };
+    unknown("plot", plots::plot(service, bob, id, figure).await);
     let edit = Edit {
         pinned: Some(true),
         ..Edit::default()

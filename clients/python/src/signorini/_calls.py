@@ -274,8 +274,22 @@ def vtu(id: str) -> Call[bytes]:
     return Call("GET", _job(id) + "/fields", lambda r: r.content, (("format", "vtu"),))
 
 
-def plot(id: str, name: str, theme: str) -> Call[str]:
-    return Call("GET", f"{_job(id)}/plots/{name}.svg", lambda r: r.text, (("theme", theme),))
+def plot(id: str, name: str, ending: str, theme: str, size: str, step: int | str | None) -> Call[bytes]:
+    params: Params = (("theme", theme), ("size", size))
+    if step is not None:
+        params += (("step", str(step)),)
+    return Call("GET", f"{_job(id)}/plots/{quote(name, safe='')}.{ending}", lambda r: r.content, params)
+
+
+FIGURES = ("svg", "png", "pdf")
+
+
+def figure_ending(path: str | os.PathLike[str]) -> str:
+    """The kind of a file of a figure. Raises ValueError for another."""
+    ending = pathlib.Path(path).suffix[1:].lower()
+    if ending not in FIGURES:
+        raise ValueError(f"{os.fspath(path)!r} must end with .{', .'.join(FIGURES)}")
+    return ending
 
 
 def _job(id: str) -> str:

@@ -1,7 +1,7 @@
 """How figures look: sizes, fonts, colours.
 
 The colours are those of Okabe and Ito, which people with any of the common kinds of colour blindness tell apart; what
-differs in colour differs in line style or in words besides.
+differs in colour differs in line style or in words besides. The figures that the service draws have the same.
 """
 
 from __future__ import annotations
@@ -27,14 +27,17 @@ class Theme:
     stick: str = "#009E73"
     slip: str = "#E69F00"
     obstacle: str = "#999999"
-    good: str = "#009E73"
-    fair: str = "#B07A00"
-    poor: str = "#D55E00"
+    good: str = "#007A5A"
+    fair: str = "#996900"
+    poor: str = "#C85000"
 
 
 THEMES = {
-    "light": Theme("#ffffff", "#1a1a1a", "#8a8a8a"),
-    "dark": Theme("#16181c", "#e8e8e8", "#8f959e", normal="#56B4E9", tangential="#FF8A3D", fair="#F0C05A"),
+    "light": Theme("#ffffff", "#1a1a1a", "#767676"),
+    "dark": Theme(
+        "#16181c", "#e8e8e8", "#969ca5", normal="#56B4E9", tangential="#FF8A3D", obstacle="#787c82",
+        good="#009E73", fair="#F0C05A", poor="#FF8A3D",
+    ),  # fmt: skip
 }
 
 QUANTITIES = {

@@ -300,8 +300,21 @@ class AsyncJob(JobView):
         document = await self._client._send(calls.result(self.id))
         return AsyncResult(self._client, self, document)
 
-    async def svg(self, plot: str, theme: str = "light") -> str:
-        return await self._client._send(calls.plot(self.id, plot, theme))
+    async def svg(self, plot: str, theme: str = "light", *, size: str = "page", step: int | str | None = None) -> str:
+        found = await self._client._send(calls.plot(self.id, plot, "svg", theme, size, step))
+        return found.decode()
+
+    async def save_figure(
+        self,
+        path: str | os.PathLike[str],
+        plot: str = "profile",
+        theme: str = "light",
+        *,
+        size: str = "page",
+        step: int | str | None = None,
+    ) -> pathlib.Path:
+        ending = calls.figure_ending(path)
+        return write(path, await self._client._send(calls.plot(self.id, plot, ending, theme, size, step)))
 
 
 class AsyncResult(Summary):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import pathlib
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +12,7 @@ from ._data import Event
 from ._job import JobView, changes
 from ._progress import Waiting
 from .problem import Problem
-from .result import Result
+from .result import Result, write
 
 if TYPE_CHECKING:
     from .client import Client
@@ -107,6 +109,23 @@ class Job(JobView):
             self.raise_for_status()
         return Result(self._client, self, self._client._send(calls.result(self.id)))
 
-    def svg(self, plot: str, theme: str = "light") -> str:
-        """A figure that the service draws: `profile`, `convergence`, `deformed` or `mesh`."""
-        return self._client._send(calls.plot(self.id, plot, theme))
+    def svg(self, plot: str, theme: str = "light", *, size: str = "page", step: int | str | None = None) -> str:
+        """A figure that the service draws: `profile`, `convergence`, `deformed` or `mesh`.
+
+        size: what it is for: `column`, `page` or `slide`
+        step: the load step at whose end it is, by name or number; of `profile` and `convergence`
+        """
+        return self._client._send(calls.plot(self.id, plot, "svg", theme, size, step)).decode()
+
+    def save_figure(
+        self,
+        path: str | os.PathLike[str],
+        plot: str = "profile",
+        theme: str = "light",
+        *,
+        size: str = "page",
+        step: int | str | None = None,
+    ) -> pathlib.Path:
+        """The same as a file, of the kind that its name ends with: .svg, .png (300 dots to an inch) or .pdf."""
+        ending = calls.figure_ending(path)
+        return write(path, self._client._send(calls.plot(self.id, plot, ending, theme, size, step)))

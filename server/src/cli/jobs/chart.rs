@@ -45,7 +45,12 @@ impl Chart {
             return format!("{}: there is nothing to draw\n", self.title);
         }
         let across = range(all().map(|point| point.0));
-        let up = range(all().map(|point| point.1));
+        let mut up = range(all().map(|point| point.1));
+        if self.logarithmic {
+            // labels are whole powers of ten, also that in the middle
+            let (low, high) = (up[0].floor(), up[1].ceil());
+            up = [low, high + (high - low).rem_euclid(2.0)];
+        }
         let datasets = shown
             .iter()
             .zip(COLOURS)
@@ -58,7 +63,7 @@ impl Chart {
                     .data(points)
             });
         let label = |value: f64| match self.logarithmic {
-            true => format!("1e{value:.0}"),
+            true => format!("1e{}", value as i32),
             false => short(value),
         };
         let middle = |[low, high]: [f64; 2]| (low + high) / 2.0;

@@ -59,6 +59,10 @@ impl Outage {
             Some(CallError::Refused(refusal)) => refusal.status == 429 || refusal.status >= 500,
             None => false,
         };
+        if passing && self.since.is_none() {
+            let minutes = PATIENCE.as_secs() / 60;
+            eprintln!("signorini: {error}; trying again for {minutes} minutes");
+        }
         let since = *self.since.get_or_insert_with(Instant::now);
         if !passing || since.elapsed() > PATIENCE {
             return Err(error);

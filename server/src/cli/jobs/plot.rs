@@ -8,8 +8,7 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
-use files::plot::{Plot, Theme};
-use reqwest::Method;
+use files::plot::Plot;
 use serde_json::Value;
 use solver::solution::ContactProfile;
 
@@ -23,11 +22,14 @@ use super::{
     id::Id,
     result::download,
 };
-use crate::{event::TimedIteration, job::JobId, run::Summary};
+use crate::{
+    event::TimedIteration, formats::Format, job::JobId, run::Summary,
+    verbs::results::RESULT_AVAILABLE,
+};
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  signorini plot job_…\n  signorini plot job_… deformed -o punch.svg\n  \
+    after_help = "Examples:\n  signorini plot job_…\n  signorini plot job_… deformed -o punch.pdf --size column\n  \
     signorini plot job_… mesh --open"
 )]
 pub(in crate::cli) struct Arguments {
@@ -38,17 +40,16 @@ pub(in crate::cli) struct Arguments {
     /// are drawn
     plot: Option<Plot>,
 
-    /// Write it to this SVG file instead
+    /// Write it to this file instead: .svg, .png or .pdf
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 
-    /// Open it with the program that this machine uses for SVG
+    /// Open it with the program that this machine uses for such a file
     #[arg(long)]
     open: bool,
 
-    /// Colours of a file: light or dark
-    #[arg(long, default_value = "light")]
-    theme: Theme,
+    #[command(flatten)]
+    look: output::Look,
 
     #[command(flatten)]
     service: Connection,
@@ -73,34 +74,41 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     if arguments.output.is_some() || arguments.open || !drawn {
         let plot = arguments.plot.unwrap_or(Plot::Profile);
         let name = <&str>::from(plot);
-        let Some(path) = arguments.output.clone().or_else(|| {
-            let folder = std::env::temp_dir();
-            arguments
-                .open
-                .then(|| folder.join(format!("signorini-{id}.{name}.svg")))
-        }) else {
+        let path = match &arguments.output {
+            Some(path) => path.clone(),
+            None if arguments.open => {
+                // a name that nobody could have prepared: the folder is everybody's
+                let mut builder = tempfile::Builder::new();
+                builder.prefix("signorini-").suffix(".svg");
+                let (_, path) = builder.tempfile()?.keep()?;
+                path
+            }
+            None => {
+                eprintln!(
+                    "signorini: {name} is not drawn in a terminal: write it by -o FILE.svg, or look at it by --open"
+                );
+                return Ok(Exit::Invalid);
+            }
+        };
+        let ending = path.extension().unwrap_or_default();
+        let mut formats = Format::OF_FIGURES.iter();
+        let Some(format) = formats.find(|format| ending.eq_ignore_ascii_case(format.name())) else {
             eprintln!(
-                "signorini: {name} is not drawn in a terminal: write it by -o FILE.svg, or look at it by --open"
+                "signorini: -o {}: the file must have one of the extensions {}",
+                path.display(),
+                Format::endings(Format::OF_FIGURES)
             );
             return Ok(Exit::Invalid);
         };
-        if path
-            .extension()
-            .is_none_or(|ending| !ending.eq_ignore_ascii_case("svg"))
-        {
+        let look = arguments.look.query();
+        let route = format!("/v1/jobs/{id}/plots/{name}.{}?{look}", format.name());
+        let answer = service.fetch(&route).await?;
+        let available = answer.headers().get(RESULT_AVAILABLE);
+        if available.is_some_and(|available| available == "partial") {
             eprintln!(
-                "signorini: -o {}: the file must have the extension .svg",
-                path.display()
+                "signorini: the result is partial: the job has not ended, or did not converge"
             );
-            return Ok(Exit::Invalid);
         }
-        let route = format!(
-            "/v1/jobs/{id}/plots/{name}.svg?theme={}",
-            <&str>::from(arguments.theme)
-        );
-        let answer = service
-            .send_surely(service.request(Method::GET, &route))
-            .await?;
         download(&service, &path, answer)?;
         eprintln!("{}", path.display());
         if arguments.open {
@@ -187,8 +195,7 @@ async fn convergence(service: &Service, id: JobId) -> anyhow::Result<Chart> {
         name,
         points: rows
             .iter()
-            .enumerate()
-            .map(|(place, row)| (1.0 + place as f64, value(row)))
+            .map(|timed| (f64::from(timed.row.k), value(timed)))
             .collect(),
     };
     Ok(Chart {

@@ -7,9 +7,9 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::Args;
-use files::plot::Theme;
+use files::plot::Plot;
 use form_urlencoded::Serializer;
-use reqwest::{Method, Response};
+use reqwest::Response;
 use serde::Deserialize;
 use serde_json::Value;
 use solver::solution::ContactProfile;
@@ -18,7 +18,7 @@ use tokio::{runtime::Handle, task::block_in_place};
 use super::{
     super::{
         exit::Exit,
-        output::{self, Output, Part},
+        output::{self, Look, Output, Part},
         report,
         service::{Connection, Service, segment},
     },
@@ -61,9 +61,8 @@ pub(in crate::cli) struct Arguments {
     #[arg(short, long, value_name = "OUT")]
     output: Vec<PathBuf>,
 
-    /// Colours of a figure: light or dark
-    #[arg(long, default_value = "light")]
-    theme: Theme,
+    #[command(flatten)]
+    look: Look,
 
     #[command(flatten)]
     service: Connection,
@@ -92,6 +91,9 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let document: Value = service.get(&format!("{base}/result")).await?;
     let scalars: Scalars = serde_json::from_value(document.clone())
         .context("the result is not that of this version of signorini")?;
+    if document["result_available"] == "partial" {
+        eprintln!("signorini: the result is partial: the job has not ended, or did not converge");
+    }
     let contacts: Vec<&str> = scalars
         .summary
         .solution
@@ -112,8 +114,12 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                 return Ok(Exit::Invalid);
             }
         };
+        if let Some(vain) = outputs.iter().find_map(|one| arguments.vain(&one.part)) {
+            eprintln!("signorini: {vain}");
+            return Ok(Exit::Invalid);
+        }
         for output in &outputs {
-            save(&service, &base, output, &document, arguments.theme).await?;
+            save(&service, &base, output, &document, &arguments).await?;
         }
         return Ok(Exit::Ok);
     }
@@ -145,11 +151,8 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                 return Ok(Exit::Invalid);
             }
         };
-        let mut query = Serializer::new(String::new());
-        query.append_pair("format", of_rows(arguments.format));
-        query.extend_pairs(arguments.points.iter().map(|points| ("points", points)));
-        query.extend_pairs(arguments.step.iter().map(|step| ("step", step)));
-        let path = format!("{base}/profiles/{}?{}", segment(boundary), query.finish());
+        let query = arguments.of_profile(of_rows(arguments.format));
+        let path = format!("{base}/profiles/{}?{query}", segment(boundary));
         let columns = |text: &str| -> anyhow::Result<String> {
             let profile: ContactProfile = serde_json::from_str(text)?;
             Ok(report::profile(&profile))
@@ -164,11 +167,32 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         .steps
         .iter()
         .map(|step| (step.name.as_str(), &step.summary));
-    if document["result_available"] == "partial" {
-        eprintln!("signorini: the result is partial: the job has not ended, or did not converge");
-    }
     output::print(&report::result(None, &scalars.summary, steps))?;
     Ok(Exit::Ok)
+}
+
+impl Arguments {
+    /// The query of a profile.
+    fn of_profile(&self, format: &str) -> String {
+        let mut query = Serializer::new(String::new());
+        query.append_pair("format", format);
+        query.extend_pairs(self.points.iter().map(|points| ("points", points)));
+        query.extend_pairs(self.step.iter().map(|step| ("step", step)));
+        query.finish()
+    }
+
+    /// Why an option has no effect on a part that is to be written.
+    fn vain(&self, part: &Part) -> Option<&'static str> {
+        let profile = matches!(part, Part::Profile(_));
+        let stepped = profile || matches!(part, Part::Plot(Plot::Profile | Plot::Convergence));
+        match () {
+            () if self.step.is_some() && !stepped => {
+                Some("--step is for profiles, and for the figures profile and convergence")
+            }
+            () if self.points.is_some() && !profile => Some("--points is for profiles"),
+            () => None,
+        }
+    }
 }
 
 /// The service's word for it; a table is made of JSON.
@@ -187,9 +211,7 @@ async fn print(
     format: Format,
     as_table: impl Fn(&str) -> anyhow::Result<String>,
 ) -> anyhow::Result<Exit> {
-    let answer = service
-        .send_surely(service.request(Method::GET, path))
-        .await?;
+    let answer = service.fetch(path).await?;
     match format {
         Format::Table => {
             let text = answer
@@ -226,7 +248,9 @@ async fn of_sweep(service: &Service, base: &str, arguments: &Arguments) -> anyho
                 return Ok(Exit::Invalid);
             }
         };
-        let answer = fetch(service, &format!("{base}/results?format={}", format.name())).await?;
+        let answer = service
+            .fetch(&format!("{base}/results?format={}", format.name()))
+            .await?;
         download(service, output, answer)?;
     }
     if arguments.output.is_empty() {
@@ -236,16 +260,12 @@ async fn of_sweep(service: &Service, base: &str, arguments: &Arguments) -> anyho
             Format::Jsonl => "jsonl",
             Format::Json => "json",
         };
-        let answer = fetch(service, &format!("{base}/results?format={format}")).await?;
+        let answer = service
+            .fetch(&format!("{base}/results?format={format}"))
+            .await?;
         write(service, answer, &mut std::io::stdout())?;
     }
     Ok(Exit::Ok)
-}
-
-async fn fetch(service: &Service, path: &str) -> anyhow::Result<Response> {
-    service
-        .send_surely(service.request(Method::GET, path))
-        .await
 }
 
 /// Writes one part to its file.
@@ -254,34 +274,37 @@ async fn save(
     base: &str,
     output: &Output,
     document: &Value,
-    theme: Theme,
+    arguments: &Arguments,
 ) -> anyhow::Result<()> {
     let format = output.format.name();
     let path = match &output.part {
         Part::Summary => None,
-        Part::Everything if format == "json" => None,
         Part::Everything => bail!(
-            "-o {}: name the part before the extension: NAME.fields.npz, NAME.profile.npz or NAME.history.npz",
+            "-o {}: name the part before the extension: NAME.summary.json, or NAME.fields, NAME.profile or NAME.history with .json or .npz",
             output.path.as_deref().unwrap_or(Path::new("-")).display()
         ),
-        Part::Profile(boundary) => Some(format!("profiles/{}?format={format}", segment(boundary))),
+        Part::Profile(boundary) => {
+            let query = arguments.of_profile(format);
+            Some(format!("profiles/{}?{query}", segment(boundary)))
+        }
         Part::History => Some(format!("history?format={format}")),
         Part::Fields => Some(format!("fields?format={format}")),
-        Part::Plot(plot) => Some(format!(
-            "plots/{}.svg?theme={}",
-            <&str>::from(*plot),
-            <&str>::from(theme)
-        )),
+        Part::Plot(plot) => {
+            let mut query = Serializer::new(arguments.look.query());
+            query.extend_pairs(arguments.step.iter().map(|step| ("step", step)));
+            let (plot, query) = (plot.as_str(), query.finish());
+            Some(format!("plots/{plot}.{format}?{query}"))
+        }
     };
     let Some(path) = path else {
-        let text = format!("{document:#}\n");
+        let text = format!("{:#}\n", document["summary"]);
         return match &output.path {
             Some(path) => output::replace(path, |out| Ok(out.write_all(text.as_bytes())?))
                 .with_context(|| format!("cannot write {}", path.display())),
             None => Ok(output::print(&text)?),
         };
     };
-    let answer = fetch(service, &format!("{base}/{path}")).await?;
+    let answer = service.fetch(&format!("{base}/{path}")).await?;
     match &output.path {
         Some(file) => download(service, file, answer),
         None => write(service, answer, &mut std::io::stdout()),

@@ -140,7 +140,10 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             eprintln!("{id}");
             return watch::follow(&service, *id, watch::Format::Table).await;
         }
-        _ if arguments.wait => return wait::all(&service, &ids, None, shown).await,
+        _ if arguments.wait => {
+            ids.iter().for_each(|id| eprintln!("{id}"));
+            return wait::all(&service, &ids, None, shown).await;
+        }
         _ => shown.print(&Found::of(documents))?,
     }
     Ok(Exit::Ok)

@@ -20,7 +20,7 @@ use crate::{
     verbs::{
         history::MAX_POINTS,
         jobs::ID,
-        plots::{PLOT, STRESS, THEME},
+        plots::{PLOT, SIZE, STRESS, THEME},
         profiles::{BOUNDARY, POINTS, STEP},
         results::JobResult,
     },
@@ -73,15 +73,19 @@ pub(super) fn operations() -> Vec<Operation> {
         get(
             READ,
             "/v1/jobs/{id}/plots/{plot}",
-            (ID, PLOT, THEME, STRESS),
+            (ID, PLOT, THEME, SIZE, STRESS, STEP, PART),
             plots::plot,
         )
         .rest_only("GetPlot")
         .summary("Draws a figure: mesh, deformed body, stresses along the contact, convergence")
-        .answers(200, "The figure", bytes("image/svg+xml"))
-        .with([result_available()])
+        .file("The figure", figures())
         .fails(NO_RESULT),
     ]
+}
+
+fn figures() -> Content {
+    let media = Format::OF_FIGURES.iter().map(|format| format.media_type());
+    media.flat_map(bytes).collect()
 }
 
 /// The errors if there is nothing to return.
