@@ -4,9 +4,10 @@ use plotters::prelude::*;
 use plotters::style::RGBColor;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::Style;
 use super::body::{Frame, Path};
-use super::page::{self, Area, Fallible, number, px, round_up, rounded};
+use super::numbers::{number, round_up, rounded};
+use super::page::{self, Area, Fallible, px};
+use super::style::Style;
 use super::theme::{ColourMap, hex};
 use solver::element::{Element, Family};
 

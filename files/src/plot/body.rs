@@ -6,8 +6,9 @@ use std::fmt::Write;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::Style;
-use super::page::{self, Area, Fallible, draw_text, px, tick};
+use super::numbers::tick;
+use super::page::{self, Area, Fallible, draw_text, px};
+use super::style::Style;
 use super::theme::hex;
 use solver::element::Element;
 use solver::mesh::runs;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use solver::problem::{Contact, Problem};
 use solver::solution::{Outcome, Summary, Verdict};
 
-use super::page::number;
+use super::numbers::number;
 
 /// The texts around a figure.
 #[derive(Clone, Debug, Default, PartialEq)]

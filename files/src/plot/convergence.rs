@@ -1,8 +1,8 @@
 //! Residuals and the contact set by iteration.
 
-use super::Style;
 use super::caption::Caption;
 use super::figure::{Curve, LineStyle, Panel, Scale, figure};
+use super::style::Style;
 use solver::error::shortened;
 use solver::problem::Problem;
 use solver::solution::Iteration;

@@ -1,16 +1,16 @@
 //! The deformed body, filled with its stresses, over its undeformed outline.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::str::FromStr;
 
 use plotters::prelude::*;
 
-use super::Style;
 use super::bands::{BAR, Bands};
 use super::body::{self, Frame, Path, Sides, Window};
 use super::caption::Caption;
+use super::numbers::{number, round_up};
 use super::obstacle::Face;
-use super::page::{self, Area, Fallible, draw_text, number, px, with_unit};
+use super::page::{self, Area, Fallible, draw_text, px, with_unit};
+use super::style::{Stress, Style};
 use super::theme::hex;
 use crate::stress::von_mises;
 use solver::problem::{Analysis, Condition, Problem};
@@ -23,37 +23,6 @@ const SMALL: f64 = 0.2;
 /// Height of the legend (pixels), and width of the line along the contact.
 const LEGEND: i32 = 24;
 const LINE: i32 = 4;
-
-/// The stress that the contours show.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Stress {
-    /// √(½((σ_xx − σ_yy)² + (σ_yy − σ_zz)² + (σ_zz − σ_xx)²) + 3σ_xy²).
-    #[default]
-    VonMises,
-    /// σ_xx (σ_rr).
-    Xx,
-    /// σ_yy (σ_zz in axisymmetry).
-    Yy,
-    /// σ_zz (σ_θθ in axisymmetry).
-    Zz,
-    /// σ_xy (σ_rz).
-    Xy,
-}
-
-impl FromStr for Stress {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "von_mises" => Ok(Stress::VonMises),
-            "xx" => Ok(Stress::Xx),
-            "yy" => Ok(Stress::Yy),
-            "zz" => Ok(Stress::Zz),
-            "xy" => Ok(Stress::Xy),
-            _ => Err("expected von_mises, xx, yy, zz or xy".to_owned()),
-        }
-    }
-}
 
 impl Stress {
     /// At a node.
@@ -295,7 +264,7 @@ fn visible(wanted: f64, largest: f64) -> f64 {
         return 1.0;
     }
     // rounded down: the reciprocal is rounded up
-    1.0 / page::round_up(1.0 / factor, &[1.0, 2.0, 5.0])
+    1.0 / round_up(1.0 / factor, &[1.0, 2.0, 5.0])
 }
 
 /// A body and its displacements.

@@ -7,9 +7,10 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::Style;
 use super::caption::Caption;
-use super::page::{self, Area, Fallible, LETTERS, draw_text, number, px, rounded, tick};
+use super::numbers::{number, rounded, tick};
+use super::page::{self, Area, Fallible, LETTERS, draw_text, px};
+use super::style::Style;
 use super::theme::Palette;
 
 /// Of the axes of a panel, without names and legend (pixels).

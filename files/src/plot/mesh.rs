@@ -10,11 +10,11 @@ use solver::model::Model;
 use solver::problem::Problem;
 use solver::solution::Fields;
 
-use super::Style;
 use super::body::{self, Frame, Path, Sides, Window};
 use super::caption::Caption;
 use super::obstacle::Face;
 use super::page::{self, draw_text, px, with_unit};
+use super::style::Style;
 use super::theme::hex;
 use crate::external::external_mesh;
 

@@ -12,27 +12,28 @@ mod deformed;
 mod figure;
 pub mod image;
 mod mesh;
+mod numbers;
 mod obstacle;
 mod page;
 mod profile;
+mod style;
 mod theme;
 
 use std::collections::BTreeMap;
-use std::str::FromStr;
 
 pub use caption::{Caption, Mark};
 pub use convergence::convergence_svg;
-pub use deformed::{Stress, deformed_svg};
+pub use deformed::deformed_svg;
 pub use figure::{Above, Curve, LineStyle, Panel, Scale, Shade, ShadeKind, figure};
 pub use mesh::mesh_svg;
 pub use profile::profile_svg;
+pub use style::{Size, Stress, Style};
 pub use theme::Theme;
 
 use solver::mesh::Mesh;
 use solver::problem::Problem;
 use solver::solution::{ContactProfile, Fields, Iteration, Summary};
 use strum::{EnumString, IntoStaticStr, VariantArray};
-use theme::Palette;
 
 /// The figures of a problem and its solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
@@ -75,80 +76,6 @@ pub struct Parts<'a> {
     pub fields: &'a Fields,
     /// The mesh that the problem names by its hash, if it does; for `mesh`.
     pub stored: Option<&'a Mesh>,
-}
-
-/// What a figure is for: how wide it is beside its letters.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr, VariantArray)]
-#[strum(serialize_all = "snake_case")]
-pub enum Size {
-    /// A column of a journal, 88 mm: letters of 7 pt.
-    Column,
-    /// A page, 160 mm: letters of 9 pt.
-    #[default]
-    Page,
-    /// A slide, 254 mm: letters of 15 pt.
-    Slide,
-}
-
-impl FromStr for Size {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let named = Size::VARIANTS.iter().find(|size| size.as_str() == text);
-        named
-            .copied()
-            .ok_or_else(|| "expected column, page or slide".to_owned())
-    }
-}
-
-impl Size {
-    /// Its name in queries.
-    pub fn as_str(self) -> &'static str {
-        self.into()
-    }
-
-    /// The width on paper.
-    fn millimetres(self) -> f64 {
-        match self {
-            Size::Column => 88.0,
-            Size::Page => 160.0,
-            Size::Slide => 254.0,
-        }
-    }
-}
-
-/// How a figure is drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Style {
-    /// Its colours.
-    pub theme: Theme,
-    /// Its width.
-    pub size: Size,
-    /// The stress that the contours of `deformed` show.
-    pub stress: Stress,
-}
-
-impl Style {
-    fn palette(self) -> Palette {
-        self.theme.palette()
-    }
-
-    /// In pixels, of which letters have 15.
-    fn width(self) -> i32 {
-        match self.size {
-            Size::Column => 520,
-            Size::Page | Size::Slide => 720,
-        }
-    }
-}
-
-impl From<Theme> for Style {
-    fn from(theme: Theme) -> Self {
-        Style {
-            theme,
-            ..Style::default()
-        }
-    }
 }
 
 /// Draws one figure. `Err`: the reason why it could not be drawn.

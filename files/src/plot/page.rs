@@ -4,8 +4,8 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::Style;
 use super::caption::{Caption, Mark};
+use super::style::Style;
 use super::theme::hex;
 use solver::error::shortened;
 use solver::problem::Units;
@@ -287,50 +287,6 @@ pub(super) fn stress(units: &Option<Units>) -> Option<&str> {
     units.as_ref()?.stress.as_deref()
 }
 
-/// A number for an axis: at most six digits, without trailing zeros, with a true minus.
-pub(super) fn number(value: f64) -> String {
-    digits(value).replace('-', "−")
-}
-
-/// A number of three digits: more would suggest an accuracy that there is not.
-pub(super) fn rounded(value: f64) -> String {
-    let unit = 10f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 2.0);
-    number((value / unit).round() * unit)
-}
-
-/// The number of a tick on an axis of some length: a rounding error beside zero is zero.
-pub(super) fn tick(value: f64, length: f64) -> String {
-    let small = value.abs() < 1e-9 * length.abs();
-    number(if small { 0.0 } else { value })
-}
-
-fn digits(value: f64) -> String {
-    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
-        let text = format!("{value:.3e}");
-        let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
-        let digits = match digits.contains('.') {
-            true => digits.trim_end_matches('0').trim_end_matches('.'),
-            false => digits,
-        };
-        return format!("{digits}e{power}");
-    }
-    let digits = 5 - (value.abs().max(1.0).log10().floor() as usize).min(5);
-    let text = format!("{value:.digits$}");
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
-    }
-}
-
-/// The first of these steps, times a power of ten, that is not below a positive number.
-pub(super) fn round_up(value: f64, steps: &[f64]) -> f64 {
-    let power = 10f64.powf(value.log10().floor());
-    let mut rounds = steps.iter().map(|step| step * power);
-    // up to rounding above counts as equal
-    let fits = rounds.find(|round| *round >= value * (1.0 - 1e-9));
-    fits.unwrap_or(10.0 * power)
-}
-
 /// A rectangle of a colour that lets what is behind it be seen, as SVG.
 pub(super) fn tinted(colour: RGBColor, opacity: f64) -> String {
     format!(r#"fill="{}" fill-opacity="{opacity}""#, hex(colour))
@@ -340,35 +296,6 @@ pub(super) fn tinted(colour: RGBColor, opacity: f64) -> String {
 mod tests {
     use super::*;
     use crate::plot::{Size, Theme};
-
-    #[test]
-    fn axis_numbers_are_short() {
-        for (value, text) in [
-            (0.0, "0"),
-            (0.1 + 0.2, "0.3"),
-            (-11507.26, "−11507.3"),
-            (250.0, "250"),
-            (1e-9, "1e−9"),
-            (2.5e7, "2.5e7"),
-        ] {
-            assert_eq!(number(value), text);
-        }
-        assert_eq!(rounded(-186_868.83), "−187000");
-        assert_eq!(rounded(0.0), "0");
-    }
-
-    #[test]
-    fn a_rounding_error_beside_zero_is_shown_as_zero() {
-        assert_eq!(tick(1.388e-17, 0.1), "0");
-        assert_eq!(tick(1.388e-17, 1e-16), "1.388e−17");
-    }
-
-    #[test]
-    fn round_numbers_are_one_two_and_five() {
-        for (value, round) in [(0.9, 1.0), (1.1, 2.0), (3.0, 5.0), (5.0, 5.0), (7e-4, 1e-3)] {
-            assert!((round_up(value, &[1.0, 2.0, 5.0]) - round).abs() < 1e-12 * round);
-        }
-    }
 
     #[test]
     fn a_title_is_escaped_and_shortened() {
@@ -409,11 +336,7 @@ mod tests {
         assert_eq!(lines(Size::Page, 1), (1, Some(0)));
         assert_eq!(lines(Size::Column, 1), (2, Some(1)), "no room beside it");
         assert_eq!(lines(Size::Page, 3).0, 3);
-        assert_eq!(
-            lines(Size::Page, 30).0,
-            LINES + 1,
-            "and the mark is not lost"
-        );
+        assert_eq!(lines(Size::Page, 30), (LINES, Some(0)));
         let foot = foot(style(Size::Column), &caption(1));
         assert!(
             foot.len() > 2 && foot[0].starts_with("Warnings: an assumption"),

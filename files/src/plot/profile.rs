@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::Style;
 use super::body::coordinates;
 use super::caption::Caption;
 use super::figure::{Above, Curve, LineStyle, Panel, Scale, Shade, ShadeKind, figure};
 use super::page::{self, with_unit};
+use super::style::Style;
 use solver::error::shortened;
 use solver::problem::{Contact, Problem};
 use solver::solution::{ContactProfile, ErrorMethod, NodeState, QuantityName, Summary};

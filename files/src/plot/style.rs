@@ -1,0 +1,112 @@
+//! How a figure is drawn: its colours, its width, the stress that it shows.
+
+use std::str::FromStr;
+
+use strum::{IntoStaticStr, VariantArray};
+
+use super::theme::{Palette, Theme};
+
+/// What a figure is for: how wide it is beside its letters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "snake_case")]
+pub enum Size {
+    /// A column of a journal, 88 mm: letters of 7 pt.
+    Column,
+    /// A page, 160 mm: letters of 9 pt.
+    #[default]
+    Page,
+    /// A slide, 254 mm: letters of 15 pt.
+    Slide,
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = Size::VARIANTS.iter().find(|size| size.as_str() == text);
+        named
+            .copied()
+            .ok_or_else(|| "expected column, page or slide".to_owned())
+    }
+}
+
+impl Size {
+    /// Its name in queries.
+    pub fn as_str(self) -> &'static str {
+        self.into()
+    }
+
+    /// The width on paper.
+    pub(super) fn millimetres(self) -> f64 {
+        match self {
+            Size::Column => 88.0,
+            Size::Page => 160.0,
+            Size::Slide => 254.0,
+        }
+    }
+}
+
+/// How a figure is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Style {
+    /// Its colours.
+    pub theme: Theme,
+    /// Its width.
+    pub size: Size,
+    /// The stress that the contours of `deformed` show.
+    pub stress: Stress,
+}
+
+impl Style {
+    pub(super) fn palette(self) -> Palette {
+        self.theme.palette()
+    }
+
+    /// In pixels, of which letters have 15.
+    pub(super) fn width(self) -> i32 {
+        match self.size {
+            Size::Column => 520,
+            Size::Page | Size::Slide => 720,
+        }
+    }
+}
+
+impl From<Theme> for Style {
+    fn from(theme: Theme) -> Self {
+        Style {
+            theme,
+            ..Style::default()
+        }
+    }
+}
+
+/// The stress that the contours show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stress {
+    /// √(½((σ_xx − σ_yy)² + (σ_yy − σ_zz)² + (σ_zz − σ_xx)²) + 3σ_xy²).
+    #[default]
+    VonMises,
+    /// σ_xx (σ_rr).
+    Xx,
+    /// σ_yy (σ_zz in axisymmetry).
+    Yy,
+    /// σ_zz (σ_θθ in axisymmetry).
+    Zz,
+    /// σ_xy (σ_rz).
+    Xy,
+}
+
+impl FromStr for Stress {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "von_mises" => Ok(Stress::VonMises),
+            "xx" => Ok(Stress::Xx),
+            "yy" => Ok(Stress::Yy),
+            "zz" => Ok(Stress::Zz),
+            "xy" => Ok(Stress::Xy),
+            _ => Err("expected von_mises, xx, yy, zz or xy".to_owned()),
+        }
+    }
+}
