@@ -7,6 +7,7 @@
 mod check;
 mod neighbours;
 mod numbers;
+mod parametrised;
 mod path;
 mod plan;
 mod read;
@@ -16,6 +17,7 @@ mod values;
 pub use check::{Group, MOST_TOLD, groups, has_own_meshes};
 pub use neighbours::Neighbour;
 pub use numbers::{Problems, Read};
+pub use parametrised::Parametrised;
 pub use plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, MOST_VALUE_BYTES, Mode, Plan};
 pub use read::{Sweep, read};
 pub use values::Fields;

@@ -158,7 +158,8 @@ fn mode(raw: Option<&RawValue>, found: &mut Findings) -> Option<Mode> {
     mode
 }
 
-fn leads_nowhere(path: &Path, nowhere: &Nowhere) -> Violation {
+/// The violation of a pointer that leads nowhere in the problem.
+pub(super) fn leads_nowhere(path: &Path, nowhere: &Nowhere) -> Violation {
     let Nowhere {
         parent,
         token,
