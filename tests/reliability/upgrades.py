@@ -2,7 +2,7 @@
 
     upgrades.py [--soak] [SEED]
 
-A store is filled by the service: jobs of each kind of end, one that waits, labels, keys, a mesh, a sweep, a deletion. For
+A store is filled by the service: jobs of each kind of end, one that waits, labels, keys, a mesh, a sweep, a model, a deletion. For
 each earlier version of its tables, a store is made by the migrations up to that one, and gets what that version would
 have stored of all this. The service starts on it, and what was stored is served as before, byte by byte where that
 version stored it; the waiting job is solved. On the way it is backed up and restored as it is. Then the upgrade is killed before its n-th write or sync, and started again.
@@ -37,10 +37,13 @@ OLD_NAMES = {("job", "twin_of"): "coalesced_into"}
 NOT_COPIED = ("_sqlx_migrations", "sqlite_sequence", "progress", "owner_size")
 # the first version that stores results compactly
 COMPACT = 10
+# the first version that has models
+MODELS = 12
+MODEL = {"problem": example(), "inputs": [["/contacts/0/indentation"]], "outputs": [{"scalars": ["normal_force"]}]}
 PIECE_BYTES = 256 << 10
 
 
-def everything(server, jobs, mesh, sweep):
+def everything(server, jobs, mesh, sweep, model):
     """Digests of what is served, by path."""
     paths = ["/v1/jobs/%s%s" % (job, part) for job in jobs
              for part in ("/problem", "/result", "/history", "/fields", "/events")]
@@ -49,6 +52,8 @@ def everything(server, jobs, mesh, sweep):
         paths.append("/v1/sweeps/%s/results?format=csv" % sweep)
     if mesh:
         paths.append("/v1/meshes/" + mesh)
+    if model:
+        paths.append("/v1/models/" + model)
     found = {}
     for path in paths:
         answer = server.call("GET", path)
@@ -74,6 +79,7 @@ def fill(server):
         jobs[job] = problem["contacts"][0]["boundary"]
     upload = server.call("POST", "/v1/meshes", MESH, content_type="application/octet-stream")
     mesh = upload.json()["hash"]
+    equal(server.call("PUT", "/v1/models/punch", MODEL).status, 201, "the model")
     sweep = {"base": example(), "axes": [{"path": "/contacts/0/friction/coefficient", "values": [0.1, 0.2, 0.3]}]}
     answer = server.call("POST", "/v1/sweeps", sweep)
     equal(answer.status // 100, 2, "the sweep, %r" % answer)
@@ -136,7 +142,7 @@ def older(source, fields, folder, version):
     store.execute("begin")
     tables = [name for name, in store.execute("select name from main.sqlite_schema where type = 'table'")]
     # rows before those that refer to them
-    order = ("problem", "job", "mesh", "mesh_piece", "sweep")
+    order = ("problem", "job", "mesh", "mesh_piece", "sweep", "model")
     for table in sorted(tables, key=lambda name: (name not in order, order.index(name) if name in order else name)):
         if table in NOT_COPIED:
             continue
@@ -183,7 +189,8 @@ def compare(server, version, known, before, kept):
         equal(now, kept, "what jobs of version %d keep" % version)
     else:
         check(all(now[job] > kept[job] for job in jobs), "what jobs of version %d keep: %r" % (version, now))
-    after = everything(server, jobs, mesh if version >= 2 else None, sweep if version >= 8 else None)
+    after = everything(server, jobs, mesh if version >= 2 else None, sweep if version >= 8 else None,
+                       "punch" if version >= MODELS else None)
     for path, found in after.items():
         equal(found, before[path], "%s of a store of version %d" % (path, version))
     for job in jobs:
@@ -237,7 +244,7 @@ def main():
         folder = pathlib.Path(name)
         with Server() as server:
             known = fill(server)
-            before = everything(server, known[0], known[1], known[2])
+            before = everything(server, known[0], known[1], known[2], "punch")
             kept = sizes(server)
             check(all(status == 200 for status, _ in before.values()), "before: %r" % before)
             answers = {job["id"]: server.call("GET", "/v1/jobs/%s/fields?format=json" % job["id"]) for job in server.every_job()}

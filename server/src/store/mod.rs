@@ -75,6 +75,7 @@ mod snapshot;
 
 // What is not a job.
 mod meshes;
+mod models;
 mod settings;
 mod space;
 mod tokens;

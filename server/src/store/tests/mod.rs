@@ -3,6 +3,7 @@
 
 mod backups;
 mod damage;
+mod models;
 mod owners;
 mod plans;
 mod simulation;
