@@ -248,6 +248,8 @@ pub enum QuotaOf {
     StoredBytes,
     /// Jobs submitted in a minute.
     Submissions,
+    /// Registered models.
+    Models,
 }
 
 impl Quota {
@@ -260,6 +262,7 @@ impl Quota {
                 Some((60 * missing).div_ceil(self.limit.max(1)).max(1))
             }
             QuotaOf::Queued | QuotaOf::StoredBytes => code.kind().retry_after_s,
+            QuotaOf::Models => None, // it does not pass by itself
         }
     }
 }
@@ -291,6 +294,10 @@ impl fmt::Display for Quota {
             QuotaOf::Submissions => write!(
                 f,
                 "{owner} may submit {limit} jobs in a minute, has submitted {used}, and this request would add {asked}{in_parts}"
+            ),
+            QuotaOf::Models => write!(
+                f,
+                "{owner} has {used} models, as many as an owner may: delete one, or replace it under its name"
             ),
         }
     }
@@ -342,7 +349,7 @@ impl ApiError {
             ApiError::ProblemTooLarge { .. } => Code::ProblemTooLarge,
             ApiError::InvalidProblem(_) => Code::InvalidProblem,
             ApiError::QuotaExceeded(quota) => match quota.of {
-                QuotaOf::Queued | QuotaOf::StoredBytes => Code::QuotaExceeded,
+                QuotaOf::Queued | QuotaOf::StoredBytes | QuotaOf::Models => Code::QuotaExceeded,
                 QuotaOf::Submissions => Code::RateLimited,
             },
             ApiError::RateLimited => Code::RateLimited,

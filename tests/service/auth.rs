@@ -31,6 +31,12 @@ const POLICY: &[(&str, &[&str])] = &[
             "GetPlot",
             "GetMesh",
             "ListMeshes",
+            "GetModel",
+            "ListModels",
+            "UmBridgeInfo",
+            "UmBridgeModelInfo",
+            "UmBridgeInputSizes",
+            "UmBridgeOutputSizes",
             "GetSweep",
             "ListSweeps",
             "ListSweepMembers",
@@ -55,6 +61,11 @@ const POLICY: &[(&str, &[&str])] = &[
             "RetryJob",
             "UpdateJob",
             "UploadMesh",
+            "PutModel",
+            "UmBridgeEvaluate",
+            "UmBridgeGradient",
+            "UmBridgeApplyJacobian",
+            "UmBridgeApplyHessian",
             "CreateSweep",
             "CreateMemberJob",
         ],
@@ -68,6 +79,7 @@ const POLICY: &[(&str, &[&str])] = &[
             "DeleteJob",
             "DeleteJobs",
             "DeleteMesh",
+            "DeleteModel",
             "CancelSweep",
             "DeleteSweep",
         ],
@@ -215,6 +227,7 @@ async fn every_route_is_for_those_whom_the_policy_names() {
                 .replace("{boundary}", "top")
                 .replace("{plot}", "mesh.svg")
                 .replace("{number}", "0")
+                .replace("{name}", "punch")
                 .replace("{token}", "000000000000")
                 .replace("{file}", "index.css")
                 .replace("{code}", "not-found");

@@ -56,6 +56,7 @@ fn filled(path: &str) -> String {
         .replace("{code}", "internal")
         .replace("{file}", "start.js")
         .replace("{plot}", "deformed.svg")
+        .replace("{name}", "punch")
 }
 
 /// Operations: GetOpenApi

@@ -12,6 +12,7 @@ use super::{
     filters::FILTERS,
     headers::{IF_MATCH, IF_NONE_MATCH, PREFER},
     input::{Input, RawInput},
+    model_body,
 };
 use crate::{cli::examples, error::ApiError, formats::Format, verbs::lists::ORDER_BY};
 
@@ -172,6 +173,10 @@ fn changed_bodies_are_read_or_refused() {
         format!(
             "{{\"jobs\": [{{\"problem\": {text}, \"limits\": {{\"timeout_s\": 1}}, \"cache\": \"off\"}}]}}"
         ),
+        format!(
+            "{{\"problem\": {text}, \"inputs\": [[\"/contacts/0/indentation\"]], \"outputs\": [{{\"scalars\": [\"normal_force\"]}}, \
+             {{\"profile\": \"top\", \"quantity\": \"gap\", \"points\": 3}}]}}"
+        ),
         "{\"name\": null, \"labels\": null, \"pinned\": true}".to_owned(),
         "{\"limits\": {\"timeout_s\": 1, \"queue_ttl_s\": 1e9}, \"priority\": -10}".to_owned(),
     ];
@@ -188,6 +193,10 @@ fn changed_bodies_are_read_or_refused() {
         "\"cache\":\"refresh\"",
         "\"priority\":",
         "\"pinned\":",
+        "\"inputs\":",
+        "\"outputs\":",
+        "\"scalars\":",
+        "\"profile\":",
         "\"\\ud800\"",
         "\"name\":\"\\u0000\"",
         ",",
@@ -209,6 +218,16 @@ fn changed_bodies_are_read_or_refused() {
             kind(
                 bodies::batch(&text).and_then(|jobs| jobs.map_err(ApiError::InvalidProblem)),
                 |jobs| jobs.len().min(3).to_string(),
+            ),
+            kind(
+                model_body::model(&text).and_then(|model| model.map_err(ApiError::InvalidProblem)),
+                |model| {
+                    format!(
+                        "{} {}",
+                        model.inputs.len().min(3),
+                        model.outputs.len().min(3)
+                    )
+                },
             ),
             kind(bodies::bare_problem(&text).and_then(found), |_| {
                 String::new()

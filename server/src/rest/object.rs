@@ -257,7 +257,8 @@ fn is_null(raw: &RawValue) -> bool {
     raw.get() == "null"
 }
 
-fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
+/// The violation of a value of the wrong type.
+pub(super) fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
     Violation {
         pointer: pointer.into(),
         reason: Reason::WrongType,

@@ -42,7 +42,8 @@ const INTRODUCTION: &str = "# The API
 Generated from the list of operations (`server/src/rest/operations`) by `signorini openapi --reference`; the same
 list makes the routes, `/openapi.json` and the test that every rpc has its route. Bodies are described there, a
 problem by `signorini schema`; `/docs` shows all of it and can try it out. Unknown names are refused, in bodies
-and in queries. Every error is a document of RFC 9457 with one of the codes below.
+and in queries. Every error is a document of RFC 9457 with one of the codes below. Below `/umbridge` errors have the form
+of that protocol, alone or beside these ([UM-Bridge](umbridge.md)).
 
 ";
 

@@ -9,6 +9,7 @@ use axum::{
     middleware::Next,
     response::{IntoResponse, Response},
 };
+use serde_json::json;
 
 use super::{coding, refused};
 use crate::{
@@ -62,8 +63,14 @@ fn with_document(mut response: Response, path: &str) -> Response {
     let Some(error) = response.extensions_mut().remove::<ApiError>() else {
         return response;
     };
-    refused::note(error.code().kind().code, path);
-    let document = error.document(&link(path)).to_string();
+    let code = error.code().kind().code;
+    refused::note(code, path);
+    let mut document = error.document(&link(path));
+    if path.starts_with("/umbridge/") {
+        // its clients know this form alone, and show what is in it
+        document["error"] = json!({ "type": code, "message": error.to_string() });
+    }
+    let document = document.to_string();
     let (mut parts, _) = response.into_parts();
     parts.headers.insert(
         header::CONTENT_TYPE,

@@ -47,14 +47,14 @@ pub(in crate::rest) struct Operation {
     pub(in crate::rest) needs_body: bool,
     /// An example of the body.
     pub(in crate::rest) example: Option<Value>,
-    /// The successful answers.
+    /// The successful answers, and those of UM-Bridge's own errors.
     pub(in crate::rest) answers: Vec<Answer>,
     /// It refuses unknown parameters.
     strict: bool,
     errors: Vec<Code>,
 }
 
-/// A successful answer.
+/// A successful answer, or one of UM-Bridge's own errors.
 pub(in crate::rest) struct Answer {
     pub(in crate::rest) status: u16,
     pub(in crate::rest) meaning: &'static str,
@@ -224,10 +224,17 @@ impl Operation {
         if self.body.is_some() {
             codes.push(Code::RequestTimeout);
         }
-        // all that reads jobs, problems or meshes, and all that writes
-        if ["/v1/jobs", "/v1/problems", "/v1/meshes", "/v1/sweeps"]
-            .iter()
-            .any(|path| self.path.starts_with(path))
+        // all that reads jobs, problems, meshes or models, and all that writes
+        if [
+            "/v1/jobs",
+            "/v1/problems",
+            "/v1/meshes",
+            "/v1/models",
+            "/v1/sweeps",
+            "/umbridge",
+        ]
+        .iter()
+        .any(|path| self.path.starts_with(path))
         {
             codes.push(Code::CorruptData);
         }
