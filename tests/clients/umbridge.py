@@ -150,7 +150,8 @@ def be_refused(server, model):
     refused(lambda: model([[0.2], [1200.0]]), "InvalidInput", "input 0 has 1 numbers; expected 2")
     refused(lambda: model(AT, {"level": 2}), "InvalidInput", "level")
     refused(lambda: model([[0.2, -1.0], [1200.0]]), "InvalidInput", COEFFICIENT)
-    refused(lambda: model([[-0.1, 0.3], [1200.0]]), "InvalidOutput", "job_", "peak_tangential_stress")
+    smooth = umbridge.HTTPModel(server.url + "/umbridge", "smooth")
+    refused(lambda: smooth([[-0.1, 900.0]]), "InvalidOutput", "job_", "peak_normal_stress")
     refused(lambda: model.apply_hessian(0, 0, 0, AT, [1.0] * 3, [1.0] * 2), "not supported")
     refused(lambda: umbridge.HTTPModel(server.url + "/umbridge", "press"), "press", "punch")
 

@@ -559,7 +559,7 @@ async fn numbers(
 
 fn absent(id: JobId, path: &str) -> ModelError {
     let why = match path.contains("tangential") {
-        true => "without friction and contact there is none",
+        true => "without friction there is none",
         false => "without contact there is none",
     };
     no_output(format!(
