@@ -8,8 +8,8 @@ RUN command -v cc >/dev/null && command -v strip >/dev/null || \
     { apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev binutils && rm -rf /var/lib/apt/lists/*; }
 WORKDIR /signorini
 COPY . .
-# the names of functions stay, for the backtrace of a panic
-RUN cargo build --release --locked --bin signorini && strip --strip-debug target/release/signorini
+# the names of functions would be a fifth of it; a panic still tells its file and line
+RUN cargo build --release --locked --bin signorini && strip target/release/signorini
 
 # Run: glibc and the binary, nothing else; not as root.
 FROM ${BASE}

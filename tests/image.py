@@ -77,7 +77,7 @@ def builder(buildah, folder, binary):
         (folder / "strip").write_text("#!/bin/sh\nexit 0\n")
         (folder / "strip").chmod(0o755)
         stripped = folder / "prebuilt"
-        subprocess.run(["strip", "--strip-debug", "-o", stripped, binary], check=True)
+        subprocess.run(["strip", "-o", stripped, binary], check=True)
         for source, place in ((stand_in, "/usr/local/bin/cargo"), (folder / "strip", "/usr/local/bin/strip"),
                               (folder / "strip", "/usr/local/bin/cc"), (stripped, "/prebuilt")):
             buildah("add", "-q", container, source, place)

@@ -173,3 +173,13 @@ def test_the_service_validates(client: sg.Client) -> None:
     assert "1. /materials/0/youngs_modulus: got -1, expected a stress > 0" in str(bad)
     with pytest.raises(sg.InvalidProblem, match="/analysis/x: got nan, expected a finite number"):
         client.validate({"analysis": {"x": float("nan")}})
+
+
+def test_a_misspelt_field_is_refused_also_later() -> None:
+    problem = sg.examples.rectangular_punch()
+    friction = problem.contacts[0].friction
+    assert friction is not None
+    with pytest.raises(AttributeError, match="Friction has no `coeficient`. Did you mean `coefficient`?"):
+        friction.coeficient = 0.9  # type: ignore[attr-defined]
+    friction.coefficient = 0.9
+    assert problem.to_dict()["contacts"][0]["friction"]["coefficient"] == 0.9

@@ -104,7 +104,8 @@ def test_a_profile(punch: sg.Result) -> None:
     with pytest.raises(ValueError, match="which contact"):
         punch.profile("bottom")
     with pytest.raises(sg.NotFound, match="no load steps"):
-        punch.profile(step=0)
+        punch.profile(step=1)
+    assert np.array_equal(punch.profile(step=0).s, punch.profile().s)  # a problem without steps has one
 
 
 def test_the_steps_of_a_load(client: sg.Client) -> None:

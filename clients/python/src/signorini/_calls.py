@@ -480,7 +480,8 @@ def resume_queue() -> Call[Document]:
 
 
 def explain(code: str) -> Call[Document]:
-    call = _get("/v1/errors/" + quote(code, safe=""))
+    # the reason of an error has the code with underscores
+    call = _get("/v1/errors/" + quote(code.replace("_", "-"), safe=""))
     return Call(call.method, call.path, _json, headers={"Accept": "application/json"})
 
 

@@ -48,6 +48,18 @@ class Part:
         if found:
             raise invalid(found, type(self).__name__)
 
+    # a type checker would take it for leave to set any name
+    if not typing.TYPE_CHECKING:
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            """Sets a field. Raises AttributeError for another name, which the service would never see."""
+            known = hints(type(self))
+            if name not in known:
+                close = difflib.get_close_matches(name, known, 1)
+                guess = f" Did you mean `{close[0]}`?" if close else f" It has {', '.join(known)}."
+                raise AttributeError(f"{type(self).__name__} has no `{name}`.{guess}")
+            super().__setattr__(name, value)
+
     def __repr__(self) -> str:
         """Only what differs from the default: a problem has more than a hundred fields."""
         held = [(field, getattr(self, field.name)) for field in dataclasses.fields(typing.cast(Any, self))]

@@ -44,7 +44,13 @@ class Attempts:
         if pause is None:
             reason = str(error) or type(error).__name__
             after = f", also after {self.failures} attempts" if self.failures > 1 else ""
-            raise ConnectionLost(f"the service at {_address(error)} cannot be reached{after}: {reason}") from error
+            hint = (
+                "Is it running (`signorini serve`)? SIGNORINI_URL names another; Client.local() starts one. "
+                "Jobs that it has go on, or begin again with it"
+            )
+            raise ConnectionLost(
+                f"the service at {_address(error)} cannot be reached{after}: {reason}. {hint}"
+            ) from error
         return pause
 
     def after_answer(self, response: httpx.Response) -> float | None:

@@ -35,8 +35,15 @@ class Theme:
 THEMES = {
     "light": Theme("#ffffff", "#1a1a1a", "#767676"),
     "dark": Theme(
-        "#16181c", "#e8e8e8", "#969ca5", normal="#56B4E9", tangential="#FF8A3D", obstacle="#787c82",
-        good="#009E73", fair="#F0C05A", poor="#FF8A3D",
+        "#16181c",
+        "#e8e8e8",
+        "#969ca5",
+        normal="#56B4E9",
+        tangential="#FF8A3D",
+        obstacle="#787c82",
+        good="#009E73",
+        fair="#F0C05A",
+        poor="#FF8A3D",
     ),  # fmt: skip
 }
 

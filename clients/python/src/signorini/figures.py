@@ -335,7 +335,7 @@ def _mark_cut(axes: Any, s: Array, values: Array, colours: Theme, about: Mapping
     at = int(np.argmin(values))
     peak = ((about.get("peaks") or {}).get(boundary) or {}).get("normal_stress")
     no_limit = peak is not None and peak.value.why == "no_limit"
-    text = f"peak {values[at]:.3g}".replace("-", "−") + (", which has no limit" if no_limit else "")
+    text = f"peak {values[at]:.3g}".replace("-", "−") + (", which grows on finer meshes" if no_limit else "")
     to_left = s[at] > (s[0] + s[-1]) / 2
     axes.annotate(
         text, (s[at], 0), xycoords=("data", "axes fraction"), xytext=(-10 if to_left else 10, 12),
