@@ -177,7 +177,7 @@ def from_other_ways(server):
 
 def with_tokens():
     """The one way to give the package a token: as the password in the address."""
-    with Server() as server:
+    with Server("--memory-budget-bytes", str(2 << 30)) as server:
         server.kill()
         create = [BINARY, "token", "create", "--data", server.data, "--name", "test", "--owner"]
         made = [subprocess.run([*create, owner, "--scope", scope], capture_output=True, text=True, check=True).stdout.strip()
@@ -366,7 +366,7 @@ def suite(folder, url):
 
 
 def main():
-    with Server() as server:
+    with Server("--memory-budget-bytes", str(2 << 30)) as server:
         register(server, "punch", with_friction())
         register(server, "smooth", frictionless())
         model = umbridge.HTTPModel(server.url + "/umbridge", "punch")
@@ -382,7 +382,7 @@ def main():
         passed = conformity(server.url + "/umbridge")
         for folder in sys.argv[1:2]:
             suite(folder, server.url + "/umbridge")
-    with Server() as server:
+    with Server("--memory-budget-bytes", str(2 << 30)) as server:
         as_documented(server)
     with_tokens()
     print("figure: %d of 22 checks of the protocol; the package umbridge drives the service, with the numbers of jobs bit by bit and "
