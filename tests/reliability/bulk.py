@@ -13,8 +13,10 @@ from attack import SOAK, Attacked, Bystander, check, equal, example
 
 JOBS = 97_704 if SOAK else 4_000
 BATCH = 500
-# half of what a commit for each takes: the same program took 0.65 to 1.25 ms on the same machine within three hours
-MOST_S_EACH = 2e-3
+# a quarter of what a commit for each takes, so that a busy machine does not decide
+MOST_S_EACH = 1e-3
+# the pace of a machine changes, too: one round of these within the bound shows what the program can do
+MOST_ROUNDS = 5
 
 
 def submit(server, count):
@@ -32,7 +34,6 @@ def timed(server, method, path, expected):
     equal(answer.status, 200, path)
     found = answer.json()
     equal((found["matched"], found["changed"]), (expected, expected), path)
-    check(took <= expected * MOST_S_EACH, "%s took %.1f s" % (path, took))
     return took
 
 
@@ -40,10 +41,16 @@ def main():
     with Attacked() as server:
         seen = server.finished_job()
         equal(server.call("POST", "/v1/queue/pause").status, 200, "pause")
-        submit(server, JOBS)
-        with Bystander(server):
-            canceled = timed(server, "POST", "/v1/jobs/cancel?status=queued", JOBS)
-            deleted = timed(server, "DELETE", "/v1/jobs?status=canceled", JOBS)
+        canceled = deleted = float("inf")
+        rounds = 0
+        while max(canceled, deleted) > JOBS * MOST_S_EACH:
+            check(rounds < MOST_ROUNDS, "of %d rounds the fastest cancel took %.1f s, the fastest deletion %.1f s" % (
+                rounds, canceled, deleted))
+            rounds += 1
+            submit(server, JOBS)
+            with Bystander(server):
+                canceled = min(canceled, timed(server, "POST", "/v1/jobs/cancel?status=queued", JOBS))
+                deleted = min(deleted, timed(server, "DELETE", "/v1/jobs?status=canceled", JOBS))
         equal(server.json("/v1/jobs/" + seen)["status"], "succeeded", "the job of the bystander")
         log = server.log.read_text()
         check("has ended: canceled" in log and "was deleted" in log, "the log tells of each")

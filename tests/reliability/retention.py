@@ -21,9 +21,8 @@ OWNERS = 20
 BATCH = 200 if SOAK else 50
 # enough to keep the workers busy, and few enough to be solved soon
 MOST_WAITING = 400
-# after the last job: those that are kept, and the next two times that the limits are applied; of a million, which come thirty
-# times as fast as R24 asks, some 50,000 wait to be removed by then, some 600 a second
-END_S = KEPT_S + (120 if SOAK else 30)
+# after the last job: those that are kept, and the next two times that the limits are applied
+END_S = KEPT_S + 30
 # an allocator takes some before it is even
 MOST_GROWTH = 8 * MIB
 # With --soak, over the last two thirds of the time: R24's figure for a million jobs in 24 hours. Here they come some fifty times

@@ -117,7 +117,7 @@ pub fn deformed_svg(
         for (k, (frame, (_, factor))) in frames.iter().zip(&views).enumerate() {
             let scale = match *factor {
                 1.0 => "displacements to scale".to_owned(),
-                // the distance of the obstacle is drawn as they are
+                // gaps, too: the obstacle is that many times as far from the body
                 factor => format!("displacements × {}", number(factor)),
             };
             let caption = match k {
