@@ -210,8 +210,8 @@ def fill(server, jobs, dice):
 
     database.executemany("insert into job (%s) values (%s)" % (", ".join(columns), ", ".join("?" * len(columns))), rows())
     database.executemany(
-        "insert into job_label (key, value, created_at, job_id) values (?, ?, ?, ?)",
-        sorted((key, value, now - (jobs - n) * 1_000_000, number + n)
+        "insert into job_label (key, value, created_at, job_id, owner) values (?, ?, ?, ?, ?)",
+        sorted((key, value, now - (jobs - n) * 1_000_000, number + n, samples["queued"]["owner"])
                for n in range(1, jobs + 1) for key, value in labels(n).items()))
     for _, sql in indexes:
         database.execute(sql)

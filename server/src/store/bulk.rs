@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use super::{
     change::Change,
     database::Store,
-    delete::{Deletion, delete},
+    delete::{Deletion, delete, remove},
     end::end,
     error::Result,
     fields::remove_fields,
@@ -113,21 +113,21 @@ impl Store {
 
 /// Discards a job; false if it is not one of those.
 async fn discard(change: &mut Change<'_>, what: Discard<'_>, key: i64) -> Result<bool> {
-    let (ended_before, owners) = match what {
-        Discard::Jobs(owners) => (None, owners),
-        Discard::OldJobs(before) | Discard::OldFields(before) => (Some(before), Owners::All),
-    };
-    if let Some(before) = ended_before {
-        // as it is now, and by its own record, which has a checksum: it may have been pinned
-        let job = find(change.sql(), key).await?;
-        let old = |job: &Job| !job.pinned && job.finished_at.is_some_and(|at| at < before);
-        let Some(job) = job.filter(old) else {
-            return Ok(false);
-        };
-        if matches!(what, Discard::OldFields(_)) {
-            remove_fields(change, &job).await?;
-            return Ok(true);
+    let before = match what {
+        Discard::Jobs(owners) => {
+            return Ok(delete(change, owners, key).await? == Deletion::Deleted);
         }
+        Discard::OldJobs(before) | Discard::OldFields(before) => before,
+    };
+    // as it is now, and by its own record, which has a checksum: it may have been pinned
+    let job = find(change.sql(), key).await?;
+    let old = |job: &Job| !job.pinned && job.finished_at.is_some_and(|at| at < before);
+    let Some(job) = job.filter(old) else {
+        return Ok(false);
+    };
+    match what {
+        Discard::OldFields(_) => remove_fields(change, &job).await?,
+        Discard::Jobs(_) | Discard::OldJobs(_) => remove(change, &job).await?,
     }
-    Ok(delete(change, owners, key).await? == Deletion::Deleted)
+    Ok(true)
 }

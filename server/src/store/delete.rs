@@ -5,7 +5,10 @@ use std::time::Duration;
 use sqlx::SqliteConnection;
 
 use super::{change::Change, database::Store, error::Result, results, rows::find, sizes, sweeps};
-use crate::{caller::Owners, job::JobId};
+use crate::{
+    caller::Owners,
+    job::{Job, JobId},
+};
 
 /// Between two transactions that remove things others write.
 pub(super) const PAUSE: Duration = Duration::from_millis(20);
@@ -60,45 +63,57 @@ pub(super) async fn delete(
     if !job.status.is_terminal() {
         return Ok(Deletion::Active);
     }
+    remove(change, &job).await?;
+    Ok(Deletion::Deleted)
+}
+
+/// What only this job has. Statements are sent together where they can be: to hand one to the thread of the connection costs as
+/// much as to run it, and retention removes hundreds in a second.
+const OF_ITS_OWN: &str = "
+    insert into deleted_job (uuid, id, owner, deleted_at) values (?2, ?1, ?3, ?4);
+    delete from event where job_id = ?1;
+    delete from job_label where job_id = ?1;
+    delete from job_size where job_id = ?1;
+    delete from job where id = ?1;";
+
+/// Removes a job that has ended, and what it has in common with others if it was the last of them.
+pub(super) async fn remove(change: &mut Change<'_>, job: &Job) -> Result<()> {
     let now = change.now();
     let tx = change.sql();
-    sqlx::query("insert into deleted_job (uuid, id, owner, deleted_at) values (?, ?, ?, ?)")
+    sqlx::query(OF_ITS_OWN)
+        .bind(job.key)
         .bind(job.id.0.to_string())
-        .bind(key)
         .bind(&job.owner)
         .bind(now.micros())
         .execute(&mut *tx)
         .await?;
-    for statement in [
-        "delete from event where job_id = ?",
-        "delete from job_label where job_id = ?",
-        "delete from job_size where job_id = ?",
-        "delete from job where id = ?",
-    ] {
-        sqlx::query(statement).bind(key).execute(&mut *tx).await?;
-    }
-    sizes::hand_on(tx, &job).await?;
+    sizes::hand_on(tx, job).await?;
     sqlx::query(
         "delete from problem where input_hash = ?1 and not exists (select 1 from job where input_hash = ?1)",
     )
     .bind(&job.input_hash)
     .execute(&mut *tx)
     .await?;
-    for result in [key, job.result_key] {
-        match is_in_use(tx, result).await? {
-            // those that have it may have deleted their fields
-            true => sizes::remove_unused_fields(tx, result).await?,
-            false => results::remove(tx, result).await?,
-        }
+    remove_unused_result(tx, job.key).await?;
+    if job.result_key != job.key {
+        remove_unused_result(tx, job.result_key).await?;
     }
     if let Some(sweep) = job.sweep
         && !sweeps::remove_without_jobs(change, sweep).await?
     {
-        sweeps::keep_failures(change.sql(), &job).await?;
+        sweeps::keep_failures(change.sql(), job).await?;
     }
     change.deleted(job.id);
-    change.changed(key);
-    Ok(Deletion::Deleted)
+    change.changed(job.key);
+    Ok(())
+}
+
+/// Removes the result under this key unless a job has it; its fields unless a job still has them.
+async fn remove_unused_result(tx: &mut SqliteConnection, result: i64) -> Result<()> {
+    match is_in_use(tx, result).await? {
+        true => sizes::remove_unused_fields(tx, result).await,
+        false => results::remove(tx, result).await,
+    }
 }
 
 /// The owner of a job that was deleted recently; `None` if there was no such job.

@@ -83,7 +83,7 @@ impl Store {
                     .bind(key)
                     .execute(change.sql())
                     .await?;
-                labels::write(&mut change, key, job.created_at, labels).await?;
+                labels::write(&mut change, key, &job.owner, job.created_at, labels).await?;
             }
             if job.waits_for_a_worker() && priority != job.priority {
                 let place = Place::of(&job);

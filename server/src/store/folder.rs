@@ -69,7 +69,7 @@ impl Folder {
         for file in &locks {
             file.try_lock().map_err(|error| match error {
                 TryLockError::WouldBlock => StoreError::Locked(format!(
-                    "another server is using the folder {}",
+                    "another server is using the folder {} (one that is stopping releases it within seconds)",
                     path.display()
                 )),
                 TryLockError::Error(error) => named(error),

@@ -1,9 +1,10 @@
 //! Lists of jobs: pages, counts, keys.
 //!
 //! A page costs as many rows as it shows, not as many as the table has. Each filter has an index in the order of
-//! the list. One filter is chosen as the access path, and the others are checked on the rows that it finds: a
-//! filter that matches few jobs, which are then sorted if necessary, or else one whose index has the order of the
-//! list, since then a page is soon full.
+//! the list, and those by label, status and name have another one that begins with the owner: most callers see
+//! only their own jobs, however many others have the same. One filter is chosen as the access path, and the
+//! others are checked on the rows that it finds: a filter that matches few jobs, which are then sorted if
+//! necessary, or else one whose index has the order of the list, since then a page is soon full.
 
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
@@ -38,6 +39,8 @@ const FEW: i64 = 1000;
 /// Matches are counted up to so many, which takes a millisecond: of several filters that match more than a few, that with the
 /// fewest is the access path, since a page may have to pass over all of them.
 const MANY: i64 = 20_000;
+/// The statuses of jobs that have ended.
+const ENDED: [Status; 3] = [Status::Succeeded, Status::Failed, Status::Canceled];
 
 impl Store {
     /// At most `limit` jobs of a list, after `cursor`.
@@ -169,7 +172,10 @@ async fn selective_path<'a>(
     candidates.extend(filter.input_hash.as_deref().map(AccessPath::InputHash));
     candidates.extend(filter.sweep.map(AccessPath::Sweep));
     candidates.extend(filter.name.as_deref().map(AccessPath::Name));
-    candidates.extend(filter.owner.as_deref().map(AccessPath::Owner));
+    // the other indexes begin with the owner, and a sweep has one only
+    if filter.input_hash.is_some() {
+        candidates.extend(filter.owner.as_deref().map(AccessPath::Owner));
+    }
     if let [status] = filter.statuses[..] {
         candidates.push(AccessPath::Status(status));
     }
@@ -180,7 +186,7 @@ async fn selective_path<'a>(
     if by_creation && candidates.len() == 1 && !matches!(candidates[0], AccessPath::Ended) {
         return Ok(None);
     }
-    let counted = if by_creation { MANY } else { FEW };
+    let mut counted = if by_creation { MANY } else { FEW };
     let mut fewest = None;
     for path in candidates {
         let mut query = QueryBuilder::<Sqlite>::new("select count(*) from (select 1 from ");
@@ -213,6 +219,13 @@ async fn selective_path<'a>(
             }
             AccessPath::All => continue,
         }
+        let owner_is_in_index = matches!(
+            path,
+            AccessPath::Label(_) | AccessPath::Name(_) | AccessPath::Status(_)
+        );
+        if owner_is_in_index && let Some(owner) = &filter.owner {
+            query.push(" and owner = ").push_bind(owner);
+        }
         query.push(" limit ").push_bind(counted + 1).push(")");
         let jobs: i64 = query
             .build_query_scalar()
@@ -223,17 +236,21 @@ async fn selective_path<'a>(
         }
         // the others have the order of the list
         let ordered = by_creation && !matches!(path, AccessPath::Ended);
-        if ordered && jobs <= MANY && fewest.is_none_or(|(_, least)| jobs < least) {
-            fewest = Some((path, jobs));
+        if ordered && jobs <= counted {
+            fewest = Some(path);
+            counted = jobs - 1; // the others only matter if they match fewer
         }
     }
-    Ok(fewest.map(|(path, _)| path))
+    Ok(fewest)
 }
 
 /// The access path if every filter matches many jobs: an index in the order of the list. It is one path, or one
 /// for each status, whose lists are merged.
 pub(super) fn ordered_paths(filter: &Filter, order: Order) -> Vec<AccessPath<'_>> {
-    let statuses = &filter.statuses;
+    let mut statuses = &filter.statuses[..];
+    if statuses.is_empty() && order.by == OrderBy::FinishedAt && filter.owner.is_some() {
+        statuses = &ENDED; // an owner's jobs are in this order by status
+    }
     let by_status: Vec<AccessPath<'_>> = statuses.iter().copied().map(AccessPath::Status).collect();
     let owner_or_all = filter
         .owner
@@ -274,6 +291,7 @@ fn page(
     cursor: Option<Cursor>,
 ) {
     let by_creation = order.by == OrderBy::CreatedAt;
+    let of_one_owner = filter.owner.is_some();
     // `indexed by`: the planner does not know how many jobs a filter matches, and would guess
     match path {
         AccessPath::Label((key, value)) => {
@@ -281,6 +299,11 @@ fn page(
             query.push_bind(key.clone());
             query.push(" and job_label.value = ");
             query.push_bind(value.clone());
+            if let Some(owner) = &filter.owner {
+                query
+                    .push(" and job_label.owner = ")
+                    .push_bind(owner.clone());
+            }
         }
         AccessPath::InputHash(hash) => {
             query.push("select * from job indexed by job_by_input where input_hash = ");
@@ -291,14 +314,21 @@ fn page(
             query.push_bind(sweep.0.to_string());
         }
         AccessPath::Name(name) => {
-            query.push("select * from job indexed by job_by_name where name = ");
+            let index = match of_one_owner {
+                true => "job_by_owner_name",
+                false => "job_by_name",
+            };
+            query.push(format!(
+                "select * from job indexed by {index} where name = "
+            ));
             query.push_bind(name.to_owned());
         }
         AccessPath::Status(status) => {
-            let index = if by_creation {
-                "job_by_status"
-            } else {
-                "job_by_status_finished"
+            let index = match (of_one_owner, by_creation) {
+                (true, true) => "job_by_owner_status",
+                (true, false) => "job_by_owner_status_finished",
+                (false, true) => "job_by_status",
+                (false, false) => "job_by_status_finished",
             };
             query.push(format!(
                 "select * from job indexed by {index} where status = "
@@ -306,14 +336,7 @@ fn page(
             query.push_bind(<&str>::from(status));
         }
         AccessPath::Owner(owner) => {
-            let index = if by_creation {
-                "job_by_owner"
-            } else {
-                "job_by_owner_finished"
-            };
-            query.push(format!(
-                "select * from job indexed by {index} where owner = "
-            ));
+            query.push("select * from job indexed by job_by_owner where owner = ");
             query.push_bind(owner.to_owned());
         }
         AccessPath::Ended => {

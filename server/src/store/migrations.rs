@@ -11,7 +11,7 @@ use super::error::{Result, StoreError};
 
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 12] = [
+const STEPS: [(i64, &str, &str); 13] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -67,6 +67,11 @@ const STEPS: [(i64, &str, &str); 12] = [
         12,
         "models",
         include_str!("../../../migrations/0012_models.sql"),
+    ),
+    (
+        13,
+        "owners lists",
+        include_str!("../../../migrations/0013_owners_lists.sql"),
     ),
 ];
 

@@ -106,12 +106,12 @@ pub(super) async fn keep_partial(tx: &mut SqliteConnection, key: i64) -> Result<
 
 /// Removes the result under this key.
 pub(super) async fn remove(tx: &mut SqliteConnection, key: i64) -> Result<()> {
-    for statement in [
-        "delete from result_part where job_id = ?",
-        "delete from result_info where job_id = ?",
-    ] {
-        sqlx::query(statement).bind(key).execute(&mut *tx).await?;
-    }
+    sqlx::query(
+        "delete from result_part where job_id = ?1; delete from result_info where job_id = ?1;",
+    )
+    .bind(key)
+    .execute(tx)
+    .await?;
     Ok(())
 }
 

@@ -129,23 +129,20 @@ pub(super) async fn take_over(tx: &mut SqliteConnection, key: i64) -> Result<()>
 /// Counts what a job that was just deleted shared with others, if it was counted for that job, for the next of them. One that
 /// has not ended yet counts it when it ends.
 pub(super) async fn hand_on(tx: &mut SqliteConnection, deleted: &Job) -> Result<()> {
-    let of_the_first_answered = "update job_size set bytes = bytes +
-             (select coalesce(sum(length(body)), 0) from result_part where job_id = ?1)
-         where job_id = (select min(id) from job where result_job = ?1) and (?2 = ?1 or job_id > ?2)
-               and not exists (select 1 from job where id = ?1)";
-    sqlx::query(of_the_first_answered)
-        .bind(deleted.result_key)
+    let to_the_first_answered_and_to_the_oldest = "
+        update job_size set bytes = bytes +
+             (select coalesce(sum(length(body)), 0) from result_part where job_id = ?2)
+         where job_id = (select min(id) from job where result_job = ?2) and (?1 = ?2 or job_id > ?1)
+               and not exists (select 1 from job where id = ?2);
+        update job_size set bytes = bytes +
+             coalesce((select octet_length(body) from problem where input_hash = ?3), 0)
+         where job_id = (select id from job where input_hash = ?3 order by created_at, id limit 1)
+               and not exists (select 1 from job where input_hash = ?3 and (created_at, id) < (?4, ?1));";
+    sqlx::query(to_the_first_answered_and_to_the_oldest)
         .bind(deleted.key)
-        .execute(&mut *tx)
-        .await?;
-    let of_the_oldest = "update job_size set bytes = bytes +
-             coalesce((select octet_length(body) from problem where input_hash = ?1), 0)
-         where job_id = (select id from job where input_hash = ?1 order by created_at, id limit 1)
-               and not exists (select 1 from job where input_hash = ?1 and (created_at, id) < (?2, ?3))";
-    sqlx::query(of_the_oldest)
+        .bind(deleted.result_key)
         .bind(&deleted.input_hash)
         .bind(deleted.created_at.micros())
-        .bind(deleted.key)
         .execute(&mut *tx)
         .await?;
     let Some(sweep) = deleted.sweep else {

@@ -228,7 +228,7 @@ pub(super) async fn insert(
     .fetch_one(change.sql())
     .await?;
     change.touched(key);
-    labels::write(change, key, now, &new.labels).await?;
+    labels::write(change, key, owner, now, &new.labels).await?;
     let queued = [(now, Payload::status(Status::Queued))];
     events::append(change.sql(), key, 0, &queued).await?;
     change.move_job(match coalesced_into {

@@ -32,8 +32,8 @@ async fn the_queries_of_the_queue_use_indexes() {
     }
 }
 
-/// A page of one owner's jobs reads no jobs of others and needs no sort; counts and bulk changes read that owner's
-/// jobs alone.
+/// A page of one owner's jobs reads no jobs of others and needs no sort, whatever others have the same label, status or name;
+/// counts and bulk changes read that owner's jobs alone.
 #[tokio::test]
 async fn lists_of_one_owner_use_indexes() {
     let folder = tempfile::tempdir().unwrap();
@@ -42,18 +42,62 @@ async fn lists_of_one_owner_use_indexes() {
         owner: Some("ada".into()),
         ..Filter::default()
     };
-    for by in [OrderBy::CreatedAt, OrderBy::FinishedAt] {
-        for descending in [true, false] {
-            let order = Order { by, descending };
-            for cursor in [None, Some(Cursor { micros: 1, key: 1 })] {
-                let paths = list::ordered_paths(&mine, order);
-                let question = list::page_of_jobs(&mine, &paths, order, cursor, 50);
-                let steps = plan(&store, question.sql().as_str()).await;
-                assert!(
-                    steps[0].contains("SEARCH job USING INDEX job_by_owner"),
-                    "{steps:?}"
-                );
-                assert!(!sorts(&steps), "{steps:?}");
+    let (labels, statuses) = (vec![("a".into(), "b".into())], vec![Status::Failed]);
+    for (filter, index, index_by_end) in [
+        (
+            mine.clone(),
+            "job_by_owner ",
+            "job_by_owner_status_finished ",
+        ),
+        (
+            Filter {
+                statuses,
+                ..mine.clone()
+            },
+            "job_by_owner_status ",
+            "job_by_owner_status_finished ",
+        ),
+        (
+            Filter {
+                name: Some("c".into()),
+                ..mine.clone()
+            },
+            "job_by_owner_name ",
+            "job_by_owner_status_finished ",
+        ),
+        (
+            Filter {
+                labels,
+                ..mine.clone()
+            },
+            "job_label_by_owner ",
+            "job_by_owner_status_finished ",
+        ),
+    ] {
+        for by in [OrderBy::CreatedAt, OrderBy::FinishedAt] {
+            for descending in [true, false] {
+                let order = Order { by, descending };
+                for cursor in [None, Some(Cursor { micros: 1, key: 1 })] {
+                    let paths = list::ordered_paths(&filter, order);
+                    for path in paths {
+                        let question = list::page_of_jobs(&filter, &[path], order, cursor, 50);
+                        let steps = plan(&store, question.sql().as_str()).await;
+                        let index = if by == OrderBy::CreatedAt {
+                            index
+                        } else {
+                            index_by_end
+                        };
+                        let uses = steps.iter().any(|step| {
+                            step.starts_with("SEARCH") && step.contains(&format!("INDEX {index}"))
+                        });
+                        assert!(uses, "{index}: {steps:?}");
+                        assert!(
+                            !steps.iter().any(|step| step.starts_with("SCAN job")),
+                            "{steps:?}"
+                        );
+                        assert!(!sorts(&steps), "{steps:?}");
+                    }
+                }
             }
         }
     }
