@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use strum::{IntoStaticStr, VariantArray};
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use crate::element::Element;
 use crate::finite::is_finite;
@@ -284,6 +284,7 @@ pub struct Warning {
     Deserialize,
     JsonSchema,
     IntoStaticStr,
+    EnumString,
     VariantArray,
 )]
 #[serde(rename_all = "snake_case")]
@@ -460,7 +461,8 @@ pub struct ForcePair {
 ///
 /// Those points are three Gauss points per edge, also without friction; with `"points": "nodal"` the
 /// nodes, except one on the axis. There `normal_stress`, the gap and the displacements are those of
-/// the edge, quadratic between its nodes; `nonlocal_pressure`, `friction_bound` and `friction_ratio`
+/// the edge, quadratic between its nodes (which beside a steep peak may overshoot into a tension that
+/// no node has; profiles at all points and at equally spaced ones show 0 there); `nonlocal_pressure`, `friction_bound` and `friction_ratio`
 /// are those of the law at the point; `tangential_stress` is the one that acts in the solution, so that
 /// it adds up to the forces of the summary (at a node it is that of the law, which differs by
 /// `Residuals::friction` of the largest); and a point is open if one of the nodes beside it is.

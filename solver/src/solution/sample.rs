@@ -14,7 +14,8 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 ///
 /// - positions, gap, displacements and normal stress are the quadratics through the three nodes of an
 ///   edge: exact, since the solution is quadratic. (Contact uses the gap at nodes; between them the obstacle
-///   itself may be elsewhere.)
+///   itself may be elsewhere.) But beside a steep peak the parabola may overshoot into a tension that no
+///   contact has: between three nodes without tension there is none.
 /// - tangential stress, nonlocal pressure, friction bound and ratio are those of the law at nodes and
 ///   friction points, five per edge with Gauss points, and curves between them: of the two parabolas in s through a
 ///   third neighbour the flatter one, and the straight line where they bend to opposite sides. So a
@@ -45,7 +46,7 @@ pub fn sample(profile: &ContactProfile, friction: &ContactProfile, count: usize)
 
 /// The columns of a profile at all points where the solution is known: the nodes, the points where friction acts, and
 /// the places of the peaks, each of one contact and in order of arc length. So the largest stresses of these columns are
-/// the peaks.
+/// the peaks. Between three nodes without tension there is none, as in [`sample`].
 pub fn at_all_points(
     profile: &ContactProfile,
     friction: &ContactProfile,
@@ -88,6 +89,10 @@ impl<'a> Known<'a> {
                 // the middle Gauss point of an edge is its midside: the node's values count
                 if friction.s[next] < *s {
                     values.push_row(friction, next);
+                    let edge = node.saturating_sub(1) / 2;
+                    if let Some(stress) = values.normal_stress.last_mut() {
+                        *stress = without_overshoot(nodes, edge, *stress);
+                    }
                 }
                 next += 1;
             }
@@ -126,13 +131,22 @@ impl<'a> Known<'a> {
             gap: vec![along(&nodes.gap)],
             normal_displacement: vec![along(&nodes.normal_displacement)],
             tangential_displacement: vec![along(&nodes.tangential_displacement)],
-            normal_stress: vec![along(&nodes.normal_stress)],
+            normal_stress: vec![without_overshoot(nodes, edge, along(&nodes.normal_stress))],
             tangential_stress: vec![between(&values.tangential_stress)],
             nonlocal_pressure: vec![between(&values.nonlocal_pressure)],
             friction_bound: vec![between(&values.friction_bound).max(0.0)],
             friction_ratio: vec![between(&values.friction_ratio).clamp(0.0, 1.0)],
             state: vec![values.state[nearest]],
         }
+    }
+}
+
+/// A normal stress on an edge: not a tension if none of its three nodes has one.
+fn without_overshoot(nodes: &ContactProfile, edge: usize, stress: f64) -> f64 {
+    let of_nodes = &nodes.normal_stress[2 * edge..=2 * edge + 2];
+    match of_nodes.iter().all(|of_node| *of_node <= 0.0) {
+        true => stress.min(0.0),
+        false => stress,
     }
 }
 
@@ -240,6 +254,29 @@ mod tests {
         let stick = 1000.0 * (1.0 - 0.5 * 0.6f64.sqrt());
         assert_eq!(turns(NodeState::Stick), stick as usize + 1);
         assert_eq!(sampled.state[4000], NodeState::Open);
+    }
+
+    /// The parabola through −100, 0 and 0 has 12.5 between the last two.
+    #[test]
+    fn there_is_no_tension_between_nodes_without_one() {
+        let (mut nodal, mut friction) = profiles(&[0.0, 1.0]);
+        let at = |s: &[f64]| {
+            s.iter()
+                .map(|s| -100.0 * (1.0 - 2.0 * s) * (1.0 - s))
+                .collect()
+        };
+        nodal.normal_stress = at(&nodal.s);
+        friction.normal_stress = at(&friction.s);
+        assert!(friction.normal_stress[2] > 8.0);
+        let sampled = sample(&nodal, &friction, 5);
+        assert_eq!(sampled.normal_stress, [-100.0, -37.5, 0.0, 0.0, 0.0]);
+        let all = at_all_points(&nodal, &friction, &ContactProfile::default());
+        assert_eq!(all.normal_stress[1], friction.normal_stress[0]);
+        assert_eq!(all.normal_stress[2..], [0.0; 3]);
+        // where a node is pulled, what lies beside it is as it was solved
+        nodal.normal_stress[2] = 1.0;
+        let sampled = sample(&nodal, &friction, 5);
+        assert_eq!(sampled.normal_stress[3], 12.5 + 0.375);
     }
 
     /// φ has a corner at the end of stick, τ at the end of contact: neither may cause an oscillation.
