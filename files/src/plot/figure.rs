@@ -7,6 +7,9 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::axis::{
+    CUT, decades, extent, interpolated, limits, peaks, place_of, power_of_ten, ticks, within,
+};
 use super::caption::Caption;
 use super::numbers::{number, rounded, tick};
 use super::page::{self, Area, Fallible, LETTERS, draw_text, px};
@@ -25,10 +28,6 @@ const NAME: i32 = 24;
 const EDGE: i32 = 4;
 const LEFT: i32 = 92;
 const RIGHT: i32 = 20;
-/// Decades that a logarithmic axis spans at most, from the largest value down.
-const DECADES: f64 = 18.0;
-/// A stress is drawn up to so many times what half of the contact stays below; a peak beyond that is cut off and marked.
-const CUT: f64 = 6.0;
 
 /// The style of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,7 +131,7 @@ pub struct Panel {
     pub shades: Vec<Shade>,
     /// Another coordinate along x.
     pub above: Option<Above>,
-    /// What is said of a peak that is cut off, after its value.
+    /// What is said of the largest peak, after its value; empty: only one that is cut off is named.
     pub of_peak: String,
 }
 
@@ -386,7 +385,8 @@ fn hatch(
     Ok(())
 }
 
-/// Two strokes through the axis wherever a curve leaves the panel, and how far the largest peak goes.
+/// Two strokes through the axis wherever a curve leaves the panel, and how far the largest peak goes; that is also said of one
+/// that is not cut off, if there is more to say of it.
 fn draw_cuts(
     area: &Area<'_>,
     style: Style,
@@ -414,6 +414,11 @@ fn draw_cuts(
                 largest = Some((x, y, over));
             }
         }
+    }
+    if largest.is_none() && !panel.of_peak.is_empty() {
+        let points = deciding(panel).into_iter().flatten();
+        let peak = points.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        largest = peak.map(|&(x, y)| (x, y, y > 0.0));
     }
     let Some((x, peak, over)) = largest else {
         return Ok(());
@@ -480,27 +485,15 @@ fn draw_above(
     Ok(())
 }
 
-/// Linear between points whose first coordinate rises.
-fn interpolated(points: impl Iterator<Item = (f64, f64)> + Clone, at: f64) -> Option<f64> {
-    let mut pairs = points.clone().zip(points.skip(1));
-    pairs.find_map(|((a, p), (b, q))| {
-        let inside = a <= at && at <= b && a < b;
-        inside.then(|| p + (at - a) / (b - a) * (q - p))
-    })
-}
-
-/// Where on the first axis the second has a value.
-fn place_of(places: &[(f64, f64)], value: f64) -> Option<f64> {
-    let turned = places.iter().map(|&(s, c)| (c, s));
-    match places.first()?.1 <= places.last()?.1 {
-        true => interpolated(turned, value),
-        false => interpolated(turned.rev(), value),
-    }
-}
-
 /// Whether a curve decides how far its axis reaches.
 fn decides(style: LineStyle) -> bool {
     style != LineStyle::Bound
+}
+
+/// The curves that do.
+fn deciding(panel: &Panel) -> Vec<&[(f64, f64)]> {
+    let curves = panel.curves.iter().filter(|curve| decides(curve.style));
+    curves.map(|curve| &curve.points[..]).collect()
 }
 
 /// What the vertical axis shows; of a logarithmic one the exponents.
@@ -522,9 +515,9 @@ fn up(panel: &Panel) -> Range<f64> {
             let most = values().fold(1.0, f64::max);
             -0.06 * most..1.06 * most
         }
-        Scale::Peaked => limits(panel, CUT),
+        Scale::Peaked => limits(&deciding(panel), CUT),
         Scale::Linear => {
-            let Range { start, end } = limits(panel, f64::INFINITY);
+            let Range { start, end } = limits(&deciding(panel), f64::INFINITY);
             // with the bounds, unless they are far from being reached
             let bounds = panel.curves.iter().filter(|curve| !decides(curve.style));
             let bounds = bounds.flat_map(|curve| curve.points.iter().map(|p| 1.08 * p.1));
@@ -532,113 +525,6 @@ fn up(panel: &Panel) -> Range<f64> {
             start.min(low.max(1.6 * start))..end.max(high.min(1.6 * end))
         }
     }
-}
-
-/// Of stresses: from the least to the largest with zero, but up to `cut` times what half of the length stays below. What is
-/// usual is judged by length, not by points: a mesh has most of its points where the peak is.
-fn limits(panel: &Panel, cut: f64) -> Range<f64> {
-    let mut parts: Vec<(f64, f64)> = Vec::new(); // value, length
-    for curve in panel.curves.iter().filter(|curve| decides(curve.style)) {
-        let points = &curve.points;
-        for (k, &(_, y)) in points.iter().enumerate() {
-            let before = points[k.saturating_sub(1)].0;
-            let after = points[(k + 1).min(points.len() - 1)].0;
-            parts.push((y, (after - before) / 2.0));
-        }
-    }
-    let (least, most) = parts
-        .iter()
-        .fold((0.0_f64, 0.0_f64), |(l, h), p| (l.min(p.0), h.max(p.0)));
-    let largest = most.max(-least);
-    let sizes = parts.iter().map(|&(y, length)| (y.abs(), length));
-    let acting = sizes.filter(|(y, _)| *y > 1e-9 * largest).collect();
-    let reach = match quantile(acting, 0.5) {
-        Some(usual) if usual * cut < largest => usual * cut,
-        _ => largest,
-    };
-    // a single point may overshoot beside a peak: where nothing of length is beyond zero, the axis ends there
-    let (low, high) = (quantile(parts.clone(), 0.001), quantile(parts, 0.999));
-    let below = if low.is_some_and(|low| low < 0.0) {
-        reach.min(-least)
-    } else {
-        0.0
-    };
-    let above = if high.is_some_and(|high| high > 0.0) {
-        reach.min(most)
-    } else {
-        0.0
-    };
-    match below + above > 0.0 {
-        true => -1.08 * below - 0.02 * above..1.08 * above + 0.02 * below,
-        false => -1.0..1.0,
-    }
-}
-
-/// The value that a share of the length stays below.
-fn quantile(mut parts: Vec<(f64, f64)>, share: f64) -> Option<f64> {
-    parts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let whole: f64 = parts.iter().map(|p| p.1).sum();
-    let mut length = 0.0;
-    let reached = parts.iter().find(|part| {
-        length += part.1;
-        length >= share * whole
-    });
-    reached.or(parts.last()).map(|part| part.0)
-}
-
-/// The parts of a curve that an axis shows, each ending where it leaves.
-fn within(points: &[(f64, f64)], up: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
-    let inside = |y: f64| up.start <= y && y <= up.end;
-    let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
-    let mut part: Vec<(f64, f64)> = Vec::new();
-    for (k, &(x, y)) in points.iter().enumerate() {
-        if let Some(&(x0, y0)) = k.checked_sub(1).and_then(|k| points.get(k)) {
-            // where the line from the point before crosses the ends of the axis, in order
-            let mut crossings: Vec<(f64, f64)> = [up.start, up.end]
-                .into_iter()
-                .filter(|limit| (y0 < *limit) != (y < *limit) && y0 != *limit && y != *limit)
-                .map(|limit| (x0 + (limit - y0) / (y - y0) * (x - x0), limit))
-                .collect();
-            if y < y0 {
-                crossings.reverse();
-            }
-            for crossing in crossings {
-                part.push(crossing);
-                if part.len() > 1 {
-                    parts.push(std::mem::take(&mut part));
-                }
-            }
-        }
-        if inside(y) {
-            part.push((x, y));
-        }
-    }
-    if part.len() > 1 {
-        parts.push(part);
-    }
-    parts
-}
-
-/// Where a curve is farthest beyond the axis, each time that it leaves it: x, the value, and whether it leaves at the top.
-fn peaks(points: &[(f64, f64)], up: &Range<f64>) -> Vec<(f64, f64, bool)> {
-    let mut found: Vec<(f64, f64, bool)> = Vec::new();
-    let mut before = None;
-    for &(x, y) in points {
-        let side = match y {
-            y if y > up.end => Some(true),
-            y if y < up.start => Some(false),
-            _ => None,
-        };
-        if let Some(over) = side {
-            match found.last_mut().filter(|_| before == side) {
-                Some(peak) if y.abs() > peak.1.abs() => (peak.0, peak.1) = (x, y),
-                Some(_) => {}
-                None => found.push((x, y, over)),
-            }
-        }
-        before = side;
-    }
-    found
 }
 
 fn stroke(palette: &Palette, style: LineStyle) -> ShapeStyle {
@@ -763,59 +649,6 @@ fn legend(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     Ok(())
 }
 
-/// As many ticks as there are whole numbers, and no more than fit.
-fn ticks(range: &Range<f64>) -> usize {
-    ((range.end - range.start) as usize + 1).clamp(2, 12)
-}
-
-/// 10ⁿ; nothing between the powers.
-fn power_of_ten(exponent: f64) -> String {
-    let round = exponent.round();
-    if (exponent - round).abs() > 1e-6 {
-        return String::new();
-    }
-    let raised = |c: char| match c {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        digit => char::from_u32('⁰' as u32 + digit.to_digit(10).unwrap_or(0)).unwrap_or('?'),
-    };
-    format!(
-        "10{}",
-        (round as i32)
-            .to_string()
-            .chars()
-            .map(raised)
-            .collect::<String>()
-    )
-}
-
-/// Whole decades around all exponents.
-fn decades(exponents: impl Iterator<Item = f64>) -> Range<f64> {
-    let (low, high) = exponents.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| {
-        (low.min(e), high.max(e))
-    });
-    if low > high {
-        return -1.0..1.0;
-    }
-    let top = (high + 0.1).ceil();
-    (low - 0.1).floor().max(top - DECADES).min(top - 2.0)..top
-}
-
-/// From the least to the largest value; never empty.
-fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
-    let start = (f64::INFINITY, f64::NEG_INFINITY);
-    let (low, high) = values.fold(start, |(low, high), v| (low.min(v), high.max(v)));
-    if low < high {
-        low..high
-    } else if low == high {
-        low - 1.0..low + 1.0
-    } else {
-        0.0..1.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -853,17 +686,6 @@ mod tests {
     }
 
     #[test]
-    fn powers_of_ten_are_raised_and_their_axis_ends_on_them() {
-        assert_eq!(power_of_ten(-10.0), "10⁻¹⁰");
-        assert_eq!(power_of_ten(2.0), "10²");
-        assert_eq!(power_of_ten(0.5), "");
-        assert_eq!(decades([-9.5, 0.3].into_iter()), -10.0..1.0);
-        assert_eq!(decades([-300.0, 0.3].into_iter()), -17.0..1.0);
-        assert_eq!(decades([0.5].into_iter()), -1.0..1.0);
-        assert_eq!(decades(std::iter::empty()), -1.0..1.0);
-    }
-
-    #[test]
     fn a_peak_is_cut_and_marked_and_a_point_that_overshoots_does_not_widen_the_axis() {
         let mut points: Vec<(f64, f64)> = (0..1000).map(|k| (f64::from(k), -100.0)).collect();
         points[998] = (997.5, 4000.0);
@@ -879,21 +701,6 @@ mod tests {
         assert_eq!(found, [(997.5, 4000.0, true), (997.6, -186_869.0, false)]);
         let svg = figure(Theme::Light, &Caption::default(), &[panel]).unwrap();
         assert!(svg.contains("peak −187000, which grows on finer meshes"));
-    }
-
-    #[test]
-    fn a_curve_ends_where_it_leaves_the_axis() {
-        let points = [(0.0, 0.0), (1.0, 2.0), (2.0, -2.0), (3.0, 0.5)];
-        let parts = within(&points, &(-1.0..1.0));
-        assert_eq!(
-            parts,
-            [
-                vec![(0.0, 0.0), (0.5, 1.0)],
-                vec![(1.25, 1.0), (1.75, -1.0)],
-                vec![(2.4, -1.0), (3.0, 0.5)],
-            ]
-        );
-        assert!(within(&[(0.0, 5.0), (1.0, 6.0)], &(-1.0..1.0)).is_empty());
     }
 
     #[test]
@@ -913,14 +720,5 @@ mod tests {
             assert!((up(&panel).end - end).abs() < 1e-9);
             panel.curves.pop();
         }
-    }
-
-    #[test]
-    fn the_second_axis_may_run_either_way() {
-        let rising = [(0.0, 5.0), (2.0, 9.0)];
-        let falling = [(0.0, 9.0), (2.0, 5.0)];
-        assert_eq!(place_of(&rising, 6.0), Some(0.5));
-        assert_eq!(place_of(&falling, 6.0), Some(1.5));
-        assert_eq!(place_of(&falling, 60.0), None);
     }
 }

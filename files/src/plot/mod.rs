@@ -4,6 +4,7 @@
 //! Axes, text and curves are drawn by plotters; bodies (`body`) are paths written here, since plotters
 //! neither clips nor joins shapes.
 
+mod axis;
 mod bands;
 mod body;
 mod caption;
