@@ -14,7 +14,7 @@ use crate::{SIGNORINI, server};
 
 /// Who may use which operation: written down here once more, and not taken from the service.
 const POLICY: &[(&str, &[&str])] = &[
-    ("open", &["GetError", "Live", "Ready"]),
+    ("open", &["GetError", "GetWarning", "Live", "Ready"]),
     ("identified", &["GetCaller"]),
     (
         "read",
@@ -52,6 +52,15 @@ const POLICY: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "read+submit",
+        &[
+            "UmBridgeEvaluate",
+            "UmBridgeGradient",
+            "UmBridgeApplyJacobian",
+            "UmBridgeApplyHessian",
+        ],
+    ),
+    (
         "submit",
         &[
             "ValidateProblem",
@@ -62,10 +71,6 @@ const POLICY: &[(&str, &[&str])] = &[
             "UpdateJob",
             "UploadMesh",
             "PutModel",
-            "UmBridgeEvaluate",
-            "UmBridgeGradient",
-            "UmBridgeApplyJacobian",
-            "UmBridgeApplyHessian",
             "CreateSweep",
             "CreateMemberJob",
         ],
@@ -102,6 +107,17 @@ const POLICY: &[(&str, &[&str])] = &[
 type Case = (String, Option<String>, Option<&'static [&'static str]>);
 
 struct Cases(Vec<Case>);
+
+/// What an administrator may use.
+const EVERYTHING: &[&str] = &[
+    "open",
+    "identified",
+    "read",
+    "submit",
+    "read+submit",
+    "cancel",
+    "admin",
+];
 
 async fn create(server: &Server, admin: Option<&str>, body: Value) -> (String, String) {
     let mut request = server.post("/v1/tokens").json(&body);
@@ -154,17 +170,19 @@ async fn with_tokens() -> (Server, String, Cases) {
             None,
         ),
     ];
-    for (scope, allows) in [
+    for (scopes, allows) in [
         ("read", &["open", "identified", "read"][..]),
         ("submit", &["open", "identified", "submit"]),
         ("cancel", &["open", "identified", "cancel"]),
         (
-            "admin",
-            &["open", "identified", "read", "submit", "cancel", "admin"],
+            "read+submit",
+            &["open", "identified", "read", "submit", "read+submit"],
         ),
+        ("admin", EVERYTHING),
     ] {
-        let (_, secret) = create(&server, Some(&admin), token("ada", &[scope])).await;
-        cases.push((scope.into(), Some(secret), Some(allows)));
+        let all: Vec<&str> = scopes.split('+').collect();
+        let (_, secret) = create(&server, Some(&admin), token("ada", &all)).await;
+        cases.push((scopes.into(), Some(secret), Some(allows)));
     }
     let (id, revoked) = create(&server, Some(&admin), token("ada", &["admin"])).await;
     let response = server
@@ -179,11 +197,7 @@ async fn with_tokens() -> (Server, String, Cases) {
     let rotated: Value = rotated.send().await.unwrap().json().await.unwrap();
     cases.push(("rotated away".into(), Some(old), None));
     let new = rotated["secret"].as_str().unwrap().to_owned();
-    cases.push((
-        "rotated".into(),
-        Some(new),
-        Some(&["open", "identified", "read", "submit", "cancel", "admin"]),
-    ));
+    cases.push(("rotated".into(), Some(new), Some(EVERYTHING)));
     (server, admin, Cases(cases))
 }
 

@@ -158,6 +158,32 @@ async fn derivatives_are_those_that_are_known() {
     close(&of_profile, &expected);
 }
 
+/// The end of the obstacle is at a node: a step to one side leaves out an edge of the contact.
+/// Operations: UmBridgeGradient, UmBridgeApplyJacobian
+#[tokio::test]
+async fn a_difference_of_two_meshes_is_no_derivative() {
+    let server = server().await;
+    let mut model = punch();
+    model["inputs"] = json!([["/contacts/0/obstacle/to"]]);
+    put(&server, "edge", &model).await;
+    let at = model["problem"]["contacts"][0]["obstacle"]["to"].clone();
+    for (endpoint, with) in [
+        ("Gradient", json!({ "sens": [1, 0] })),
+        ("ApplyJacobian", json!({ "vec": [1] })),
+    ] {
+        let mut body = json!({ "name": "edge", "input": [[at]], "outWrt": 0, "inWrt": 0 });
+        let fields = body.as_object_mut().unwrap();
+        fields.extend(with.as_object().unwrap().clone());
+        let (status, kind, message) = refused(&server, endpoint, body).await;
+        assert_eq!(
+            (status, kind.as_str()),
+            (StatusCode::INTERNAL_SERVER_ERROR, "InvalidOutput"),
+            "{message}"
+        );
+        assert!(message.contains("have meshes with"), "{message}");
+    }
+}
+
 /// Operations: UmBridgeModelInfo, UmBridgeGradient, UmBridgeApplyJacobian, UmBridgeApplyHessian
 #[tokio::test]
 async fn what_a_model_does_not_support_is_refused_as_unsupported() {

@@ -63,10 +63,13 @@ fn admit(service: &Service, request: &Request) -> Result<Identified, ApiError> {
         },
         Err(error) => return Err(error),
     };
-    match access {
-        Access::Needs(scope) if !identified.caller.may(scope) => Err(lacks(&identified, scope)),
-        Access::Open | Access::Identified | Access::Needs(_) => Ok(identified),
+    if let Access::Needs(scopes) = access {
+        let missing = scopes.iter().find(|scope| !identified.caller.may(**scope));
+        if let Some(scope) = missing {
+            return Err(lacks(&identified, *scope));
+        }
     }
+    Ok(identified)
 }
 
 /// The refusal of a caller who does not have this scope.
@@ -127,7 +130,7 @@ fn access(request: &Request) -> Access {
         // 405
         None if OPERATIONS.keys().any(|(_, known)| *known == route.as_str()) => Access::Open,
         // a route that somebody has added beside the list
-        None => Access::Needs(Scope::Admin),
+        None => Access::Needs(&[Scope::Admin]),
     }
 }
 

@@ -59,7 +59,14 @@ fn section(out: &mut String, operation: &Operation) {
     let who = match operation.access {
         Access::Open => "everyone, without a token".to_owned(),
         Access::Identified => "every token".to_owned(),
-        Access::Needs(scope) => format!("tokens with the scope `{}`", <&str>::from(scope)),
+        Access::Needs([scope]) => format!("tokens with the scope `{}`", <&str>::from(scope)),
+        Access::Needs(scopes) => {
+            let words: Vec<String> = scopes
+                .iter()
+                .map(|scope| format!("`{}`", <&str>::from(scope)))
+                .collect();
+            format!("tokens with the scopes {}", words.join(" and "))
+        }
     };
     let _ = writeln!(out, "- for {who}");
     let named = |parameter: &&Description| parameter.location != Location::Path;

@@ -22,7 +22,7 @@ use super::call::Call;
 use crate::{
     error::ApiError,
     model::Model,
-    verbs::umbridge::{self as verbs, Kind, ModelError, Pair, invalid},
+    verbs::umbridge::{self as verbs, Kind, ModelError, Pair, With, invalid},
     violations::quoted,
 };
 
@@ -357,9 +357,11 @@ async fn evaluated(mut call: Call) -> Result<Outputs, ModelError> {
         let fields = Fields::read(&text)?;
         let model = verbs::model(&call.service, &call.caller, &fields.name()?).await?;
         fields.without_options()?;
-        (model.name, fields.input()?)
+        let input = fields.input()?;
+        verbs::check_input(&model.description, &input)?;
+        (model.name, input)
     };
-    // to wait for the end of jobs takes no memory
+    // to wait for the end of jobs takes little memory: the input is as small as the model says
     call.received.release();
     let output = verbs::evaluate(&call.service, &call.caller, &name, input).await?;
     Ok(Outputs { output })
@@ -388,11 +390,17 @@ async fn differentiated(mut call: Call, along: Along) -> Result<Derivative, Mode
         let model = verbs::model(&call.service, &call.caller, &fields.name()?).await?;
         verbs::supports_derivatives(&model)?;
         fields.without_options()?;
-        let with = match along {
+        let with: Vec<f64> = match along {
             Along::Sens => value("sens", fields.sens, "a list of finite numbers")?,
             Along::Vec => value("vec", fields.vec, "a list of finite numbers")?,
         };
-        (model.name, fields.pair()?, (fields.input()?, with))
+        let (pair, input) = (fields.pair()?, fields.input()?);
+        let checked = match along {
+            Along::Sens => With::Sens(&with),
+            Along::Vec => With::Vec(&with),
+        };
+        verbs::check_derivative(&model.description, pair, &input, checked)?;
+        (model.name, pair, (input, with))
     };
     call.received.release();
     let (service, caller) = (&call.service, &call.caller);

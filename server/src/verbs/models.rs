@@ -123,7 +123,7 @@ pub async fn put(
 }
 
 /// A violation of the job that solves the problem of a model, which has the limits that all have by default.
-fn of_problem(violation: Violation) -> Violation {
+pub(super) fn of_problem(violation: Violation) -> Violation {
     match violation.pointer.starts_with("/limits") {
         true => Violation {
             pointer: PROBLEM.into(),

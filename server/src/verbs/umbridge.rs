@@ -4,9 +4,11 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use files::sweep::Parametrised;
+use futures_util::future::try_join_all;
 use solver::{
     error::{Violation, rounded, shortened},
     problem::Problem,
+    solution::Residuals,
 };
 use strum::IntoStaticStr;
 
@@ -23,7 +25,7 @@ use crate::{
     caller::Caller,
     error::ApiError,
     job::{Job, JobId, Status},
-    model::{Description, Model, Output, Scalar},
+    model::{Description, Model, Output, Scalar, Stress},
     transfer::Received,
     violations::{PROBLEM, quoted},
 };
@@ -85,14 +87,8 @@ struct Ready {
 
 /// The names of the caller's models, in order.
 pub async fn names(service: &Service, caller: &Caller) -> Result<Vec<String>, ApiError> {
-    let all = service
-        .store
-        .models(caller.visible_owners(), None, i64::MAX)
-        .await?;
-    let mut names: Vec<String> = all.into_iter().map(|model| model.name).collect();
-    names.sort();
-    names.dedup(); // an administrator sees those of several owners
-    Ok(names)
+    let owners = caller.visible_owners();
+    Ok(service.store.model_names(owners, i64::MAX).await?)
 }
 
 /// The model of this name.
@@ -110,7 +106,9 @@ pub async fn model(service: &Service, caller: &Caller, name: &str) -> Answer<Mod
 }
 
 async fn not_found(service: &Service, caller: &Caller, name: &str) -> Result<ModelError, ApiError> {
-    let names = names(service, caller).await?;
+    const SHOWN: i64 = 20;
+    let owners = caller.visible_owners();
+    let names = service.store.model_names(owners, SHOWN).await?;
     let known = match names.is_empty() {
         true => "none is registered: PUT /v1/models/{name} registers one".to_owned(),
         false => format!("there are: {}", shortened(&names.join(", "), 500)),
@@ -169,12 +167,13 @@ pub async fn evaluate(
     input: Vec<Vec<f64>>,
 ) -> Answer<Vec<Vec<f64>>> {
     let ready = ready(service, caller, name).await?;
-    ready.check_input(&input)?;
+    check_input(&ready.description, &input)?;
     let points = vec![input.concat()];
-    let mut found = solved(ready, service, caller, points, |outputs| outputs).await?;
-    found
+    let mut found = solved(ready, service, caller, points).await?;
+    let found = found
         .pop()
-        .ok_or_else(|| ApiError::internal("an evaluation has no output").into())
+        .ok_or_else(|| ApiError::internal("an evaluation has no output"))?;
+    Ok(found.outputs)
 }
 
 /// Jᵀ s: the derivatives of s · F by the numbers of one vector of inputs, where F is one vector of outputs. By central
@@ -187,16 +186,8 @@ pub async fn gradient(
     (input, sens): (Vec<Vec<f64>>, Vec<f64>),
 ) -> Answer<Vec<f64>> {
     let ready = ready(service, caller, name).await?;
-    let Vectors { out, range } = ready.check(pair, &input)?;
-    let outputs = ready.description.output_sizes()[out];
-    if sens.len() != outputs {
-        return Err(wrong_length(
-            "sens",
-            sens.len(),
-            outputs,
-            &format!("output {out}"),
-        ));
-    }
+    let Vectors { out, range } =
+        check_derivative(&ready.description, pair, &input, With::Sens(&sens))?;
     let at = input.concat();
     let steps: Vec<f64> = range
         .clone()
@@ -216,16 +207,18 @@ pub async fn gradient(
         .enumerate()
         .map(|(n, k)| points[2 * n][k] - points[2 * n + 1][k]);
     let widths: Vec<f64> = widths.collect();
-    let objective = |outputs: Vec<Vec<f64>>| -> f64 {
-        let weighted = outputs[out].iter().zip(&sens);
+    let objective = |found: &Evaluation| -> f64 {
+        let weighted = found.outputs[out].iter().zip(&sens);
         weighted.map(|(number, s)| s * number).sum()
     };
-    let found = solved(ready, service, caller, points, objective).await?;
-    let ends = found.chunks_exact(2).zip(widths);
-    finite(
-        ends.map(|(ends, width)| (ends[0] - ends[1]) / width)
-            .collect(),
-    )
+    let tolerance = ready.tolerance;
+    let found = solved(ready, service, caller, points).await?;
+    let mut derivatives = vec![];
+    for (ends, width) in found.chunks_exact(2).zip(widths) {
+        comparable(&ends[0], &ends[1], tolerance)?;
+        derivatives.push((objective(&ends[0]) - objective(&ends[1])) / width);
+    }
+    finite(derivatives)
 }
 
 /// J v: the derivative of one vector of outputs along v in one vector of inputs. By a central difference, from two jobs.
@@ -237,11 +230,8 @@ pub async fn apply_jacobian(
     (input, vec): (Vec<Vec<f64>>, Vec<f64>),
 ) -> Answer<Vec<f64>> {
     let ready = ready(service, caller, name).await?;
-    let Vectors { out, range } = ready.check(pair, &input)?;
-    if vec.len() != range.len() {
-        let of = format!("input {}", pair.in_wrt);
-        return Err(wrong_length("vec", vec.len(), range.len(), &of));
-    }
+    let Vectors { out, range } =
+        check_derivative(&ready.description, pair, &input, With::Vec(&vec))?;
     let at = input.concat();
     // no number moves by more than the step that a gradient takes for it, and one by as much
     let parts = range
@@ -258,6 +248,11 @@ pub async fn apply_jacobian(
         }
         largest => ready.step() / largest,
     };
+    if !t.is_finite() {
+        return Err(invalid(
+            "vec is too small: its numbers are scaled to a step",
+        ));
+    }
     let moved = |by: f64| {
         let mut point = at.clone();
         for (k, v) in range.clone().zip(&vec) {
@@ -266,9 +261,10 @@ pub async fn apply_jacobian(
         point
     };
     let points = vec![moved(t), moved(-t)];
-    let one = |mut outputs: Vec<Vec<f64>>| outputs.swap_remove(out);
-    let found = solved(ready, service, caller, points, one).await?;
-    let ends = found[0].iter().zip(&found[1]);
+    let tolerance = ready.tolerance;
+    let found = solved(ready, service, caller, points).await?;
+    comparable(&found[0], &found[1], tolerance)?;
+    let ends = found[0].outputs[out].iter().zip(&found[1].outputs[out]);
     finite(
         ends.map(|(plus, minus)| (plus - minus) / (2.0 * t))
             .collect(),
@@ -322,54 +318,112 @@ fn finite(numbers: Vec<f64>) -> Answer<Vec<f64>> {
 }
 
 /// Where in all numbers a pair of vectors is.
-struct Vectors {
+#[derive(Debug)]
+pub struct Vectors {
     out: usize,
     /// The numbers of the vector of inputs among all inputs.
     range: std::ops::Range<usize>,
 }
 
-impl Ready {
-    fn check_input(&self, input: &[Vec<f64>]) -> Answer<()> {
-        let sizes = self.description.input_sizes();
-        if input.len() != sizes.len() {
-            let (got, expected) = (input.len(), sizes.len());
-            return Err(invalid(format!(
-                "input has {got} vectors; the model takes {expected}"
+/// What came of one job.
+struct Evaluation {
+    job: JobId,
+    outputs: Vec<Vec<f64>>,
+    /// Of the body, and on the contact boundaries.
+    unknowns: [u64; 2],
+    residuals: Residuals,
+}
+
+/// An error if a model does not take this input.
+pub fn check_input(description: &Description, input: &[Vec<f64>]) -> Answer<()> {
+    let sizes = description.input_sizes();
+    if input.len() != sizes.len() {
+        let (got, expected) = (input.len(), sizes.len());
+        return Err(invalid(format!(
+            "input has {got} vectors; the model takes {expected}"
+        )));
+    }
+    for (k, (vector, size)) in input.iter().zip(sizes).enumerate() {
+        if vector.len() != size {
+            return Err(wrong_length(
+                &format!("input {k}"),
+                vector.len(),
+                size,
+                "the model",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// What a derivative is taken with.
+#[derive(Clone, Copy, Debug)]
+pub enum With<'a> {
+    /// Weights of outputs.
+    Sens(&'a [f64]),
+    /// A direction of inputs.
+    Vec(&'a [f64]),
+}
+
+/// Checks a request for a derivative of a model that has some.
+pub fn check_derivative(
+    description: &Description,
+    pair: Pair,
+    input: &[Vec<f64>],
+    with: With<'_>,
+) -> Answer<Vectors> {
+    check_input(description, input)?;
+    let index = |name: &str, got: i64, count: usize| match usize::try_from(got) {
+        Ok(index) if index < count => Ok(index),
+        _ => Err(invalid(format!(
+            "{name} is {got}; expected 0 … {}",
+            count.saturating_sub(1)
+        ))),
+    };
+    let (inputs, outputs) = (description.input_sizes(), description.output_sizes());
+    let out = index("outWrt", pair.out_wrt, outputs.len())?;
+    let of = index("inWrt", pair.in_wrt, inputs.len())?;
+    let (name, got, expected, whose) = match with {
+        With::Sens(sens) => ("sens", sens.len(), outputs[out], format!("output {out}")),
+        With::Vec(vec) => ("vec", vec.len(), inputs[of], format!("input {of}")),
+    };
+    if got != expected {
+        return Err(wrong_length(name, got, expected, &whose));
+    }
+    let start: usize = inputs[..of].iter().sum();
+    Ok(Vectors {
+        out,
+        range: start..start + inputs[of],
+    })
+}
+
+/// An error unless the difference of two solutions is one of the problem, and not of their meshes or of what rounding leaves.
+fn comparable(one: &Evaluation, other: &Evaluation, tolerance: f64) -> Answer<()> {
+    if one.unknowns != other.unknowns {
+        return Err(no_output(format!(
+            "{} and {}, the ends of a step, have meshes with {} and {} unknowns, so that their difference is not a derivative: the \
+             problem is refined until its result is accurate, or an input changes the mesh. Register it with a number for \
+             `mesh.refine`, and take no derivative by what changes the mesh",
+            one.job, other.job, one.unknowns[0], other.unknowns[0]
+        )));
+    }
+    for end in [one, other] {
+        if !end.residuals.within(tolerance) {
+            let Residuals {
+                kkt, monolithic, ..
+            } = end.residuals;
+            return Err(no_output(format!(
+                "{} has a residual of {:.1e}, where rounding ends its iterations, and not the tolerance {tolerance:.0e} of the \
+                 problem: a difference of such solutions is mostly noise",
+                end.job,
+                kkt.max(monolithic).max(end.residuals.friction)
             )));
         }
-        for (k, (vector, size)) in input.iter().zip(sizes).enumerate() {
-            if vector.len() != size {
-                return Err(wrong_length(
-                    &format!("input {k}"),
-                    vector.len(),
-                    size,
-                    "the model",
-                ));
-            }
-        }
-        Ok(())
     }
+    Ok(())
+}
 
-    /// Checks a request for a derivative of a model that has some.
-    fn check(&self, pair: Pair, input: &[Vec<f64>]) -> Answer<Vectors> {
-        self.check_input(input)?;
-        let index = |name: &str, got: i64, count: usize| match usize::try_from(got) {
-            Ok(index) if index < count => Ok(index),
-            _ => Err(invalid(format!(
-                "{name} is {got}; expected 0 … {}",
-                count.saturating_sub(1)
-            ))),
-        };
-        let sizes = self.description.input_sizes();
-        let out = index("outWrt", pair.out_wrt, self.description.outputs.len())?;
-        let of = index("inWrt", pair.in_wrt, sizes.len())?;
-        let start: usize = sizes[..of].iter().sum();
-        Ok(Vectors {
-            out,
-            range: start..start + sizes[of],
-        })
-    }
-
+impl Ready {
     /// The step of a central difference, relative to the size of a number: the cube root of the precision of the function,
     /// which here is the tolerance of the solver and not that of the machine. A step h has an error of h² from the curvature,
     /// and of tolerance/h from what the solver leaves; at this step both are alike, some 2e-7 for a tolerance of 1e-10.
@@ -383,21 +437,21 @@ impl Ready {
     }
 }
 
-/// What is kept of the outputs at each of these points, from jobs that are submitted together.
-async fn solved<T>(
+/// The outputs at each of these points, from jobs that are submitted together. Each is read as soon as it has ended: it may be
+/// deleted before the last one has. The first one without outputs ends the wait.
+async fn solved(
     ready: Ready,
     service: &Arc<Service>,
     caller: &Caller,
     points: Vec<Vec<f64>>,
-    keep: impl Fn(Vec<Vec<f64>>) -> T,
-) -> Answer<Vec<T>> {
+) -> Answer<Vec<Evaluation>> {
     let (jobs, outputs) = submitted(ready, service, caller, points).await?;
-    let mut found = vec![];
-    for id in jobs {
+    let outputs = &outputs;
+    let evaluations = jobs.into_iter().map(|id| async move {
         let job = ended(service, caller, id).await?;
-        found.push(keep(numbers(service, caller, &outputs, &job).await?));
-    }
-    Ok(found)
+        evaluation(service, caller, outputs, &job).await
+    });
+    try_join_all(evaluations).await
 }
 
 /// Submits a job for each of these points, all or none; what to read of their results. Of the rest nothing is kept: to wait
@@ -450,12 +504,19 @@ async fn submitted(
             let number = first.split('/').nth(2).unwrap_or_default();
             let point = number.parse().ok().and_then(|n: usize| points.get(n));
             let point = point.map_or(&[][..], Vec::as_slice);
-            refused(
-                &inputs,
-                point,
-                &violations,
-                &format!("/jobs/{number}{PROBLEM}"),
-            )
+            // those of the first job that is invalid; others have other inputs
+            let prefix = format!("/jobs/{number}");
+            let of_this_job = violations.into_iter().filter_map(|violation| {
+                let inside = violation.pointer.strip_prefix(&prefix)?.to_owned();
+                (inside.is_empty() || inside.starts_with('/')).then(|| {
+                    models::of_problem(Violation {
+                        pointer: inside,
+                        ..violation
+                    })
+                })
+            });
+            let of_this_job: Vec<Violation> = of_this_job.collect();
+            refused(&inputs, point, &of_this_job, PROBLEM)
         }
         other => other.into(),
     })?;
@@ -502,13 +563,13 @@ async fn ended(service: &Service, caller: &Caller, id: JobId) -> Result<Job, Api
     }
 }
 
-/// The outputs of a job that has ended. Without a converged solution there are none.
-async fn numbers(
+/// What came of a job that has ended. Without a converged solution it is an error.
+async fn evaluation(
     service: &Service,
     caller: &Caller,
     outputs: &[Output],
     job: &Job,
-) -> Answer<Vec<Vec<f64>>> {
+) -> Answer<Evaluation> {
     let id = job.id;
     if job.status != Status::Succeeded {
         let why = match (&job.failure, job.reason) {
@@ -527,8 +588,9 @@ async fn numbers(
         found.push(match output {
             Output::Scalars { scalars } => {
                 let numbers = scalars.iter().map(|path| {
-                    let number = Scalar::parse(path).and_then(|scalar| scalar.of(&summary));
-                    number.ok_or_else(|| absent(id, path))
+                    let scalar = Scalar::parse(path);
+                    let number = scalar.as_ref().and_then(|scalar| scalar.of(&summary));
+                    number.ok_or_else(|| absent(id, path, scalar))
                 });
                 numbers.collect::<Answer<Vec<f64>>>()?
             }
@@ -552,15 +614,22 @@ async fn numbers(
         });
     }
     match found.iter().flatten().all(|number| number.is_finite()) {
-        true => Ok(found),
+        true => Ok(Evaluation {
+            job: id,
+            outputs: found,
+            unknowns: [summary.dofs, summary.contact_dofs],
+            residuals: summary.residuals,
+        }),
         false => Err(no_output(format!("{id} has a number that is not finite"))),
     }
 }
 
-fn absent(id: JobId, path: &str) -> ModelError {
-    let why = match path.contains("tangential") {
-        true => "without friction there is none",
-        false => "without contact there is none",
+fn absent(id: JobId, path: &str, scalar: Option<Scalar>) -> ModelError {
+    let why = match scalar {
+        Some(Scalar::OfPeak(_, Stress::PeakTangentialStress, _)) => {
+            "without friction there is none"
+        }
+        _ => "without contact there is none",
     };
     no_output(format!(
         "{id} succeeded, but has no {}: {why}",

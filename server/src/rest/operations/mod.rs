@@ -140,6 +140,7 @@ mod tests {
             "/proto/signorini.proto",
             "/v1/schema/problem.json",
             "/v1/errors/{code}",
+            "/v1/warnings/{code}",
             "/metrics",
             "/livez",
             "/readyz",

@@ -18,10 +18,12 @@ use crate::{
 // Who may use an operation; an entry begins with it, so that none is without.
 pub(super) const OPEN: Access = Access::Open;
 pub(super) const IDENTIFIED: Access = Access::Identified;
-pub(super) const READ: Access = Access::Needs(Scope::Read);
-pub(super) const SUBMIT: Access = Access::Needs(Scope::Submit);
-pub(super) const CANCEL: Access = Access::Needs(Scope::Cancel);
-pub(super) const ADMIN: Access = Access::Needs(Scope::Admin);
+pub(super) const READ: Access = Access::Needs(&[Scope::Read]);
+pub(super) const SUBMIT: Access = Access::Needs(&[Scope::Submit]);
+/// Submits what it also returns the results of.
+pub(super) const READ_AND_SUBMIT: Access = Access::Needs(&[Scope::Read, Scope::Submit]);
+pub(super) const CANCEL: Access = Access::Needs(&[Scope::Cancel]);
+pub(super) const ADMIN: Access = Access::Needs(&[Scope::Admin]);
 
 /// An operation of the API.
 pub(in crate::rest) struct Operation {

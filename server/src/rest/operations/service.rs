@@ -5,11 +5,11 @@ use super::{
     operation::{ADMIN, IDENTIFIED, OPEN, Operation, READ, SUBMIT, get, post, probe},
 };
 use crate::{
-    catalog::{Code, Kind},
+    catalog::{Code, Kind, WarningKind},
     rest::{
         bodies::BareProblem,
         docs::{self, FILE},
-        service::{self, CODE},
+        service::{self, CODE, WARNING},
         submit,
     },
     verbs::{
@@ -58,6 +58,10 @@ pub(super) fn operations() -> Vec<Operation> {
             .rest_only("GetError")
             .summary("Explains a kind of error and what to do, for programs or as a page")
             .answers(200, "The explanation", [json::<Kind>(), bytes("text/html")].concat()),
+        get(OPEN, "/v1/warnings/{code}", (WARNING,), service::warning)
+            .rest_only("GetWarning")
+            .summary("Explains a warning of a result")
+            .answers(200, "The explanation", json::<WarningKind>()),
         get(READ, "/v1/schema/problem.json", (), service::schema)
             .rest_only("GetProblemSchema")
             .summary("Returns the JSON Schema of a problem: every field with its meaning and default")

@@ -4,7 +4,7 @@ use serde_json::json as value;
 
 use super::{
     content::json,
-    operation::{Operation, READ, SUBMIT, get, post},
+    operation::{Operation, READ, READ_AND_SUBMIT, get, post},
 };
 use crate::{
     catalog::Code,
@@ -42,28 +42,28 @@ pub(super) fn operations() -> Vec<Operation> {
             .example(named)
             .answers(200, "The sizes", json::<OutputSizes>())
             .refuses(),
-        post(SUBMIT, "/umbridge/Evaluate", (), handlers::evaluate)
+        post(READ_AND_SUBMIT, "/umbridge/Evaluate", (), handlers::evaluate)
             .rest_only("UmBridgeEvaluate")
             .summary("Evaluates a model: submits a job, waits for its end, and returns numbers of its result")
             .body(json::<EvaluateRequest>())
             .example(value!({ "name": "punch", "input": [[0.25, 0.3]], "config": {} }))
             .answers(200, "The outputs", json::<Outputs>())
             .evaluates(),
-        post(SUBMIT, "/umbridge/Gradient", (), handlers::gradient)
+        post(READ_AND_SUBMIT, "/umbridge/Gradient", (), handlers::gradient)
             .rest_only("UmBridgeGradient")
             .summary("Returns the gradient of an objective by central differences, from two jobs for each number of the input")
             .body(json::<GradientRequest>())
             .example(value!({ "name": "punch", "outWrt": 0, "inWrt": 0, "input": [[0.25, 0.3]], "sens": [1, 0], "config": {} }))
             .answers(200, "The gradient", json::<Derivative>())
             .evaluates(),
-        post(SUBMIT, "/umbridge/ApplyJacobian", (), handlers::apply_jacobian)
+        post(READ_AND_SUBMIT, "/umbridge/ApplyJacobian", (), handlers::apply_jacobian)
             .rest_only("UmBridgeApplyJacobian")
             .summary("Returns the derivative of an output along a vector by a central difference, from two jobs")
             .body(json::<JacobianRequest>())
             .example(value!({ "name": "punch", "outWrt": 0, "inWrt": 0, "input": [[0.25, 0.3]], "vec": [1, 0], "config": {} }))
             .answers(200, "The derivative", json::<Derivative>())
             .evaluates(),
-        post(SUBMIT, "/umbridge/ApplyHessian", (), handlers::apply_hessian)
+        post(READ_AND_SUBMIT, "/umbridge/ApplyHessian", (), handlers::apply_hessian)
             .rest_only("UmBridgeApplyHessian")
             .summary("Is refused: no model has second derivatives")
             .body(json::<ModelRequest>())
