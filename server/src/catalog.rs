@@ -1,8 +1,9 @@
 //! Every kind of error there is: of requests, and of jobs. The one source of HTTP status and gRPC code, of the
-//! pages at `/v1/errors/{code}` and of `signorini explain`.
+//! pages at `/v1/errors/{code}` and of `signorini explain`. Beside them the warnings of results.
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use solver::solution::WarningCode;
 use strum::{EnumString, IntoStaticStr, VariantArray};
 use tonic::Code as Grpc;
 
@@ -25,6 +26,36 @@ pub struct Kind {
     pub retry_after_s: Option<u64>,
     /// What it means, and what to do.
     pub explanation: &'static str,
+}
+
+/// What clients may rely on about a warning.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct WarningKind {
+    /// Its stable name.
+    pub code: &'static str,
+    /// What it means: one line, the same every time.
+    pub title: String,
+    /// What to do.
+    pub explanation: &'static str,
+}
+
+/// What clients may rely on about this warning; its meaning is that of the schema of results.
+pub fn warning(code: WarningCode) -> WarningKind {
+    let schema = schemars::schema_for!(WarningCode).to_value();
+    let code = code.as_str();
+    let variants = schema.get("oneOf").and_then(|all| all.as_array());
+    let meaning = variants
+        .into_iter()
+        .flatten()
+        .find(|variant| variant["const"] == code)
+        .and_then(|variant| variant["description"].as_str())
+        .unwrap_or_default();
+    WarningKind {
+        code,
+        title: meaning.replace('\n', " ").trim_end_matches('.').to_owned(),
+        explanation: "The result is there, and is to be read with this in mind. The `message` of the warning, in \
+                      `summary.warnings`, says where and how much, and what to do.",
+    }
 }
 
 /// Where the service explains a kind of error.

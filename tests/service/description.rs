@@ -146,3 +146,19 @@ async fn every_error_is_explained_to_programs_and_people() {
         );
     }
 }
+
+/// Operations: GetWarning
+#[tokio::test]
+async fn every_warning_is_explained() {
+    let server = server().await;
+    let document = server.json("/openapi.json").await;
+    let path = &document["paths"]["/v1/warnings/{code}"]["get"];
+    let codes = path["parameters"][0]["schema"]["enum"].as_array().unwrap();
+    assert!(codes.len() > 30);
+    for code in codes {
+        let path = format!("/v1/warnings/{}", code.as_str().unwrap());
+        let kind = server.json(&path).await;
+        assert_eq!(kind["code"], *code);
+        assert!(kind["title"].as_str().unwrap().len() > 10, "{kind}");
+    }
+}

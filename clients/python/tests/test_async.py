@@ -97,6 +97,7 @@ def test_sweeps(server: sg.LocalServer, capsys: pytest.CaptureFixture[str]) -> N
             sweep = await client.sweep(PUNCH, {"contacts.0.friction.coefficient": [0.1, 0.2, 0.3]}, name="twin")
             await sweep.wait(60)
             assert len(await sweep.table()) == 3 and len(await sweep.to_pandas()) == 3
+            assert (await sweep.plot("stick_width")).axes
             member = await sweep.member(2)
             assert (await (await member.job()).wait(60, progress=False)).converged
             with pytest.raises(IndexError):
@@ -141,6 +142,7 @@ def test_meshes_and_the_service(server: sg.LocalServer) -> None:
             assert (await client.pause_queue())["paused"] and not (await client.resume_queue())["paused"]
             assert (await client.queue())["workers"] == 2
             assert (await client.explain("timed-out"))["title"]
+            assert (await client.explain("mesh_too_coarse_for_radius"))["title"]
 
     asyncio.run(run())
 

@@ -166,7 +166,10 @@ def test_the_service_tells_about_itself(client: sg.Client) -> None:
     assert client.pause_queue()["paused"] is True
     assert client.resume_queue()["paused"] is False
     assert client.queue()["workers"] == 2
-    assert "title" in client.explain("not-converged")
+    for code in ("not-converged", "not_converged", "quota-exceeded", "mesh_too_coarse_for_radius"):
+        assert client.explain(code)["title"], code
+    with pytest.raises(sg.NotFound):
+        client.explain("no_such_code")
 
 
 def test_a_token_says_who_one_is(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -179,6 +179,8 @@ def test_a_misspelt_field_is_refused_also_later() -> None:
     problem = sg.examples.rectangular_punch()
     friction = problem.contacts[0].friction
     assert friction is not None
+    with pytest.raises(TypeError, match="Friction has no `coeficient`. Did you mean `coefficient`?"):
+        p.Friction(**{"coeficient": 0.3, "elastic_slip": 1e-4})  # type: ignore[arg-type]
     with pytest.raises(AttributeError, match="Friction has no `coeficient`. Did you mean `coefficient`?"):
         friction.coeficient = 0.9  # type: ignore[attr-defined]
     friction.coefficient = 0.9

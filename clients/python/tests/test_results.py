@@ -61,6 +61,9 @@ def test_the_summary(punch: sg.Result) -> None:
     text = repr(punch)
     assert text.startswith("outcome           converged\nverdict ") and "normal force      9" in text
     assert "warning: contact_reaches_obstacle_end: " in text
+    assert repr(punch.profile()).startswith("<Profile of 'top': ") and " rows; .s, .x, .y, " in repr(punch.profile())
+    assert repr(punch.history).startswith("<History: ") and ".to_pandas()" in repr(punch.history)
+    assert repr(punch.fields()).startswith("<Fields: ") and " nodes, " in repr(punch.fields())
 
 
 def test_the_errors_of_several_contacts_add_up() -> None:

@@ -12,6 +12,7 @@ import pytest
 
 import signorini as sg
 from signorini import _calls as calls
+from signorini._progress import Waiting
 from signorini._retry import Attempts
 
 Answer = httpx.Response | Exception
@@ -85,6 +86,44 @@ def test_pauses_grow_and_end_with_the_limit(monkeypatch: pytest.MonkeyPatch) -> 
     assert 50 < sum(pauses) <= 60
     attempts.succeeded()
     assert attempts.after_error(httpx.ReadError("reset")) <= 0.1, "what comes after an answer is counted anew"
+
+
+def test_a_service_that_is_away_is_told_about_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = [0.0]
+    told: list[str] = []
+    attempts = Attempts(True, 60, lambda: now[0], told.append)
+    for _ in range(8):
+        now[0] += attempts.after_error(httpx.ConnectError("refused"))
+    assert len(told) == 1 and told[0].startswith(
+        "the service at this address cannot be reached (refused); trying again for "
+    )
+    assert attempts.after_answer(httpx.Response(200)) is None
+    assert told[1:] == ["the service answers again"]
+    attempts.succeeded()
+    for _ in range(3):
+        now[0] += attempts.after_error(httpx.ReadError("reset"))
+    assert len(told) == 2, "nothing is said of what is over after a moment"
+    # by default it goes to the log, which Python shows
+    busy = problem(503, "queue-full", True, Retry_After="7")
+    service = Service(busy, busy, httpx.Response(200, json={"name": "x"}))
+    assert client_of(service, monkeypatch).info() == {"name": "x"}
+    assert [record.message for record in caplog.records] == [
+        "the service is busy (queue-full); trying again for 60 s",
+        "the service answers again",
+    ]
+    service = Service(
+        httpx.Response(502, text="bad", headers={"Retry-After": "9"}), httpx.Response(200, json={"name": "x"})
+    )
+    assert client_of(service, monkeypatch).info() == {"name": "x"}
+    assert "the service is busy (HTTP status 502)" in caplog.text
+    # while one waits, on a line of its own
+    waiting = Waiting("punch", None, True, "")
+    waiting.note("the service is busy (queue-full); trying again for 60 s")
+    assert capsys.readouterr().err == "the service is busy (queue-full); trying again for 60 s\n"
+    Waiting("punch", None, False, "").note("silent")
+    assert capsys.readouterr().err == ""
 
 
 def test_what_might_be_done_twice_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,6 +66,54 @@ def test_values_that_belong_together(client: sg.Client) -> None:
     assert second.parameters["/contacts/0/obstacle"]["kind"] == "parabola"
 
 
+def test_a_study_tells_what_to_look_at_and_is_drawn(client: sg.Client, capsys: pytest.CaptureFixture[str]) -> None:
+    axes = {RHO: sg.logspace(0.005, 0.05, 4), MU: [0.1, 0.3]}
+    study = client.sweep(BASE, axes, name="stick over ρ").wait(60)
+    told = capsys.readouterr().err
+    assert (
+        "8 of 8 members have warnings: " in told and "mesh_too_coarse_for_radius 6" in told and "client.explain" in told
+    )
+    table = study.table()
+    text = repr(table)
+    assert text.splitlines()[0].split()[:4] == ["number", "nonlocal_radius", "coefficient", "status"]
+    assert "0.005" in text and "members have warnings" in text
+    assert "… 2 more rows" in repr(
+        sg.SweepTable({name: np.resize(column, 12) for name, column in table.columns.items()})
+    )
+    with pytest.raises(KeyError, match="there is no column 'stick_with'; did you mean 'stick_width'"):
+        table["stick_with"]
+    with pytest.raises(KeyError, match="there is no column 'zzz'; there are number, "):
+        table["zzz"]
+
+    figure = study.plot("stick_width", size="column", theme="dark")
+    (axes_drawn,) = figure.axes
+    assert axes_drawn.get_xscale() == "log" and axes_drawn.get_ylabel() == "width of stick"
+    legend = axes_drawn.get_legend()
+    assert legend is not None and [text.get_text() for text in legend.get_texts()][:2] == [
+        r"$\mu$ = 0.1",
+        r"$\mu$ = 0.3",
+    ]
+    assert (
+        figure.get_suptitle() == "stick over ρ" and "members have warnings: mesh too coarse" in figure.get_supxlabel()
+    )
+    other = table.plot("normal_force", x="coefficient", title="")
+    assert other.axes[0].get_xscale() == "linear" and other.axes[0].get_xlabel() == r"$\mu$"
+    for words, wrong in [("has no numbers", ("status", None)), ("has no numbers", ("stick_width", "warnings"))]:
+        with pytest.raises(ValueError, match=words):
+            table.plot(wrong[0], x=wrong[1])
+    many = {**table.columns, "coefficient": np.arange(8.0), "nonlocal_radius": np.zeros(8), "number": np.arange(8)}
+    crowd = sg.SweepTable({name: np.resize(column, 16) for name, column in many.items()} | {"/a": np.arange(16.0)})
+    crowd.parameters = ["coefficient", "a"]
+    crowd.columns["coefficient"] = np.arange(16.0)
+    with pytest.raises(ValueError, match="16 curves are too many"):
+        crowd.plot("stick_width", x="coefficient")
+    alone = sg.SweepTable({"number": np.arange(1), "stick_width": np.ones(1), "status": np.array(["failed"]),
+                           "reason": np.array(["invalid_problem"]), "warnings": np.array([""])})  # fmt: skip
+    assert alone.notes() == ["1 of 1 members have no solution: invalid_problem 1 (column detail)"]
+    with pytest.raises(ValueError, match="has no parameters"):
+        alone.plot("stick_width")
+
+
 def test_axes_are_spaced_as_the_service_spaces_them(client: sg.Client) -> None:
     axis = sg.logspace(0.005, 0.05, 4)
     table = client.sweep(BASE, {RHO: axis}).wait(60, progress=False).table()

@@ -8,10 +8,11 @@ use axum::{
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
+use solver::solution::WarningCode;
 
 use super::{accept::prefers, call::Call};
 use crate::{
-    catalog::{Code, Kind},
+    catalog::{self, Code, Kind, WarningKind},
     error::ApiError,
     parameters::{Variable, Words},
     verbs::{
@@ -98,6 +99,19 @@ fn page(kind: &Kind) -> String {
          code{{font-size:1.1em}}</style>\
          <h1>{title}</h1><p><code>{code}</code></p>{facts}<p>{explanation}</p></html>\n"
     )
+}
+
+/// A warning in a path.
+pub(super) const WARNING: Variable<Words<WarningCode>> = Variable {
+    name: "code",
+    kind: "warning",
+    meaning: "The code of a warning",
+    values: Words::all(),
+};
+
+/// The explanation of a warning.
+pub(super) async fn warning(_: Call, code: WarningCode) -> Result<Json<WarningKind>, ApiError> {
+    Ok(Json(catalog::warning(code)))
 }
 
 /// The JSON Schema of a problem.

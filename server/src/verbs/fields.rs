@@ -71,7 +71,7 @@ pub(super) async fn are_kept(service: &Service, job: &Job) -> Result<(), ApiErro
 }
 
 /// Fields in memory, once there is room for them; `None` if there are none.
-async fn load(service: &Service, key: i64) -> Result<Option<Arc<Loaded>>, ApiError> {
+pub(super) async fn load(service: &Service, key: i64) -> Result<Option<Arc<Loaded>>, ApiError> {
     if let Some(loaded) = service.fields_in_memory.find(key) {
         return Ok(Some(loaded));
     }

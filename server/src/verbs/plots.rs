@@ -12,7 +12,9 @@ use solver::{
 use super::{
     fields,
     history::StoredHistory,
-    jobs, profiles,
+    jobs,
+    loaded::Loaded as LoadedFields,
+    profiles,
     results::{self, Found, StepResult, read},
     service::Service,
 };
@@ -22,6 +24,7 @@ use crate::{
     formats::Format,
     job::{Job, JobId, ResultAvailable},
     parameters::{Parameter, Variable, Words},
+    store::Snapshot,
 };
 
 /// A figure in a path, and its format.
@@ -108,13 +111,14 @@ pub async fn plot(
         style,
         step,
     } = figure;
+    // before there is a permit to work: who has that must not wait for memory
+    let fields = match plot {
+        Plot::Mesh | Plot::Deformed => fields_of(service, caller, id, plot).await?,
+        Plot::Profile | Plot::Convergence => None,
+    };
     // loaded once there is a permit, so that waiting requests use no memory
     let load = async {
-        let mut found = match plot {
-            // these show the problem or the iterations, and so can be drawn while the job waits or runs
-            Plot::Mesh | Plot::Convergence => jobs::snapshot(service, caller, id).await?,
-            Plot::Profile | Plot::Deformed => results::with_result(service, caller, id).await?,
-        };
+        let mut found = snapshot(service, caller, id, plot).await?;
         if step.is_some() && found.job.result_available == ResultAvailable::None {
             return Err(results::no_result(&found.job));
         }
@@ -140,17 +144,6 @@ pub async fn plot(
         };
         let job = found.job.clone();
         drop(found);
-        if plot == Plot::Deformed {
-            fields::are_kept(service, &job).await?;
-        }
-        let fields = match plot {
-            Plot::Mesh | Plot::Deformed => service.store.fields(job.result_key).await?,
-            _ => None,
-        };
-        let fields = fields.map(|(_, fields)| fields);
-        if plot == Plot::Deformed && fields.is_none() {
-            return Err(results::no_result(&job));
-        }
         let store = &service.store;
         let stored = store.problem(job.key).await?;
         let (title, problem) = stored.ok_or(ApiError::Deleted(id))?;
@@ -194,6 +187,38 @@ pub async fn plot(
     service.work_on(load, draw).await?
 }
 
+/// What a figure is drawn from, as it is now.
+async fn snapshot(
+    service: &Service,
+    caller: &Caller,
+    id: JobId,
+    plot: Plot,
+) -> Result<Snapshot, ApiError> {
+    match plot {
+        // these show the problem or the iterations, and so can be drawn while the job waits or runs
+        Plot::Mesh | Plot::Convergence => jobs::snapshot(service, caller, id).await,
+        Plot::Profile | Plot::Deformed => results::with_result(service, caller, id).await,
+    }
+}
+
+/// The fields of a job for this figure, once there is memory for them.
+async fn fields_of(
+    service: &Service,
+    caller: &Caller,
+    id: JobId,
+    plot: Plot,
+) -> Result<Option<Arc<LoadedFields>>, ApiError> {
+    let job = snapshot(service, caller, id, plot).await?.job.clone();
+    if plot == Plot::Deformed {
+        fields::are_kept(service, &job).await?;
+    }
+    let fields = fields::load(service, job.result_key).await?;
+    match plot == Plot::Deformed && fields.is_none() {
+        true => Err(results::no_result(&job)),
+        false => Ok(fields),
+    }
+}
+
 /// What figures are drawn from, most in its stored form; the parts that a figure does not need are absent.
 struct Loaded {
     job: Job,
@@ -203,7 +228,7 @@ struct Loaded {
     columns: Vec<(String, Vec<u8>)>,
     summary: Option<Vec<u8>>,
     history: Option<StoredHistory>,
-    fields: Option<Fields>,
+    fields: Option<Arc<LoadedFields>>,
     stored: Option<Vec<u8>>,
 }
 
@@ -223,7 +248,8 @@ impl Loaded {
         if plot == Plot::Convergence && history.is_empty() {
             return Err(results::no_result(&self.job));
         }
-        let fields = self.fields.unwrap_or_default();
+        let nothing = Fields::default();
+        let fields = self.fields.as_ref().map_or(&nothing, |found| &found.fields);
         let stored: Option<Mesh> = self
             .stored
             .map(|bytes| postcard::from_bytes(&bytes).map_err(ApiError::internal))
@@ -238,7 +264,7 @@ impl Loaded {
             partial: self.step.is_none() && self.job.result_available != ResultAvailable::Final,
             step: self.step.as_ref().map(|(_, step)| step.name.as_str()),
             profiles: &profiles,
-            fields: &fields,
+            fields,
             stored: stored.as_ref(),
         };
         Ok(plot::draw(plot, style, &self.problem, &parts))

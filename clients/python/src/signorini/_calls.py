@@ -479,9 +479,8 @@ def resume_queue() -> Call[Document]:
     return _safely(_post("/v1/queue/resume"))
 
 
-def explain(code: str) -> Call[Document]:
-    # the reason of an error has the code with underscores
-    call = _get("/v1/errors/" + quote(code.replace("_", "-"), safe=""))
+def explain(kind: str, code: str) -> Call[Document]:
+    call = _get(f"/v1/{kind}/" + quote(code, safe=""))
     return Call(call.method, call.path, _json, headers={"Accept": "application/json"})
 
 

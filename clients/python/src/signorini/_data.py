@@ -171,7 +171,7 @@ class StoredMesh:
         return cls(**{name: document[name] for name in names}, warnings=warnings, document=document)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Columns:
     """Columns of equal length."""
 
@@ -193,8 +193,15 @@ class Columns:
     def __len__(self) -> int:
         return len(next(iter(self.columns().values())))
 
+    def __repr__(self) -> str:
+        columns = ", ".join(f".{name}" for name in self.columns())
+        return f"<{type(self).__name__}{self._which()}: {len(self)} rows; {columns}; .to_pandas(), .plot()>"
 
-@dataclass(frozen=True)
+    def _which(self) -> str:
+        return ", partial" if getattr(self, "partial", False) else ""
+
+
+@dataclass(frozen=True, repr=False)
 class Profile(Columns):
     """What lies along a contact boundary, sorted by arc length. Stresses are those on the body.
 
@@ -232,8 +239,11 @@ class Profile(Columns):
 
         return figures.profile(self, **options)
 
+    def _which(self) -> str:
+        return f" of {self.boundary!r}" + super()._which()
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class History(Columns):
     """A row for each iteration of the last attempt. Residuals are dimensionless; NaN is a number that is absent."""
 
@@ -266,7 +276,7 @@ class History(Columns):
         return figures.convergence(self, **options)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Fields:
     """Displacements and stresses at the nodes, and the mesh.
 
@@ -294,6 +304,14 @@ class Fields:
     gauss_stress: Array
     about: Mapping[str, Any] = field(default_factory=dict, repr=False)
     partial: bool = False
+
+    def __repr__(self) -> str:
+        elements = len(self.quads) + len(self.triangles)
+        partial = ", partial" if self.partial else ""
+        return (
+            f"<Fields{partial}: {len(self.points)} nodes, {elements} elements; .points, .displacement, .stress, "
+            ".principal_stress, .von_mises, …; .to_pyvista(), .plot()>"
+        )
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
         """As an unstructured grid of PyVista (`pip install signorini[pyvista]`)."""

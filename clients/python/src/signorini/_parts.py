@@ -41,6 +41,16 @@ class Part:
     ends in an underscore: `from_` is the JSON's `from`.
     """
 
+    # a type checker would take it for leave to give any name
+    if not typing.TYPE_CHECKING:
+
+        def __new__(cls, *args: Any, **values: Any) -> Part:
+            """Raises TypeError for a name that is none of its fields."""
+            for name in values:
+                if name not in hints(cls):
+                    raise TypeError(no_field(cls, name))
+            return super().__new__(cls)
+
     def __post_init__(self) -> None:
         found: list[Violation] = []
         for name, hint in hints(type(self)).items():
@@ -53,11 +63,8 @@ class Part:
 
         def __setattr__(self, name: str, value: Any) -> None:
             """Sets a field. Raises AttributeError for another name, which the service would never see."""
-            known = hints(type(self))
-            if name not in known:
-                close = difflib.get_close_matches(name, known, 1)
-                guess = f" Did you mean `{close[0]}`?" if close else f" It has {', '.join(known)}."
-                raise AttributeError(f"{type(self).__name__} has no `{name}`.{guess}")
+            if name not in hints(type(self)):
+                raise AttributeError(no_field(type(self), name))
             super().__setattr__(name, value)
 
     def __repr__(self) -> str:
@@ -103,6 +110,14 @@ def hints(cls: Any) -> dict[str, Any]:
         found = typing.get_type_hints(cls, include_extras=True)
         _HINTS[cls] = {field.name: found[field.name] for field in dataclasses.fields(cls)}
     return _HINTS[cls]
+
+
+def no_field(cls: Any, name: str) -> str:
+    """That a class has no field of this name, with the one that may be meant."""
+    known = hints(cls)
+    close = difflib.get_close_matches(name, known, 1)
+    guess = f"Did you mean `{close[0]}`?" if close else f"It has {', '.join(known)}."
+    return f"{cls.__name__} has no `{name}`. {guess}"
 
 
 def json_name(name: str) -> str:

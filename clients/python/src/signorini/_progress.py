@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TextIO
 
 from ._calls import LONGEST_WAIT_S
@@ -64,10 +64,21 @@ class Waiting:
         if not ended and self._end is not None and time.monotonic() >= self._end:
             raise WaitTimeout(f"{self.what} has not ended in time; it goes on.\n  {self.back}")
 
+    def note(self, text: str) -> None:
+        """Shows, on a line of its own, what happens to the connection meanwhile."""
+        if self._progress:
+            self.close()
+            self.tell([text])
+
     def detached(self) -> None:
         """Tells how to come back, after Ctrl-C."""
         self.close()
         self._out.write(f"Detached. {self.back}\n")
+        self._out.flush()
+
+    def tell(self, lines: Iterable[str]) -> None:
+        """Writes lines below the last one."""
+        self._out.writelines(line + "\n" for line in lines)
         self._out.flush()
 
     def close(self) -> None:

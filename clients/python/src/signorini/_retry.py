@@ -7,6 +7,7 @@ with its idempotency key).
 
 from __future__ import annotations
 
+import logging
 import random
 import time
 from collections.abc import Callable
@@ -17,32 +18,50 @@ from .errors import ConnectionLost
 
 FIRST_PAUSE_S = 0.1
 LONGEST_PAUSE_S = 5.0
+QUIET_S = 1.0
+"""Nothing is said of what is over after so many seconds."""
+
+LOG = logging.getLogger("signorini")
+"""Python shows its warnings on standard error unless the program sets up logging otherwise."""
 
 
 class Attempts:
     """The attempts of one request.
 
     limit_s: no attempt begins later than so many seconds after the first failure
+    tell: is given a sentence when attempts go on for longer than a moment, and another one when they have succeeded
     """
 
-    def __init__(self, repeatable: bool, limit_s: float, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        repeatable: bool,
+        limit_s: float,
+        clock: Callable[[], float] = time.monotonic,
+        tell: Callable[[str], None] = LOG.warning,
+    ) -> None:
         self.repeatable = repeatable
         self.limit_s = limit_s
         self.failures = 0
         self._clock = clock
+        self._tell = tell
+        self._told = False
         self._first_failure: float | None = None
 
     def succeeded(self) -> None:
         """The service was reached: what comes later is counted anew."""
+        if self._told:
+            self._tell("the service answers again")
         self.failures = 0
+        self._told = False
         self._first_failure = None
 
     def after_error(self, error: httpx.TransportError) -> float:
         """Seconds to wait before the next attempt. Raises `ConnectionLost` if there is none."""
         never_arrived = isinstance(error, (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout))
-        pause = self._pause(None) if self.repeatable or never_arrived else None
+        reason = str(error) or type(error).__name__
+        why = f"the service at {_address(error)} cannot be reached ({reason})"
+        pause = self._pause(None, why) if self.repeatable or never_arrived else None
         if pause is None:
-            reason = str(error) or type(error).__name__
             after = f", also after {self.failures} attempts" if self.failures > 1 else ""
             hint = (
                 "Is it running (`signorini serve`)? SIGNORINI_URL names another; Client.local() starts one. "
@@ -56,22 +75,32 @@ class Attempts:
     def after_answer(self, response: httpx.Response) -> float | None:
         """Seconds to wait before the next attempt; None if this answer is the last."""
         if response.status_code in (429, 503):
-            if not _says_retryable(response):
-                return None
-        elif response.status_code not in (502, 504) or not self.repeatable:
-            return None
-        return self._pause(retry_after_s(response))
+            again = _says_retryable(response)
+        else:
+            again = response.status_code in (502, 504) and self.repeatable
+        if again:
+            return self._pause(retry_after_s(response), f"the service is busy ({_reason(response)})")
+        if self._told:
+            self._tell("the service answers again")
+            self._told = False
+        return None
 
-    def _pause(self, wanted: float | None) -> float | None:
+    def _pause(self, wanted: float | None, why: str) -> float | None:
         now = self._clock()
         if self._first_failure is None:
             self._first_failure = now
         self.failures += 1
         # half of the pause is left to chance, so that many clients do not come back at the same moment
-        pause = min(FIRST_PAUSE_S * 2 ** min(self.failures - 1, 10), LONGEST_PAUSE_S) * random.uniform(0.5, 1)
+        pause: float = min(FIRST_PAUSE_S * 2 ** min(self.failures - 1, 10), LONGEST_PAUSE_S) * random.uniform(0.5, 1)
         if wanted is not None:
             pause = max(pause, wanted)
-        return pause if now + pause <= self._first_failure + self.limit_s else None
+        last = self._first_failure + self.limit_s
+        if now + pause > last:
+            return None
+        if not self._told and now + pause > self._first_failure + QUIET_S:
+            self._tell(f"{why}; trying again for {last - now:.0f} s")
+            self._told = True
+        return pause
 
 
 def retry_after_s(response: httpx.Response) -> float | None:
@@ -85,6 +114,14 @@ def _says_retryable(response: httpx.Response) -> bool:
         return bool(response.json().get("retryable", True))
     except (ValueError, AttributeError):  # not the service's own answer, but a proxy's
         return True
+
+
+def _reason(response: httpx.Response) -> str:
+    """The code of the error that the service answered with, or the status."""
+    try:
+        return str(response.json()["code"])
+    except (ValueError, KeyError, TypeError):  # not the service's own answer, but a proxy's
+        return f"HTTP status {response.status_code}"
 
 
 def _address(error: httpx.TransportError) -> str:

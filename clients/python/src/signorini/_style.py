@@ -63,8 +63,22 @@ QUANTITIES = {
     "stress_yy": r"stress  $\sigma_{yy}$",
     "stress_zz": r"stress  $\sigma_{zz}$",
     "stress_xy": r"stress  $\sigma_{xy}$",
+    "stick_width": "width of stick",
+    "slip_width": "width of slip",
+    "contact_width": "width of contact",
+    "peak_normal_stress": r"peak of  $\sigma_n$",
+    "peak_tangential_stress": r"peak of  $\sigma_t$",
 }
 """The names of quantities on axes."""
+
+PARAMETERS = {
+    "coefficient": r"$\mu$",
+    "nonlocal_radius": r"$\rho$",
+    "elastic_slip": r"$\varepsilon$",
+    "youngs_modulus": r"$E$",
+    "poissons_ratio": r"$\nu$",
+}
+"""The usual symbols of parameters that studies vary."""
 
 SYMBOLS = {"μ": r"$\mu$", "ρ": r"$\rho$", "ε": r"$\varepsilon$"}
 

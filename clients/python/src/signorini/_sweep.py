@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import collections
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import pointer as pointers
@@ -13,6 +15,12 @@ from ._progress import sweep_line
 if TYPE_CHECKING:
     import pandas
     import pyarrow
+    from matplotlib.figure import Figure
+
+SHOWN_ROWS = 10
+"""Rows of a table that its `repr` shows."""
+SHOWN_COLUMNS = ("status", "normal_force", "tangential_force", "stick_width", "peak_tangential_stress", "warnings")
+"""What it shows besides the parameters."""
 
 
 class SweepView:
@@ -85,19 +93,59 @@ class SweepTable:
     columns: arrays by name. A parameter is named by the last part of its pointer, `nonlocal_radius`, or by all of it
         where several end alike.
     parameters: the names of these columns
+    title: the name of the sweep, which a figure has as its title
     """
 
-    def __init__(self, found: Mapping[str, Array]) -> None:
+    def __init__(self, found: Mapping[str, Array], title: str = "") -> None:
         pointed = [name for name in found if name.startswith("/")]
         short = short_names(pointed)
         self.columns: dict[str, Array] = {short.get(name, name): column for name, column in found.items()}
         self.parameters = [short[name] for name in pointed]
+        self.title = title
 
     def __getitem__(self, name: str) -> Array:
+        """A column. Raises KeyError with the names that there are."""
+        if name not in self.columns:
+            close = difflib.get_close_matches(name, self.columns, 1)
+            guess = f"did you mean {close[0]!r}? " if close else ""
+            raise KeyError(f"there is no column {name!r}; {guess}there are {', '.join(self.columns)}")
         return self.columns[name]
 
     def __len__(self) -> int:
         return len(self.columns["number"])
+
+    def __repr__(self) -> str:
+        names = ["number", *self.parameters, *(name for name in SHOWN_COLUMNS if name in self.columns)]
+        rows = [names] + [
+            [_cell(self.columns[name][row]) for name in names] for row in range(min(len(self), SHOWN_ROWS))
+        ]
+        widths = [max(len(row[column]) for row in rows) for column in range(len(names))]
+        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+        if len(self) > SHOWN_ROWS:
+            lines.append(f"… {len(self) - SHOWN_ROWS} more rows")
+        return "\n".join([*lines, *self.notes()])
+
+    def plot(self, quantity: str, **options: Any) -> Figure:
+        """Draws a column over the parameters; see `signorini.figures.sweep`."""
+        from . import figures
+
+        return figures.sweep(self, quantity, **options)
+
+    def notes(self) -> list[str]:
+        """How many members have no solution, or one with warnings, and which; empty if all is well."""
+        lines = []
+        failed = self["status"] == "failed"
+        if failed.any():
+            reasons = counted(self["reason"][failed].tolist())
+            lines.append(f"{failed.sum()} of {len(self)} members have no solution: {reasons} (column detail)")
+        codes = [text.split() for text in self["warnings"].tolist()]
+        warned = sum(1 for of_member in codes if of_member)
+        if warned:
+            words = counted(code for of_member in codes for code in of_member)
+            lines.append(
+                f"{warned} of {len(self)} members have warnings: {words} (client.explain tells what they mean)"
+            )
+        return lines
 
     def to_pandas(self) -> pandas.DataFrame:
         """As a table of pandas (`pip install signorini[pandas]`)."""
@@ -108,6 +156,15 @@ class SweepTable:
         """As a table of Arrow (`pip install signorini[arrow]`)."""
         table: pyarrow.Table = load("pyarrow", "arrow").table(self.columns)
         return table
+
+
+def counted(words: Iterable[str]) -> str:
+    """Words with how often they occur, the most frequent first."""
+    return ", ".join(f"{word} {count}" for word, count in collections.Counter(words).most_common())
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
 def short_names(found: list[str]) -> dict[str, str]:

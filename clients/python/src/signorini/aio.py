@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import os
 import pathlib
-from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -23,8 +23,9 @@ from ._data import Event, Fields, History, Profile, StoredMesh, Summary, Validat
 from ._events import Cursor
 from ._job import JobView, changes
 from ._progress import Waiting
-from ._retry import Attempts
+from ._retry import LOG, Attempts
 from ._sweep import Member, SweepTable, SweepView
+from .errors import NotFound
 from .local import LocalServer
 from .problem import Problem
 from .result import write
@@ -193,12 +194,15 @@ class AsyncClient:
         return await self._send(calls.resume_queue())
 
     async def explain(self, code: str) -> Mapping[str, Any]:
-        return await self._send(calls.explain(code))
+        try:
+            return await self._send(calls.explain("errors", code.replace("_", "-")))
+        except NotFound:
+            return await self._send(calls.explain("warnings", code.replace("-", "_")))
 
     # Sending
 
-    async def _send(self, call: Call[T], limit_s: float | None = None) -> T:
-        attempts = Attempts(call.repeatable, self.retry_for if limit_s is None else limit_s)
+    async def _send(self, call: Call[T], limit_s: float | None = None, tell: Callable[[str], None] = LOG.warning) -> T:
+        attempts = Attempts(call.repeatable, self.retry_for if limit_s is None else limit_s, tell=tell)
         while True:
             try:
                 response = await self._http.request(**request_arguments(call))
@@ -255,7 +259,7 @@ class AsyncJob(JobView):
         try:
             while not self.ended:
                 call = calls.job(self.id, waiting.seconds())
-                self.document = await self._client._send(call, waiting.left(self._client.retry_for))
+                self.document = await self._client._send(call, waiting.left(self._client.retry_for), waiting.note)
                 waiting.seen(self.status, self.line(), self.ended, self._residual())
         except asyncio.CancelledError:  # which is also what Ctrl-C becomes
             waiting.detached()
@@ -375,17 +379,22 @@ class AsyncSweep(SweepView):
         try:
             while not self.ended:
                 call = calls.sweep(self.id, waiting.seconds())
-                self.document = await self._client._send(call, waiting.left(self._client.retry_for))
+                self.document = await self._client._send(call, waiting.left(self._client.retry_for), waiting.note)
                 waiting.seen(self.status, self.line(), self.ended)
         except asyncio.CancelledError:
             waiting.detached()
             raise
         finally:
             waiting.close()
+        if progress:
+            waiting.tell((await self.table()).notes())
         return self
 
     async def table(self) -> SweepTable:
-        return SweepTable(await self._client._send(calls.sweep_table(self.id)))
+        return SweepTable(await self._client._send(calls.sweep_table(self.id)), self.title)
+
+    async def plot(self, quantity: str, **options: Any) -> Figure:
+        return (await self.table()).plot(quantity, **options)
 
     async def to_pandas(self) -> pandas.DataFrame:
         return (await self.table()).to_pandas()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import os
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -16,7 +16,8 @@ from ._calls import Call, MeshSource, Submission
 from ._connection import Connection, request_arguments, stream_arguments
 from ._data import Event, StoredMesh, Validation
 from ._events import Cursor
-from ._retry import Attempts
+from ._retry import LOG, Attempts
+from .errors import NotFound
 from .job import Job
 from .local import LocalServer
 from .problem import Problem
@@ -248,14 +249,17 @@ class Client:
         return self._send(calls.resume_queue())
 
     def explain(self, code: str) -> Mapping[str, Any]:
-        """What an error code means, and what to do."""
-        return self._send(calls.explain(code))
+        """What the code of an error or of a warning, or the reason of a failed job, means, and what to do."""
+        try:
+            return self._send(calls.explain("errors", code.replace("_", "-")))
+        except NotFound:
+            return self._send(calls.explain("warnings", code.replace("-", "_")))
 
     # Sending
 
-    def _send(self, call: Call[T], limit_s: float | None = None) -> T:
+    def _send(self, call: Call[T], limit_s: float | None = None, tell: Callable[[str], None] = LOG.warning) -> T:
         """Sends a request, again where that is safe, and reads the answer."""
-        attempts = Attempts(call.repeatable, self.retry_for if limit_s is None else limit_s)
+        attempts = Attempts(call.repeatable, self.retry_for if limit_s is None else limit_s, tell=tell)
         while True:
             try:
                 response = self._http.request(**request_arguments(call))

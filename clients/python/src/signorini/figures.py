@@ -3,6 +3,7 @@
     profile       stresses along a contact, stick and slip shaded
     convergence   residuals and changes of contact by iteration
     deformed      the deformed body with a stress
+    sweep         a column of a study over its parameters
     problem       mesh, supports and obstacles of a problem, before it is solved
 
 All return a `matplotlib.figure.Figure`: `figure.savefig("punch.pdf")`. Each takes `size`, one of `column` (88 mm),
@@ -20,13 +21,14 @@ import numpy as np
 
 from . import _shapes as shapes
 from ._data import Array, Fields, History, Profile
-from ._style import QUANTITIES, Theme, style, subtitle, unit
+from ._style import PARAMETERS, QUANTITIES, Theme, style, subtitle, unit
+from ._sweep import SweepTable
 from .problem import Problem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["convergence", "deformed", "problem", "profile"]
+__all__ = ["convergence", "deformed", "problem", "profile", "sweep"]
 
 CUT = 6.0
 """A stress is drawn up to so many times its median along the contact; a peak beyond it is cut and marked."""
@@ -252,6 +254,105 @@ def problem(found: Problem, *, size: str = "page", theme: str = "light", title: 
         about = {"title": found.title or "", "parameters": friction}
         _head(figure, axes, about, colours, False, title)
     return _finished(plt, figure)
+
+
+MOST_CURVES = 12
+"""More in one figure cannot be told apart."""
+
+
+def sweep(
+    table: SweepTable,
+    quantity: str,
+    *,
+    x: str | None = None,
+    size: str = "page",
+    theme: str = "light",
+    title: str | None = None,
+) -> Figure:
+    """A column of a study over one parameter, with a curve for each value of the others.
+
+    quantity: a column of numbers, such as `stick_width`
+    x: the parameter along the axis; absent: the one with the most values
+
+    A member with a warning that not all of them have has a hollow marker; one without a solution interrupts its
+    curve. Below is counted how many members have which warnings. Raises ValueError where more than twelve curves
+    would be needed, or a column has no numbers.
+    """
+    values = _numbers(table, quantity)
+    if not table.parameters:
+        raise ValueError("the sweep has no parameters")
+    distinct = {name: len(set(table[name].tolist())) for name in table.parameters}
+    numeric = [name for name in table.parameters if table[name].dtype.kind in "fiu"]
+    if x is None:
+        x = max(numeric or table.parameters, key=lambda name: distinct[name])
+    along = _numbers(table, x)
+    others = [name for name in table.parameters if name != x and distinct[name] > 1]
+    curves: dict[tuple[Any, ...], list[int]] = {}
+    for row in range(len(table)):
+        curves.setdefault(tuple(table[name][row] for name in others), []).append(row)
+    if len(curves) > MOST_CURVES:
+        raise ValueError(
+            f"{len(curves)} curves are too many for one figure (x={x!r}, one for each {', '.join(others)})"
+        )
+    codes = [set(text.split()) for text in table["warnings"].tolist()]
+    solved = [codes[row] for row in np.flatnonzero(np.isfinite(values))]
+    of_all = set.intersection(*solved) if solved else set()
+    warned = np.array([bool(of_member - of_all) for of_member in codes])
+    with style(size, theme) as (plt, width, colours):
+        figure, axes = plt.subplots(figsize=(width, 0.7 * width), layout="constrained")
+        # along a scale of brightness, which any eye can order; neither end is lost on the ground
+        scale = plt.get_cmap("cividis")(np.linspace(*((0.0, 0.85) if theme == "light" else (0.3, 1.0)), len(curves)))
+        colour = [colours.normal] if len(curves) == 1 else scale
+        for number, (key, rows) in enumerate(curves.items()):
+            order = np.array(rows)[np.argsort(along[rows], kind="stable")]
+            label = ", ".join(f"{PARAMETERS.get(n, n)} = {_short(v)}" for n, v in zip(others, key, strict=True))
+            dashes = ("-", "--", "-.", ":")[number % 4]
+            axes.plot(along[order], values[order], color=colour[number], linestyle=dashes, label=label or None)
+            for some, face in ((order[~warned[order]], colour[number]), (order[warned[order]], colours.ground)):
+                axes.plot(along[some], values[some], "o", color=colour[number], markerfacecolor=face, markersize=4)
+        if np.all(along > 0) and _is_geometric(np.unique(along)):
+            axes.set_xscale("log")
+            # few numbers, in plain form: powers of ten would cover each other within a decade
+            axes.xaxis.set_major_locator(plt.matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.xaxis.set_minor_formatter("")
+        if np.any(warned & np.isfinite(values)):
+            axes.plot(
+                [], [], "o", color=colours.ink, markerfacecolor=colours.ground, markersize=4, label="with warnings"
+            )
+        axes.set_xlabel(PARAMETERS.get(x, x.replace("_", " ")))
+        axes.set_ylabel(QUANTITIES.get(quantity, quantity.replace("_", " ")))
+        axes.grid(axis="y")
+        handles, labels = axes.get_legend_handles_labels()
+        if labels and size == "column":
+            axes.legend(handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
+        elif labels:
+            # as the curves mostly are, the last on top
+            axes.legend(handles[::-1], labels[::-1], loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        figure.suptitle(table.title if title is None else title, x=0.01, ha="left", fontweight="bold", fontsize="large")
+        notes = "\n".join(textwrap.fill(note.split(" (c")[0].replace("_", " "), 95) for note in table.notes())
+        if notes:
+            figure.supxlabel(notes, x=0.01, ha="left", fontsize="x-small", color=colours.faint)
+    return _finished(plt, figure)
+
+
+def _numbers(table: SweepTable, name: str) -> Array:
+    column = table[name]
+    if column.dtype.kind not in "fiu":
+        raise ValueError(f"the column {name!r} has no numbers")
+    return column.astype(float)
+
+
+def _is_geometric(values: Array) -> bool:
+    """Whether values grow by about the same factor, and in all by a lot."""
+    if len(values) < 3 or values[-1] < 4 * values[0]:
+        return False
+    factors = values[1:] / values[:-1]
+    return bool(factors.max() < 1.6 * factors.min())
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}".replace("-", "−") if isinstance(value, float) else str(value)
 
 
 def _finished(plt: Any, figure: Any) -> Figure:

@@ -45,7 +45,7 @@ class Job(JobView):
         try:
             while not self.ended:
                 call = calls.job(self.id, waiting.seconds())
-                self.document = self._client._send(call, waiting.left(self._client.retry_for))
+                self.document = self._client._send(call, waiting.left(self._client.retry_for), waiting.note)
                 waiting.seen(self.status, self.line(), self.ended, self._residual())
         except KeyboardInterrupt:
             waiting.detached()

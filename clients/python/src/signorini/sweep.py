@@ -13,6 +13,7 @@ from .job import Job
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
     from .client import Client
 
@@ -31,25 +32,32 @@ class Sweep(SweepView):
     def wait(self, timeout: float | None = None, progress: bool = True) -> Sweep:
         """Waits until all members have ended, solved or not: the table says which.
 
-        Arguments are those of `Job.wait`; Ctrl-C detaches.
+        Arguments are those of `Job.wait`; Ctrl-C detaches. With `progress` it tells in the end how many members have no
+        solution, or one with warnings.
         """
         back = f"The sweep goes on. Come back with client.sweep({self.id!r}).wait()"
         waiting = Waiting(self.title, timeout, progress, back, self._card)
         try:
             while not self.ended:
                 call = calls.sweep(self.id, waiting.seconds())
-                self.document = self._client._send(call, waiting.left(self._client.retry_for))
+                self.document = self._client._send(call, waiting.left(self._client.retry_for), waiting.note)
                 waiting.seen(self.status, self.line(), self.ended)
         except KeyboardInterrupt:
             waiting.detached()
             raise
         finally:
             waiting.close()
+        if progress:
+            waiting.tell(self.table().notes())
         return self
 
     def table(self) -> SweepTable:
         """The table as it is now; it fills while the sweep runs."""
-        return SweepTable(self._client._send(calls.sweep_table(self.id)))
+        return SweepTable(self._client._send(calls.sweep_table(self.id)), self.title)
+
+    def plot(self, quantity: str, **options: Any) -> Figure:
+        """Draws a column of the table over the parameters; see `signorini.figures.sweep`."""
+        return self.table().plot(quantity, **options)
 
     def to_pandas(self) -> pandas.DataFrame:
         """The table as one of pandas (`pip install signorini[pandas]`)."""

@@ -30,7 +30,7 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  signorini plot job_…\n  signorini plot job_… deformed -o punch.pdf --size column\n  \
-    signorini plot job_… mesh --open"
+    signorini plot job_… profile --step 2\n  signorini plot job_… mesh --open"
 )]
 pub(in crate::cli) struct Arguments {
     /// The job
@@ -47,6 +47,14 @@ pub(in crate::cli) struct Arguments {
     /// Open it with the program that this machine uses for such a file
     #[arg(long)]
     open: bool,
+
+    /// At the end of this load step, by its name or its number from 0 [default: the last]
+    #[arg(long)]
+    step: Option<String>,
+
+    /// The stress that the figure deformed shows [default: von_mises]
+    #[arg(long, value_parser = ["von_mises", "xx", "yy", "zz", "xy"])]
+    stress: Option<String>,
 
     #[command(flatten)]
     look: output::Look,
@@ -66,6 +74,10 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         );
         return Ok(Exit::Invalid);
     };
+    if arguments.stress.is_some() && arguments.plot != Some(Plot::Deformed) {
+        eprintln!("signorini: --stress is for the figure deformed");
+        return Ok(Exit::Invalid);
+    }
     let service = arguments.service.open()?;
     let drawn = matches!(
         arguments.plot,
@@ -101,8 +113,13 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             return Ok(Exit::Invalid);
         };
         let look = arguments.look.query();
-        let route = format!("/v1/jobs/{id}/plots/{name}.{}?{look}", format.name());
-        let answer = service.fetch(&route).await?;
+        let mut more = form_urlencoded::Serializer::new(String::new());
+        more.extend_pairs(arguments.step.iter().map(|step| ("step", step)));
+        more.extend_pairs(arguments.stress.iter().map(|stress| ("stress", stress)));
+        let (format, more) = (format.name(), more.finish());
+        let route = format!("/v1/jobs/{id}/plots/{name}.{format}?{look}&{more}");
+        let route = route.trim_end_matches('&');
+        let answer = service.fetch(route).await?;
         let available = answer.headers().get(RESULT_AVAILABLE);
         if available.is_some_and(|available| available == "partial") {
             eprintln!(
@@ -116,12 +133,16 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         }
         return Ok(Exit::Ok);
     }
+    let step = match &arguments.step {
+        Some(wanted) => Some(number_of_step(&service, id, wanted).await?),
+        None => None,
+    };
     let mut figures = vec![];
     if arguments.plot != Some(Plot::Convergence) {
-        figures.extend(profiles(&service, id).await?);
+        figures.extend(profiles(&service, id, step).await?);
     }
     if arguments.plot != Some(Plot::Profile) {
-        figures.push(convergence(&service, id).await?);
+        figures.push(convergence(&service, id, step).await?);
     }
     let in_colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let width = console::Term::stdout()
@@ -135,14 +156,40 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// The stresses along each contact boundary.
-async fn profiles(service: &Service, id: JobId) -> anyhow::Result<Vec<Chart>> {
+/// The number of a load step, given by its name or that number. A problem without load steps has step 0.
+async fn number_of_step(service: &Service, id: JobId, wanted: &str) -> anyhow::Result<u32> {
+    let result: Value = service.get(&format!("/v1/jobs/{id}/result")).await?;
+    let steps = result["steps"].as_array();
+    let names: Vec<&str> = steps
+        .into_iter()
+        .flatten()
+        .filter_map(|step| step["name"].as_str())
+        .collect();
+    let number = names.iter().position(|name| *name == wanted);
+    let number = number.or_else(|| wanted.parse().ok());
+    let number = number.filter(|number| *number < names.len().max(1));
+    let number = number.with_context(|| match names.is_empty() {
+        true => format!("{id} has no load steps; leave out --step"),
+        false => format!(
+            "{id} has no load step {wanted:?}; it has, by name or by number from 0: {}",
+            names.join(", ")
+        ),
+    })?;
+    Ok(u32::try_from(number)?)
+}
+
+/// The stresses along each contact boundary, at the end of this step or of the last one.
+async fn profiles(service: &Service, id: JobId, step: Option<u32>) -> anyhow::Result<Vec<Chart>> {
     let mut result: Value = service.get(&format!("/v1/jobs/{id}/result")).await?;
     let summary: Summary = serde_json::from_value(result["summary"].take())
         .context("the result is not that of this version of signorini")?;
     let mut figures = vec![];
     for boundary in summary.solution.contacts.keys() {
-        let path = format!("/v1/jobs/{id}/profiles/{}?format=json", segment(boundary));
+        let at = step.map_or(String::new(), |number| format!("&step={number}"));
+        let path = format!(
+            "/v1/jobs/{id}/profiles/{}?format=json{at}",
+            segment(boundary)
+        );
         let profile: ContactProfile = service.get(&path).await?;
         let points = |values: &[f64]| {
             profile
@@ -184,13 +231,16 @@ async fn profiles(service: &Service, id: JobId) -> anyhow::Result<Vec<Chart>> {
     Ok(figures)
 }
 
-/// The residuals by iteration.
-async fn convergence(service: &Service, id: JobId) -> anyhow::Result<Chart> {
-    let rows: Vec<TimedIteration> = service
+/// The residuals by iteration, of this step or of all.
+async fn convergence(service: &Service, id: JobId, step: Option<u32>) -> anyhow::Result<Chart> {
+    let mut rows: Vec<TimedIteration> = service
         .get(&format!(
             "/v1/jobs/{id}/history?format=json&max_points=2000"
         ))
         .await?;
+    if let Some(number) = step {
+        rows.retain(|timed| timed.row.step == number);
+    }
     let curve = |name, value: fn(&TimedIteration) -> f64| Curve {
         name,
         points: rows
