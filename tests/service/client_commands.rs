@@ -308,6 +308,42 @@ async fn every_end_has_its_exit_code() {
 }
 
 #[tokio::test]
+async fn a_load_step_and_a_stress_are_drawn() {
+    let server = server().await;
+    let folder = tempfile::tempdir().unwrap();
+    let mut problem = example_json("rectangular_punch");
+    problem["steps"] = json!([{ "name": "half", "indentation": 0.5 }, { "name": "whole" }]);
+    problem["mesh"]["refine"] = json!(0);
+    let id = server.submit(&problem).await;
+    server.until_done(&id).await;
+    let url = &server.url;
+    let mut drawn = vec![];
+    for step in ["half", "1"] {
+        drawn.push(ends(url, &["plot", &id, "--step", step], 0).await.0);
+    }
+    assert!(drawn[0].contains("Convergence") && drawn[0] != drawn[1]);
+    assert_eq!(
+        drawn[1],
+        ends(url, &["plot", &id, "--step", "whole"], 0).await.0
+    );
+    let (_, said) = ends(url, &["plot", &id, "--step", "third"], 1).await;
+    assert!(said.contains("half, whole"), "{said}");
+    let file = folder.path().join("figure.svg");
+    let file = file.to_str().unwrap();
+    let read = || std::fs::read_to_string(file).unwrap();
+    ends(url, &["plot", &id, "-o", file, "--step", "half"], 0).await;
+    assert!(read().contains("load step half"));
+    let deformed = ["plot", &id, "deformed", "-o", file];
+    ends(url, &deformed, 0).await;
+    let mises = read();
+    ends(url, &[&deformed[..], &["--stress", "xy"]].concat(), 0).await;
+    assert_ne!(read(), mises);
+    let (_, said) = ends(url, &["plot", &id, "--stress", "xy"], 2).await;
+    assert!(said.contains("is for the figure deformed"), "{said}");
+    ends(url, &["plot", &id, "deformed", "--stress", "zy"], 2).await;
+}
+
+#[tokio::test]
 async fn a_token_is_sent_and_one_that_is_refused_has_its_exit_code() {
     let server = Server::start(SIGNORINI, &[]).await;
     let created = ends(

@@ -117,7 +117,7 @@ def test_a_service_that_is_away_is_told_about_once(
         httpx.Response(502, text="bad", headers={"Retry-After": "9"}), httpx.Response(200, json={"name": "x"})
     )
     assert client_of(service, monkeypatch).info() == {"name": "x"}
-    assert "the service is busy (HTTP status 502)" in caplog.text
+    assert "a proxy gets no answer from the service (HTTP status 502)" in caplog.text
     # while one waits, on a line of its own
     waiting = Waiting("punch", None, True, "")
     waiting.note("the service is busy (queue-full); trying again for 60 s")

@@ -71,7 +71,9 @@ def test_a_study_tells_what_to_look_at_and_is_drawn(client: sg.Client, capsys: p
     study = client.sweep(BASE, axes, name="stick over ρ").wait(60)
     told = capsys.readouterr().err
     assert (
-        "8 of 8 members have warnings: " in told and "mesh_too_coarse_for_radius 6" in told and "client.explain" in told
+        "8 of 8 members have warnings: " in told
+        and "mesh_too_coarse_for_radius 6" in told
+        and "client.explain(code)" in told
     )
     table = study.table()
     text = repr(table)
@@ -104,12 +106,25 @@ def test_a_study_tells_what_to_look_at_and_is_drawn(client: sg.Client, capsys: p
     many = {**table.columns, "coefficient": np.arange(8.0), "nonlocal_radius": np.zeros(8), "number": np.arange(8)}
     crowd = sg.SweepTable({name: np.resize(column, 16) for name, column in many.items()} | {"/a": np.arange(16.0)})
     crowd.parameters = ["coefficient", "a"]
-    crowd.columns["coefficient"] = np.arange(16.0)
+    crowd.columns["coefficient"] = np.arange(16.0) % 2
     with pytest.raises(ValueError, match="16 curves are too many"):
         crowd.plot("stick_width", x="coefficient")
+    # values that belong together are one curve; a last state that did not converge is no value
+    pair = sg.SweepTable({**table.columns, "/b": np.arange(8.0), "/a": 2 * np.arange(8.0)})
+    pair.columns["status"] = np.array(["succeeded"] * 6 + ["failed", "canceled"])
+    pair.columns["reason"] = np.array([""] * 6 + ["not_converged", "user_cancel"])
+    (drawn,) = pair.plot("normal_force", title="pair").axes
+    heights = np.asarray(drawn.lines[0].get_ydata())
+    assert len(heights) == 8 and np.isnan(heights[6:].astype(float)).all()
+    assert pair.notes()[0] == "2 of 8 members have no solution: not_converged 1, user_cancel 1"
+    listed = sg.SweepTable({**table.columns, "/b": np.arange(8) // 2 * 1.0, "/a": np.array([1.0, np.nan] * 4)})
+    labels = listed.plot("normal_force").axes[0].get_legend_handles_labels()[1]
+    assert labels[:2] == ["a = 1", "a = as in the problem"]
+    nothing = {name: column[:0] for name, column in pair.columns.items()}
+    assert sg.SweepTable(nothing | {"/a": np.zeros(0)}).plot("normal_force").axes
     alone = sg.SweepTable({"number": np.arange(1), "stick_width": np.ones(1), "status": np.array(["failed"]),
                            "reason": np.array(["invalid_problem"]), "warnings": np.array([""])})  # fmt: skip
-    assert alone.notes() == ["1 of 1 members have no solution: invalid_problem 1 (column detail)"]
+    assert alone.notes() == ["1 of 1 members have no solution: invalid_problem 1"]
     with pytest.raises(ValueError, match="has no parameters"):
         alone.plot("stick_width")
 

@@ -704,6 +704,25 @@ mod tests {
     }
 
     #[test]
+    fn a_peak_that_is_not_cut_is_named_if_there_is_more_to_say() {
+        let mut panel = Panel {
+            curves: vec![curve("", &[(0.0, -1.0), (1.0, -2.5), (2.0, -1.0)])],
+            ..Panel::default()
+        };
+        let drawn = |panel: &Panel| {
+            figure(
+                Theme::Light,
+                &Caption::default(),
+                std::slice::from_ref(panel),
+            )
+            .unwrap()
+        };
+        assert!(!drawn(&panel).contains("peak"));
+        panel.of_peak = ", which grows on finer meshes".into();
+        assert!(drawn(&panel).contains("peak −2.5, which grows on finer meshes"));
+    }
+
+    #[test]
     fn a_bound_far_away_does_not_hide_the_curve() {
         let line = |y: f64| vec![(0.0, 0.0), (1.0, y), (2.0, 0.0)];
         let mut panel = Panel {

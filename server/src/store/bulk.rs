@@ -113,11 +113,12 @@ impl Store {
 
 /// Discards a job; false if it is not one of those.
 async fn discard(change: &mut Change<'_>, what: Discard<'_>, key: i64) -> Result<bool> {
-    let before = match what {
+    let (before, fields_alone) = match what {
         Discard::Jobs(owners) => {
             return Ok(delete(change, owners, key).await? == Deletion::Deleted);
         }
-        Discard::OldJobs(before) | Discard::OldFields(before) => before,
+        Discard::OldJobs(before) => (before, false),
+        Discard::OldFields(before) => (before, true),
     };
     // as it is now, and by its own record, which has a checksum: it may have been pinned
     let job = find(change.sql(), key).await?;
@@ -125,9 +126,9 @@ async fn discard(change: &mut Change<'_>, what: Discard<'_>, key: i64) -> Result
     let Some(job) = job.filter(old) else {
         return Ok(false);
     };
-    match what {
-        Discard::OldFields(_) => remove_fields(change, &job).await?,
-        Discard::Jobs(_) | Discard::OldJobs(_) => remove(change, &job).await?,
+    match fields_alone {
+        true => remove_fields(change, &job).await?,
+        false => remove(change, &job).await?,
     }
     Ok(true)
 }

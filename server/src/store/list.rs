@@ -403,7 +403,11 @@ fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, path: Option<Ac
             None => query.push(" and job.id in (select job_id from job_label where key = "),
         };
         query.push_bind(key.clone()).push(" and value = ");
-        query.push_bind(value.clone()).push(")");
+        query.push_bind(value.clone());
+        if let (None, Some(owner)) = (path, owner) {
+            query.push(" and owner = ").push_bind(owner.clone());
+        }
+        query.push(")");
     }
     let texts = [
         ("owner", owner),

@@ -67,17 +67,6 @@ impl Store {
         self.damages.noting(read).await
     }
 
-    /// The names of at most `limit` models of these owners, in order.
-    pub async fn model_names(&self, owners: Owners<'_>, limit: i64) -> Result<Vec<String>> {
-        Ok(sqlx::query_scalar(
-            "select distinct name from model where ?1 is null or owner = ?1 order by name limit ?2",
-        )
-        .bind(only(owners))
-        .bind(limit)
-        .fetch_all(&self.reader)
-        .await?)
-    }
-
     /// Registers a model, or replaces that of the same name and owner; true if it is new. `None`: the owner has `most` others.
     pub async fn put_model(
         &self,

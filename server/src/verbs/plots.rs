@@ -116,7 +116,7 @@ pub async fn plot(
         Plot::Mesh | Plot::Deformed => fields_of(service, caller, id, plot).await?,
         Plot::Profile | Plot::Convergence => None,
     };
-    // loaded once there is a permit, so that waiting requests use no memory
+    // the rest once there is a permit, so that waiting requests use no memory for it
     let load = async {
         let mut found = snapshot(service, caller, id, plot).await?;
         if step.is_some() && found.job.result_available == ResultAvailable::None {

@@ -1,7 +1,10 @@
 //! What UM-Bridge asks of a registered model: numbers of the result of its problem, for given inputs, and differences of
 //! them. Each evaluation is a job like any other, in the same queue and cache, and under the same quotas.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use files::sweep::Parametrised;
 use futures_util::future::try_join_all;
@@ -11,6 +14,7 @@ use solver::{
     solution::Residuals,
 };
 use strum::IntoStaticStr;
+use tokio::sync::Mutex;
 
 use super::{
     envelope::{Envelope, JobRequest},
@@ -87,8 +91,17 @@ struct Ready {
 
 /// The names of the caller's models, in order.
 pub async fn names(service: &Service, caller: &Caller) -> Result<Vec<String>, ApiError> {
+    const AT_ONCE: i64 = 100; // an administrator sees those of all
     let owners = caller.visible_owners();
-    Ok(service.store.model_names(owners, i64::MAX).await?)
+    let (mut names, mut before) = (BTreeSet::new(), None);
+    loop {
+        let some = service.store.models(owners, before, AT_ONCE).await?;
+        let Some(last) = some.last() else {
+            return Ok(names.into_iter().collect());
+        };
+        before = Some(last.key);
+        names.extend(some.into_iter().map(|model| model.name));
+    }
 }
 
 /// The model of this name.
@@ -108,10 +121,14 @@ pub async fn model(service: &Service, caller: &Caller, name: &str) -> Answer<Mod
 async fn not_found(service: &Service, caller: &Caller, name: &str) -> Result<ModelError, ApiError> {
     const SHOWN: i64 = 20;
     let owners = caller.visible_owners();
-    let names = service.store.model_names(owners, SHOWN).await?;
+    let latest = service.store.models(owners, None, SHOWN).await?;
+    let names: Vec<&str> = latest.iter().map(|model| model.name.as_str()).collect();
     let known = match names.is_empty() {
         true => "none is registered: PUT /v1/models/{name} registers one".to_owned(),
-        false => format!("there are: {}", shortened(&names.join(", "), 500)),
+        false => format!(
+            "the latest are: {} (GET /v1/models lists all)",
+            shortened(&names.join(", "), 500)
+        ),
     };
     let message = format!("there is no model {:?}; {known}", quoted(name));
     Ok(ModelError::Protocol(Kind::ModelNotFound, message))
@@ -169,11 +186,11 @@ pub async fn evaluate(
     let ready = ready(service, caller, name).await?;
     check_input(&ready.description, &input)?;
     let points = vec![input.concat()];
-    let mut found = solved(ready, service, caller, points).await?;
+    let mut found = solved(ready, service, caller, points, |outputs| outputs).await?;
     let found = found
         .pop()
         .ok_or_else(|| ApiError::internal("an evaluation has no output"))?;
-    Ok(found.outputs)
+    Ok(found.kept)
 }
 
 /// Jᵀ s: the derivatives of s · F by the numbers of one vector of inputs, where F is one vector of outputs. By central
@@ -207,16 +224,16 @@ pub async fn gradient(
         .enumerate()
         .map(|(n, k)| points[2 * n][k] - points[2 * n + 1][k]);
     let widths: Vec<f64> = widths.collect();
-    let objective = |found: &Evaluation| -> f64 {
-        let weighted = found.outputs[out].iter().zip(&sens);
+    let objective = |outputs: Vec<Vec<f64>>| -> f64 {
+        let weighted = outputs[out].iter().zip(&sens);
         weighted.map(|(number, s)| s * number).sum()
     };
-    let tolerance = ready.tolerance;
-    let found = solved(ready, service, caller, points).await?;
+    let step = ready.step();
+    let found = solved(ready, service, caller, points, objective).await?;
     let mut derivatives = vec![];
     for (ends, width) in found.chunks_exact(2).zip(widths) {
-        comparable(&ends[0], &ends[1], tolerance)?;
-        derivatives.push((objective(&ends[0]) - objective(&ends[1])) / width);
+        comparable(&ends[0], &ends[1], step)?;
+        derivatives.push((ends[0].kept - ends[1].kept) / width);
     }
     finite(derivatives)
 }
@@ -261,10 +278,11 @@ pub async fn apply_jacobian(
         point
     };
     let points = vec![moved(t), moved(-t)];
-    let tolerance = ready.tolerance;
-    let found = solved(ready, service, caller, points).await?;
-    comparable(&found[0], &found[1], tolerance)?;
-    let ends = found[0].outputs[out].iter().zip(&found[1].outputs[out]);
+    let step = ready.step();
+    let one = |mut outputs: Vec<Vec<f64>>| outputs.swap_remove(out);
+    let found = solved(ready, service, caller, points, one).await?;
+    comparable(&found[0], &found[1], step)?;
+    let ends = found[0].kept.iter().zip(&found[1].kept);
     finite(
         ends.map(|(plus, minus)| (plus - minus) / (2.0 * t))
             .collect(),
@@ -326,9 +344,10 @@ pub struct Vectors {
 }
 
 /// What came of one job.
-struct Evaluation {
+struct Evaluation<T> {
     job: JobId,
-    outputs: Vec<Vec<f64>>,
+    /// The outputs, or what is kept of them.
+    kept: T,
     /// Of the body, and on the contact boundaries.
     unknowns: [u64; 2],
     residuals: Residuals,
@@ -397,26 +416,34 @@ pub fn check_derivative(
     })
 }
 
-/// An error unless the difference of two solutions is one of the problem, and not of their meshes or of what rounding leaves.
-fn comparable(one: &Evaluation, other: &Evaluation, tolerance: f64) -> Answer<()> {
+/// An error unless the difference of two solutions is one of the problem, and not of their meshes or of what rounding leaves: a
+/// residual r puts the derivative off by some r/step of its size, and may do so by as much as the step is.
+fn comparable<T>(one: &Evaluation<T>, other: &Evaluation<T>, step: f64) -> Answer<()> {
     if one.unknowns != other.unknowns {
+        let (a, b) = (one.unknowns, other.unknowns);
         return Err(no_output(format!(
-            "{} and {}, the ends of a step, have meshes with {} and {} unknowns, so that their difference is not a derivative: the \
-             problem is refined until its result is accurate, or an input changes the mesh. Register it with a number for \
-             `mesh.refine`, and take no derivative by what changes the mesh",
-            one.job, other.job, one.unknowns[0], other.unknowns[0]
+            "{} and {}, the ends of a step, have {} and {} unknowns ({} and {} on contacts), so that their difference is not a \
+             derivative: the problem is refined until its result is accurate, or an input changes the mesh or the contact \
+             boundary. Register it with a number for `mesh.refine`, and take no derivative by such an input",
+            one.job, other.job, a[0], b[0], a[1], b[1]
         )));
     }
     for end in [one, other] {
-        if !end.residuals.within(tolerance) {
-            let Residuals {
-                kkt, monolithic, ..
-            } = end.residuals;
+        let Residuals {
+            kkt,
+            friction,
+            monolithic,
+            ..
+        } = end.residuals;
+        let residual = kkt.max(friction).max(monolithic);
+        // also where it is no number
+        if !(residual <= step * step) {
             return Err(no_output(format!(
-                "{} has a residual of {:.1e}, where rounding ends its iterations, and not the tolerance {tolerance:.0e} of the \
-                 problem: a difference of such solutions is mostly noise",
+                "{} has a residual of {residual:.1e}, where rounding ended its iterations: a difference with a step of {step:.1e} \
+                 would be off by {:.1e} of its size. Register the problem with a tolerance of {residual:.0e} or more, which \
+                 makes the step larger",
                 end.job,
-                kkt.max(monolithic).max(end.residuals.friction)
+                residual / step
             )));
         }
     }
@@ -437,19 +464,22 @@ impl Ready {
     }
 }
 
-/// The outputs at each of these points, from jobs that are submitted together. Each is read as soon as it has ended: it may be
-/// deleted before the last one has. The first one without outputs ends the wait.
-async fn solved(
+/// What is kept of the outputs at each of these points, from jobs that are submitted together. Each is read as soon as it has
+/// ended, since it may be deleted before the last one has, but one at a time: outputs may be large. The first one without
+/// outputs ends the wait.
+async fn solved<T>(
     ready: Ready,
     service: &Arc<Service>,
     caller: &Caller,
     points: Vec<Vec<f64>>,
-) -> Answer<Vec<Evaluation>> {
+    keep: impl Fn(Vec<Vec<f64>>) -> T,
+) -> Answer<Vec<Evaluation<T>>> {
     let (jobs, outputs) = submitted(ready, service, caller, points).await?;
-    let outputs = &outputs;
+    let (outputs, keep, reading) = (&outputs, &keep, &Mutex::new(()));
     let evaluations = jobs.into_iter().map(|id| async move {
         let job = ended(service, caller, id).await?;
-        evaluation(service, caller, outputs, &job).await
+        let _turn = reading.lock().await;
+        evaluation(service, caller, outputs, &job, keep).await
     });
     try_join_all(evaluations).await
 }
@@ -564,12 +594,13 @@ async fn ended(service: &Service, caller: &Caller, id: JobId) -> Result<Job, Api
 }
 
 /// What came of a job that has ended. Without a converged solution it is an error.
-async fn evaluation(
+async fn evaluation<T>(
     service: &Service,
     caller: &Caller,
     outputs: &[Output],
     job: &Job,
-) -> Answer<Evaluation> {
+    keep: impl Fn(Vec<Vec<f64>>) -> T,
+) -> Answer<Evaluation<T>> {
     let id = job.id;
     if job.status != Status::Succeeded {
         let why = match (&job.failure, job.reason) {
@@ -616,7 +647,7 @@ async fn evaluation(
     match found.iter().flatten().all(|number| number.is_finite()) {
         true => Ok(Evaluation {
             job: id,
-            outputs: found,
+            kept: keep(found),
             unknowns: [summary.dofs, summary.contact_dofs],
             residuals: summary.residuals,
         }),

@@ -79,7 +79,9 @@ class Attempts:
         else:
             again = response.status_code in (502, 504) and self.repeatable
         if again:
-            return self._pause(retry_after_s(response), f"the service is busy ({_reason(response)})")
+            silent = response.status_code in (502, 504)
+            who = "a proxy gets no answer from the service" if silent else "the service is busy"
+            return self._pause(retry_after_s(response), f"{who} ({_reason(response)})")
         if self._told:
             self._tell("the service answers again")
             self._told = False

@@ -7,6 +7,8 @@ import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from . import pointer as pointers
 from ._data import Array
 from ._extras import load
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
     import pyarrow
     from matplotlib.figure import Figure
 
+TABLE_S = 5.0
+"""Seconds for which a table is asked for that is only told about."""
 SHOWN_ROWS = 10
 """Rows of a table that its `repr` shows."""
 SHOWN_COLUMNS = ("status", "normal_force", "tangential_force", "stick_width", "peak_tangential_stress", "warnings")
@@ -28,6 +32,7 @@ class SweepView:
 
     def __init__(self, document: Mapping[str, Any]) -> None:
         self.document = document
+        self._told = False  # what to look at in its table
 
     @property
     def id(self) -> str:
@@ -88,7 +93,8 @@ class SweepView:
 
 
 class SweepTable:
-    """A row for each member: its parameters and what came of it. NaN where a member is not solved.
+    """A row for each member: its parameters and what came of it. NaN where a member is not solved; the numbers of one
+    that failed to converge (column `status`) are those of its last state.
 
     columns: arrays by name. A parameter is named by the last part of its pointer, `nonlocal_radius`, or by all of it
         where several end alike.
@@ -123,7 +129,7 @@ class SweepTable:
         lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
         if len(self) > SHOWN_ROWS:
             lines.append(f"… {len(self) - SHOWN_ROWS} more rows")
-        return "\n".join([*lines, *self.notes()])
+        return "\n".join([*lines, *self.hinted_notes()])
 
     def plot(self, quantity: str, **options: Any) -> Figure:
         """Draws a column over the parameters; see `signorini.figures.sweep`."""
@@ -134,18 +140,21 @@ class SweepTable:
     def notes(self) -> list[str]:
         """How many members have no solution, or one with warnings, and which; empty if all is well."""
         lines = []
-        failed = self["status"] == "failed"
-        if failed.any():
-            reasons = counted(self["reason"][failed].tolist())
-            lines.append(f"{failed.sum()} of {len(self)} members have no solution: {reasons} (column detail)")
+        without = np.isin(self["status"], ["failed", "canceled"])
+        if without.any():
+            reasons = counted(self["reason"][without].tolist())
+            lines.append(f"{without.sum()} of {len(self)} members have no solution: {reasons}")
         codes = [text.split() for text in self["warnings"].tolist()]
         warned = sum(1 for of_member in codes if of_member)
         if warned:
             words = counted(code for of_member in codes for code in of_member)
-            lines.append(
-                f"{warned} of {len(self)} members have warnings: {words} (client.explain tells what they mean)"
-            )
+            lines.append(f"{warned} of {len(self)} members have warnings: {words}")
         return lines
+
+    def hinted_notes(self) -> list[str]:
+        """The same, and how to learn more."""
+        notes = self.notes()
+        return [*notes, "client.explain(code) tells what a code means"] if notes else []
 
     def to_pandas(self) -> pandas.DataFrame:
         """As a table of pandas (`pip install signorini[pandas]`)."""

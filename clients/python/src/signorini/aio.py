@@ -7,6 +7,7 @@ and waiting are written here once more.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import pathlib
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
@@ -24,8 +25,8 @@ from ._events import Cursor
 from ._job import JobView, changes
 from ._progress import Waiting
 from ._retry import LOG, Attempts
-from ._sweep import Member, SweepTable, SweepView
-from .errors import NotFound
+from ._sweep import TABLE_S, Member, SweepTable, SweepView
+from .errors import NotFound, SignoriniError
 from .local import LocalServer
 from .problem import Problem
 from .result import write
@@ -386,12 +387,18 @@ class AsyncSweep(SweepView):
             raise
         finally:
             waiting.close()
-        if progress:
-            waiting.tell((await self.table()).notes())
+        if progress and not self._told:
+            self._told = True
+            # the sweep has ended, whatever becomes of this
+            with contextlib.suppress(SignoriniError):
+                waiting.tell((await self._table(waiting.left(TABLE_S))).hinted_notes())
         return self
 
     async def table(self) -> SweepTable:
-        return SweepTable(await self._client._send(calls.sweep_table(self.id)), self.title)
+        return await self._table()
+
+    async def _table(self, retry_for: float | None = None) -> SweepTable:
+        return SweepTable(await self._client._send(calls.sweep_table(self.id), retry_for), self.title)
 
     async def plot(self, quantity: str, **options: Any) -> Figure:
         return (await self.table()).plot(quantity, **options)

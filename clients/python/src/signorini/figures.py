@@ -278,48 +278,35 @@ def sweep(
     curve. Below is counted how many members have which warnings. Raises ValueError where more than twelve curves
     would be needed, or a column has no numbers.
     """
-    values = _numbers(table, quantity)
     if not table.parameters:
         raise ValueError("the sweep has no parameters")
-    distinct = {name: len(set(table[name].tolist())) for name in table.parameters}
-    numeric = [name for name in table.parameters if table[name].dtype.kind in "fiu"]
+    # one that did not converge has the numbers of its last state
+    values = np.where(table["status"] == "succeeded", _numbers(table, quantity), np.nan)
     if x is None:
-        x = max(numeric or table.parameters, key=lambda name: distinct[name])
+        numeric = [name for name in table.parameters if table[name].dtype.kind in "fiu"]
+        x = max(numeric or table.parameters, key=lambda name: np.unique(table[name]).size)
     along = _numbers(table, x)
-    others = [name for name in table.parameters if name != x and distinct[name] > 1]
-    curves: dict[tuple[Any, ...], list[int]] = {}
-    for row in range(len(table)):
-        curves.setdefault(tuple(table[name][row] for name in others), []).append(row)
-    if len(curves) > MOST_CURVES:
-        raise ValueError(
-            f"{len(curves)} curves are too many for one figure (x={x!r}, one for each {', '.join(others)})"
-        )
-    codes = [set(text.split()) for text in table["warnings"].tolist()]
-    solved = [codes[row] for row in np.flatnonzero(np.isfinite(values))]
-    of_all = set.intersection(*solved) if solved else set()
-    warned = np.array([bool(of_member - of_all) for of_member in codes])
+    curves = _curves(table, x)
+    warned = _warned(table, values)
     with style(size, theme) as (plt, width, colours):
         figure, axes = plt.subplots(figsize=(width, 0.7 * width), layout="constrained")
         # along a scale of brightness, which any eye can order; neither end is lost on the ground
         scale = plt.get_cmap("cividis")(np.linspace(*((0.0, 0.85) if theme == "light" else (0.3, 1.0)), len(curves)))
         colour = [colours.normal] if len(curves) == 1 else scale
-        for number, (key, rows) in enumerate(curves.items()):
+        for number, (label, rows) in enumerate(curves.items()):
             order = np.array(rows)[np.argsort(along[rows], kind="stable")]
-            label = ", ".join(f"{PARAMETERS.get(n, n)} = {_short(v)}" for n, v in zip(others, key, strict=True))
             dashes = ("-", "--", "-.", ":")[number % 4]
             axes.plot(along[order], values[order], color=colour[number], linestyle=dashes, label=label or None)
             for some, face in ((order[~warned[order]], colour[number]), (order[warned[order]], colours.ground)):
                 axes.plot(along[some], values[some], "o", color=colour[number], markerfacecolor=face, markersize=4)
-        if np.all(along > 0) and _is_geometric(np.unique(along)):
+        if np.any(warned):
+            axes.plot([], [], "o", color=colours.ink, mfc=colours.ground, markersize=4, label="with warnings")
+        if len(along) and np.all(along > 0) and _is_geometric(np.unique(along)):
             axes.set_xscale("log")
             # few numbers, in plain form: powers of ten would cover each other within a decade
             axes.xaxis.set_major_locator(plt.matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.xaxis.set_minor_formatter("")
-        if np.any(warned & np.isfinite(values)):
-            axes.plot(
-                [], [], "o", color=colours.ink, markerfacecolor=colours.ground, markersize=4, label="with warnings"
-            )
         axes.set_xlabel(PARAMETERS.get(x, x.replace("_", " ")))
         axes.set_ylabel(QUANTITIES.get(quantity, quantity.replace("_", " ")))
         axes.grid(axis="y")
@@ -330,10 +317,36 @@ def sweep(
             # as the curves mostly are, the last on top
             axes.legend(handles[::-1], labels[::-1], loc="upper left", bbox_to_anchor=(1.0, 1.0))
         figure.suptitle(table.title if title is None else title, x=0.01, ha="left", fontweight="bold", fontsize="large")
-        notes = "\n".join(textwrap.fill(note.split(" (c")[0].replace("_", " "), 95) for note in table.notes())
+        notes = "\n".join(textwrap.fill(note.replace("_", " "), 95) for note in table.notes())
         if notes:
             figure.supxlabel(notes, x=0.01, ha="left", fontsize="x-small", color=colours.faint)
     return _finished(plt, figure)
+
+
+def _curves(table: SweepTable, x: str) -> dict[str, list[int]]:
+    """The rows of each curve, by its label: members that differ in x alone, and in what x determines."""
+    columns = {name: [_short(value) for value in table[name].tolist()] for name in table.parameters}
+    along = [repr(value) for value in table[x].tolist()]  # NaN is not equal to itself
+    pairs = {name: set(zip(along, column, strict=True)) for name, column in columns.items()}
+    others = [name for name in columns if len(set(columns[name])) > 1 and len(pairs[name]) > len(set(along))]
+    curves: dict[str, list[int]] = {}
+    for row in range(len(table)):
+        label = ", ".join(f"{PARAMETERS.get(name, name)} = {columns[name][row]}" for name in others)
+        curves.setdefault(label, []).append(row)
+    if len(curves) > MOST_CURVES:
+        raise ValueError(
+            f"{len(curves)} curves are too many for one figure (x={x!r}, one for each {', '.join(others)})"
+        )
+    return curves
+
+
+def _warned(table: SweepTable, values: Array) -> Array:
+    """Which members with a value have a warning that not all of these have."""
+    codes = [set(text.split()) for text in table["warnings"].tolist()]
+    there = np.isfinite(values)
+    solved = [codes[row] for row in np.flatnonzero(there)]
+    of_all = set.intersection(*solved) if solved else set()
+    return np.asarray(there & np.array([bool(of_member - of_all) for of_member in codes], dtype=bool))
 
 
 def _numbers(table: SweepTable, name: str) -> Array:
@@ -352,7 +365,10 @@ def _is_geometric(values: Array) -> bool:
 
 
 def _short(value: Any) -> str:
-    return f"{value:.4g}".replace("-", "−") if isinstance(value, float) else str(value)
+    """A value as a label has it; a member of a list that leaves it out has that of the problem itself."""
+    if value == "" or (isinstance(value, float) and np.isnan(value)):
+        return "as in the problem"
+    return f"{value:.6g}".replace("-", "−") if isinstance(value, float) else str(value)
 
 
 def _finished(plt: Any, figure: Any) -> Figure:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from . import _calls as calls
 from ._data import Event
 from ._progress import Waiting
-from ._sweep import Member, SweepTable, SweepView
+from ._sweep import TABLE_S, Member, SweepTable, SweepView
+from .errors import SignoriniError
 from .job import Job
 
 if TYPE_CHECKING:
@@ -47,13 +49,19 @@ class Sweep(SweepView):
             raise
         finally:
             waiting.close()
-        if progress:
-            waiting.tell(self.table().notes())
+        if progress and not self._told:
+            self._told = True
+            # the sweep has ended, whatever becomes of this
+            with contextlib.suppress(SignoriniError):
+                waiting.tell(self._table(waiting.left(TABLE_S)).hinted_notes())
         return self
 
     def table(self) -> SweepTable:
         """The table as it is now; it fills while the sweep runs."""
-        return SweepTable(self._client._send(calls.sweep_table(self.id)), self.title)
+        return self._table()
+
+    def _table(self, retry_for: float | None = None) -> SweepTable:
+        return SweepTable(self._client._send(calls.sweep_table(self.id), retry_for), self.title)
 
     def plot(self, quantity: str, **options: Any) -> Figure:
         """Draws a column of the table over the parameters; see `signorini.figures.sweep`."""

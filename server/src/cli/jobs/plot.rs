@@ -233,10 +233,14 @@ async fn profiles(service: &Service, id: JobId, step: Option<u32>) -> anyhow::Re
 
 /// The residuals by iteration, of this step or of all.
 async fn convergence(service: &Service, id: JobId, step: Option<u32>) -> anyhow::Result<Chart> {
+    // of one step all rows are wanted, of all steps no more than can be seen
+    let thinned = if step.is_some() {
+        ""
+    } else {
+        "&max_points=2000"
+    };
     let mut rows: Vec<TimedIteration> = service
-        .get(&format!(
-            "/v1/jobs/{id}/history?format=json&max_points=2000"
-        ))
+        .get(&format!("/v1/jobs/{id}/history?format=json{thinned}"))
         .await?;
     if let Some(number) = step {
         rows.retain(|timed| timed.row.step == number);
