@@ -18,7 +18,7 @@ use serde::{
 use serde_json::value::RawValue;
 use solver::error::shortened;
 
-use super::call::Call;
+use super::{call::Call, refused};
 use crate::{
     error::ApiError,
     model::Model,
@@ -298,7 +298,8 @@ fn answer<T: Serialize>(answered: Result<T, ModelError>) -> Result<Response, Api
                 }
                 Kind::InvalidOutput => StatusCode::INTERNAL_SERVER_ERROR,
             };
-            let r#type = kind.into();
+            let r#type: &'static str = kind.into();
+            refused::note(r#type, "/umbridge");
             let error = Told { r#type, message };
             Ok((status, Json(Refused { error })).into_response())
         }

@@ -436,8 +436,7 @@ fn comparable<T>(one: &Evaluation<T>, other: &Evaluation<T>, step: f64) -> Answe
             ..
         } = end.residuals;
         let residual = kkt.max(friction).max(monolithic);
-        // also where it is no number
-        if !(residual <= step * step) {
+        if residual > step * step {
             return Err(no_output(format!(
                 "{} has a residual of {residual:.1e}, where rounding ended its iterations: a difference with a step of {step:.1e} \
                  would be off by {:.1e} of its size. Register the problem with a tolerance of {residual:.0e} or more, which \
