@@ -36,8 +36,8 @@ pub(super) enum AccessPath<'a> {
 /// A filter that matches no more jobs than this is the access path, whatever the order of the list: to read and sort
 /// all of them costs less than a page may.
 const FEW: i64 = 1000;
-/// Matches are counted up to so many, which takes a millisecond: of several filters that match more than a few, that with the
-/// fewest is the access path, since a page may have to pass over all of them.
+/// Matches are counted up to so many, which takes a millisecond or two: of several filters that match more than a few, the first
+/// one within this is the access path, or one with a tenth of its matches, since a page may have to pass over all of them.
 const MANY: i64 = 20_000;
 /// The statuses of jobs that have ended.
 const ENDED: [Status; 3] = [Status::Succeeded, Status::Failed, Status::Canceled];
@@ -238,7 +238,8 @@ async fn selective_path<'a>(
         let ordered = by_creation && !matches!(path, AccessPath::Ended);
         if ordered && jobs <= counted {
             fewest = Some(path);
-            counted = jobs - 1; // the others only matter if they match fewer
+            // to count costs time, too: another one only matters if it matches many times fewer
+            counted = (jobs / 10).max(FEW);
         }
     }
     Ok(fewest)
