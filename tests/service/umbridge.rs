@@ -177,7 +177,7 @@ async fn a_difference_of_two_meshes_is_no_derivative() {
         let (status, kind, message) = refused(&server, endpoint, body).await;
         assert_eq!(
             (status, kind.as_str()),
-            (StatusCode::INTERNAL_SERVER_ERROR, "InvalidOutput"),
+            (StatusCode::BAD_REQUEST, "UnsupportedFeature"),
             "{message}"
         );
         // the mesh is the same, the contact boundary is not

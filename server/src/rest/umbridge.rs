@@ -369,46 +369,32 @@ async fn evaluated(mut call: Call) -> Result<Outputs, ModelError> {
 }
 
 pub(super) async fn gradient(call: Call) -> Result<Response, ApiError> {
-    answer(differentiated(call, Along::Sens).await)
+    let sens = |fields: &Fields<'_>| value("sens", fields.sens, "a list of finite numbers");
+    answer(differentiated(call, |fields| sens(fields).map(With::Sens)).await)
 }
 
 pub(super) async fn apply_jacobian(call: Call) -> Result<Response, ApiError> {
-    answer(differentiated(call, Along::Vec).await)
+    let vec = |fields: &Fields<'_>| value("vec", fields.vec, "a list of finite numbers");
+    answer(differentiated(call, |fields| vec(fields).map(With::Vec)).await)
 }
 
-/// What a derivative is taken with.
-enum Along {
-    /// Weights of outputs.
-    Sens,
-    /// A direction of inputs.
-    Vec,
-}
-
-async fn differentiated(mut call: Call, along: Along) -> Result<Derivative, ModelError> {
-    let (name, pair, given) = {
+async fn differentiated(
+    mut call: Call,
+    with: impl Fn(&Fields<'_>) -> Result<With, ModelError>,
+) -> Result<Derivative, ModelError> {
+    let (name, pair, input, with) = {
         let text = text(&mut call).await?;
         let fields = Fields::read(&text)?;
         let model = verbs::model(&call.service, &call.caller, &fields.name()?).await?;
         verbs::supports_derivatives(&model)?;
         fields.without_options()?;
-        let with: Vec<f64> = match along {
-            Along::Sens => value("sens", fields.sens, "a list of finite numbers")?,
-            Along::Vec => value("vec", fields.vec, "a list of finite numbers")?,
-        };
+        let with = with(&fields)?;
         let (pair, input) = (fields.pair()?, fields.input()?);
-        let checked = match along {
-            Along::Sens => With::Sens(&with),
-            Along::Vec => With::Vec(&with),
-        };
-        verbs::check_derivative(&model.description, pair, &input, checked)?;
-        (model.name, pair, (input, with))
+        verbs::check_derivative(&model.description, pair, &input, &with)?;
+        (model.name, pair, input, with)
     };
     call.received.release();
-    let (service, caller) = (&call.service, &call.caller);
-    let output = match along {
-        Along::Sens => verbs::gradient(service, caller, &name, pair, given).await?,
-        Along::Vec => verbs::apply_jacobian(service, caller, &name, pair, given).await?,
-    };
+    let output = verbs::derivative(&call.service, &call.caller, &name, pair, input, with).await?;
     Ok(Derivative { output })
 }
 

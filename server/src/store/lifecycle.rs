@@ -112,6 +112,8 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
     .execute(change.sql())
     .await?;
     match (ending.result, result) {
+        // it never ran, so that no pieces were written; thousands of such jobs may be canceled at once
+        (ResultAvailable::None, ResultAvailable::None) if job.attempt == 0 => {}
         (ResultAvailable::None, ResultAvailable::None) => {
             // removes pieces that were written for a result that is not kept
             results::remove(change.sql(), job.key).await?;
@@ -123,7 +125,9 @@ pub(super) async fn end_job(change: &mut Change<'_>, job: &Job, ending: &Ending)
     // the same as is told of it later
     let mut ended = read(change.sql(), job.key).await?;
     sizes::count(change.sql(), job.key).await?;
-    sizes::take_over(change.sql(), job.key).await?;
+    if ended.result_key != ended.key {
+        sizes::take_over(change.sql(), job.key).await?;
+    }
     sizes::add_sizes(change.sql(), std::slice::from_mut(&mut ended)).await?;
     let done = Payload::Done {
         job: Box::new(ended),

@@ -20,7 +20,7 @@ use super::{
     service::Service,
     submit,
     sweeps::{self, SweepRequest},
-    umbridge::{self, Kind, ModelError, Pair},
+    umbridge::{self, Kind, ModelError, Pair, With},
     watch::{self, Until},
 };
 use crate::{
@@ -250,22 +250,19 @@ async fn a_model_of_another_owner_does_not_exist() {
     assert!(listed.unwrap().items.is_empty());
     assert!(umbridge::names(service, bob).await.unwrap().is_empty());
     let input = || vec![vec![0.1]];
-    let (one, pair) = (
-        || (input(), vec![1.0]),
-        Pair {
-            out_wrt: 0,
-            in_wrt: 0,
-        },
-    );
+    let pair = Pair {
+        out_wrt: 0,
+        in_wrt: 0,
+    };
     for refused in [
         umbridge::model(service, bob, "punch").await.err(),
         umbridge::evaluate(service, bob, "punch", input())
             .await
             .err(),
-        umbridge::gradient(service, bob, "punch", pair, one())
+        umbridge::derivative(service, bob, "punch", pair, input(), With::Sens(vec![1.0]))
             .await
             .err(),
-        umbridge::apply_jacobian(service, bob, "punch", pair, one())
+        umbridge::derivative(service, bob, "punch", pair, input(), With::Vec(vec![1.0]))
             .await
             .err(),
         umbridge::apply_hessian(service, bob, "punch").await.err(),

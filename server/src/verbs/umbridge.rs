@@ -193,19 +193,35 @@ pub async fn evaluate(
     Ok(found.kept)
 }
 
-/// Jᵀ s: the derivatives of s · F by the numbers of one vector of inputs, where F is one vector of outputs. By central
-/// differences, from two jobs for each number.
-pub async fn gradient(
+/// A derivative at this input, by central differences: the gradient for weights, the one along it for a direction.
+pub async fn derivative(
     service: &Arc<Service>,
     caller: &Caller,
     name: &str,
     pair: Pair,
-    (input, sens): (Vec<Vec<f64>>, Vec<f64>),
+    input: Vec<Vec<f64>>,
+    with: With,
 ) -> Answer<Vec<f64>> {
     let ready = ready(service, caller, name).await?;
-    let Vectors { out, range } =
-        check_derivative(&ready.description, pair, &input, With::Sens(&sens))?;
+    // the model may be another one since the request was checked
+    let vectors = check_derivative(&ready.description, pair, &input, &with)?;
     let at = input.concat();
+    match with {
+        With::Sens(sens) => gradient(service, caller, ready, vectors, at, sens).await,
+        With::Vec(vec) => along(service, caller, ready, vectors, at, vec).await,
+    }
+}
+
+/// Jᵀ s: the derivatives of s · F by the numbers of one vector of inputs, where F is one vector of outputs. From two jobs for
+/// each number.
+async fn gradient(
+    service: &Arc<Service>,
+    caller: &Caller,
+    ready: Ready,
+    Vectors { out, range }: Vectors,
+    at: Vec<f64>,
+    sens: Vec<f64>,
+) -> Answer<Vec<f64>> {
     let steps: Vec<f64> = range
         .clone()
         .map(|k| ready.step() * ready.size(&at, k))
@@ -238,18 +254,15 @@ pub async fn gradient(
     finite(derivatives)
 }
 
-/// J v: the derivative of one vector of outputs along v in one vector of inputs. By a central difference, from two jobs.
-pub async fn apply_jacobian(
+/// J v: the derivative of one vector of outputs along v in one vector of inputs. From two jobs.
+async fn along(
     service: &Arc<Service>,
     caller: &Caller,
-    name: &str,
-    pair: Pair,
-    (input, vec): (Vec<Vec<f64>>, Vec<f64>),
+    ready: Ready,
+    Vectors { out, range }: Vectors,
+    at: Vec<f64>,
+    vec: Vec<f64>,
 ) -> Answer<Vec<f64>> {
-    let ready = ready(service, caller, name).await?;
-    let Vectors { out, range } =
-        check_derivative(&ready.description, pair, &input, With::Vec(&vec))?;
-    let at = input.concat();
     // no number moves by more than the step that a gradient takes for it, and one by as much
     let parts = range
         .clone()
@@ -376,12 +389,12 @@ pub fn check_input(description: &Description, input: &[Vec<f64>]) -> Answer<()> 
 }
 
 /// What a derivative is taken with.
-#[derive(Clone, Copy, Debug)]
-pub enum With<'a> {
+#[derive(Debug)]
+pub enum With {
     /// Weights of outputs.
-    Sens(&'a [f64]),
+    Sens(Vec<f64>),
     /// A direction of inputs.
-    Vec(&'a [f64]),
+    Vec(Vec<f64>),
 }
 
 /// Checks a request for a derivative of a model that has some.
@@ -389,7 +402,7 @@ pub fn check_derivative(
     description: &Description,
     pair: Pair,
     input: &[Vec<f64>],
-    with: With<'_>,
+    with: &With,
 ) -> Answer<Vectors> {
     check_input(description, input)?;
     let index = |name: &str, got: i64, count: usize| match usize::try_from(got) {
@@ -421,12 +434,13 @@ pub fn check_derivative(
 fn comparable<T>(one: &Evaluation<T>, other: &Evaluation<T>, step: f64) -> Answer<()> {
     if one.unknowns != other.unknowns {
         let (a, b) = (one.unknowns, other.unknowns);
-        return Err(no_output(format!(
+        let why = format!(
             "{} and {}, the ends of a step, have {} and {} unknowns ({} and {} on contacts), so that their difference is not a \
              derivative: the problem is refined until its result is accurate, or an input changes the mesh or the contact \
-             boundary. Register it with a number for `mesh.refine`, and take no derivative by such an input",
+             boundary; register it with a number for `mesh.refine`, and take no derivative by such an input",
             one.job, other.job, a[0], b[0], a[1], b[1]
-        )));
+        );
+        return Err(unsupported("A derivative at this input is", &why));
     }
     for end in [one, other] {
         let Residuals {
@@ -437,13 +451,14 @@ fn comparable<T>(one: &Evaluation<T>, other: &Evaluation<T>, step: f64) -> Answe
         } = end.residuals;
         let residual = kkt.max(friction).max(monolithic);
         if residual > step * step {
-            return Err(no_output(format!(
+            let why = format!(
                 "{} has a residual of {residual:.1e}, where rounding ended its iterations: a difference with a step of {step:.1e} \
-                 would be off by {:.1e} of its size. Register the problem with a tolerance of {residual:.0e} or more, which \
+                 would be off by {:.1e} of its size; register the problem with a tolerance of {residual:.0e} or more, which \
                  makes the step larger",
                 end.job,
                 residual / step
-            )));
+            );
+            return Err(unsupported("A derivative at this input is", &why));
         }
     }
     Ok(())
