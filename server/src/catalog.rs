@@ -230,7 +230,7 @@ catalog! {
     Draining: of_request("The service is stopping", 503, Grpc::Unavailable, Some(5),
         "The service accepts no more jobs because it is about to stop or restart. Accepted jobs are kept. Try again."),
     Overloaded: of_request("Too many transfers at once", 503, Grpc::Unavailable, Some(2),
-        "Bodies or answers of other requests occupy the memory that this service has for them, or all its connections are busy. Nothing was done. Try again."),
+        "Bodies or answers of other requests occupy the memory that this service has for them, all its connections are busy, or as many meshes are being uploaded as may be at once. Nothing was done. Try again."),
     StorageLost: of_request("The store was removed, replaced or damaged", 503, Grpc::Unavailable, Some(60),
         "The database was removed, replaced, cut short or damaged, since it was opened or before. Nothing is accepted, since it would be lost; what can still be read is answered. The operator can stop the service, put the files back as they were or save what is intact with `signorini doctor`, and start it again."),
     StorageFull: of_request("The disk is full or cannot be written", 507, Grpc::ResourceExhausted, Some(60),

@@ -62,8 +62,11 @@ pub enum ApiError {
     /// The headers are too large.
     #[error("the headers of the request are too large")]
     HeaderTooLarge,
-    /// Others occupy the memory for transfers, or the connections.
-    #[error("other requests occupy the memory for transfers, or all connections; try again")]
+    /// Others occupy the memory for transfers, the connections, or the uploads that there may be.
+    #[error(
+        "other requests occupy the memory for transfers, all connections, or all uploads of meshes that there may be at once (32, of \
+         one owner 8); try again"
+    )]
     Overloaded,
     /// The caller is not identified.
     #[error("{0}")]
@@ -287,9 +290,13 @@ impl fmt::Display for Quota {
             ),
             QuotaOf::StoredBytes => write!(
                 f,
-                "{owner} keeps {} of at most {}, jobs and meshes: delete some of them, or the fields of some",
+                "{owner} keeps {} of at most {}, jobs and meshes{}: delete some of them, or the fields of some",
                 size(*used),
-                size(*limit)
+                size(*limit),
+                match asked {
+                    0 => String::new(),
+                    _ => format!(", and what arrives now would add {}", size(*asked)),
+                }
             ),
             QuotaOf::Submissions => write!(
                 f,

@@ -238,6 +238,74 @@ async fn delete(server: &Server, user: &str, path: &str) -> (StatusCode, String)
     (response.status(), response.text().await.unwrap())
 }
 
+/// A result is stored as columns, compressed: what a smallest and a large one may take.
+#[tokio::test]
+async fn results_are_stored_compactly() {
+    let server = shared(&[]).await;
+    for (refine, most) in [(None, 20_000), (Some(5), 15_000_000)] {
+        let mut problem = example_json("rectangular_punch");
+        if let Some(refine) = refine {
+            problem["mesh"]["refine"] = json!(refine);
+        }
+        let request = server.post("/v1/jobs").header("x-remote-user", "ada");
+        let job = request
+            .json(&json!({"problem": problem, "cache": "off"}))
+            .send()
+            .await;
+        let job: Value = job.unwrap().json().await.unwrap();
+        let job = ended(&server, "ada", &job).await;
+        assert_eq!(job["status"], "succeeded", "{job}");
+        let stored = job["stored_bytes"].as_u64().unwrap();
+        assert!(stored <= most, "refine {refine:?}: {stored} bytes");
+    }
+}
+
+/// Meshes that arrive at the same time count together, and none of them waits for the others to end.
+#[tokio::test]
+async fn uploads_at_once_stay_within_the_share_of_their_owner() {
+    let server = shared(&["--max-bytes-per-owner", "300000"]).await;
+    let begin = |user: &str| {
+        let (pieces, arriving) = tokio::sync::mpsc::channel::<std::io::Result<Vec<u8>>>(1);
+        let stream = futures_util::stream::unfold(arriving, |mut arriving| async {
+            Some((arriving.recv().await?, arriving))
+        });
+        let request = server.post("/v1/meshes").header("x-remote-user", user);
+        let sent = request.body(reqwest::Body::wrap_stream(stream)).send();
+        (pieces, tokio::spawn(sent))
+    };
+    let comment = || Ok(vec![b'*'; 200_000]);
+    let (first, first_answer) = begin("ada");
+    first.send(comment()).await.unwrap();
+    // once it is known to have arrived: it is taken from the channel when the next one is
+    first.send(Ok(vec![b'*'; 10])).await.unwrap();
+    first.send(Ok(vec![b'*'; 10])).await.unwrap();
+    tokio::time::sleep(std::time::Duration::from_millis(300)).await;
+    let (second, answer) = begin("ada");
+    second.send(comment()).await.unwrap();
+    let answer = answer.await.unwrap().unwrap();
+    assert_eq!(answer.status(), StatusCode::TOO_MANY_REQUESTS);
+    let refusal: Value = answer.json().await.unwrap();
+    assert_eq!(refusal["code"], "quota-exceeded", "{refusal}");
+    assert_eq!(refusal["quota"]["of"], "stored_bytes", "{refusal}");
+    // seven more of hers begin, and no eighth; another owner's does
+    let more: Vec<_> = (0..7).map(|_| begin("ada")).collect();
+    for (pieces, _) in &more {
+        pieces.send(Ok(b"*".to_vec())).await.unwrap();
+    }
+    tokio::time::sleep(std::time::Duration::from_millis(300)).await;
+    let (_, answer) = begin("ada");
+    let answer = answer.await.unwrap().unwrap();
+    assert_eq!(answer.status(), StatusCode::SERVICE_UNAVAILABLE);
+    let refusal: Value = answer.json().await.unwrap();
+    assert_eq!(refusal["code"], "overloaded", "{refusal}");
+    let (pieces, answer) = begin("bob");
+    pieces.send(Ok(b"nothing".to_vec())).await.unwrap();
+    drop(pieces);
+    let answer = answer.await.unwrap().unwrap();
+    assert_eq!(answer.status(), StatusCode::UNPROCESSABLE_ENTITY);
+    drop((first, first_answer, more));
+}
+
 /// Operations: DeleteFields, ListOwners, GetCaller, GetServerInfo
 #[tokio::test]
 async fn what_each_owner_keeps_is_told_and_limited_and_fields_can_be_deleted_alone() {

@@ -174,6 +174,34 @@ pub(super) fn may_have_priorities(
     }
 }
 
+/// An error if the share of the caller does not hold so many jobs more: before they are meshed and checked, which takes
+/// processors from others. Their place in the queue is not asked for: an earlier result needs none.
+pub(super) async fn has_share(
+    service: &Service,
+    caller: &Caller,
+    asked: usize,
+) -> Result<(), ApiError> {
+    service.may_keep_more(caller.owner()).await?;
+    let left = service.rates().and_then(|rates| rates.left(caller.owner()));
+    match left {
+        Some(left) if left < asked as u64 => Err(too_often(service, caller, left, asked as u64)),
+        _ => Ok(()),
+    }
+}
+
+/// The caller has submitted as many jobs in this minute as they may.
+fn too_often(service: &Service, caller: &Caller, left: u64, asked: u64) -> ApiError {
+    let per_minute = service.rates().and_then(|rates| rates.per_minute);
+    let limit = u64::from(per_minute.unwrap_or_default());
+    ApiError::QuotaExceeded(Quota {
+        owner: caller.owner().to_owned(),
+        of: QuotaOf::Submissions,
+        limit,
+        used: limit.saturating_sub(left),
+        asked,
+    })
+}
+
 /// Stores jobs in the queue, all or none; the caller is their owner.
 pub(super) async fn enqueue(
     service: &Service,
@@ -199,14 +227,7 @@ pub(super) async fn enqueue_sweep(
     if let Some(rates) = service.rates()
         && let Err(left) = rates.take(caller.owner(), asked)
     {
-        let limit = rates.per_minute.unwrap_or_default().into();
-        return Err(ApiError::QuotaExceeded(Quota {
-            owner: caller.owner().to_owned(),
-            of: QuotaOf::Submissions,
-            limit,
-            used: limit.saturating_sub(left),
-            asked,
-        }));
+        return Err(too_often(service, caller, left, asked));
     }
     let most_of_owner = service.max_queued_of_owner();
     let hash = jobs.iter().find_map(|job| job.mesh.clone());

@@ -70,7 +70,10 @@ pub async fn upload(
 ) -> Result<(MeshInfo, bool), ApiError> {
     service.accepting()?;
     service.store.has_room()?;
-    service.may_keep_more(caller.owner()).await?;
+    let owner = caller.owner().to_owned();
+    let room = service.room_of(&owner).await?;
+    room.check(0)?;
+    let mut upload = service.begin_upload(&owner)?;
     let limit_bytes = service.max_mesh_bytes;
     // without a name: the system removes it when the process ends
     let file = tempfile::tempfile_in(&service.data).map_err(unwritten)?;
@@ -86,13 +89,17 @@ pub async fn upload(
         if bytes > limit_bytes {
             return Err(ApiError::PayloadTooLarge { limit_bytes });
         }
+        // with what arrives beside it: of many uploads at once each would fit
+        room.check(upload.arrived(piece.len()))?;
         hash.update(piece);
         out.write_all(piece).await.map_err(unwritten)?;
     }
     drop(pieces); // what decodes them has a window in memory
     out.flush().await.map_err(unwritten)?;
+    drop(out);
     let hash = digest::sha256_text(hash);
-    let owner = caller.owner().to_owned();
+    // others may have been stored since this one began
+    service.room_of(&owner).await?.check(upload.arrived(0))?;
     if let Some(known) = service.store.mesh(Owners::All, &hash).await?
         && let Some(new) = service.store.own_mesh(&owner, &hash).await?
     {
@@ -105,6 +112,7 @@ pub async fn upload(
         .await??;
     let service = service.clone();
     detached(async move {
+        let _upload = upload;
         let (info, encoded) = parsed;
         let mut encoded = tokio::fs::File::from_std(encoded);
         let new = loop {

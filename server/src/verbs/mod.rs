@@ -16,6 +16,7 @@ pub mod meshes;
 pub mod problems;
 
 mod admission;
+mod uploads;
 
 // Jobs.
 pub mod bulk;

@@ -4,7 +4,10 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{sync::Semaphore, time::timeout};
 
-use super::loaded::FieldsInMemory;
+use super::{
+    loaded::FieldsInMemory,
+    uploads::{Upload, Uploads},
+};
 use crate::{
     config::{Config, Isolation, ProxyTrust, Web},
     error::{ApiError, Quota, QuotaOf},
@@ -60,6 +63,36 @@ pub struct Service {
     pub tls: bool,
     /// The folder for uploads until they are read.
     pub(super) data: PathBuf,
+    /// Those that are arriving.
+    uploads: Arc<Uploads>,
+}
+
+/// What an owner may keep beside what they keep.
+#[derive(Debug)]
+pub(super) struct Room {
+    owner: String,
+    /// `None` without limit.
+    limit: Option<u64>,
+    used: u64,
+}
+
+impl Room {
+    /// An error if it is used up, or would not hold these bytes more.
+    pub(super) fn check(&self, more: u64) -> Result<(), ApiError> {
+        let Room { owner, limit, used } = self;
+        match *limit {
+            Some(limit) if *used >= limit || used.saturating_add(more) > limit => {
+                Err(ApiError::QuotaExceeded(Quota {
+                    owner: owner.clone(),
+                    of: QuotaOf::StoredBytes,
+                    limit,
+                    used: *used,
+                    asked: more,
+                }))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 impl Service {
@@ -85,6 +118,7 @@ impl Service {
             web: config.web.clone(),
             tls: config.tls.is_on(),
             data: config.store.data.clone(),
+            uploads: Arc::default(),
         }
     }
 
@@ -117,19 +151,24 @@ impl Service {
 
     /// An error if the owner keeps as much as they may.
     pub(super) async fn may_keep_more(&self, owner: &str) -> Result<(), ApiError> {
-        let Some(limit) = self.max_bytes_of_owner() else {
-            return Ok(());
+        self.room_of(owner).await?.check(0)
+    }
+
+    /// What an owner may keep beside what they keep now.
+    pub(super) async fn room_of(&self, owner: &str) -> Result<Room, ApiError> {
+        let limit = self.max_bytes_of_owner();
+        let used = match limit {
+            Some(_) => self.bytes_of(owner).await?,
+            None => 0,
         };
-        match self.bytes_of(owner).await? {
-            used if used >= limit => Err(ApiError::QuotaExceeded(Quota {
-                owner: owner.to_owned(),
-                of: QuotaOf::StoredBytes,
-                limit,
-                used,
-                asked: 0,
-            })),
-            _ => Ok(()),
-        }
+        let owner = owner.to_owned();
+        Ok(Room { owner, limit, used })
+    }
+
+    /// Counts an upload that begins.
+    pub(super) fn begin_upload(&self, owner: &str) -> Result<Upload, ApiError> {
+        let upload = self.uploads.begin(owner, self.is_shared());
+        upload.ok_or(ApiError::Overloaded)
     }
 
     /// An error once the service is about to stop.

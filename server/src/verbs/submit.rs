@@ -6,7 +6,7 @@ use futures_util::{StreamExt, TryStreamExt};
 use solver::error::{Findings, Reason, Violation};
 
 use super::{
-    admission::{admit, enqueue, prepare, replayed},
+    admission::{admit, enqueue, has_share, prepare, replayed},
     envelope::JobRequest,
     key::Key,
     service::{Service, detached},
@@ -60,6 +60,7 @@ pub async fn create(
                 return single(vec![old], true);
             }
         }
+        has_share(&service, &caller, 1).await?;
         let new = admit(&service, &caller, prepared).await?;
         let Accepted { jobs, replayed, .. } = enqueue(&service, &caller, vec![new], key).await?;
         single(jobs, replayed)
@@ -102,6 +103,7 @@ pub async fn create_batch(
             let replayed = true;
             return Ok(Submitted { accepted, replayed });
         }
+        has_share(&service, &caller, prepared.len()).await?;
         let jobs = each(prepared, |prepared| admit(&service, &caller, prepared)).await?;
         let Accepted { jobs, replayed, .. } = enqueue(&service, &caller, jobs, key).await?;
         Ok(Submitted {
