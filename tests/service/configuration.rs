@@ -35,7 +35,8 @@ fn write(folder: &Path, name: &str, text: &str) -> String {
 #[test]
 fn a_flag_precedes_a_variable_which_precedes_the_file_which_precedes_the_default() {
     let folder = tempfile::tempdir().unwrap();
-    let settings = "# of the lab\nworkers = 3\nmax_queued = 5\ngrace_s = 7\nallowed_hosts = [\"lab\", \"lab:1\"]\n";
+    let settings = "# of the lab\nworkers = 3\nmax_queued = 5\ngrace_s = 7\nallowed_hosts = [\"lab\", \"lab:1\"]\n\
+        retain_days = 30\nretain_fields_days = 7.5\n";
     let file = write(folder.path(), "settings.toml", settings);
     let variables = [
         ("SIGNORINI_MAX_QUEUED", "6"),
@@ -51,6 +52,8 @@ fn a_flag_precedes_a_variable_which_precedes_the_file_which_precedes_the_default
         format!("allowed_hosts = [\"lab\", \"lab:1\"]  # {file}:5\n"),
         "max_connections = 8192  # default\n".into(),
         "isolation = \"thread\"  # default\n".into(),
+        format!("retain_days = 30  # {file}:6\n"),
+        format!("retain_fields_days = 7.5  # {file}:7\n"),
         "allow_unauthenticated = false  # default\n".into(),
         "# max_running_per_owner is not set: as many as there are workers\n".into(),
     ] {

@@ -274,6 +274,37 @@ async fn callers_who_are_not_identified_have_some_lines_in_each_second() {
     );
 }
 
+/// Who tries what they may not do is known, however many others are refused.
+#[tokio::test]
+async fn the_owner_of_a_refused_request_is_in_its_line() {
+    let server = Server::start(SIGNORINI, &["--log-format", "json"]).await;
+    let token = async |admin: Option<&str>, scope: &str, owner: &str| {
+        let body = json!({"name": "test", "owner": owner, "scopes": [scope]});
+        let mut request = server.post("/v1/tokens").json(&body);
+        if let Some(admin) = admin {
+            request = request.bearer_auth(admin);
+        }
+        let created: Value = request.send().await.unwrap().json().await.unwrap();
+        created["secret"].as_str().unwrap().to_owned()
+    };
+    let admin = token(None, "admin", "root").await;
+    let ada = token(Some(&admin), "read", "ada").await;
+    for _ in 0..100 {
+        server.get("/v1/jobs").send().await.unwrap();
+    }
+    let refused = server.get("/v1/tokens").bearer_auth(&ada);
+    let answer = refused.header("x-request-id", "by-ada").send().await;
+    assert_eq!(answer.unwrap().status(), StatusCode::FORBIDDEN);
+    let log = log_with(&server, "by-ada").await;
+    let lines = objects(&log);
+    let line = lines.iter().find(|line| line["request_id"] == "by-ada");
+    let line = line.unwrap();
+    assert_eq!(
+        (&line["owner"], &line["status"]),
+        (&json!("ada"), &json!(403))
+    );
+}
+
 #[tokio::test]
 async fn the_filter_is_that_of_rust_log_if_there_is_no_other() {
     let folder = tempfile::tempdir().unwrap();

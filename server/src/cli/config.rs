@@ -64,7 +64,7 @@ fn value(arg: &Arg, matches: &ArgMatches) -> anyhow::Result<String> {
     }
     let value = match Kind::of(arg) {
         Kind::Flag => matches.get_flag(id).to_string(),
-        Kind::Integer => texts.concat(),
+        Kind::Integer | Kind::Number => texts.concat(),
         Kind::Text => quoted(texts.concat()),
         Kind::List => {
             let quoted: Vec<String> = texts.into_iter().map(quoted).collect();

@@ -235,6 +235,8 @@ fn most_similar<'a, T>(name: &str, known: &'a [T], text: impl Fn(&T) -> &str) ->
 pub(super) enum Kind {
     Text,
     Integer,
+    /// With or without a decimal point.
+    Number,
     Flag,
     List,
 }
@@ -252,6 +254,7 @@ impl Kind {
             ArgAction::SetTrue => Kind::Flag,
             _ if arg.get_value_delimiter().is_some() => Kind::List,
             _ if integers.iter().any(|integer| found == *integer) => Kind::Integer,
+            _ if found == TypeId::of::<f64>() => Kind::Number,
             _ => Kind::Text,
         }
     }
@@ -260,6 +263,7 @@ impl Kind {
         match self {
             Kind::Text => "expected a text in quotation marks",
             Kind::Integer => "expected an integer",
+            Kind::Number => "expected a number",
             Kind::Flag => "expected true or false",
             Kind::List => "expected a list of texts, such as [\"one\", \"another\"]",
         }
@@ -378,7 +382,10 @@ fn texts(arg: &Arg, value: &DeValue<'_>) -> Result<Vec<String>, String> {
     let texts: Vec<String> = match (kind, value) {
         (Kind::Text, DeValue::String(text)) => vec![text.to_string()],
         (Kind::Flag, DeValue::Boolean(flag)) => vec![flag.to_string()],
-        (Kind::Integer, DeValue::Integer(integer)) => {
+        (Kind::Number, DeValue::Float(number)) => vec![number.as_str().to_owned()],
+        // as `config show` printed it once
+        (Kind::Number, DeValue::String(text)) => vec![text.to_string()],
+        (Kind::Integer | Kind::Number, DeValue::Integer(integer)) => {
             let parsed = i128::from_str_radix(integer.as_str(), integer.radix());
             vec![parsed.map_err(|_| mismatch(value))?.to_string()]
         }
@@ -399,7 +406,7 @@ fn texts(arg: &Arg, value: &DeValue<'_>) -> Result<Vec<String>, String> {
         }
         check(arg, OsStr::new(text)).map_err(|expected| {
             let found = match kind {
-                Kind::Integer => text.clone(),
+                Kind::Integer | Kind::Number => text.clone(),
                 _ => format!("{text:?}"),
             };
             format!("found {found}, {expected}")
@@ -461,7 +468,7 @@ mod tests {
         let (_, wrong) = read(
             "wokers = 2\nworkers = 'many'\n\nisolation = 'proces'\nmax_queued = -1\nallowed_hosts = 'lab'\n\
              allowed_origins = ['https://a', 'lab/']\nproxy_admins = ['a,b']\nallow_unauthenticated = 1\nlisten = 80\n\
-             [tls]\nkey = 1\n",
+             retain_days = true\n[tls]\nkey = 1\n",
         );
         let expected = [
             "a.toml:1: \"wokers\": there is no such setting; did you mean workers?",
@@ -474,7 +481,8 @@ mod tests {
             "a.toml:8: proxy_admins: found \"a,b\", expected each as an element of its own",
             "a.toml:9: allow_unauthenticated: found 1, expected true or false",
             "a.toml:10: listen: found 80, expected a text in quotation marks",
-            "a.toml:11: \"tls\": there is no such setting; did you mean tls_key?",
+            "a.toml:11: retain_days: found true, expected a number",
+            "a.toml:12: \"tls\": there is no such setting; did you mean tls_key?",
         ];
         assert_eq!(wrong, expected);
     }

@@ -35,47 +35,50 @@ pub(super) async fn authenticate(
     next: Next,
 ) -> Response {
     let (grpc, path) = (is_grpc(&request), request.uri().path().to_owned());
-    let answer = match admit(&service, &request) {
-        Ok(Identified { caller, by }) => {
-            let trace = request.extensions().get::<Trace>().cloned();
-            let caller = caller.in_trace(trace);
-            request.extensions_mut().insert(caller.clone());
-            let mut answer = next.run(request).await;
-            answer.extensions_mut().insert(caller); // for `observe`
-            while_valid(answer, service.store.clone(), by)
-        }
-        Err(error) => Err(error),
+    let access = access(&request);
+    let Identified { caller, by } = match identified(&service, &request, access) {
+        Ok(identified) => identified,
+        Err(error) => return refusal(grpc, &path, error),
     };
-    answer.unwrap_or_else(|error| refusal(grpc, &path, error))
+    let caller = caller.in_trace(request.extensions().get::<Trace>().cloned());
+    let answer = match lacks(access, &caller, &by) {
+        Some(error) => Err(error),
+        None => {
+            request.extensions_mut().insert(caller.clone());
+            while_valid(next.run(request).await, service.store.clone(), by)
+        }
+    };
+    let mut answer = answer.unwrap_or_else(|error| refusal(grpc, &path, error));
+    answer.extensions_mut().insert(caller); // for `observe`
+    answer
 }
 
-/// The caller, if the request is one that they may make.
-fn admit(service: &Service, request: &Request) -> Result<Identified, ApiError> {
-    let access = access(request);
+/// Who makes a request.
+fn identified(
+    service: &Service,
+    request: &Request,
+    access: Access,
+) -> Result<Identified, ApiError> {
     let peer = request.extensions().get::<Peer>().copied();
     let credentials = credentials(request.headers(), &service.trust.user_header);
-    let identified = match identify(&service.store, &service.trust, peer, &credentials) {
-        Ok(identified) => identified,
+    match identify(&service.store, &service.trust, peer, &credentials) {
         // also with a token that is no longer valid, as a monitor may have it
-        Err(_) if access == Access::Open => Identified {
+        Err(_) if access == Access::Open => Ok(Identified {
             caller: Caller::anonymous(),
             by: By::OpenOperation,
-        },
-        Err(error) => return Err(error),
-    };
-    if let Access::Needs(scopes) = access {
-        let missing = scopes.iter().find(|scope| !identified.caller.may(**scope));
-        if let Some(scope) = missing {
-            return Err(lacks(&identified, *scope));
-        }
+        }),
+        identified => identified,
     }
-    Ok(identified)
 }
 
-/// The refusal of a caller who does not have this scope.
-fn lacks(Identified { caller, by }: &Identified, scope: Scope) -> ApiError {
+/// The refusal of a caller who does not have a scope that is needed.
+fn lacks(access: Access, caller: &Caller, by: &By) -> Option<ApiError> {
+    let Access::Needs(scopes) = access else {
+        return None;
+    };
+    let scope = *scopes.iter().find(|scope| !caller.may(**scope))?;
     let (scope, owner): (&str, _) = (scope.into(), caller.owner());
-    ApiError::Forbidden(match by {
+    Some(ApiError::Forbidden(match by {
         By::Proxy => format!(
             "this needs the scope {scope}, which {owner}, whom the proxy names, does not have; an administrator can give it \
              with --proxy-scopes, or a token that has it"
@@ -83,7 +86,7 @@ fn lacks(Identified { caller, by }: &Identified, scope: Scope) -> ApiError {
         By::Token(_) | By::NoTokensNeeded | By::OpenOperation => {
             format!("this needs the scope {scope}, which the token of {owner} does not have")
         }
-    })
+    }))
 }
 
 /// Who may make a request. What is no operation is answered by 404, 405 or UNIMPLEMENTED, which says nothing that
