@@ -3,7 +3,7 @@
 use std::{
     path::{Path, PathBuf},
     process::{Output, Stdio},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use serde_json::{Value, json};
@@ -170,6 +170,11 @@ async fn a_problem_is_submitted_waited_for_listed_and_its_result_printed() {
         .unwrap();
     assert!(read("a.vtu") == fields.bytes().await.unwrap());
     ends(url, &["result", &id, "-o", &name("a.xlsx")], 2).await;
+    // nothing is written if one of the names is wrong
+    let (first, whole) = (name("b.csv"), name("b.json"));
+    let (_, said) = ends(url, &["result", &id, "-o", &first, "-o", &whole], 2).await;
+    assert!(said.contains("NAME.summary.json"), "{said}");
+    assert!(!Path::new(&first).exists());
 
     let (drawn, _) = ends(url, &["plot", &id], 0).await;
     for part in [
@@ -256,8 +261,10 @@ async fn every_end_has_its_exit_code() {
 
     // 4: it has not ended; 3: it was canceled
     let long = submit(&save("large.json", &large())).await;
+    let began = Instant::now();
     let (_, shown) = ends(url, &["wait", &long, "--timeout", "0.3"], 4).await;
     assert_eq!(shown, "");
+    assert!(began.elapsed() >= Duration::from_millis(300));
     ends(url, &["cancel", &long], 0).await;
     ends(url, &["wait", &long], 3).await;
     ends(url, &["cancel", &long], 0).await;
@@ -326,7 +333,7 @@ async fn a_load_step_and_a_stress_are_drawn() {
         drawn[1],
         ends(url, &["plot", &id, "--step", "whole"], 0).await.0
     );
-    let (_, said) = ends(url, &["plot", &id, "--step", "third"], 1).await;
+    let (_, said) = ends(url, &["plot", &id, "--step", "third"], 6).await;
     assert!(said.contains("half, whole"), "{said}");
     let file = folder.path().join("figure.svg");
     let file = file.to_str().unwrap();
@@ -402,7 +409,9 @@ async fn a_watch_and_a_wait_go_on_when_the_service_comes_back() {
     let id = ends(&server.url, &submit, 0).await.0.trim().to_owned();
     server.until_running(&id).await;
     let watch = spawn(&server.url, &["watch", "-f", "jsonl", &id]);
-    let wait = spawn(&server.url, &["wait", &id, "-f", "json"]);
+    // less than one request waits: a service that is gone must not end it early
+    let wait = ["wait", &id, "-f", "json", "--timeout", "29"];
+    let wait = spawn(&server.url, &wait);
     tokio::time::sleep(Duration::from_millis(300)).await;
     server.kill().await;
     tokio::time::sleep(Duration::from_millis(500)).await;
@@ -469,9 +478,40 @@ async fn a_sweep_is_submitted_watched_and_its_table_printed() {
     let saved = folder.path().join("table.csv");
     ends(url, &["result", &id, "-o", saved.to_str().unwrap()], 0).await;
     assert_eq!(std::fs::read_to_string(saved).unwrap(), table);
+    let (text, _) = ends(url, &["result", &id, "-o", "-"], 0).await;
+    let (same, _) = ends(url, &["result", &id, "-f", "json"], 0).await;
+    assert!(text == same && !Path::new("-").exists());
     ends(url, &["plot", &id], 2).await;
     ends(url, &["rm", &id], 0).await;
     ends(url, &["get", &id], 6).await;
+}
+
+/// The service has JSON by pages of 1,000 members at most; the command has all of them.
+#[tokio::test]
+async fn a_table_of_many_members_is_whole_in_json() {
+    let server = server().await;
+    let folder = tempfile::tempdir().unwrap();
+    let url = &server.url;
+    problem(folder.path(), "sheet");
+    let values: Vec<f64> = (0..1001).map(|number| f64::from(number) * 4e-4).collect();
+    let sweep = json!({
+        "base": "sheet.json",
+        "axes": [{ "path": "/contacts/0/friction/coefficient", "values": values }],
+    });
+    let file = write(folder.path(), "sweep.json", &sweep.to_string());
+    let id = ends(url, &["submit", &file, "-q"], 0).await.0;
+    let id = id.trim();
+    ends(url, &["wait", id], 0).await;
+    let saved = folder.path().join("table.json");
+    ends(url, &["result", id, "-o", saved.to_str().unwrap()], 0).await;
+    let text = std::fs::read_to_string(saved).unwrap();
+    let table: Value = serde_json::from_str(&text).unwrap();
+    let members = table["members"].as_array().unwrap();
+    let numbers: Vec<i64> = members
+        .iter()
+        .map(|member| member["number"].as_i64().unwrap())
+        .collect();
+    assert_eq!(numbers, (0..1001).collect::<Vec<_>>());
 }
 
 #[tokio::test]

@@ -59,7 +59,7 @@ fn quantile(mut parts: Vec<(f64, f64)>, share: f64) -> Option<f64> {
 }
 
 /// The parts of a curve that an axis shows, each ending where it leaves.
-pub(super) fn within(points: &[(f64, f64)], up: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
+pub fn within(points: &[(f64, f64)], up: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
     let inside = |y: f64| up.start <= y && y <= up.end;
     let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
     let mut part: Vec<(f64, f64)> = Vec::new();
@@ -111,6 +111,26 @@ pub(super) fn peaks(points: &[(f64, f64)], up: &Range<f64>) -> Vec<(f64, f64, bo
         before = side;
     }
     found
+}
+
+/// The peak that a figure names: x, the value, and whether it is at the top. Of those beyond the axis the largest; where none is,
+/// the largest of the curves if there is more to say of it than that it is cut off.
+pub(super) fn named_peak(
+    curves: &[&[(f64, f64)]],
+    up: &Range<f64>,
+    of_peak: &str,
+) -> Option<(f64, f64, bool)> {
+    let beyond = curves.iter().flat_map(|points| peaks(points, up));
+    let largest = beyond.reduce(|most, peak| match peak.1.abs() > most.1.abs() {
+        true => peak,
+        false => most,
+    });
+    if largest.is_some() || of_peak.is_empty() {
+        return largest;
+    }
+    let points = curves.iter().copied().flatten();
+    let peak = points.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    Some((peak.0, peak.1, peak.1 > 0.0))
 }
 
 /// Linear between points whose first coordinate rises.

@@ -8,7 +8,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::{
-    CUT, decades, extent, interpolated, limits, peaks, place_of, power_of_ten, ticks, within,
+    CUT, decades, extent, interpolated, limits, named_peak, peaks, place_of, power_of_ten, ticks,
+    within,
 };
 use super::caption::Caption;
 use super::numbers::{number, rounded, tick};
@@ -395,13 +396,12 @@ fn draw_cuts(
     up: &Range<f64>,
 ) -> Fallible<()> {
     let palette = style.palette();
-    let mut largest: Option<(f64, f64, bool)> = None; // x, value, whether at the top
     for curve in panel.curves.iter().filter(|curve| decides(curve.style)) {
         let line = stroke(&palette, curve.style)
             .color
             .to_rgba()
             .stroke_width(px(1) as u32 + 6);
-        for (x, y, over) in peaks(&curve.points, up) {
+        for (x, _, over) in peaks(&curve.points, up) {
             let (x_at, y_at) = (frame.x(x), if over { frame.top } else { frame.bottom });
             let back = [(x_at - px(7), y_at - px(4)), (x_at + px(7), y_at + px(4))];
             area.draw(&Rectangle::new(back, palette.background.filled()))?;
@@ -410,17 +410,9 @@ fn draw_cuts(
                 let wave = wave.map(|(dx, dy)| (x_at + px(dx), y_at + off + px(dy)));
                 area.draw(&PathElement::new(wave, line))?;
             }
-            if largest.is_none_or(|(_, most, _)| y.abs() > most.abs()) {
-                largest = Some((x, y, over));
-            }
         }
     }
-    if largest.is_none() && !panel.of_peak.is_empty() {
-        let points = deciding(panel).into_iter().flatten();
-        let peak = points.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        largest = peak.map(|&(x, y)| (x, y, y > 0.0));
-    }
-    let Some((x, peak, over)) = largest else {
+    let Some((x, peak, over)) = named_peak(&deciding(panel), up, &panel.of_peak) else {
         return Ok(());
     };
     let words = format!("peak {}{}", rounded(peak), panel.of_peak);

@@ -22,12 +22,13 @@ mod theme;
 
 use std::collections::BTreeMap;
 
+pub use axis::within;
 pub use caption::{Caption, Mark};
 pub use convergence::convergence_svg;
 pub use deformed::deformed_svg;
 pub use figure::{Above, Curve, LineStyle, Panel, Scale, Shade, ShadeKind, figure};
 pub use mesh::mesh_svg;
-pub use profile::profile_svg;
+pub use profile::{ProfileView, profile_svg};
 pub use style::{Size, Stress, Style};
 pub use theme::Theme;
 

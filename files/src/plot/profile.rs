@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use super::axis::{CUT, limits, named_peak};
 use super::body::coordinates;
 use super::caption::Caption;
 use super::figure::{Above, Curve, LineStyle, Panel, Scale, Shade, ShadeKind, figure};
+use super::numbers::{number, rounded};
 use super::page::{self, with_unit};
 use super::style::Style;
 use solver::error::shortened;
@@ -54,25 +56,13 @@ fn panels(
         true => shades(profile, shown.clone()),
         false => vec![],
     };
-    let no_limit = summary.and_then(|summary| summary.accuracy.as_ref());
-    let no_limit = no_limit.is_some_and(|accuracy| {
-        accuracy.quantities.iter().any(|q| {
-            q.contact == name
-                && q.quantity == QuantityName::PeakNormalStress
-                && q.method == ErrorMethod::NoLimit
-        })
-    });
     let normal = Panel {
         x: if rough { String::new() } else { along.clone() },
         y: stress("normal stress σ_n"),
         curves: vec![curve("", LineStyle::Line(0), &profile.normal_stress)],
         shades: shades.clone(),
         above: position(profile, coordinates(&problem.analysis), unit, shown.clone()),
-        of_peak: match no_limit {
-            true => ", which grows on finer meshes",
-            false => "",
-        }
-        .to_owned(),
+        of_peak: of_peak(name, summary).to_owned(),
         ..Panel::default()
     };
     if !rough {
@@ -103,6 +93,66 @@ fn panels(
         ..Panel::default()
     };
     vec![normal, tangential]
+}
+
+/// What is to be said of the peak of σ_n beside its value.
+fn of_peak(name: &str, summary: Option<&Summary>) -> &'static str {
+    let accuracy = summary.and_then(|summary| summary.accuracy.as_ref());
+    let no_limit = accuracy.is_some_and(|accuracy| {
+        accuracy.quantities.iter().any(|q| {
+            q.contact == name
+                && q.quantity == QuantityName::PeakNormalStress
+                && q.method == ErrorMethod::NoLimit
+        })
+    });
+    match no_limit {
+        true => ", which grows on finer meshes",
+        false => "",
+    }
+}
+
+/// What figures show of the stresses along a contact boundary, for those who draw both of them over one axis themselves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProfileView {
+    /// The points under stress, with a margin on each side.
+    pub points: Range<usize>,
+    /// From where to where the axis of stresses goes.
+    pub stresses: Range<f64>,
+    /// A sentence about the peak of σ_n where it is cut off, or where it grows on finer meshes.
+    pub peak: Option<String>,
+}
+
+impl ProfileView {
+    /// Of this contact boundary. The summary tells whether the peak has a limit.
+    pub fn of(name: &str, profile: &ContactProfile, summary: Option<&Summary>) -> ProfileView {
+        let points = stressed(profile);
+        let curve = |values: &[f64]| -> Vec<(f64, f64)> {
+            points.clone().map(|i| (profile.s[i], values[i])).collect()
+        };
+        let normal = curve(&profile.normal_stress);
+        let tangential = curve(&profile.tangential_stress);
+        let of_normal = limits(&[&normal], CUT);
+        let stresses = match tangential.iter().any(|(_, stress)| *stress != 0.0) {
+            true => {
+                let of_tangential = limits(&[&tangential], f64::INFINITY);
+                of_normal.start.min(of_tangential.start)..of_normal.end.max(of_tangential.end)
+            }
+            false => of_normal,
+        };
+        let of_peak = of_peak(name, summary);
+        let peak = named_peak(&[&normal], &stresses, of_peak).map(|(s, peak, _)| {
+            let place = format!("σ_n: peak {} at s = {}", rounded(peak), number(s));
+            match stresses.contains(&peak) {
+                true => format!("{place}{of_peak}"),
+                false => format!("{place}{of_peak}; the axis ends before it"),
+            }
+        });
+        ProfileView {
+            points,
+            stresses,
+            peak,
+        }
+    }
 }
 
 /// Stick and slip: each reaches half of the way to a neighbour in another state.
@@ -237,6 +287,42 @@ mod tests {
         let flat = BTreeMap::from([("top".to_owned(), flat)]);
         assert!(drawn(&problem, &flat).is_ok());
         assert!(drawn(&problem, &BTreeMap::new()).is_err());
+    }
+
+    #[test]
+    fn a_peak_is_beyond_the_axis_and_named() {
+        let mut profile = ContactProfile {
+            s: (0..=100).map(f64::from).collect(),
+            normal_stress: vec![-10.0; 101],
+            tangential_stress: vec![3.0; 101],
+            friction_bound: vec![3.0; 101],
+            ..ContactProfile::default()
+        };
+        let flat = ProfileView::of("top", &profile, None);
+        assert_eq!((flat.points.clone(), &flat.peak), (0..101, &None));
+        assert!(flat.stresses.start < -10.0 && flat.stresses.end > 3.0);
+        assert!(flat.stresses.start > -12.0 && flat.stresses.end < 4.0);
+
+        profile.normal_stress[100] = -186_868.83;
+        let peaked = ProfileView::of("top", &profile, None);
+        assert!((-80.0..-60.0).contains(&peaked.stresses.start));
+        let said = "σ_n: peak −187000 at s = 100; the axis ends before it";
+        assert_eq!(peaked.peak.as_deref(), Some(said));
+    }
+
+    #[test]
+    fn a_peak_without_a_limit_is_named_in_any_case() {
+        let problem: Problem = serde_json::from_str(include_str!(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../examples/rectangular_punch.json"
+        )))
+        .unwrap();
+        let solution = crate::plot::tests::solution(&problem);
+        let profile = &solution.profiles["top"];
+        let shown = ProfileView::of("top", profile, Some(&solution.summary));
+        let peak = shown.peak.unwrap();
+        assert!(peak.starts_with("σ_n: peak −"), "{peak}");
+        assert!(peak.contains(", which grows on finer meshes"), "{peak}");
     }
 
     #[test]

@@ -11,6 +11,9 @@ use crate::catalog::{Code, Kind, WarningKind, warning};
 const WIDTH: usize = 28;
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  signorini explain not_converged\n  signorini explain queue-full"
+)]
 pub(super) struct Arguments {
     /// A code: the `code` or `type` of an error, the `reason` of a job, or the `code` of a warning; without it, all are
     /// listed

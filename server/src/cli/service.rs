@@ -78,6 +78,9 @@ pub(super) enum CallError {
 pub(super) struct Refusal {
     /// HTTP status.
     pub(super) status: u16,
+    /// Whether the service says that the same request may succeed later; absent if it is not this service that has answered.
+    #[serde(default)]
+    retryable: Option<bool>,
     /// The kind of error; empty if it is not this service that has answered.
     pub(super) code: String,
     title: String,
@@ -233,6 +236,12 @@ impl Service {
 }
 
 impl Refusal {
+    /// Waiting may help: the service says so, or something that stands before it has lost it.
+    pub(super) fn may_pass(&self) -> bool {
+        let of_proxy = matches!(self.status, 429 | 502..=504);
+        self.retryable.unwrap_or(of_proxy)
+    }
+
     /// The same request may succeed in a moment.
     fn is_passing(&self) -> bool {
         matches!(
@@ -258,6 +267,7 @@ pub(super) fn segment(name: &str) -> String {
 fn foreign(url: &str, status: StatusCode) -> Refusal {
     Refusal {
         status: status.as_u16(),
+        retryable: None,
         code: String::new(),
         title: String::new(),
         detail: Some(format!(

@@ -34,6 +34,9 @@ use crate::{
 };
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  signorini solve examples/rectangular_punch.json\n  signorini solve punch.json -o punch.csv -o punch.svg -o punch.vtu"
+)]
 pub(super) struct Arguments {
     /// The problem: a JSON file, or an Abaqus or CalculiX deck (.inp)
     file: PathBuf,

@@ -32,6 +32,9 @@ use crate::{
 };
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  signorini sweep examples/sweeps/stick_width.json -o study.csv\n\nSolved here, without a service; `signorini submit` takes the same file."
+)]
 pub(super) struct Arguments {
     /// The sweep: a JSON file as for POST /v1/sweeps; `base` may also be the path of a problem, from that file's folder
     file: PathBuf,

@@ -16,6 +16,9 @@ use super::{
 use crate::job::JobId;
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  signorini cancel job_…\n  signorini cancel $(signorini ls --label study=radius --status queued -n 0 -q)"
+)]
 pub(in crate::cli) struct Cancel {
     /// Jobs or sweeps
     #[arg(required = true)]
@@ -45,6 +48,7 @@ pub(super) async fn cancel(arguments: Cancel) -> anyhow::Result<Exit> {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  signorini wait $(signorini retry job_… -q)")]
 pub(in crate::cli) struct Retry {
     /// Jobs that have ended
     #[arg(required = true, value_parser = job)]
@@ -85,6 +89,9 @@ pub(super) async fn retry(arguments: Retry) -> anyhow::Result<Exit> {
 }
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  signorini rm job_…\n  signorini rm --fields $(signorini ls --label study=radius -n 0 -q)"
+)]
 pub(in crate::cli) struct Remove {
     /// Jobs or sweeps that have ended
     #[arg(required = true)]

@@ -1,5 +1,8 @@
 //! Curves in a terminal, drawn with the dots of braille characters.
 
+use std::ops::Range;
+
+use files::plot::within;
 use ratatui_core::{
     buffer::Buffer,
     layout::Rect,
@@ -21,8 +24,18 @@ pub(super) struct Chart {
     /// The quantity of the horizontal axis.
     pub(super) across: String,
     pub(super) curves: Vec<Curve>,
-    /// The vertical axis is one of powers of ten; values that are not positive are left out.
-    pub(super) logarithmic: bool,
+    /// The vertical axis.
+    pub(super) scale: Scale,
+    /// A line below the title.
+    pub(super) note: Option<String>,
+}
+
+/// The vertical axis.
+pub(super) enum Scale {
+    /// From here to there; what of a curve is beyond is not drawn.
+    Within(Range<f64>),
+    /// Powers of ten; values that are not positive are left out.
+    Logarithmic,
 }
 
 /// Curves in their order: told apart also by who sees no red or no green.
@@ -35,36 +48,47 @@ const COLOURS: [(Color, &str); 3] = [
 impl Chart {
     /// The figure, as lines of so many characters.
     pub(super) fn draw(&self, width: u16, height: u16, in_colour: bool) -> String {
-        let shown: Vec<(&str, Vec<(f64, f64)>)> = self
+        let visible: Vec<Vec<(f64, f64)>> = self
             .curves
             .iter()
-            .map(|curve| (curve.name, self.visible(curve)))
+            .map(|curve| self.visible(curve))
             .collect();
-        let all = || shown.iter().flat_map(|(_, points)| points.iter().copied());
+        let all = || visible.iter().flatten().copied();
         if all().next().is_none() {
             return format!("{}: there is nothing to draw\n", self.title);
         }
         let across = range(all().map(|point| point.0));
-        let mut up = range(all().map(|point| point.1));
-        if self.logarithmic {
-            // labels are whole powers of ten, also that in the middle
-            let (low, high) = (up[0].floor(), up[1].ceil());
-            up = [low, high + (high - low).rem_euclid(2.0)];
-        }
-        let datasets = shown
+        let up = match &self.scale {
+            Scale::Within(up) => [up.start, up.end],
+            Scale::Logarithmic => {
+                // labels are whole powers of ten, also that in the middle
+                let [low, high] = range(all().map(|point| point.1));
+                let (low, high) = (low.floor(), high.ceil());
+                [low, high + (high - low).rem_euclid(2.0)]
+            }
+        };
+        // a curve that leaves the axis and comes back is drawn as several
+        let parts: Vec<(Color, Vec<(f64, f64)>)> = visible
             .iter()
             .zip(COLOURS)
-            .map(|((name, points), (colour, _))| {
-                Dataset::default()
-                    .name(*name)
-                    .marker(Marker::Braille)
-                    .graph_type(GraphType::Line)
-                    .style(Style::new().fg(colour))
-                    .data(points)
-            });
-        let label = |value: f64| match self.logarithmic {
-            true => format!("1e{}", value as i32),
-            false => short(value),
+            .flat_map(|(points, (colour, _))| {
+                let parts = match &self.scale {
+                    Scale::Within(up) => within(points, up),
+                    Scale::Logarithmic => vec![points.clone()],
+                };
+                parts.into_iter().map(move |part| (colour, part))
+            })
+            .collect();
+        let datasets = parts.iter().map(|(colour, points)| {
+            Dataset::default()
+                .marker(Marker::Braille)
+                .graph_type(GraphType::Line)
+                .style(Style::new().fg(*colour))
+                .data(points)
+        });
+        let label = |value: f64| match self.scale {
+            Scale::Logarithmic => format!("1e{}", value as i32),
+            Scale::Within(_) => short(value),
         };
         let middle = |[low, high]: [f64; 2]| (low + high) / 2.0;
         let across_labels = [across[0], middle(across), across[1]].map(short);
@@ -88,25 +112,27 @@ impl Chart {
         )
     }
 
-    /// The title, and the names of the curves in their colours.
+    /// The title, and the names of the curves in their colours; below them the note.
     fn heading(&self, in_colour: bool) -> String {
         let names = self.curves.iter().zip(COLOURS);
         let names =
             names.map(|(curve, (_, code))| coloured(&format!("─ {}", curve.name), code, in_colour));
         let names: Vec<String> = names.collect();
-        format!("{}   {}", self.title, names.join("   "))
+        let note = self.note.iter().map(|note| format!("\n{note}"));
+        let note: String = note.collect();
+        format!("{}   {}{note}", self.title, names.join("   "))
     }
 
     fn visible(&self, curve: &Curve) -> Vec<(f64, f64)> {
         let points = curve.points.iter().copied();
         let finite = |point: &(f64, f64)| point.0.is_finite() && point.1.is_finite();
-        match self.logarithmic {
-            true => points
+        match self.scale {
+            Scale::Logarithmic => points
                 .filter(|point| point.1 > 0.0)
                 .map(|(x, y)| (x, y.log10()))
                 .filter(finite)
                 .collect(),
-            false => points.filter(finite).collect(),
+            Scale::Within(_) => points.filter(finite).collect(),
         }
     }
 }
@@ -178,7 +204,8 @@ mod tests {
                 name: "σ_n",
                 points: vec![(0.0, -2.0), (1.0, 3.0)],
             }],
-            logarithmic: false,
+            scale: Scale::Within(-2.0..3.0),
+            note: None,
         };
         let drawn = chart.draw(40, 10, false);
         let lines: Vec<&str> = drawn.lines().collect();
@@ -197,6 +224,45 @@ mod tests {
     }
 
     #[test]
+    fn a_peak_beyond_the_axis_does_not_hide_the_curve() {
+        let curve: Vec<(f64, f64)> = (0..=100)
+            .map(|k| f64::from(k) / 100.0)
+            .map(|s| (s, if s == 0.5 { -1e5 } else { -1.0 - s }))
+            .collect();
+        let chart = Chart {
+            title: "Stresses".into(),
+            across: "s".into(),
+            curves: vec![Curve {
+                name: "σ_n",
+                points: curve,
+            }],
+            scale: Scale::Within(-4.0..0.0),
+            note: Some("σ_n: peak −100000 at s = 0.5; the axis ends before it".into()),
+        };
+        let drawn = chart.draw(40, 14, false);
+        let lines: Vec<&str> = drawn.lines().collect();
+        assert_eq!(lines[0], "Stresses   ─ σ_n");
+        assert!(
+            lines[1].starts_with("σ_n: peak −100000 at s = 0.5"),
+            "{drawn}"
+        );
+        assert!(drawn.contains("-4.00"), "{drawn}");
+        // the curve runs from −1 to −2, in more than one line of characters, and to the end of the axis at the peak
+        let of_curve = |line: &&&str| line.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c));
+        let rows = lines.iter().filter(of_curve).count();
+        assert!(rows >= 8, "{drawn}");
+        let left = |line: &str| {
+            line.chars()
+                .take(20)
+                .any(|c| c as u32 > 0x2800 && (c as u32) < 0x2900)
+        };
+        assert!(
+            lines.iter().filter(|line| left(line)).count() >= 2,
+            "{drawn}"
+        );
+    }
+
+    #[test]
     fn nothing_to_draw_is_said() {
         let none = Chart {
             title: "Convergence".into(),
@@ -205,7 +271,8 @@ mod tests {
                 name: "residual",
                 points: vec![(1.0, 0.0)],
             }],
-            logarithmic: true,
+            scale: Scale::Logarithmic,
+            note: None,
         };
         assert_eq!(
             none.draw(40, 10, false),

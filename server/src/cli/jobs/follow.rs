@@ -7,7 +7,7 @@ use eventsource_stream::Eventsource;
 use futures_util::StreamExt;
 use reqwest::{Method, StatusCode, header};
 use serde_json::Value;
-use tokio::time::{Instant, sleep};
+use tokio::time::{Instant, sleep, sleep_until, timeout_at};
 
 use super::{
     super::{
@@ -56,7 +56,7 @@ impl Outage {
                 self.known |= connected;
                 self.known
             }
-            Some(CallError::Refused(refusal)) => refusal.status == 429 || refusal.status >= 500,
+            Some(CallError::Refused(refusal)) => refusal.may_pass(),
             None => false,
         };
         if passing && self.since.is_none() {
@@ -81,7 +81,8 @@ pub(super) async fn wait(
 ) -> anyhow::Result<Option<Value>> {
     let mut outage = Outage::new();
     loop {
-        let left = deadline.map(|end| end.saturating_duration_since(Instant::now()).as_secs_f64());
+        let asked = Instant::now();
+        let left = deadline.map(|end| end.saturating_duration_since(asked).as_secs_f64());
         let wait = left.map_or(WAIT_S, |left| left.min(WAIT_S));
         let until = match id {
             Id::Job(_) => "&until=terminal",
@@ -93,12 +94,23 @@ pub(super) async fn wait(
             Ok(answer) => service.document(answer).await,
             Err(error) => Err(error),
         };
-        match document {
-            Ok(document) if has_ended(&document) => return Ok(Some(document)),
-            Ok(_) => outage.over(),
-            Err(error) => outage.bear(error).await?,
+        match (document, deadline) {
+            (Ok(document), _) if has_ended(&document) => return Ok(Some(document)),
+            (Ok(_), _) => {
+                outage.over();
+                // a service that stops answers at once, and would be asked again without a pause
+                let pause = asked + FIRST_PAUSE;
+                sleep_until(deadline.map_or(pause, |end| end.min(pause))).await;
+            }
+            (Err(error), None) => outage.bear(error).await?,
+            (Err(error), Some(end)) => {
+                // the pause ends with the time that there is
+                if let Ok(borne) = timeout_at(end, outage.bear(error)).await {
+                    borne?;
+                }
+            }
         }
-        if left.is_some_and(|left| left <= wait) {
+        if deadline.is_some_and(|end| Instant::now() >= end) {
             return Ok(None);
         }
     }
@@ -131,6 +143,12 @@ pub(super) async fn events(
                 continue;
             }
         };
+        let kind = answer.headers().get(header::CONTENT_TYPE);
+        if !kind.is_some_and(|kind| kind.as_bytes().starts_with(b"text/event-stream")) {
+            bail!(
+                "what {path} answers is no stream of events: is the address that of a signorini service?"
+            );
+        }
         outage.over();
         let mut events = answer.bytes_stream().eventsource();
         // a stream that breaks off is taken up again behind the last event that arrived

@@ -9,6 +9,7 @@ use super::{
 };
 
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  signorini get job_…\n  signorini get job_… sweep_… -f json")]
 pub(in crate::cli) struct Arguments {
     /// Jobs or sweeps
     #[arg(required = true)]

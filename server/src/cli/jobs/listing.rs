@@ -119,7 +119,7 @@ fn lines(documents: &[Value]) -> anyhow::Result<String> {
         "STATUS",
         "NAME",
         "OWNER",
-        "SUBMITTED",
+        "SUBMITTED (UTC)",
         "TIME",
         "NOTES",
     ];

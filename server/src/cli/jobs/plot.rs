@@ -8,9 +8,9 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
-use files::plot::Plot;
+use files::plot::{Plot, ProfileView};
 use serde_json::Value;
-use solver::solution::ContactProfile;
+use solver::solution::{ContactProfile, Summary};
 
 use super::{
     super::{
@@ -18,14 +18,11 @@ use super::{
         output,
         service::{Connection, Service, segment},
     },
-    chart::{Chart, Curve},
+    chart::{Chart, Curve, Scale},
     id::Id,
-    result::download,
+    result::{PARTIAL, download},
 };
-use crate::{
-    event::TimedIteration, formats::Format, job::JobId, run::Summary,
-    verbs::results::RESULT_AVAILABLE,
-};
+use crate::{event::TimedIteration, formats::Format, job::JobId, verbs::results::RESULT_AVAILABLE};
 
 #[derive(Debug, Args)]
 #[command(
@@ -122,9 +119,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         let answer = service.fetch(route).await?;
         let available = answer.headers().get(RESULT_AVAILABLE);
         if available.is_some_and(|available| available == "partial") {
-            eprintln!(
-                "signorini: the result is partial: the job has not ended, or did not converge"
-            );
+            eprintln!("{PARTIAL}");
         }
         download(&service, &path, answer)?;
         eprintln!("{}", path.display());
@@ -133,13 +128,24 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         }
         return Ok(Exit::Ok);
     }
-    let step = match &arguments.step {
-        Some(wanted) => Some(number_of_step(&service, id, wanted).await?),
-        None => None,
-    };
     let mut figures = vec![];
-    if arguments.plot != Some(Plot::Convergence) {
-        figures.extend(profiles(&service, id, step).await?);
+    let mut step = None;
+    // a job without a result has iterations all the same
+    if arguments.plot != Some(Plot::Convergence) || arguments.step.is_some() {
+        let result: Value = service.get(&format!("/v1/jobs/{id}/result")).await?;
+        if result["result_available"] == "partial" {
+            eprintln!("{PARTIAL}");
+        }
+        if let Some(wanted) = &arguments.step {
+            step = number_of_step(&result, wanted);
+            if step.is_none() {
+                eprintln!("signorini: {}", no_step(&result, id, wanted));
+                return Ok(Exit::NotFound);
+            }
+        }
+        if arguments.plot != Some(Plot::Convergence) {
+            figures.extend(profiles(&service, id, result, step).await?);
+        }
     }
     if arguments.plot != Some(Plot::Profile) {
         figures.push(convergence(&service, id, step).await?);
@@ -157,47 +163,66 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
 }
 
 /// The number of a load step, given by its name or that number. A problem without load steps has step 0.
-async fn number_of_step(service: &Service, id: JobId, wanted: &str) -> anyhow::Result<u32> {
-    let result: Value = service.get(&format!("/v1/jobs/{id}/result")).await?;
-    let steps = result["steps"].as_array();
-    let names: Vec<&str> = steps
-        .into_iter()
-        .flatten()
-        .filter_map(|step| step["name"].as_str())
-        .collect();
+fn number_of_step(result: &Value, wanted: &str) -> Option<u32> {
+    let names = names_of_steps(result);
     let number = names.iter().position(|name| *name == wanted);
     let number = number.or_else(|| wanted.parse().ok());
     let number = number.filter(|number| *number < names.len().max(1));
-    let number = number.with_context(|| match names.is_empty() {
+    number.and_then(|number| u32::try_from(number).ok())
+}
+
+/// That there is no such load step, and which there are.
+fn no_step(result: &Value, id: JobId, wanted: &str) -> String {
+    let names = names_of_steps(result);
+    match names.is_empty() {
         true => format!("{id} has no load steps; leave out --step"),
         false => format!(
             "{id} has no load step {wanted:?}; it has, by name or by number from 0: {}",
             names.join(", ")
         ),
-    })?;
-    Ok(u32::try_from(number)?)
+    }
 }
 
-/// The stresses along each contact boundary, at the end of this step or of the last one.
-async fn profiles(service: &Service, id: JobId, step: Option<u32>) -> anyhow::Result<Vec<Chart>> {
-    let mut result: Value = service.get(&format!("/v1/jobs/{id}/result")).await?;
-    let summary: Summary = serde_json::from_value(result["summary"].take())
+fn names_of_steps(result: &Value) -> Vec<&str> {
+    let steps = result["steps"].as_array().into_iter().flatten();
+    steps.filter_map(|step| step["name"].as_str()).collect()
+}
+
+/// The stresses along each contact boundary, at the end of this step or of the last one: the part and the axis of figures.
+async fn profiles(
+    service: &Service,
+    id: JobId,
+    mut result: Value,
+    step: Option<u32>,
+) -> anyhow::Result<Vec<Chart>> {
+    let of_step = step.and_then(|number| result["steps"].get_mut(number as usize));
+    let summary = match of_step {
+        Some(step) => step["summary"].take(),
+        None => result["summary"].take(),
+    };
+    let summary: Summary = serde_json::from_value(summary)
         .context("the result is not that of this version of signorini")?;
     let mut figures = vec![];
-    for boundary in summary.solution.contacts.keys() {
+    for boundary in summary.contacts.keys() {
         let at = step.map_or(String::new(), |number| format!("&step={number}"));
         let path = format!(
             "/v1/jobs/{id}/profiles/{}?format=json{at}",
             segment(boundary)
         );
         let profile: ContactProfile = service.get(&path).await?;
+        let columns = [
+            &profile.normal_stress,
+            &profile.tangential_stress,
+            &profile.friction_bound,
+        ];
+        anyhow::ensure!(
+            columns.iter().all(|column| column.len() == profile.s.len()),
+            "the profile of {boundary:?} is not that of this version of signorini: its columns differ in length"
+        );
+        let view = ProfileView::of(boundary, &profile, Some(&summary));
         let points = |values: &[f64]| {
-            profile
-                .s
-                .iter()
-                .copied()
-                .zip(values.iter().copied())
-                .collect()
+            let shown = view.points.clone();
+            shown.map(|i| (profile.s[i], values[i])).collect()
         };
         let bound: Vec<f64> = profile
             .friction_bound
@@ -225,7 +250,8 @@ async fn profiles(service: &Service, id: JobId, step: Option<u32>) -> anyhow::Re
             title: format!("Stresses along {boundary:?}"),
             across: "s".into(),
             curves,
-            logarithmic: false,
+            scale: Scale::Within(view.stresses),
+            note: view.peak,
         });
     }
     Ok(figures)
@@ -260,7 +286,8 @@ async fn convergence(service: &Service, id: JobId, step: Option<u32>) -> anyhow:
             curve("friction residual", |timed| timed.row.friction_residual),
             curve("tolerance", |timed| timed.row.tolerance),
         ],
-        logarithmic: true,
+        scale: Scale::Logarithmic,
+        note: None,
     })
 }
 

@@ -11,7 +11,7 @@ use files::plot::Plot;
 use form_urlencoded::Serializer;
 use reqwest::Response;
 use serde::Deserialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 use solver::solution::ContactProfile;
 use tokio::{runtime::Handle, task::block_in_place};
 
@@ -25,7 +25,7 @@ use super::{
     id::Id,
     listing::Format,
 };
-use crate::{event::TimedIteration, run::Summary};
+use crate::{event::TimedIteration, formats, run::Summary, verbs::page::MAX_PAGE_SIZE};
 
 #[derive(Debug, Args)]
 #[command(
@@ -68,6 +68,10 @@ pub(in crate::cli) struct Arguments {
     service: Connection,
 }
 
+/// What is said of a partial result.
+pub(super) const PARTIAL: &str =
+    "signorini: the result is partial: the job has not ended, or did not converge";
+
 /// What the service answers for a result.
 #[derive(Deserialize)]
 struct Scalars {
@@ -92,7 +96,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let scalars: Scalars = serde_json::from_value(document.clone())
         .context("the result is not that of this version of signorini")?;
     if document["result_available"] == "partial" {
-        eprintln!("signorini: the result is partial: the job has not ended, or did not converge");
+        eprintln!("{PARTIAL}");
     }
     let contacts: Vec<&str> = scalars
         .summary
@@ -114,8 +118,11 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                 return Ok(Exit::Invalid);
             }
         };
-        if let Some(vain) = outputs.iter().find_map(|one| arguments.vain(&one.part)) {
-            eprintln!("signorini: {vain}");
+        let wrong = outputs
+            .iter()
+            .find_map(|one| without_part(one).or_else(|| arguments.vain(&one.part)));
+        if let Some(wrong) = wrong {
+            eprintln!("signorini: {wrong}");
             return Ok(Exit::Invalid);
         }
         for output in &outputs {
@@ -182,17 +189,29 @@ impl Arguments {
     }
 
     /// Why an option has no effect on a part that is to be written.
-    fn vain(&self, part: &Part) -> Option<&'static str> {
+    fn vain(&self, part: &Part) -> Option<String> {
         let profile = matches!(part, Part::Profile(_));
         let stepped = profile || matches!(part, Part::Plot(Plot::Profile | Plot::Convergence));
         match () {
             () if self.step.is_some() && !stepped => {
-                Some("--step is for profiles, and for the figures profile and convergence")
+                Some("--step is for profiles, and for the figures profile and convergence".into())
             }
-            () if self.points.is_some() && !profile => Some("--points is for profiles"),
+            () if self.points.is_some() && !profile => Some("--points is for profiles".into()),
             () => None,
         }
     }
+}
+
+/// Why a file cannot be written: its name chooses the whole result, which the service has only in parts.
+fn without_part(output: &Output) -> Option<String> {
+    matches!(output.part, Part::Everything).then(|| {
+        let path = output.path.as_deref().unwrap_or(Path::new("-"));
+        format!(
+            "-o {}: name the part before the extension: NAME.summary.json, or NAME.fields, NAME.profile or NAME.history with .json \
+             or .npz",
+            path.display()
+        )
+    })
 }
 
 /// The service's word for it; a table is made of JSON.
@@ -240,32 +259,72 @@ async fn of_sweep(service: &Service, base: &str, arguments: &Arguments) -> anyho
         );
         return Ok(Exit::Invalid);
     }
-    for output in &arguments.output {
-        let format = match super::super::sweep::format_of(output) {
-            Ok(format) => format,
-            Err(problem) => {
-                eprintln!("signorini: {problem}");
-                return Ok(Exit::Invalid);
-            }
-        };
-        let answer = service
-            .fetch(&format!("{base}/results?format={}", format.name()))
-            .await?;
-        download(service, output, answer)?;
+    // all names are read before anything is fetched
+    let formats = arguments
+        .output
+        .iter()
+        .map(|path| super::super::sweep::format_of(path));
+    let formats: Vec<formats::Format> = match formats.collect() {
+        Ok(formats) => formats,
+        Err(problem) => {
+            eprintln!("signorini: {problem}");
+            return Ok(Exit::Invalid);
+        }
+    };
+    for (path, format) in arguments.output.iter().zip(formats) {
+        let path = (path.as_os_str() != "-").then_some(path.as_path());
+        table(service, base, format, path).await?;
     }
     if arguments.output.is_empty() {
         let format = match arguments.format {
             // the table of a sweep has many columns: it is for a program
-            Format::Table | Format::Csv => "csv",
-            Format::Jsonl => "jsonl",
-            Format::Json => "json",
+            Format::Table | Format::Csv => formats::Format::Csv,
+            Format::Jsonl => formats::Format::Jsonl,
+            Format::Json => formats::Format::Json,
         };
-        let answer = service
-            .fetch(&format!("{base}/results?format={format}"))
-            .await?;
-        write(service, answer, &mut std::io::stdout())?;
+        table(service, base, format, None).await?;
     }
     Ok(Exit::Ok)
+}
+
+/// Writes the table of a sweep to a file, or to standard output: all members, though the service has JSON by pages.
+async fn table(
+    service: &Service,
+    base: &str,
+    format: formats::Format,
+    path: Option<&Path>,
+) -> anyhow::Result<()> {
+    let route = format!("{base}/results?format={}", format.name());
+    if format != formats::Format::Json {
+        let answer = service.fetch(&route).await?;
+        return match path {
+            Some(path) => download(service, path, answer),
+            None => write(service, answer, &mut std::io::stdout()),
+        };
+    }
+    let (mut members, mut token) = (vec![], Some(String::new()));
+    while let Some(at) = token {
+        let mut query = Serializer::new(format!("&page_size={MAX_PAGE_SIZE}"));
+        if !at.is_empty() {
+            query.append_pair("page_token", &at);
+        }
+        let mut page: Page = service.get(&format!("{route}{}", query.finish())).await?;
+        members.append(&mut page.members);
+        token = page.next_page_token;
+    }
+    let text = format!("{:#}\n", json!({ "members": members }));
+    match path {
+        Some(path) => output::replace(path, |out| Ok(out.write_all(text.as_bytes())?))
+            .with_context(|| format!("cannot write {}", path.display())),
+        None => Ok(output::print(&text)?),
+    }
+}
+
+/// A page of the table of a sweep.
+#[derive(Deserialize)]
+struct Page {
+    members: Vec<Value>,
+    next_page_token: Option<String>,
 }
 
 /// Writes one part to its file.
@@ -279,10 +338,7 @@ async fn save(
     let format = output.format.name();
     let path = match &output.part {
         Part::Summary => None,
-        Part::Everything => bail!(
-            "-o {}: name the part before the extension: NAME.summary.json, or NAME.fields, NAME.profile or NAME.history with .json or .npz",
-            output.path.as_deref().unwrap_or(Path::new("-")).display()
-        ),
+        Part::Everything => bail!(without_part(output).unwrap_or_default()),
         Part::Profile(boundary) => {
             let query = arguments.of_profile(format);
             Some(format!("profiles/{}?{query}", segment(boundary)))
