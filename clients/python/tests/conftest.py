@@ -16,7 +16,7 @@ import signorini as sg
 TOP = pathlib.Path(__file__).resolve().parents[3]
 BINARY = pathlib.Path(os.environ.get("SIGNORINI_BINARY", TOP / "target/release/signorini"))
 os.environ["SIGNORINI_BINARY"] = str(BINARY)
-for variable in ("SIGNORINI_URL", "SIGNORINI_TOKEN"):
+for variable in ("SIGNORINI_URL", "SIGNORINI_TOKEN", "SIGNORINI_CA"):
     os.environ.pop(variable, None)
 
 

@@ -59,12 +59,52 @@ def test_the_other_figures_of_a_result(punch: sg.Result) -> None:
     assert "von Mises stress" in words(fields.plot(title="Another title"))
     signed = fields.plot(quantity="stress_yy", scale=2, zoom=True)
     assert signed.axes[1].get_ylabel() == r"stress  $\sigma_{yy}$"
+    assert "contact, displacements × 2" in words(signed)
+    both = fields.plot(size="slide")
+    assert [axes.get_xlabel().split("\n")[1] for axes in both.axes[:2]] == [
+        "displacements to scale",
+        "contact, displacements to scale",
+    ]
+    assert "obstacle" in words(both) and len(fields.plot(zoom=False).axes) == 2  # with the bar of colours
     figures.deformed(dataclasses.replace(fields, contact_state=np.full(len(fields.points), -1)), zoom=True)
     with pytest.raises(ValueError, match="quantity is one of von_mises, stress_xx"):
         fields.plot(quantity="stress")
     for wrong in ({"size": "poster"}, {"theme": "blue"}):
         with pytest.raises(ValueError, match=f"{next(iter(wrong))} is one of"):
             punch.plot_profile(**wrong)
+
+
+def test_the_obstacle_touches_the_body_where_they_are_in_contact(punch: sg.Result) -> None:
+    fields = punch.fields()
+    for scale in (1.0, 50.0):
+        face, outward = shapes.obstacle_after(fields.profiles["top"], scale)
+        touching = (fields.points + scale * fields.displacement)[fields.contact_state > 0, :2]
+        apart = np.linalg.norm(touching[:, None] - face[None], axis=2).min(axis=1)
+        assert apart.max() < 1e-9 * scale
+        np.testing.assert_allclose(outward, [[0, 1]] * len(face), atol=1e-12)
+
+
+def test_small_displacements_are_drawn_larger(client: sg.Client) -> None:
+    problem = sg.examples.sheet(refine=0)
+    problem.contacts[0].indentation /= 100
+    fields = client.submit(problem).wait(60, progress=False).fields()
+    factor = fields.plot(zoom=False).axes[0].get_xlabel().split("× ")[1]
+    size, largest = np.ptp(fields.points, axis=0).max(), np.linalg.norm(fields.displacement, axis=1).max()
+    assert factor.strip("0") in "125" and 0.04 < float(factor) * largest / size <= 0.1
+
+
+def test_a_figure_of_a_load_step_says_what_was_then(client: sg.Client) -> None:
+    problem = sg.examples.rectangular_punch(refine=0)
+    problem.steps = [
+        sg.problem.Step(name="press"),
+        sg.problem.Step(name="lift", indentation=-1.0),
+    ]
+    result = client.submit(problem).wait(60, progress=False)
+    pressed, lifted = result.profile(step="press"), result.profile(step=1)
+    assert pressed.about["extents"]["top"]["slip"] and not lifted.about["extents"]["top"]["slip"]
+    text = words(result.plot_profile(step="press"))
+    assert "load step press" in text and "slip" in text
+    assert "load step lift" in words(lifted.plot()) and "load step" not in words(result.plot_profile())
 
 
 def test_a_partial_result_says_so(client: sg.Client) -> None:

@@ -130,6 +130,17 @@ def test_arrays_and_numbers_of_numpy_and_tuples_will_do() -> None:
         p.Grid(x=np.array([0, np.inf]), y=[0, 1])
 
 
+def test_arrays_may_be_set_later_too() -> None:
+    problem = sg.examples.rectangular_punch()
+    assert problem.mesh.grid is not None
+    problem.mesh.grid.top = np.array([[0, 0], [4, 0.1]])
+    problem.supports[0].ux = [np.float64(0), np.array(0.1)]  # type: ignore[list-item]
+    document = problem.to_dict()
+    assert document["mesh"]["grid"]["top"] == [[0, 0], [4, 0.1]] and document["supports"][0]["ux"] == [0, 0.1]
+    json.dumps(document)
+    assert "top=array" in repr(problem)
+
+
 def test_dictionaries_will_do_wherever_a_class_is_expected() -> None:
     contact = p.Contact(boundary="top", obstacle={"kind": "flat", "from": 0, "to": 1})  # type: ignore[arg-type]
     assert contact.obstacle == p.Flat(from_=0, to=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pathlib
+import subprocess
 import threading
 
 import pytest
@@ -74,6 +76,36 @@ def test_a_service_of_ones_own_stops_with_the_client(tmp_path_factory: pytest.Te
         temporary = client._server.data
         assert temporary.exists()
     assert not temporary.exists()
+
+
+def test_a_service_of_ones_own_needs_no_token(monkeypatch: pytest.MonkeyPatch) -> None:
+    # that of another service, which a service without tokens would refuse
+    monkeypatch.setenv("SIGNORINI_TOKEN", "of_the_lab")
+    with sg.Client.local() as client:
+        assert client.me()["owner"] == "local"
+        sweep = client.sweep(sg.examples.sheet(refine=0), {"contacts.0.indentation": [0.01, 0.02]})
+        with pytest.raises(sg.WaitTimeout, match="The sweep is lost when this program ends"):
+            sweep.wait(timeout=0, progress=False)
+
+
+def test_a_certificate_of_ones_own_authority(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    command = "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 -subj /CN=lab".split()
+    command += ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)]
+    subprocess.run(command, check=True, capture_output=True)
+    server = sg.LocalServer(options=["--tls-cert", str(certificate), "--tls-key", str(key)])
+    try:
+        url = server.start()
+        with sg.Client(url, ca=certificate) as client:
+            assert client.info()["name"] == "signorini"
+        # not tried for a minute: it would never be trusted
+        with sg.Client(url) as client, pytest.raises(sg.ConnectionLost, match="cannot be called: .*certificate"):
+            client.info()
+        monkeypatch.setenv("SIGNORINI_CA", str(certificate))
+        with sg.Client(url) as client:
+            assert client.info()["name"] == "signorini"
+    finally:
+        server.stop()
 
 
 def test_a_service_that_does_not_start_says_why(tmp_path_factory: pytest.TempPathFactory) -> None:

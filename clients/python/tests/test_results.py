@@ -120,6 +120,21 @@ def test_the_steps_of_a_load(client: sg.Client) -> None:
     np.testing.assert_allclose(half.gap, whole.gap / 2)
 
 
+def test_a_job_between_two_load_steps_has_no_result_yet(client: sg.Client) -> None:
+    problem = sg.examples.rectangular_punch(refine=0)
+    problem.steps = [sg.problem.Step(name="half", indentation=0.5), sg.problem.Step(name="rest", increments=10_000)]
+    job = client.submit(problem, cache="off")
+    try:
+        assert any(event.type == "iteration" and event["step"] == 1 for event in job.events())
+        # the service has what there is; it must not be taken for the end
+        with pytest.raises(sg.ResultNotReady):
+            job.result()
+        so_far = job.result(partial=True)
+        assert so_far.partial and [step["name"] for step in so_far.steps] == ["half"]
+    finally:
+        job.cancel()
+
+
 def test_the_history(punch: sg.Result) -> None:
     history = punch.history
     assert list(history.k) == list(range(1, punch.summary["iterations"] + 1))

@@ -164,7 +164,31 @@ def test_a_job_that_an_earlier_attempt_deleted_is_deleted(monkeypatch: pytest.Mo
         sg.Job(client, JOB).delete()
 
 
-def test_every_code_has_its_class() -> None:
+@pytest.mark.parametrize("error", [httpx.UnsupportedProtocol("no htp://"), httpx.LocalProtocolError("Illegal header")])
+def test_what_no_time_mends_is_not_repeated(error: httpx.TransportError, monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(error)
+    with pytest.raises(sg.ConnectionLost, match="cannot be called"):
+        client_of(service, monkeypatch).info()
+    assert len(service.requests) == 1 and not service.pauses
+
+
+def test_addresses_and_tokens_that_cannot_be() -> None:
+    with pytest.raises(ValueError, match="begins with http:// or https://, not 'htp://lab'"):
+        sg.Client("htp://lab")
+    with pytest.raises(ValueError, match="the token has characters") as caught:
+        sg.Client(token="two\nlines")
+    assert "two" not in str(caught.value)
+    # as it is read from a file
+    assert sg.Client(token="secret\n")._http.headers["Authorization"] == "Bearer secret"
+
+
+def test_every_code_of_the_service_has_its_class(client: sg.Client) -> None:
+    paths = client._http.get("/openapi.json").json()["paths"].values()
+    answers = [answer for path in paths for verb in path.values() for answer in verb["responses"].values()]
+    refusals = [answer["content"].get("application/problem+json") for answer in answers if "content" in answer]
+    codes = {code for refusal in refusals if refusal for code in refusal["schema"]["properties"]["code"]["enum"]}
+    # no operation that there is answers that there is none
+    assert codes | {"method-not-allowed"} == set(sg.errors.CLASSES)
     for code, kind in sg.errors.CLASSES.items():
         with pytest.raises(kind):
             calls.raise_error(problem(400, code))

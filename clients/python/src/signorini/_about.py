@@ -8,11 +8,17 @@ from typing import Any
 from ._data import Summary
 
 
-def about(result: Summary, problem: Mapping[str, Any]) -> dict[str, Any]:
-    """Title, parameters of friction (μ, ρ, ε by contact), verdict, warnings, units, extents."""
+def about(result: Summary, problem: Mapping[str, Any], step: int | str | None = None) -> dict[str, Any]:
+    """Title, parameters of friction (μ, ρ, ε by contact), verdict, warnings, units, extents; at the end of a step."""
+    name = None
+    if step is not None and result.steps:
+        names = [document["name"] for document in result.steps]
+        found = result.steps[names.index(step) if step in names else int(step)]
+        name, result = found["name"], Summary(found, result.partial)
     contacts = {contact["boundary"]: contact for contact in problem.get("contacts") or []}
     return {
         "title": problem.get("title") or "",
+        "step": name,
         "parameters": {name: parameters(contact) for name, contact in contacts.items()},
         "verdict": result.verdict,
         "outcome": result.outcome,
@@ -27,6 +33,11 @@ def about(result: Summary, problem: Mapping[str, Any]) -> dict[str, Any]:
             for name, contact in result.contacts.items()
         },
     }
+
+
+def obstacles(problem: Mapping[str, Any]) -> list[str]:
+    """The boundaries of contacts with an obstacle: without a condition there is only a friction that is prescribed."""
+    return [contact["boundary"] for contact in problem.get("contacts") or [] if contact.get("condition") != "none"]
 
 
 def parameters(contact: Mapping[str, Any]) -> dict[str, float]:

@@ -245,8 +245,16 @@ def problem(id: str) -> Call[Document]:
     return _get(_job(id) + "/problem")
 
 
-def result(id: str) -> Call[Document]:
-    return _get(_job(id) + "/result")
+def result(id: str, partial: bool) -> Call[Document]:
+    def decode(response: httpx.Response) -> Document:
+        document = _json(response)
+        # while a job runs, the service has the last of its load steps that has ended
+        if document["result_available"] == "partial" and not partial:
+            detail = "what it has so far is partial: result(partial=True) returns that"
+            raise errors.ResultNotReady("The job has not ended", code="result-not-ready", detail=detail)
+        return document
+
+    return Call("GET", _job(id) + "/result", decode)
 
 
 def profile(id: str, boundary: str, step: int | str | None, points: int | str | None) -> Call[dict[str, Array]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import ssl
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -24,16 +25,28 @@ PING_S = 15.0
 @dataclass(frozen=True)
 class Connection:
     url: str
-    token: str | None
-    retry_for: float
+    token: str
+    """Empty without one."""
+    ca: str
+    """Path of a certificate authority's certificates; empty for those of the machine."""
 
     @classmethod
-    def of(cls, url: str | None, token: str | None, retry_for: float) -> Connection:
-        """From the arguments of a client, or the environment."""
+    def of(cls, url: str | None, token: str | None, ca: str | os.PathLike[str] | None) -> Connection:
+        """From the arguments of a client, or the environment where one is None. ValueError: what cannot be."""
         url = url or os.environ.get("SIGNORINI_URL") or DEFAULT_URL
         if "://" not in url:
             url = "http://" + url
-        return cls(url.rstrip("/"), token or os.environ.get("SIGNORINI_TOKEN") or None, retry_for)
+        if urlsplit(url).scheme not in ("http", "https"):
+            raise ValueError(f"the address of the service begins with http:// or https://, not {url!r}")
+        if token is None:
+            token = os.environ.get("SIGNORINI_TOKEN", "")
+        # read from a file, it ends with a line break; what is wrong with it is told without telling it
+        token = token.strip()
+        if not (token.isascii() and token.isprintable()):
+            raise ValueError("the token has characters that no token has: was it copied whole, and nothing else?")
+        if ca is None:
+            ca = os.environ.get("SIGNORINI_CA", "")
+        return cls(url.rstrip("/"), token, os.fspath(ca))
 
     def settings(self) -> dict[str, Any]:
         """Of `httpx.Client` and `httpx.AsyncClient`."""
@@ -44,6 +57,7 @@ class Connection:
             "base_url": self.url,
             "headers": headers,
             "timeout": httpx.Timeout(READ_S, connect=10.0),
+            "verify": ssl.create_default_context(cafile=self.ca) if self.ca else True,
             # a proxy must not be asked for what is on this machine
             "trust_env": not is_loopback(self.url),
         }

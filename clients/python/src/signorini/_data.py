@@ -302,6 +302,8 @@ class Fields:
     gauss_points: Array
     gauss_element: Array
     gauss_stress: Array
+    profiles: Mapping[str, Profile] = field(default_factory=dict, repr=False)
+    """The contacts with an obstacle at their nodes, by the names of their boundaries; for figures."""
     about: Mapping[str, Any] = field(default_factory=dict, repr=False)
     partial: bool = False
 

@@ -126,10 +126,15 @@ def json_name(name: str) -> str:
 
 def is_default(field: dataclasses.Field[Any], value: Any) -> bool:
     if field.default is not dataclasses.MISSING:
-        return bool(value == field.default)
-    if field.default_factory is not dataclasses.MISSING:
-        return bool(value == field.default_factory())
-    return False
+        default = field.default
+    elif field.default_factory is not dataclasses.MISSING:
+        default = field.default_factory()
+    else:
+        return False
+    try:
+        return bool(value == default)
+    except ValueError:  # an array, of which each number would be compared: somebody has set it
+        return False
 
 
 def plain(value: Any, defaults: bool = False) -> Any:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from ._calls import LONGEST_WAIT_S
 from .errors import WaitTimeout
+
+if TYPE_CHECKING:
+    from .local import LocalServer
 
 REFRESH_S = 0.5
 
@@ -105,6 +108,13 @@ class Waiting:
         else:
             self._out.write(line + "\n")
         self._out.flush()
+
+
+def goes_on(what: str, again: str, server: LocalServer | None) -> str:
+    """What becomes of a job or sweep that nobody waits for any more, and how to wait again."""
+    if server is not None and server.temporary:
+        return f"The {what} is lost when this program ends, and its service with it. Until then: {again}"
+    return f"The {what} goes on. Come back with {again}"
 
 
 def job_line(title: str, job: Mapping[str, Any]) -> str:

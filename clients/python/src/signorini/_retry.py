@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import random
+import ssl
 import time
 from collections.abc import Callable
 
@@ -57,8 +58,10 @@ class Attempts:
 
     def after_error(self, error: httpx.TransportError) -> float:
         """Seconds to wait before the next attempt. Raises `ConnectionLost` if there is none."""
-        never_arrived = isinstance(error, (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout))
         reason = str(error) or type(error).__name__
+        if _is_lasting(error):
+            raise ConnectionLost(f"the service at {_address(error)} cannot be called: {reason}") from error
+        never_arrived = isinstance(error, (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout))
         why = f"the service at {_address(error)} cannot be reached ({reason})"
         pause = self._pause(None, why) if self.repeatable or never_arrived else None
         if pause is None:
@@ -103,6 +106,18 @@ class Attempts:
             self._tell(f"{why}; trying again for {last - now:.0f} s")
             self._told = True
         return pause
+
+
+def _is_lasting(error: httpx.TransportError) -> bool:
+    """Whether the request would end the same way at any time: a certificate that is not trusted, no such protocol."""
+    if isinstance(error, (httpx.UnsupportedProtocol, httpx.LocalProtocolError)):
+        return True
+    causes: list[BaseException | None] = [error]
+    while (cause := causes[-1]) is not None:
+        if isinstance(cause, ssl.SSLCertVerificationError):
+            return True
+        causes.append(cause.__cause__ or cause.__context__)
+    return False
 
 
 def retry_after_s(response: httpx.Response) -> float | None:

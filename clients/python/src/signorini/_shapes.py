@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import problem as p
+from ._data import Profile
 
 Array = NDArray[Any]
 
@@ -31,6 +32,43 @@ def mesh_lines(mesh: p.MeshInput) -> Iterator[Array]:
             yield nodes[around(list(element))]
     else:
         raise ValueError("the mesh is in a file, which is not read here; once there is a job, job.svg('mesh') draws it")
+
+
+def sides(blocks: list[Array]) -> tuple[Array, Array]:
+    """The sides of quadratic elements, each once, as rows (end, middle, end); and those that only one element has."""
+    every = []
+    for block in blocks:
+        corners = block.shape[1] // 2 if len(block) else 0
+        for k in range(corners):
+            every.append(np.column_stack([block[:, k], block[:, corners + k], block[:, (k + 1) % corners]]))
+    rows = np.concatenate(every).astype(int)
+    # two elements that share a side share the node in its middle
+    _, first, counts = np.unique(rows[:, 1], return_index=True, return_counts=True)
+    return rows[first], rows[first[counts == 1]]
+
+
+def curved(points: Array, sides: Array) -> Array:
+    """The sides as curves through their three nodes, five points each."""
+    xi = np.linspace(-1, 1, 5)
+    shape = np.column_stack([xi * (xi - 1) / 2, 1 - xi**2, xi * (xi + 1) / 2])
+    return np.asarray(np.einsum("pk,skc->spc", shape, points[sides]))
+
+
+def obstacle_after(profile: Profile, scale: float) -> tuple[Array, Array]:
+    """The face of an obstacle at the end, beside a body with scaled displacements, and the direction out of the body.
+
+    On the surface where they touch, elsewhere as far from it as their gap, which is scaled like the displacements.
+    """
+    before = np.column_stack([profile.x, profile.y])
+    if len(before) < 2:
+        return np.empty((0, 2)), np.empty((0, 2))
+    outward = normals(before)
+    clockwise = np.column_stack([outward[:, 1], -outward[:, 0]])
+    moved = profile.normal_displacement[:, None] * outward + profile.tangential_displacement[:, None] * clockwise
+    gap = profile.gap - profile.normal_displacement
+    there = np.isfinite(gap)
+    face = before + scale * (moved + np.where(there, gap, 0)[:, None] * outward)
+    return face[there], outward[there]
 
 
 def around(element: list[int]) -> list[int]:

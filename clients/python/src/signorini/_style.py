@@ -142,6 +142,8 @@ def subtitle(about: Mapping[str, Any], boundary: str | None = None) -> str:
     for name, found in shown.items():
         text = "   ".join(f"{SYMBOLS[symbol]} = {value:.4g}" for symbol, value in found.items()) or "no friction"
         parts.append(f"{name}:  {text}" if len(parameters) > 1 else text)
+    if about.get("step") is not None:
+        parts.append(f"load step {about['step']}")
     return "      ".join(parts)
 
 

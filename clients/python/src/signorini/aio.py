@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import httpx
 
 from . import _calls as calls
-from ._about import about
+from ._about import about, obstacles
 from ._calls import Call, MeshSource, Submission
 from ._connection import Connection, request_arguments, stream_arguments
 from ._data import Event, Fields, History, Profile, StoredMesh, Summary, Validation, known
 from ._events import Cursor
 from ._job import JobView, changes
-from ._progress import Waiting
+from ._progress import Waiting, goes_on
 from ._retry import LOG, Attempts
 from ._sweep import TABLE_S, Member, SweepTable, SweepView
 from .errors import NotFound, SignoriniError
@@ -41,8 +41,15 @@ T = TypeVar("T")
 class AsyncClient:
     """A connection to a service, for asyncio; see `Client`. It is closed by `aclose()` or `async with`."""
 
-    def __init__(self, url: str | None = None, token: str | None = None, *, retry_for: float = 60.0) -> None:
-        connection = Connection.of(url, token, retry_for)
+    def __init__(
+        self,
+        url: str | None = None,
+        token: str | None = None,
+        *,
+        ca: str | os.PathLike[str] | None = None,
+        retry_for: float = 60.0,
+    ) -> None:
+        connection = Connection.of(url, token, ca)
         self.url = connection.url
         self.retry_for = retry_for
         self._server: LocalServer | None = None
@@ -255,15 +262,16 @@ class AsyncJob(JobView):
     async def wait(self, timeout: float | None = None, progress: bool = True) -> AsyncResult:
         """Waits until the job has ended, and returns its result; see `Job.wait`. It can be canceled like any task,
         and the job goes on."""
-        back = f"The job goes on. Come back with await (await client.job({self.id!r})).wait()"
+        back = goes_on("job", f"await (await client.job({self.id!r})).wait()", self._client._server)
         waiting = Waiting(self.title, timeout, progress, back, self._card)
         try:
             while not self.ended:
                 call = calls.job(self.id, waiting.seconds())
                 self.document = await self._client._send(call, waiting.left(self._client.retry_for), waiting.note)
                 waiting.seen(self.status, self.line(), self.ended, self._residual())
-        except asyncio.CancelledError:  # which is also what Ctrl-C becomes
-            waiting.detached()
+        except asyncio.CancelledError:  # which is also what Ctrl-C becomes, and what a time-out of asyncio does
+            if progress:
+                waiting.detached()
             raise
         finally:
             waiting.close()
@@ -302,7 +310,7 @@ class AsyncJob(JobView):
             await self.refresh()
         if not partial:
             self.raise_for_status()
-        document = await self._client._send(calls.result(self.id))
+        document = await self._client._send(calls.result(self.id, partial))
         return AsyncResult(self._client, self, document)
 
     async def svg(self, plot: str, theme: str = "light", *, size: str = "page", step: int | str | None = None) -> str:
@@ -328,7 +336,7 @@ class AsyncResult(Summary):
     def __init__(self, client: AsyncClient, job: AsyncJob, document: Mapping[str, Any]) -> None:
         super().__init__(document, document.get("result_available") == "partial")
         self._client = client
-        self._about: Mapping[str, Any] | None = None
+        self._problem: Mapping[str, Any] | None = None
         self.job = job
 
     async def profile(
@@ -336,7 +344,7 @@ class AsyncResult(Summary):
     ) -> Profile:
         name = self._boundary(boundary)
         found = await self._client._send(calls.profile(self.job.id, name, step, points))
-        return Profile(**known(Profile, found), boundary=name, about=await self.about(), partial=self.partial)
+        return Profile(**known(Profile, found), boundary=name, about=await self.about(step), partial=self.partial)
 
     async def history(self) -> History:
         found = await self._client._send(calls.history(self.job.id, None))
@@ -344,18 +352,22 @@ class AsyncResult(Summary):
 
     async def fields(self) -> Fields:
         found = await self._client._send(calls.fields(self.job.id))
-        return Fields(**known(Fields, found), about=await self.about(), partial=self.partial)
+        about = await self.about()
+        profiles = {name: await self.profile(name, points="nodes") for name in obstacles(self._problem or {})}
+        return Fields(**known(Fields, found), profiles=profiles, about=about, partial=self.partial)
 
     async def save_vtu(self, path: str | os.PathLike[str]) -> pathlib.Path:
         return write(path, await self._client._send(calls.vtu(self.job.id)))
 
-    async def plot_profile(self, boundary: str | None = None, **options: Any) -> Figure:
-        return (await self.profile(boundary)).plot(**options)
+    async def plot_profile(
+        self, boundary: str | None = None, *, step: int | str | None = None, **options: Any
+    ) -> Figure:
+        return (await self.profile(boundary, step=step)).plot(**options)
 
-    async def about(self) -> Mapping[str, Any]:
-        if self._about is None:
-            self._about = about(self, await self._client._send(calls.problem(self.job.id)))
-        return self._about
+    async def about(self, step: int | str | None = None) -> Mapping[str, Any]:
+        if self._problem is None:
+            self._problem = await self._client._send(calls.problem(self.job.id))
+        return about(self, self._problem, step)
 
     def _repr_html_(self) -> str:
         from . import _html
@@ -375,7 +387,7 @@ class AsyncSweep(SweepView):
         return self
 
     async def wait(self, timeout: float | None = None, progress: bool = True) -> AsyncSweep:
-        back = f"The sweep goes on. Come back with await (await client.sweep({self.id!r})).wait()"
+        back = goes_on("sweep", f"await (await client.sweep({self.id!r})).wait()", self._client._server)
         waiting = Waiting(self.title, timeout, progress, back, self._card)
         try:
             while not self.ended:
@@ -383,7 +395,8 @@ class AsyncSweep(SweepView):
                 self.document = await self._client._send(call, waiting.left(self._client.retry_for), waiting.note)
                 waiting.seen(self.status, self.line(), self.ended)
         except asyncio.CancelledError:
-            waiting.detached()
+            if progress:
+                waiting.detached()
             raise
         finally:
             waiting.close()

@@ -31,6 +31,8 @@ class Client:
 
     url: its address; absent: the environment variable SIGNORINI_URL, or http://127.0.0.1:8080
     token: who you are; absent: SIGNORINI_TOKEN
+    ca: for https, a file with the certificate of the authority that has signed the service's, if the machine does not
+        know it; absent: SIGNORINI_CA
     retry_for: seconds for which a request is repeated while the service cannot be reached or is busy; only requests
         that cannot do anything twice are repeated
 
@@ -38,8 +40,15 @@ class Client:
     Every method raises an `ApiError` where the service refuses, and `ConnectionLost` where it cannot be reached.
     """
 
-    def __init__(self, url: str | None = None, token: str | None = None, *, retry_for: float = 60.0) -> None:
-        connection = Connection.of(url, token, retry_for)
+    def __init__(
+        self,
+        url: str | None = None,
+        token: str | None = None,
+        *,
+        ca: str | os.PathLike[str] | None = None,
+        retry_for: float = 60.0,
+    ) -> None:
+        connection = Connection.of(url, token, ca)
         self.url = connection.url
         self.retry_for = retry_for
         self._server: LocalServer | None = None

@@ -233,7 +233,6 @@ CLASSES: Mapping[str, type[ApiError]] = {
     "request-timeout": Unavailable,
     "queue-full": Unavailable,
     "draining": Unavailable,
-    "starting": Unavailable,
     "overloaded": Unavailable,
     "storage-lost": Unavailable,
     "storage-full": StorageFull,

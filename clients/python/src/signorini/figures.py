@@ -13,6 +13,7 @@ beside it the verdict; below the figure the warnings.
 
 from __future__ import annotations
 
+import dataclasses
 import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -115,16 +116,10 @@ def convergence(found: History, *, size: str = "page", theme: str = "light", tit
     return _finished(plt, figure)
 
 
-def _window(points: Array, state: Array) -> tuple[Array, Array]:
-    """Two corners of a box around the contact; all of the body without one."""
-    touching = points[state > 0]
-    if len(touching) == 0:
-        return points.min(axis=0), points.max(axis=0)
-    middle = (touching.min(axis=0) + touching.max(axis=0)) / 2
-    reach = 0.75 * float(np.ptp(touching, axis=0).max())
-    return np.maximum(middle - reach, points.min(axis=0)), np.minimum(middle + reach, points.max(axis=0) + 0.1 * reach)
-
-
+VISIBLE = 0.1
+"""The largest displacement is drawn as this part of the body, or of the window at the contact."""
+SMALL = 0.2
+"""A contact below this part of the body has a panel of its own."""
 COMPONENTS = {"stress_xx": 0, "stress_yy": 1, "stress_zz": 2, "stress_xy": 3}
 
 
@@ -132,17 +127,17 @@ def deformed(
     found: Fields,
     *,
     quantity: str = "von_mises",
-    scale: float = 1.0,
-    zoom: bool = False,
+    scale: float | None = None,
+    zoom: bool | None = None,
     size: str = "page",
     theme: str = "light",
     title: str | None = None,
 ) -> Figure:
-    """The deformed body, coloured by a stress.
+    """The deformed body, coloured by a stress, with its outline before and the obstacles as they are after.
 
     quantity: `von_mises`, `stress_xx`, `stress_yy`, `stress_zz`, `stress_xy`
-    scale: factor on the displacements
-    zoom: whether only the contact and what is near it is shown
+    scale: factor on displacements and gaps; absent: one by which they can be seen, which the figure names
+    zoom: whether only the contact and what is near it is shown; absent: a second panel shows it where it is small
     """
     if quantity == "von_mises":
         values = found.von_mises
@@ -150,58 +145,147 @@ def deformed(
         values = found.stress[:, COMPONENTS[quantity]]
     else:
         raise ValueError(f"quantity is one of von_mises, {', '.join(COMPONENTS)}, not {quantity!r}")
+    views = _views(found, scale, zoom)
+    signed = quantity != "von_mises"
+    # of the last view, which is the one at the contact
+    high = _usual(found, values, views[-1])
+    low = -high if signed else 0.0
     with style(size, theme) as (plt, width, colours):
-        from matplotlib.collections import LineCollection
-
-        points = (found.points + scale * found.displacement)[:, :2]
-        signed = quantity != "von_mises"
-        triangles = _small_triangles(found)
-        # a mesh has most of its nodes where stresses are largest: what is usual is judged by area
-        (x0, y0), (x1, y1), (x2, y2) = (found.points[triangles[:, corner], :2].T for corner in range(3))
-        areas = np.abs((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
-        corner, opposite = _window(points, found.contact_state) if zoom else (points.min(axis=0), points.max(axis=0))
-        middles = points[triangles].mean(axis=1)
-        areas = areas * np.all((middles >= corner) & (middles <= opposite), axis=1)
-        high = _quantile(np.abs(values[triangles]).mean(axis=1), areas, 0.995) or 1.0
-        low = -high if signed else 0.0
-        span = opposite - corner
-        height = float(np.clip(0.75 * width * span[1] / span[0], 0.2 * width, 1.1 * width)) + 0.25 * width
-        figure, axes = plt.subplots(figsize=(width, height), layout="compressed")
-        image = axes.tripcolor(
-            points[:, 0],
-            points[:, 1],
-            triangles,
-            values,
-            shading="gouraud",
-            cmap="PuOr" if signed else "cividis",
-            vmin=low,
-            vmax=high,
-            rasterized=True,
+        # a long body needs the width
+        below = size == "column" or views[0].height < 0.5 * views[0].width
+        rows, columns = (len(views), 1) if below else (1, len(views))
+        most = (1.1 if len(views) == 1 else 0.8 if size == "column" else 0.5) * width
+        tall = [np.clip(0.75 * width * view.height / view.width / columns, 0.2 * width, most) for view in views]
+        height = float(sum(tall) if below else max(tall)) + 0.25 * width
+        ratios = {"height_ratios": tall} if below else {}
+        figure, grid = plt.subplots(
+            rows, columns, figsize=(width, height), layout="compressed", squeeze=False, **ratios
         )
-        around = [points[shapes.around(list(e))] for block in (found.quads, found.triangles) for e in block]
-        # thin enough that a graded mesh does not hide what is below it
-        thickness = 0.35 if len(around) < 500 else 0.12
-        axes.add_collection(LineCollection(around, colors=colours.ink, linewidths=thickness, alpha=0.5))
-        for state, colour, shape, word in ((1, colours.stick, "o", "stick"), (2, colours.slip, "D", "slip")):
-            at = points[found.contact_state == state]
-            if len(at):
-                axes.plot(*at.T, shape, color=colour, markersize=2, label=word, linestyle="none")
-        if np.any(found.contact_state > 0):
-            legend = axes.legend(loc="upper right", markerscale=2, frameon=True, framealpha=0.85)
+        panels = list(grid.ravel())
+        for axes, view in zip(panels, views, strict=True):
+            image = _draw_body(
+                axes, found, view, values, colours, cmap="PuOr" if signed else "cividis", vmin=low, vmax=high
+            )
+            axes.set_xlabel("$x$" + unit(found.about, "length") + f"\n{view.words}")
+            axes.set_ylabel("$y$" + unit(found.about, "length"))
+        handles, labels = panels[-1].get_legend_handles_labels()
+        if labels:
+            legend = panels[-1].legend(handles, labels, loc="upper right", markerscale=2, frameon=True, framealpha=0.85)
             legend.get_frame().set(facecolor=colours.ground, linewidth=0)
         beyond = {(True, True): "both", (True, False): "min", (False, True): "max", (False, False): "neither"}
         extend = beyond[bool(values.min() < low), bool(values.max() > high)]
-        bar = figure.colorbar(image, ax=axes, extend=extend, shrink=0.85, pad=0.02)
+        bar = figure.colorbar(image, ax=panels, extend=extend, shrink=0.85, pad=0.02)
         bar.set_label(QUANTITIES[quantity] + unit(found.about, "stress"))
         bar.outline.set_visible(False)
-        axes.set_aspect("equal")
-        if zoom:
-            axes.set(xlim=(corner[0], opposite[0]), ylim=(corner[1], opposite[1]))
-        axes.set_xlabel("$x$" + unit(found.about, "length"))
-        axes.set_ylabel("$y$" + unit(found.about, "length"))
-        _head(figure, axes, found.about, colours, found.partial, title)
+        _head(figure, panels[0], found.about, colours, found.partial, title, right=panels[columns - 1])
         _foot(figure, found.about, colours, width)
     return _finished(plt, figure)
+
+
+@dataclasses.dataclass(frozen=True)
+class _View:
+    """A part of the deformed body: two corners of a box, and the factor on displacements."""
+
+    low: Array
+    high: Array
+    scale: float
+    contact: bool
+
+    @property
+    def width(self) -> float:
+        return float(self.high[0] - self.low[0])
+
+    @property
+    def height(self) -> float:
+        return float(self.high[1] - self.low[1])
+
+    @property
+    def words(self) -> str:
+        scale = "displacements to scale" if self.scale == 1 else f"displacements × {self.scale:g}"
+        return f"contact, {scale}" if self.contact else scale
+
+
+def _views(found: Fields, scale: float | None, zoom: bool | None) -> list[_View]:
+    """What is shown: the body, and the contact where it is small, or one of both."""
+    before, moved = found.points[:, :2], found.displacement[:, :2]
+    size = float(np.ptp(before, axis=0).max())
+
+    def at(scale: float) -> Array:
+        return np.asarray(before + scale * moved)
+
+    factor = _visible(VISIBLE * size, moved) if scale is None else scale
+    shown = np.concatenate([before, at(factor)])
+    margin = 0.04 * size
+    whole = _View(shown.min(axis=0) - margin, shown.max(axis=0) + margin, factor, False)
+    touching = found.contact_state > 0
+    if zoom is False or not np.any(touching):
+        return [whole]
+    extent = float(np.ptp(before[touching], axis=0).max()) or 0.01 * size
+    if zoom is None and extent > SMALL * size:
+        return [whole]
+    near = np.all(np.abs(before - _middle(before[touching])) <= 0.75 * extent, axis=1)
+    factor = _visible(VISIBLE * extent, moved[near]) if scale is None else scale
+    middle = _middle(at(factor)[touching])
+    contact = _View(middle - 0.75 * extent, middle + 0.75 * extent, factor, True)
+    return [contact] if zoom else [whole, contact]
+
+
+def _middle(points: Array) -> Array:
+    return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2)
+
+
+def _visible(wanted: float, moved: Array) -> float:
+    """1, 2 or 5 times a power of ten, by which the largest displacement is about `wanted`; 1 if it nearly is."""
+    largest = float(np.linalg.norm(moved, axis=1).max(initial=0.0))
+    if not largest or wanted / largest < 2:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(wanted / largest))
+    return float(max(step for step in (power, 2 * power, 5 * power) if step <= wanted / largest * (1 + 1e-9)))
+
+
+def _usual(found: Fields, values: Array, view: _View) -> float:
+    """The size of a stress that nearly all of a view stays below.
+
+    A mesh has most of its nodes where stresses are largest: what is usual is judged by area.
+    """
+    triangles = _small_triangles(found)
+    (x0, y0), (x1, y1), (x2, y2) = (found.points[triangles[:, corner], :2].T for corner in range(3))
+    areas = np.abs((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
+    points = (found.points + view.scale * found.displacement)[:, :2]
+    middles = points[triangles].mean(axis=1)
+    areas = areas * np.all((middles >= view.low) & (middles <= view.high), axis=1)
+    return _quantile(np.abs(values[triangles]).mean(axis=1), areas, 0.995) or 1.0
+
+
+def _draw_body(axes: Any, found: Fields, view: _View, values: Array, colours: Theme, **look: Any) -> Any:
+    """One view of the body; the colours are returned, for their bar."""
+    from matplotlib.collections import LineCollection
+
+    points = (found.points + view.scale * found.displacement)[:, :2]
+    triangles = _small_triangles(found)
+    image = axes.tripcolor(points[:, 0], points[:, 1], triangles, values, shading="gouraud", rasterized=True, **look)
+    sides, outline = shapes.sides([found.quads, found.triangles])
+    # thin enough that a graded mesh does not hide what is below it
+    thickness = 0.35 if len(sides) < 1000 else 0.12
+    lines = shapes.curved(points, sides)
+    axes.add_collection(LineCollection(list(lines), colors=colours.ink, linewidths=thickness, alpha=0.5))
+    before = shapes.curved(found.points[:, :2], outline)
+    axes.add_collection(LineCollection(list(before), colors=colours.faint, linewidths=0.6, linestyles=(0, (4, 3))))
+    depth = 0.03 * max(view.width, view.height)
+    for along in found.profiles.values():
+        face, outward = shapes.obstacle_after(along, view.scale)
+        if len(face) > 1:
+            band = np.concatenate([face, (face + depth * outward)[::-1]])
+            axes.fill(
+                *band.T, facecolor=colours.obstacle, edgecolor=colours.ink, linewidth=0.6, alpha=0.85, label="obstacle"
+            )
+    for state, colour, shape, word in ((1, colours.stick, "o", "stick"), (2, colours.slip, "D", "slip")):
+        at = points[found.contact_state == state]
+        if len(at):
+            axes.plot(*at.T, shape, color=colour, markersize=2, label=word, linestyle="none")
+    axes.set_aspect("equal")
+    axes.set(xlim=(view.low[0], view.high[0]), ylim=(view.low[1], view.high[1] + 1.5 * depth))
+    return image
 
 
 def problem(found: Problem, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
@@ -478,8 +562,9 @@ def _head(
     partial: bool,
     title: str | None,
     boundary: str | None = None,
+    right: Any = None,
 ) -> None:
-    """Title, parameters below it; the verdict on the right."""
+    """Title, parameters below it; the verdict on the right, over the panel `right` where several are side by side."""
     words = title if title is not None else about.get("title") or ""
     below = subtitle(about, boundary)
     verdict = about.get("verdict") or ""
@@ -496,7 +581,8 @@ def _head(
         # on a line of its own where both would not fit beside each other
         if partial or figure.get_figwidth() < 4:
             mark += "\n"
-        axes.set_title(mark, loc="right", fontsize="medium", color=colour, fontweight="bold" if partial else None)
+        weight = "bold" if partial else None
+        (right or axes).set_title(mark, loc="right", fontsize="medium", color=colour, fontweight=weight)
 
 
 def _foot(figure: Any, about: Mapping[str, Any], colours: Theme, width: float) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from . import _calls as calls
 from ._data import Event
 from ._job import JobView, changes
-from ._progress import Waiting
+from ._progress import Waiting, goes_on
 from .problem import Problem
 from .result import Result, write
 
@@ -55,12 +55,8 @@ class Job(JobView):
         return self.result()
 
     def _back(self) -> str:
-        if self._client._server is not None and self._client._server.temporary:
-            return f"The job is lost when this program ends, and its service with it: client.job({self.id!r}).wait()"
-        return (
-            f"The job goes on. Come back with client.job({self.id!r}).wait(), "
-            f"or stop it with client.job({self.id!r}).cancel()"
-        )
+        again = f"client.job({self.id!r})"
+        return goes_on("job", f"{again}.wait(), or stop it with {again}.cancel()", self._client._server)
 
     def events(self, after_seq: int = 0) -> Iterator[Event]:
         """All events of the job, past ones first, then live ones, until it has ended.
@@ -101,13 +97,14 @@ class Job(JobView):
     def result(self, partial: bool = False) -> Result:
         """The result. Raises `ResultNotReady` while the job runs, `JobFailed` where it has no solution.
 
-        partial: whether the last state of an iteration that did not end will do
+        partial: whether the last state of an iteration that did not end will do, or, while the job runs, the last load
+            step that has ended
         """
         if not self.ended:
             self.refresh()
         if not partial:
             self.raise_for_status()
-        return Result(self._client, self, self._client._send(calls.result(self.id)))
+        return Result(self._client, self, self._client._send(calls.result(self.id, partial)))
 
     def svg(self, plot: str, theme: str = "light", *, size: str = "page", step: int | str | None = None) -> str:
         """A figure that the service draws: `profile`, `convergence`, `deformed` or `mesh`.

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from . import _calls as calls
-from ._about import about
+from ._about import about, obstacles
 from ._data import Fields, History, Profile, Summary, known
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Result(Summary):
         """
         name = self._boundary(boundary)
         found = self._client._send(calls.profile(self.job.id, name, step, points))
-        return Profile(**known(Profile, found), boundary=name, about=self.about, partial=self.partial)
+        return Profile(**known(Profile, found), boundary=name, about=self._about(step), partial=self.partial)
 
     @functools.cached_property
     def history(self) -> History:
@@ -54,20 +54,28 @@ class Result(Summary):
     def fields(self) -> Fields:
         """Displacements and stresses of the whole body."""
         found = self._client._send(calls.fields(self.job.id))
-        return Fields(**known(Fields, found), about=self.about, partial=self.partial)
+        profiles = {name: self.profile(name, points="nodes") for name in obstacles(self._problem)}
+        return Fields(**known(Fields, found), profiles=profiles, about=self.about, partial=self.partial)
 
     def save_vtu(self, path: str | os.PathLike[str]) -> pathlib.Path:
         """Writes the fields for ParaView, completely or not at all."""
         return write(path, self._client._send(calls.vtu(self.job.id)))
 
-    def plot_profile(self, boundary: str | None = None, **options: Any) -> Figure:
-        """Draws the stresses along a contact; see `signorini.figures.profile`."""
-        return self.profile(boundary).plot(**options)
+    def plot_profile(self, boundary: str | None = None, *, step: int | str | None = None, **options: Any) -> Figure:
+        """Draws the stresses along a contact, at the end of a load step; see `signorini.figures.profile`."""
+        return self.profile(boundary, step=step).plot(**options)
 
     @functools.cached_property
     def about(self) -> Mapping[str, Any]:
         """What a figure says besides its curves: title, parameters, verdict, units."""
-        return about(self, self._client._send(calls.problem(self.job.id)))
+        return self._about()
+
+    def _about(self, step: int | str | None = None) -> Mapping[str, Any]:
+        return about(self, self._problem, step)
+
+    @functools.cached_property
+    def _problem(self) -> Mapping[str, Any]:
+        return self._client._send(calls.problem(self.job.id))
 
     def _repr_html_(self) -> str:
         from . import _html

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _calls as calls
 from ._data import Event
-from ._progress import Waiting
+from ._progress import Waiting, goes_on
 from ._sweep import TABLE_S, Member, SweepTable, SweepView
 from .errors import SignoriniError
 from .job import Job
@@ -37,7 +37,7 @@ class Sweep(SweepView):
         Arguments are those of `Job.wait`; Ctrl-C detaches. With `progress` it tells in the end how many members have no
         solution, or one with warnings.
         """
-        back = f"The sweep goes on. Come back with client.sweep({self.id!r}).wait()"
+        back = goes_on("sweep", f"client.sweep({self.id!r}).wait()", self._client._server)
         waiting = Waiting(self.title, timeout, progress, back, self._card)
         try:
             while not self.ended:
