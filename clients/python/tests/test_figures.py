@@ -77,11 +77,48 @@ def test_the_other_figures_of_a_result(punch: sg.Result) -> None:
 def test_the_obstacle_touches_the_body_where_they_are_in_contact(punch: sg.Result) -> None:
     fields = punch.fields()
     for scale in (1.0, 50.0):
-        face, outward = shapes.obstacle_after(fields.profiles["top"], scale)
+        face, outward = shapes.obstacle_after(fields, fields.profiles["top"], scale)
         touching = (fields.points + scale * fields.displacement)[fields.contact_state > 0, :2]
         apart = np.linalg.norm(touching[:, None] - face[None], axis=2).min(axis=1)
         assert apart.max() < 1e-9 * scale
         np.testing.assert_allclose(outward, [[0, 1]] * len(face), atol=1e-12)
+
+
+def test_an_obstacle_with_normals_of_its_own_touches_too(client: sg.Client) -> None:
+    problem = sg.examples.rectangular_punch(refine=0)
+    contact = problem.contacts[0]
+    contact.obstacle = p.Wedge(angle=20)
+    contact.normal, contact.indentation = "obstacle", 0.1
+    fields = client.submit(problem).wait(60, progress=False).fields()
+    face, _ = shapes.obstacle_after(fields, fields.profiles["top"], 1)
+    touching = (fields.points + fields.displacement)[fields.contact_state > 0, :2]
+    apart = np.linalg.norm(touching[:, None] - face[None], axis=2).min(axis=1)
+    assert len(touching) and apart.max() < 1e-9
+    assert words(fields.plot()).count("obstacle") == 1
+
+
+def test_a_contact_at_one_node_is_shown_with_its_neighbours(punch: sg.Result) -> None:
+    fields = punch.fields()
+    state = np.minimum(fields.contact_state, 0)
+    state[np.flatnonzero(fields.contact_state > 0)[0]] = 1
+    one = dataclasses.replace(fields, contact_state=state)
+    view = figures._views(one, None, None)[-1]
+    assert view.contact and view.width > 0
+    assert figures._usual(one, one.von_mises, view) > np.median(one.von_mises) / 10
+
+
+def test_a_step_of_a_job_that_failed_later_is_not_partial(client: sg.Client) -> None:
+    problem = unconverged_problem()
+    problem.steps = [sg.problem.Step(name="light", indentation=0.0), sg.problem.Step(name="heavy")]
+    job = client.submit(problem)
+    with pytest.raises(sg.JobFailed):
+        job.wait(60, progress=False)
+    result = job.result(partial=True)
+    assert "PARTIAL" in words(result.plot_profile())
+    assert "PARTIAL" not in words(result.plot_profile(step="light"))
+    # one that had not ended when the result was read
+    later = dataclasses.replace(result.profile(step="light"), about=result._about("later"))
+    assert "load step later" in words(later.plot())
 
 
 def test_small_displacements_are_drawn_larger(client: sg.Client) -> None:

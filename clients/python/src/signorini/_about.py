@@ -10,20 +10,25 @@ from ._data import Summary
 
 def about(result: Summary, problem: Mapping[str, Any], step: int | str | None = None) -> dict[str, Any]:
     """Title, parameters of friction (μ, ρ, ε by contact), verdict, warnings, units, extents; at the end of a step."""
-    name = None
-    if step is not None and result.steps:
-        names = [document["name"] for document in result.steps]
-        found = result.steps[names.index(step) if step in names else int(step)]
-        name, result = found["name"], Summary(found, result.partial)
     contacts = {contact["boundary"]: contact for contact in problem.get("contacts") or []}
-    return {
+    said = {
         "title": problem.get("title") or "",
-        "step": name,
         "parameters": {name: parameters(contact) for name, contact in contacts.items()},
+        "units": problem.get("units") or {},
+    }
+    if step is not None and problem.get("steps"):
+        names = [document["name"] for document in result.steps]
+        number = names.index(step) if step in names else int(step) if str(step).isdigit() else len(names)
+        if number >= len(names):
+            # it has ended since this result was read, which says nothing of it
+            return {**said, "step": str(step)}
+        said["step"] = names[number]
+        result = Summary(result.steps[number], False)
+    return {
+        **said,
         "verdict": result.verdict,
         "outcome": result.outcome,
         "warnings": [warning.code for warning in result.warnings],
-        "units": problem.get("units") or {},
         "extents": {name: {"stick": contact.stick, "slip": contact.slip} for name, contact in result.contacts.items()},
         "peaks": {
             name: {

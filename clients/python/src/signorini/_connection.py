@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 from urllib.parse import urlsplit
 
+import certifi
 import httpx
 
 from ._calls import Call
@@ -57,10 +58,26 @@ class Connection:
             "base_url": self.url,
             "headers": headers,
             "timeout": httpx.Timeout(READ_S, connect=10.0),
-            "verify": ssl.create_default_context(cafile=self.ca) if self.ca else True,
+            "verify": self._trusted(),
             # a proxy must not be asked for what is on this machine
             "trust_env": not is_loopback(self.url),
         }
+
+    def _trusted(self) -> ssl.SSLContext | bool:
+        """Whom a service over https may have its certificate from."""
+        if not self.url.startswith("https://"):
+            return True
+        if self.ca:
+            try:
+                return ssl.create_default_context(cafile=self.ca)
+            except OSError as error:  # an SSLError is one, too
+                raise ValueError(
+                    f"the file of a certificate authority, {self.ca!r}, cannot be used: {error}"
+                ) from error
+        # those of the machine, and those that Python's packages bring, which a machine may not have
+        context = ssl.create_default_context()
+        context.load_verify_locations(certifi.where())
+        return context
 
 
 def request_arguments(call: Call[Any]) -> Mapping[str, Any]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import problem as p
-from ._data import Profile
+from ._data import Fields, Profile
 
 Array = NDArray[Any]
 
@@ -54,20 +54,23 @@ def curved(points: Array, sides: Array) -> Array:
     return np.asarray(np.einsum("pk,skc->spc", shape, points[sides]))
 
 
-def obstacle_after(profile: Profile, scale: float) -> tuple[Array, Array]:
+def obstacle_after(fields: Fields, profile: Profile, scale: float) -> tuple[Array, Array]:
     """The face of an obstacle at the end, beside a body with scaled displacements, and the direction out of the body.
 
     On the surface where they touch, elsewhere as far from it as their gap, which is scaled like the displacements.
     """
-    before = np.column_stack([profile.x, profile.y])
-    if len(before) < 2:
+    # a profile names its nodes by their positions, which are those of the fields to the last bit
+    numbers = {place: number for number, place in enumerate(map(tuple, fields.points[:, :2].tolist()))}
+    places = zip(profile.x.tolist(), profile.y.tolist(), strict=True)
+    found = [(row, numbers[place]) for row, place in enumerate(places) if place in numbers]
+    if len(found) < 2:
         return np.empty((0, 2)), np.empty((0, 2))
-    outward = normals(before)
-    clockwise = np.column_stack([outward[:, 1], -outward[:, 0]])
-    moved = profile.normal_displacement[:, None] * outward + profile.tangential_displacement[:, None] * clockwise
-    gap = profile.gap - profile.normal_displacement
+    rows, nodes = np.array(found).T
+    outward = normals(fields.points[nodes, :2])
+    gap = (profile.gap - profile.normal_displacement)[rows]
     there = np.isfinite(gap)
-    face = before + scale * (moved + np.where(there, gap, 0)[:, None] * outward)
+    drawn = (fields.points + scale * fields.displacement)[nodes, :2]
+    face = drawn + scale * np.where(there, gap, 0)[:, None] * outward
     return face[there], outward[there]
 
 

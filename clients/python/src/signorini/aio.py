@@ -66,7 +66,7 @@ class AsyncClient:
     ) -> AsyncClient:
         """A service of one's own; see `Client.local`."""
         server = LocalServer(data, binary=binary, workers=workers, options=options)
-        client = cls(server.start(), token="")
+        client = cls(server.start(), token="", ca="")
         client._server = server
         return client
 
@@ -344,7 +344,9 @@ class AsyncResult(Summary):
     ) -> Profile:
         name = self._boundary(boundary)
         found = await self._client._send(calls.profile(self.job.id, name, step, points))
-        return Profile(**known(Profile, found), boundary=name, about=await self.about(step), partial=self.partial)
+        about = await self.about(step)
+        partial = self.partial and about.get("step") is None
+        return Profile(**known(Profile, found), boundary=name, about=about, partial=partial)
 
     async def history(self) -> History:
         found = await self._client._send(calls.history(self.job.id, None))

@@ -71,7 +71,7 @@ class Client:
         options: further options of `signorini serve`
         """
         server = LocalServer(data, binary=binary, workers=workers, options=options)
-        client = cls(server.start(), token="")
+        client = cls(server.start(), token="", ca="")
         client._server = server
         return client
 

@@ -170,7 +170,10 @@ def deformed(
             axes.set_ylabel("$y$" + unit(found.about, "length"))
         handles, labels = panels[-1].get_legend_handles_labels()
         if labels:
-            legend = panels[-1].legend(handles, labels, loc="upper right", markerscale=2, frameon=True, framealpha=0.85)
+            unique = dict(zip(labels, handles, strict=True))
+            legend = panels[-1].legend(
+                unique.values(), unique.keys(), loc="upper right", markerscale=2, frameon=True, framealpha=0.85
+            )
             legend.get_frame().set(facecolor=colours.ground, linewidth=0)
         beyond = {(True, True): "both", (True, False): "min", (False, True): "max", (False, False): "neither"}
         extend = beyond[bool(values.min() < low), bool(values.max() > high)]
@@ -218,15 +221,20 @@ def _views(found: Fields, scale: float | None, zoom: bool | None) -> list[_View]
     margin = 0.04 * size
     whole = _View(shown.min(axis=0) - margin, shown.max(axis=0) + margin, factor, False)
     touching = found.contact_state > 0
+    # with the neighbours on the surface, so that one node has an extent too
+    _, outline = shapes.sides([found.quads, found.triangles])
+    touching[outline[np.any(touching[outline], axis=1)]] = True
     if zoom is False or not np.any(touching):
         return [whole]
-    extent = float(np.ptp(before[touching], axis=0).max()) or 0.01 * size
+    extent = float(np.ptp(before[touching], axis=0).max())
     if zoom is None and extent > SMALL * size:
         return [whole]
-    near = np.all(np.abs(before - _middle(before[touching])) <= 0.75 * extent, axis=1)
-    factor = _visible(VISIBLE * extent, moved[near]) if scale is None else scale
+    if scale is None:
+        # at least 1: the window follows a contact that has moved far
+        factor = max(1.0, _visible(VISIBLE * 1.5 * extent, moved[touching]))
+    reach = 0.5 * max(1.5 * extent, 1.1 * float(np.ptp(at(factor)[touching], axis=0).max()))
     middle = _middle(at(factor)[touching])
-    contact = _View(middle - 0.75 * extent, middle + 0.75 * extent, factor, True)
+    contact = _View(middle - reach, middle + reach, factor, True)
     return [contact] if zoom else [whole, contact]
 
 
@@ -237,7 +245,7 @@ def _middle(points: Array) -> Array:
 def _visible(wanted: float, moved: Array) -> float:
     """1, 2 or 5 times a power of ten, by which the largest displacement is about `wanted`; 1 if it nearly is."""
     largest = float(np.linalg.norm(moved, axis=1).max(initial=0.0))
-    if not largest or wanted / largest < 2:
+    if not largest or 0.25 <= wanted / largest < 2:
         return 1.0
     power = 10.0 ** np.floor(np.log10(wanted / largest))
     return float(max(step for step in (power, 2 * power, 5 * power) if step <= wanted / largest * (1 + 1e-9)))
@@ -253,7 +261,9 @@ def _usual(found: Fields, values: Array, view: _View) -> float:
     areas = np.abs((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
     points = (found.points + view.scale * found.displacement)[:, :2]
     middles = points[triangles].mean(axis=1)
-    areas = areas * np.all((middles >= view.low) & (middles <= view.high), axis=1)
+    inside = np.all((middles >= view.low) & (middles <= view.high), axis=1)
+    # a window within one element has the middle of none
+    areas = areas * inside if np.any(inside) else areas
     return _quantile(np.abs(values[triangles]).mean(axis=1), areas, 0.995) or 1.0
 
 
@@ -273,7 +283,7 @@ def _draw_body(axes: Any, found: Fields, view: _View, values: Array, colours: Th
     axes.add_collection(LineCollection(list(before), colors=colours.faint, linewidths=0.6, linestyles=(0, (4, 3))))
     depth = 0.03 * max(view.width, view.height)
     for along in found.profiles.values():
-        face, outward = shapes.obstacle_after(along, view.scale)
+        face, outward = shapes.obstacle_after(found, along, view.scale)
         if len(face) > 1:
             band = np.concatenate([face, (face + depth * outward)[::-1]])
             axes.fill(

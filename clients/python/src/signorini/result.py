@@ -43,7 +43,10 @@ class Result(Summary):
         """
         name = self._boundary(boundary)
         found = self._client._send(calls.profile(self.job.id, name, step, points))
-        return Profile(**known(Profile, found), boundary=name, about=self._about(step), partial=self.partial)
+        about = self._about(step)
+        # a step that has ended is what it is, whatever became of the next one
+        partial = self.partial and about.get("step") is None
+        return Profile(**known(Profile, found), boundary=name, about=about, partial=partial)
 
     @functools.cached_property
     def history(self) -> History:
