@@ -62,12 +62,20 @@ pub enum ApiError {
     /// The headers are too large.
     #[error("the headers of the request are too large")]
     HeaderTooLarge,
-    /// Others occupy the memory for transfers, the connections, or the uploads that there may be.
-    #[error(
-        "other requests occupy the memory for transfers, all connections, or all uploads of meshes that there may be at once (32, of \
-         one owner 8); try again"
-    )]
+    /// Others occupy the memory for transfers, or the connections.
+    #[error("other requests occupy the memory for transfers, or all connections; try again")]
     Overloaded,
+    /// As many meshes are being uploaded as may be at once.
+    #[error(
+        "{} at once, as many as may be; try again when one has ended",
+        uploads(owner, most)
+    )]
+    TooManyUploads {
+        /// By this owner; `None`: by all.
+        owner: Option<String>,
+        /// So many.
+        most: usize,
+    },
     /// The caller is not identified.
     #[error("{0}")]
     Unauthenticated(&'static str),
@@ -226,6 +234,13 @@ pub enum ApiError {
     StorageFull,
 }
 
+fn uploads(owner: &Option<String>, most: &usize) -> String {
+    match owner {
+        Some(owner) => format!("{owner} uploads {most} meshes"),
+        None => format!("{most} meshes are being uploaded"),
+    }
+}
+
 /// What an owner has as much of as they may.
 #[derive(Clone, Debug, Serialize)]
 pub struct Quota {
@@ -264,6 +279,7 @@ impl Quota {
                 let missing = (self.used + self.asked).saturating_sub(self.limit);
                 Some((60 * missing).div_ceil(self.limit.max(1)).max(1))
             }
+            QuotaOf::StoredBytes if self.asked > 0 => None, // it would be sent as a whole again
             QuotaOf::Queued | QuotaOf::StoredBytes => code.kind().retry_after_s,
             QuotaOf::Models => None, // it does not pass by itself
         }
@@ -330,7 +346,7 @@ impl ApiError {
             ApiError::RequestTimeout => Code::RequestTimeout,
             ApiError::UriTooLong => Code::UriTooLong,
             ApiError::HeaderTooLarge => Code::HeaderTooLarge,
-            ApiError::Overloaded => Code::Overloaded,
+            ApiError::Overloaded | ApiError::TooManyUploads { .. } => Code::Overloaded,
             ApiError::Unauthenticated(_) => Code::Unauthenticated,
             ApiError::Forbidden(_) => Code::Forbidden,
             ApiError::NotFound(_) => Code::NotFound,

@@ -380,8 +380,8 @@ async fn nobody_sees_or_changes_what_another_owner_has() {
                 things += 1;
             } else if method == "get" && !route.contains('{') {
                 let (_, text) = send(request, &bob).await;
-                for secret in [&job, &sweep, &mesh] {
-                    assert!(!text.contains(secret.as_str()), "{path}: {text}");
+                for secret in [&*job, &*sweep, &*mesh, "of-ada"] {
+                    assert!(!text.contains(secret), "{path}: {text}");
                 }
                 lists += 1;
             }
@@ -826,6 +826,9 @@ async fn the_command_line_manages_tokens() {
     assert_eq!(me["scopes"], json!(["read", "submit", "cancel"]));
     let (_, list, _) = run(&["list"], &envs);
     assert_eq!(list.lines().count(), 3, "{list}");
+    // a folder that is named goes before an address of the environment
+    let (code, _, told) = run(&["list", "--data", "/no/such/folder"], &envs);
+    assert_eq!(code, Some(4), "{told}");
     let id = &ada[4..16];
     let (_, rotated, _) = run(&["rotate", id], &envs);
     let status = async |secret: &str| {

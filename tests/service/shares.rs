@@ -2,10 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use futures_util::{StreamExt, stream::FuturesUnordered};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use service::pb::{self, job_service_client::JobServiceClient};
-use suite::{example_json, harness::Server};
+use suite::{
+    example_json,
+    harness::{Server, soon},
+};
 use tonic::{Code, Request};
 use tonic_types::StatusExt;
 
@@ -253,8 +257,16 @@ async fn results_are_stored_compactly() {
             .send()
             .await;
         let job: Value = job.unwrap().json().await.unwrap();
-        let job = ended(&server, "ada", &job).await;
-        assert_eq!(job["status"], "succeeded", "{job}");
+        let ends = async {
+            loop {
+                let job = ended(&server, "ada", &job).await;
+                if job["status"] == "succeeded" {
+                    return job;
+                }
+                assert_eq!(job["status"], "running", "{job}");
+            }
+        };
+        let job = soon("a large job", ends).await;
         let stored = job["stored_bytes"].as_u64().unwrap();
         assert!(stored <= most, "refine {refine:?}: {stored} bytes");
     }
@@ -273,37 +285,73 @@ async fn uploads_at_once_stay_within_the_share_of_their_owner() {
         let sent = request.body(reqwest::Body::wrap_stream(stream)).send();
         (pieces, tokio::spawn(sent))
     };
-    let comment = || Ok(vec![b'*'; 200_000]);
-    let (first, first_answer) = begin("ada");
-    first.send(comment()).await.unwrap();
-    // once it is known to have arrived: it is taken from the channel when the next one is
-    first.send(Ok(vec![b'*'; 10])).await.unwrap();
-    first.send(Ok(vec![b'*'; 10])).await.unwrap();
-    tokio::time::sleep(std::time::Duration::from_millis(300)).await;
-    let (second, answer) = begin("ada");
-    second.send(comment()).await.unwrap();
-    let answer = answer.await.unwrap().unwrap();
-    assert_eq!(answer.status(), StatusCode::TOO_MANY_REQUESTS);
-    let refusal: Value = answer.json().await.unwrap();
+    // what ends at once with this file, until it does so with this status: others may still be arriving
+    let until = async |user: &str, bytes: usize, expected: StatusCode| -> Value {
+        let ends = async {
+            loop {
+                let (pieces, answer) = begin(user);
+                let _ = pieces.send(Ok(vec![b'*'; bytes])).await;
+                drop(pieces);
+                let answer = answer.await.unwrap().unwrap();
+                if answer.status() == expected {
+                    return answer.json().await.unwrap();
+                }
+            }
+        };
+        soon(expected.as_str(), ends).await
+    };
+    let (first, _answer) = begin("ada");
+    first.send(Ok(vec![b'*'; 200_000])).await.unwrap();
+    let refusal = until("ada", 200_000, StatusCode::TOO_MANY_REQUESTS).await;
     assert_eq!(refusal["code"], "quota-exceeded", "{refusal}");
     assert_eq!(refusal["quota"]["of"], "stored_bytes", "{refusal}");
-    // seven more of hers begin, and no eighth; another owner's does
-    let more: Vec<_> = (0..7).map(|_| begin("ada")).collect();
-    for (pieces, _) in &more {
-        pieces.send(Ok(b"*".to_vec())).await.unwrap();
+    // the same would be refused for as long as the others arrive, and sent as a whole each time
+    assert_eq!(refusal["retryable"], false, "{refusal}");
+    // seven more of hers begin, of ten; another owner's does
+    let (more, answers): (Vec<_>, FuturesUnordered<_>) = (0..10).map(|_| begin("ada")).unzip();
+    for pieces in &more {
+        // one that was refused takes nothing any more
+        let _ = pieces.try_send(Ok(b"*".to_vec()));
     }
-    tokio::time::sleep(std::time::Duration::from_millis(300)).await;
-    let (_, answer) = begin("ada");
-    let answer = answer.await.unwrap().unwrap();
-    assert_eq!(answer.status(), StatusCode::SERVICE_UNAVAILABLE);
-    let refusal: Value = answer.json().await.unwrap();
-    assert_eq!(refusal["code"], "overloaded", "{refusal}");
-    let (pieces, answer) = begin("bob");
-    pieces.send(Ok(b"nothing".to_vec())).await.unwrap();
-    drop(pieces);
-    let answer = answer.await.unwrap().unwrap();
-    assert_eq!(answer.status(), StatusCode::UNPROCESSABLE_ENTITY);
-    drop((first, first_answer, more));
+    let refused: Vec<_> = soon("three refusals", answers.take(3).collect()).await;
+    for answer in refused {
+        let answer: reqwest::Response = answer.unwrap().unwrap();
+        assert_eq!(answer.status(), StatusCode::SERVICE_UNAVAILABLE);
+        let refusal: Value = answer.json().await.unwrap();
+        assert_eq!(refusal["code"], "overloaded", "{refusal}");
+        let said = refusal["detail"].as_str().unwrap();
+        assert!(said.starts_with("ada uploads 8 meshes at once"), "{said}");
+    }
+    until("bob", 7, StatusCode::UNPROCESSABLE_ENTITY).await;
+}
+
+/// A mesh that an owner has adds nothing when it is uploaded again, as after an answer that was lost.
+#[tokio::test]
+async fn a_mesh_that_is_there_can_be_uploaded_again_whatever_is_left() {
+    let file = crate::meshes::file("gmsh/fillet-mixed-msh41-binary.msh");
+    let server = shared(&["--max-bytes-per-owner", "30000"]).await;
+    let upload = async |file: Vec<u8>| {
+        let request = server.post("/v1/meshes").header("x-remote-user", "ada");
+        let answer = request.body(file).send().await.unwrap();
+        (answer.status(), answer.json::<Value>().await.unwrap())
+    };
+    // as many as fit, which are not many
+    let first = upload(file.clone()).await;
+    assert_eq!(first.0, StatusCode::CREATED, "{}", first.1);
+    let mut refused = None;
+    for family in ["tri6", "quad8", "quad9", "mixed"] {
+        let name = format!("gmsh/fillet-{family}-msh22-ascii.msh");
+        let (status, document) = upload(crate::meshes::file(&name)).await;
+        if status == StatusCode::TOO_MANY_REQUESTS {
+            refused = Some(document);
+        }
+    }
+    let refused = refused.expect("all of them fit");
+    assert_eq!(refused["quota"]["limit"], 30_000, "{refused}");
+    let kept = get(&server, "ada", "/v1/me").await["stored_bytes"]["used"].clone();
+    assert!(kept.as_u64().unwrap() <= 30_000, "{kept}");
+    let (status, again) = upload(file).await;
+    assert_eq!((status, &again["hash"]), (StatusCode::OK, &first.1["hash"]));
 }
 
 /// Operations: DeleteFields, ListOwners, GetCaller, GetServerInfo

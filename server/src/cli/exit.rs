@@ -83,7 +83,9 @@ impl Exit {
                 "client commands: the time to wait is over, and the job has not ended"
             }
             Exit::Unreachable => "client commands: the service cannot be reached",
-            Exit::NotFound => "client commands: there is no such job, sweep, result or token",
+            Exit::NotFound => {
+                "client commands: there is no such job, sweep, load step, result or token"
+            }
             Exit::Denied => "client commands: no valid token, or one that may not do this",
             Exit::Quota => "client commands: the owner's share is used up, or the queue is full",
             Exit::Locked => "serve, doctor, restore, token: another server uses the folder",

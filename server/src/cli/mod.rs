@@ -140,7 +140,9 @@ pub fn main() -> ExitCode {
         }
         Command::Token(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
-            with_runtime(token::run(arguments))
+            let all = Cli::command();
+            let (_, given) = settings::innermost(&all, &matches);
+            with_runtime(token::run(arguments, token::names_folder(given)))
         }
         Command::Solve(arguments) => {
             let _lines = log::start(LevelFilter::WARN);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
-use clap::{Args, Subcommand};
+use clap::{ArgMatches, Args, Subcommand, parser::ValueSource};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -83,7 +83,14 @@ struct TokenStore {
     trust: Trust,
 }
 
-pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
+/// Whether the command line names a folder and no address: that goes before an address in the environment.
+pub(super) fn names_folder(given: &ArgMatches) -> bool {
+    let named = |id: &str| given.value_source(id) == Some(ValueSource::CommandLine);
+    named("data") && !named("url")
+}
+
+/// `folder`: the tokens are those of a store, and not of a running service.
+pub(super) async fn run(arguments: Arguments, folder: bool) -> anyhow::Result<Exit> {
     match arguments.command {
         Command::Create {
             name,
@@ -98,7 +105,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                 scopes,
                 expires_in_s: expires_in,
             };
-            let (token, secret) = match at.open(true).await? {
+            let (token, secret) = match at.open(true, folder).await? {
                 Target::Store(store) => {
                     let new = tokens::create(&store, &Caller::local(), request).await;
                     close(store).await;
@@ -124,7 +131,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             output::print(&format!("{secret}\n"))?;
         }
         Command::List { at } => {
-            let all = match at.open(false).await? {
+            let all = match at.open(false, folder).await? {
                 Target::Store(store) => {
                     let all = tokens::list(&store, &Caller::local());
                     close(store).await;
@@ -138,7 +145,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             output::print(&listed(&all))?;
         }
         Command::Revoke { id, at } => {
-            let token = match at.open(false).await? {
+            let token = match at.open(false, folder).await? {
                 Target::Store(store) => {
                     let revoked = tokens::revoke(&store, &Caller::local(), &id).await;
                     close(store).await;
@@ -153,7 +160,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             eprintln!("{}", told(&token));
         }
         Command::Rotate { id, at } => {
-            let (token, secret) = match at.open(false).await? {
+            let (token, secret) = match at.open(false, folder).await? {
                 Target::Store(store) => {
                     let new = tokens::rotate(&store, &Caller::local(), &id).await;
                     close(store).await;
@@ -188,9 +195,9 @@ enum Target {
 }
 
 impl TokenStore {
-    /// `create`: a store may be made for it.
-    async fn open(&self, create: bool) -> anyhow::Result<Target> {
-        let Some(url) = &self.url else {
+    /// `create`: a store may be made for it; `folder`: it is not the address that counts.
+    async fn open(&self, create: bool, folder: bool) -> anyhow::Result<Target> {
+        let Some(url) = self.url.as_ref().filter(|url| !folder && !url.is_empty()) else {
             let folder = self.folder.path();
             if !folder.exists() {
                 match create {

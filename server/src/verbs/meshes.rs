@@ -72,7 +72,7 @@ pub async fn upload(
     service.store.has_room()?;
     let owner = caller.owner().to_owned();
     let room = service.room_of(&owner).await?;
-    room.check(0)?;
+    room.holds(0)?;
     let mut upload = service.begin_upload(&owner)?;
     let limit_bytes = service.max_mesh_bytes;
     // without a name: the system removes it when the process ends
@@ -89,8 +89,8 @@ pub async fn upload(
         if bytes > limit_bytes {
             return Err(ApiError::PayloadTooLarge { limit_bytes });
         }
-        // with what arrives beside it: of many uploads at once each would fit
-        room.check(upload.arrived(piece.len()))?;
+        // how large the mesh in it is, and whether it is there already, is not known yet
+        room.would_hold(upload.arrived(piece.len()))?;
         hash.update(piece);
         out.write_all(piece).await.map_err(unwritten)?;
     }
@@ -98,8 +98,10 @@ pub async fn upload(
     out.flush().await.map_err(unwritten)?;
     drop(out);
     let hash = digest::sha256_text(hash);
-    // others may have been stored since this one began
-    service.room_of(&owner).await?.check(upload.arrived(0))?;
+    if let Some(known) = service.store.mesh(Owners::Only(&owner), &hash).await? {
+        return Ok((known, false));
+    }
+    service.may_keep_more(&owner).await?;
     if let Some(known) = service.store.mesh(Owners::All, &hash).await?
         && let Some(new) = service.store.own_mesh(&owner, &hash).await?
     {
@@ -110,10 +112,14 @@ pub async fn upload(
     let parsed = service
         .work(move || parse(file, &folder, name, bytes as u64))
         .await??;
+    let (info, encoded) = parsed;
+    let mesh_bytes = encoded.metadata().map_err(ApiError::internal)?.len();
+    // those first that are about to be stored: one that is stored meanwhile counts twice for a moment, and never not at all
+    let more = upload.read(mesh_bytes);
+    service.room_of(&owner).await?.holds(more)?;
     let service = service.clone();
     detached(async move {
         let _upload = upload;
-        let (info, encoded) = parsed;
         let mut encoded = tokio::fs::File::from_std(encoded);
         let new = loop {
             let pieces = store(&service, &info.hash, &mut encoded).await?;

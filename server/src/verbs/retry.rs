@@ -6,7 +6,7 @@ use serde::Serialize;
 use solver::problem::Problem;
 
 use super::{
-    admission::{admit, enqueue, prepare, replayed},
+    admission::{admit, enqueue, has_share, prepare, replayed},
     envelope::{Envelope, JobRequest},
     jobs,
     key::Key,
@@ -86,6 +86,7 @@ pub async fn retry(
                 Cache::Use | Cache::Refresh => Cache::Refresh,
             },
         };
+        has_share(&service, &caller, 1).await?;
         let problem = service.work(move || files::parse(&problem)).await?;
         let problem = problem.map(|problem| Problem { title, ..problem });
         let request = JobRequest { envelope, problem };

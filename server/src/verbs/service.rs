@@ -67,7 +67,7 @@ pub struct Service {
     uploads: Arc<Uploads>,
 }
 
-/// What an owner may keep beside what they keep.
+/// What an owner keeps, and may keep.
 #[derive(Debug)]
 pub(super) struct Room {
     owner: String,
@@ -77,21 +77,32 @@ pub(super) struct Room {
 }
 
 impl Room {
-    /// An error if it is used up, or would not hold these bytes more.
-    pub(super) fn check(&self, more: u64) -> Result<(), ApiError> {
-        let Room { owner, limit, used } = self;
-        match *limit {
-            Some(limit) if *used >= limit || used.saturating_add(more) > limit => {
-                Err(ApiError::QuotaExceeded(Quota {
-                    owner: owner.clone(),
-                    of: QuotaOf::StoredBytes,
-                    limit,
-                    used: *used,
-                    asked: more,
-                }))
+    /// An error if it is used up, or does not hold these bytes more.
+    pub(super) fn holds(&self, more: u64) -> Result<(), ApiError> {
+        match self.limit {
+            Some(limit) if self.used >= limit || self.used.saturating_add(more) > limit => {
+                Err(self.refusal(limit, more))
             }
             _ => Ok(()),
         }
+    }
+
+    /// An error if these bytes are more than the owner may ever keep.
+    pub(super) fn would_hold(&self, bytes: u64) -> Result<(), ApiError> {
+        match self.limit {
+            Some(limit) if bytes > limit => Err(self.refusal(limit, bytes)),
+            _ => Ok(()),
+        }
+    }
+
+    fn refusal(&self, limit: u64, asked: u64) -> ApiError {
+        ApiError::QuotaExceeded(Quota {
+            owner: self.owner.clone(),
+            of: QuotaOf::StoredBytes,
+            limit,
+            used: self.used,
+            asked,
+        })
     }
 }
 
@@ -151,10 +162,10 @@ impl Service {
 
     /// An error if the owner keeps as much as they may.
     pub(super) async fn may_keep_more(&self, owner: &str) -> Result<(), ApiError> {
-        self.room_of(owner).await?.check(0)
+        self.room_of(owner).await?.holds(0)
     }
 
-    /// What an owner may keep beside what they keep now.
+    /// What an owner keeps now, and may keep.
     pub(super) async fn room_of(&self, owner: &str) -> Result<Room, ApiError> {
         let limit = self.max_bytes_of_owner();
         let used = match limit {
@@ -167,8 +178,7 @@ impl Service {
 
     /// Counts an upload that begins.
     pub(super) fn begin_upload(&self, owner: &str) -> Result<Upload, ApiError> {
-        let upload = self.uploads.begin(owner, self.is_shared());
-        upload.ok_or(ApiError::Overloaded)
+        self.uploads.begin(owner, self.is_shared())
     }
 
     /// An error once the service is about to stop.

@@ -13,7 +13,7 @@ use solver::{
 use tokio::time::{Instant, timeout, timeout_at};
 
 use super::{
-    admission::{admit, enqueue_sweep, prepare, replayed, time_violation},
+    admission::{admit, enqueue_sweep, has_share, prepare, replayed, time_violation},
     envelope::{Envelope, JobRequest, MAX_NAME},
     filters::SweepIds,
     key::Key,
@@ -131,6 +131,7 @@ pub async fn create(
         if let Some(old) = replayed(&service, &caller, key.as_ref()).await? {
             return of_jobs(&service, &caller, &old, true).await;
         }
+        has_share(&service, &caller, 1).await?;
         let checked = service
             .work(move || {
                 let groups = groups(&definition);

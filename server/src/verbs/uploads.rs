@@ -5,64 +5,97 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
+use crate::error::ApiError;
+
 /// Uploads at once. Each has up to two files without a name, of those that `listener/files` keeps free, and a buffer.
 const MOST: usize = 32;
 /// Of one owner, where there are several.
 const MOST_OF_OWNER: usize = 8;
 
-/// The uploads that are arriving, by owner: how many, and their bytes.
+/// The uploads that are arriving, by owner.
 #[derive(Debug, Default)]
-pub(super) struct Uploads(Mutex<BTreeMap<String, (usize, u64)>>);
+pub(super) struct Uploads(Mutex<BTreeMap<String, Arriving>>);
+
+/// Those of one owner.
+#[derive(Debug, Default)]
+struct Arriving {
+    number: usize,
+    /// Of files that arrive.
+    file_bytes: u64,
+    /// Of meshes that were read from such files, and are about to be stored.
+    mesh_bytes: u64,
+}
 
 /// One of them, until it is stored or given up.
 #[derive(Debug)]
 pub(super) struct Upload {
     uploads: Arc<Uploads>,
     owner: String,
-    bytes: u64,
+    file_bytes: u64,
+    mesh_bytes: u64,
 }
 
 impl Uploads {
-    /// Counts an upload that begins; `None`: there are as many as there may be.
-    pub(super) fn begin(self: &Arc<Uploads>, owner: &str, shared: bool) -> Option<Upload> {
+    /// Counts an upload that begins; an error if there are as many as there may be.
+    pub(super) fn begin(
+        self: &Arc<Uploads>,
+        owner: &str,
+        shared: bool,
+    ) -> Result<Upload, ApiError> {
         let mut all = self.all();
-        let number: usize = all.values().map(|(number, _)| number).sum();
-        let of_owner = all.get(owner).map_or(0, |(number, _)| *number);
-        if number >= MOST || (shared && of_owner >= MOST_OF_OWNER) {
-            return None;
+        let number: usize = all.values().map(|of_owner| of_owner.number).sum();
+        let of_owner = all.get(owner).map_or(0, |of_owner| of_owner.number);
+        if shared && of_owner >= MOST_OF_OWNER {
+            let owner = Some(owner.to_owned());
+            let most = MOST_OF_OWNER;
+            return Err(ApiError::TooManyUploads { owner, most });
         }
-        all.entry(owner.to_owned()).or_default().0 += 1;
-        Some(Upload {
+        if number >= MOST {
+            let (owner, most) = (None, MOST);
+            return Err(ApiError::TooManyUploads { owner, most });
+        }
+        all.entry(owner.to_owned()).or_default().number += 1;
+        Ok(Upload {
             uploads: self.clone(),
             owner: owner.to_owned(),
-            bytes: 0,
+            file_bytes: 0,
+            mesh_bytes: 0,
         })
     }
 
-    fn all(&self) -> MutexGuard<'_, BTreeMap<String, (usize, u64)>> {
+    fn all(&self) -> MutexGuard<'_, BTreeMap<String, Arriving>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Upload {
-    /// Counts bytes that have arrived; returns those of all uploads of its owner.
+    /// Counts bytes of its file; returns those of all files of its owner that are arriving.
     pub(super) fn arrived(&mut self, bytes: usize) -> u64 {
-        let bytes = bytes as u64;
-        self.bytes += bytes;
+        self.file_bytes += bytes as u64;
         let mut all = self.uploads.all();
-        let (_, of_owner) = all.entry(self.owner.clone()).or_default();
-        *of_owner += bytes;
-        *of_owner
+        let of_owner = all.entry(self.owner.clone()).or_default();
+        of_owner.file_bytes += bytes as u64;
+        of_owner.file_bytes
+    }
+
+    /// Counts the mesh that was read from it, once; returns the bytes of all meshes of its owner that are about to be stored.
+    pub(super) fn read(&mut self, mesh_bytes: u64) -> u64 {
+        self.mesh_bytes += mesh_bytes;
+        let mut all = self.uploads.all();
+        let of_owner = all.entry(self.owner.clone()).or_default();
+        of_owner.mesh_bytes += mesh_bytes;
+        of_owner.mesh_bytes
     }
 }
 
 impl Drop for Upload {
     fn drop(&mut self) {
         let mut all = self.uploads.all();
-        if let Some((number, bytes)) = all.get_mut(&self.owner) {
-            *number = number.saturating_sub(1);
-            *bytes = bytes.saturating_sub(self.bytes);
-            if *number == 0 {
+        if let Some(of_owner) = all.get_mut(&self.owner) {
+            of_owner.number = of_owner.number.saturating_sub(1);
+            of_owner.file_bytes = of_owner.file_bytes.saturating_sub(self.file_bytes);
+            of_owner.mesh_bytes = of_owner.mesh_bytes.saturating_sub(self.mesh_bytes);
+            if of_owner.number == 0 {
                 all.remove(&self.owner);
             }
         }
@@ -80,14 +113,21 @@ mod tests {
         let mut of_ada: Vec<Upload> = (0..MOST_OF_OWNER)
             .map(|_| uploads.begin("ada", true).unwrap())
             .collect();
-        assert!(uploads.begin("ada", true).is_none());
+        assert!(matches!(
+            uploads.begin("ada", true),
+            Err(ApiError::TooManyUploads {
+                owner: Some(_),
+                most: MOST_OF_OWNER
+            })
+        ));
         let mut of_bob = uploads.begin("bob", true).unwrap();
         assert_eq!(of_ada[0].arrived(10), 10);
         assert_eq!(of_ada[1].arrived(5), 15);
         assert_eq!(of_bob.arrived(1), 1);
+        assert_eq!((of_ada[0].read(100), of_ada[1].read(50)), (100, 150));
         drop(of_ada.remove(0));
         let mut another = uploads.begin("ada", true).unwrap();
-        assert_eq!(another.arrived(2), 7);
+        assert_eq!((another.arrived(2), another.read(1)), (7, 51));
         drop((another, of_ada, of_bob));
         assert!(uploads.all().is_empty());
     }
@@ -98,9 +138,16 @@ mod tests {
         let all: Vec<Upload> = (0..MOST)
             .map(|_| uploads.begin("local", false).unwrap())
             .collect();
-        assert!(uploads.begin("local", false).is_none());
-        assert!(uploads.begin("another", true).is_none());
+        for (owner, shared) in [("local", false), ("another", true)] {
+            assert!(matches!(
+                uploads.begin(owner, shared),
+                Err(ApiError::TooManyUploads {
+                    owner: None,
+                    most: MOST
+                })
+            ));
+        }
         drop(all);
-        assert!(uploads.begin("local", false).is_some());
+        assert!(uploads.begin("local", false).is_ok());
     }
 }

@@ -25,31 +25,38 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 /// Seconds that one request waits at most, of those that the service allows: a proxy may cut off what is silent for a minute.
 const WAIT_S: f64 = 30.0;
 
+/// An answer that is due at the end of the time to wait may come so much later.
+const GRACE: Duration = Duration::from_secs(5);
+
 /// Since when the service was not reached.
 struct Outage {
     /// It has answered before, or a connection to it was open.
     known: bool,
     since: Option<Instant>,
     pause: Duration,
+    /// When the time to wait is over.
+    deadline: Option<Instant>,
 }
 
 impl Outage {
-    fn new() -> Outage {
+    fn until(deadline: Option<Instant>) -> Outage {
         Outage {
             known: false,
             since: None,
             pause: FIRST_PAUSE,
+            deadline,
         }
     }
 
     fn over(&mut self) {
         *self = Outage {
             known: true,
-            ..Outage::new()
+            ..Outage::until(self.deadline)
         };
     }
 
-    /// Waits before the next attempt, or gives up: with an error that will not pass, or a service that never was there.
+    /// Waits before the next attempt, not beyond the deadline, or gives up: with an error that will not pass, or a service that
+    /// never was there.
     async fn bear(&mut self, error: anyhow::Error) -> anyhow::Result<()> {
         let passing = match error.downcast_ref() {
             Some(CallError::Unreachable { connected, .. }) => {
@@ -59,27 +66,38 @@ impl Outage {
             Some(CallError::Refused(refusal)) => refusal.may_pass(),
             None => false,
         };
-        if passing && self.since.is_none() {
-            let minutes = PATIENCE.as_secs() / 60;
-            eprintln!("signorini: {error}; trying again for {minutes} minutes");
-        }
-        let since = *self.since.get_or_insert_with(Instant::now);
-        if !passing || since.elapsed() > PATIENCE {
+        let now = Instant::now();
+        let since = *self.since.get_or_insert(now);
+        let last = since + PATIENCE;
+        if !passing || now > last {
             return Err(error);
         }
-        sleep(self.pause).await;
+        let end = self.deadline.map_or(last, |deadline| deadline.min(last));
+        if since == now {
+            let left = end.saturating_duration_since(now).as_secs_f64().ceil();
+            eprintln!("signorini: {error}; trying again for {left} s");
+        }
+        sleep_until((now + self.pause).min(end)).await;
         self.pause = (self.pause * 2).min(LONGEST_PAUSE);
         Ok(())
     }
 }
 
-/// Waits until it has ended; `None`: the deadline has passed.
+/// How a wait ends.
+pub(super) enum Waited {
+    /// The job or sweep has ended.
+    Ended(Value),
+    /// The time is over; what the service last said, if it has said anything.
+    TimedOut(Option<Value>),
+}
+
+/// Waits until it has ended, or until the deadline.
 pub(super) async fn wait(
     service: &Service,
     id: Id,
     deadline: Option<Instant>,
-) -> anyhow::Result<Option<Value>> {
-    let mut outage = Outage::new();
+) -> anyhow::Result<Waited> {
+    let (mut outage, mut last) = (Outage::until(deadline), None);
     loop {
         let asked = Instant::now();
         let left = deadline.map(|end| end.saturating_duration_since(asked).as_secs_f64());
@@ -89,39 +107,44 @@ pub(super) async fn wait(
             Id::Sweep(_) => "",
         };
         let path = format!("{}?wait={wait:.3}{until}", id.path());
-        let answer = service.send(service.request(Method::GET, &path)).await;
-        let document: anyhow::Result<Value> = match answer {
-            Ok(answer) => service.document(answer).await,
-            Err(error) => Err(error),
+        let answer = async {
+            let answer = service.send(service.request(Method::GET, &path)).await?;
+            service.document::<Value>(answer).await
         };
-        match (document, deadline) {
-            (Ok(document), _) if has_ended(&document) => return Ok(Some(document)),
-            (Ok(_), _) => {
+        let answer = match deadline {
+            None => answer.await,
+            Some(end) => match timeout_at(end + GRACE, answer).await {
+                Ok(answer) => answer,
+                Err(_) => return Ok(Waited::TimedOut(last)),
+            },
+        };
+        match answer {
+            Ok(document) => {
+                let Some(status) = status_of(&document) else {
+                    bail!(
+                        "what {path} answers has no status: is the address that of a signorini service?"
+                    );
+                };
+                if status.is_terminal() {
+                    return Ok(Waited::Ended(document));
+                }
                 outage.over();
+                last = Some(document);
                 // a service that stops answers at once, and would be asked again without a pause
                 let pause = asked + FIRST_PAUSE;
                 sleep_until(deadline.map_or(pause, |end| end.min(pause))).await;
             }
-            (Err(error), None) => outage.bear(error).await?,
-            (Err(error), Some(end)) => {
-                // the pause ends with the time that there is
-                if let Ok(borne) = timeout_at(end, outage.bear(error)).await {
-                    borne?;
-                }
-            }
+            Err(error) => outage.bear(error).await?,
         }
         if deadline.is_some_and(|end| Instant::now() >= end) {
-            return Ok(None);
+            return Ok(Waited::TimedOut(last));
         }
     }
 }
 
-/// Whether a job or a sweep has ended.
-fn has_ended(document: &Value) -> bool {
-    let status = document["status"].as_str();
-    status
-        .and_then(|word| word.parse().ok())
-        .is_some_and(Status::is_terminal)
+/// How a job or a sweep is.
+fn status_of(document: &Value) -> Option<Status> {
+    document["status"].as_str()?.parse().ok()
 }
 
 /// Hears all events, each once, until there is no further one.
@@ -130,7 +153,7 @@ pub(super) async fn events(
     id: Id,
     mut heard: impl FnMut(Value) -> anyhow::Result<ControlFlow<()>>,
 ) -> anyhow::Result<()> {
-    let (mut outage, mut last) = (Outage::new(), 0);
+    let (mut outage, mut last) = (Outage::until(None), 0);
     loop {
         let path = format!("{}/events?after_seq={last}", id.path());
         let request = service.request(Method::GET, &path);
@@ -194,8 +217,7 @@ pub(super) fn exit_of_document(id: Id, document: &Value) -> anyhow::Result<Exit>
 /// The same of a sweep.
 pub(super) fn exit_of_sweep(document: &Value) -> Exit {
     let failed = document["members"]["failed"].as_u64().unwrap_or_default();
-    let status = document["status"].as_str();
-    match status.and_then(|word| word.parse().ok()) {
+    match status_of(document) {
         Some(Status::Canceled) => Exit::Canceled,
         Some(Status::Failed) => Exit::Failed,
         _ if failed > 0 => Exit::NotConverged,

@@ -1,6 +1,6 @@
 //! Jobs and sweeps as they are printed.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, collections::BTreeSet};
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
@@ -175,6 +175,9 @@ fn notes(job: &Job) -> String {
             .iter()
             .map(|warning| warning.code.as_str().to_owned()),
     );
+    // both ends of a contact may have the same
+    let mut told = BTreeSet::new();
+    notes.retain(|note| told.insert(note.clone()));
     notes.join("; ")
 }
 

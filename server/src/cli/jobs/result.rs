@@ -118,15 +118,17 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                 return Ok(Exit::Invalid);
             }
         };
-        let wrong = outputs
-            .iter()
-            .find_map(|one| without_part(one).or_else(|| arguments.vain(&one.part)));
-        if let Some(wrong) = wrong {
-            eprintln!("signorini: {wrong}");
-            return Ok(Exit::Invalid);
-        }
-        for output in &outputs {
-            save(&service, &base, output, &document, &arguments).await?;
+        let routes = outputs.iter().map(|output| arguments.route(output));
+        let routes = match routes.collect::<Result<Vec<_>, _>>() {
+            Ok(routes) => routes,
+            Err(problem) => {
+                eprintln!("signorini: {problem}");
+                return Ok(Exit::Invalid);
+            }
+        };
+        for (output, route) in outputs.iter().zip(routes) {
+            let route = route.map(|route| format!("{base}/{route}"));
+            save(&service, output, route, &document).await?;
         }
         return Ok(Exit::Ok);
     }
@@ -188,30 +190,45 @@ impl Arguments {
         query.finish()
     }
 
-    /// Why an option has no effect on a part that is to be written.
-    fn vain(&self, part: &Part) -> Option<String> {
+    /// Where below the job the service has what is to be written to a file; `None`: it is in the result. An error says what is
+    /// wrong with the options.
+    fn route(&self, output: &Output) -> Result<Option<String>, String> {
+        let part = &output.part;
         let profile = matches!(part, Part::Profile(_));
         let stepped = profile || matches!(part, Part::Plot(Plot::Profile | Plot::Convergence));
-        match () {
-            () if self.step.is_some() && !stepped => {
-                Some("--step is for profiles, and for the figures profile and convergence".into())
-            }
-            () if self.points.is_some() && !profile => Some("--points is for profiles".into()),
-            () => None,
+        if self.step.is_some() && !stepped {
+            return Err(
+                "--step is for profiles, and for the figures profile and convergence".into(),
+            );
         }
+        if self.points.is_some() && !profile {
+            return Err("--points is for profiles".into());
+        }
+        let format = output.format.name();
+        Ok(match part {
+            Part::Summary => None,
+            Part::Everything => {
+                let path = output.path.as_deref().unwrap_or(Path::new("-"));
+                return Err(format!(
+                    "-o {}: name the part before the extension: NAME.summary.json, or NAME.fields, NAME.profile or NAME.history with \
+                     .json or .npz",
+                    path.display()
+                ));
+            }
+            Part::Profile(boundary) => {
+                let query = self.of_profile(format);
+                Some(format!("profiles/{}?{query}", segment(boundary)))
+            }
+            Part::History => Some(format!("history?format={format}")),
+            Part::Fields => Some(format!("fields?format={format}")),
+            Part::Plot(plot) => {
+                let mut query = Serializer::new(self.look.query());
+                query.extend_pairs(self.step.iter().map(|step| ("step", step)));
+                let (plot, query) = (plot.as_str(), query.finish());
+                Some(format!("plots/{plot}.{format}?{query}"))
+            }
+        })
     }
-}
-
-/// Why a file cannot be written: its name chooses the whole result, which the service has only in parts.
-fn without_part(output: &Output) -> Option<String> {
-    matches!(output.part, Part::Everything).then(|| {
-        let path = output.path.as_deref().unwrap_or(Path::new("-"));
-        format!(
-            "-o {}: name the part before the extension: NAME.summary.json, or NAME.fields, NAME.profile or NAME.history with .json \
-             or .npz",
-            path.display()
-        )
-    })
 }
 
 /// The service's word for it; a table is made of JSON.
@@ -330,29 +347,11 @@ struct Page {
 /// Writes one part to its file.
 async fn save(
     service: &Service,
-    base: &str,
     output: &Output,
+    route: Option<String>,
     document: &Value,
-    arguments: &Arguments,
 ) -> anyhow::Result<()> {
-    let format = output.format.name();
-    let path = match &output.part {
-        Part::Summary => None,
-        Part::Everything => bail!(without_part(output).unwrap_or_default()),
-        Part::Profile(boundary) => {
-            let query = arguments.of_profile(format);
-            Some(format!("profiles/{}?{query}", segment(boundary)))
-        }
-        Part::History => Some(format!("history?format={format}")),
-        Part::Fields => Some(format!("fields?format={format}")),
-        Part::Plot(plot) => {
-            let mut query = Serializer::new(arguments.look.query());
-            query.extend_pairs(arguments.step.iter().map(|step| ("step", step)));
-            let (plot, query) = (plot.as_str(), query.finish());
-            Some(format!("plots/{plot}.{format}?{query}"))
-        }
-    };
-    let Some(path) = path else {
+    let Some(route) = route else {
         let text = format!("{:#}\n", document["summary"]);
         return match &output.path {
             Some(path) => output::replace(path, |out| Ok(out.write_all(text.as_bytes())?))
@@ -360,7 +359,7 @@ async fn save(
             None => Ok(output::print(&text)?),
         };
     };
-    let answer = service.fetch(&format!("{base}/{path}")).await?;
+    let answer = service.fetch(&route).await?;
     match &output.path {
         Some(file) => download(service, file, answer),
         None => write(service, answer, &mut std::io::stdout()),

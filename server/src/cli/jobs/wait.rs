@@ -10,7 +10,7 @@ use super::{
         exit::Exit,
         service::{Connection, Service},
     },
-    follow,
+    follow::{self, Waited},
     id::Id,
     listing::{Found, Shown},
 };
@@ -57,13 +57,16 @@ pub(super) async fn all(
     let (mut documents, mut exit) = (vec![], Exit::Ok);
     for id in ids {
         match follow::detached(*id, follow::wait(service, *id, deadline)).await? {
-            Some(document) => {
+            Waited::Ended(document) => {
                 exit = exit.max(follow::exit_of_document(*id, &document)?);
                 documents.push(document);
             }
-            None => {
+            Waited::TimedOut(last) => {
                 exit = exit.max(Exit::TimedOut);
-                documents.push(service.get(&id.path()).await?);
+                if last.is_none() {
+                    eprintln!("signorini: {id}: the service did not answer in time");
+                }
+                documents.extend(last);
             }
         }
     }
