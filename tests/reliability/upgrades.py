@@ -63,9 +63,17 @@ def everything(server, jobs, mesh, sweep, model):
 
 def sizes(server):
     """What each job keeps that has ended; its owner keeps the sum."""
-    kept = {job["id"]: job["stored_bytes"] for job in server.every_job() if job.get("stored_bytes") is not None}
-    owner, = server.json("/v1/owners")["owners"]
-    equal((owner["jobs"], owner["job_bytes"]), (len(kept), sum(kept.values())), "what the owner keeps")
+    def of_owner():
+        owner, = server.json("/v1/owners")["owners"]
+        return owner["jobs"], owner["job_bytes"]
+
+    before, after = None, of_owner()
+    # the job that waited may end between the answers
+    while before != after:
+        before = after
+        kept = {job["id"]: job["stored_bytes"] for job in server.every_job() if job.get("stored_bytes") is not None}
+        after = of_owner()
+    equal(after, (len(kept), sum(kept.values())), "what the owner keeps")
     return kept
 
 
