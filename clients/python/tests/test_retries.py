@@ -178,6 +178,8 @@ def test_addresses_and_tokens_that_cannot_be() -> None:
     with pytest.raises(ValueError, match="the token has characters") as caught:
         sg.Client(token="two\nlines")
     assert "two" not in str(caught.value)
+    with pytest.raises(ValueError, match="the file of a certificate authority, '/no/such.pem', cannot be used"):
+        sg.Client("https://lab", ca="/no/such.pem")
     # as it is read from a file
     assert sg.Client(token="secret\n")._http.headers["Authorization"] == "Bearer secret"
 
