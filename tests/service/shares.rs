@@ -285,30 +285,23 @@ async fn uploads_at_once_stay_within_the_share_of_their_owner() {
         let sent = request.body(reqwest::Body::wrap_stream(stream)).send();
         (pieces, tokio::spawn(sent))
     };
-    // what ends at once with this file, until it does so with this status: others may still be arriving
-    let until = async |user: &str, bytes: usize, expected: StatusCode| -> Value {
-        let ends = async {
-            loop {
-                let (pieces, answer) = begin(user);
-                let _ = pieces.send(Ok(vec![b'*'; bytes])).await;
-                drop(pieces);
-                let answer = answer.await.unwrap().unwrap();
-                if answer.status() == expected {
-                    return answer.json().await.unwrap();
-                }
-            }
-        };
-        soon(expected.as_str(), ends).await
-    };
-    let (first, _answer) = begin("ada");
-    first.send(Ok(vec![b'*'; 200_000])).await.unwrap();
-    let refusal = until("ada", 200_000, StatusCode::TOO_MANY_REQUESTS).await;
+    // two that arrive at once are too much, though each would fit: one is refused, or both
+    let (two, mut answers): (Vec<_>, FuturesUnordered<_>) = (0..2).map(|_| begin("ada")).unzip();
+    for pieces in &two {
+        pieces.try_send(Ok(vec![b'*'; 200_000])).unwrap();
+    }
+    let refused = soon("a refusal", answers.next()).await;
+    let refused: reqwest::Response = refused.unwrap().unwrap().unwrap();
+    assert_eq!(refused.status(), StatusCode::TOO_MANY_REQUESTS);
+    let refusal: Value = refused.json().await.unwrap();
     assert_eq!(refusal["code"], "quota-exceeded", "{refusal}");
     assert_eq!(refusal["quota"]["of"], "stored_bytes", "{refusal}");
-    // the same would be refused for as long as the others arrive, and sent as a whole each time
+    // the same would be refused for as long as the other arrives, and sent as a whole each time
     assert_eq!(refusal["retryable"], false, "{refusal}");
-    // seven more of hers begin, of ten; another owner's does
-    let (more, answers): (Vec<_>, FuturesUnordered<_>) = (0..10).map(|_| begin("ada")).unzip();
+    drop(two);
+    soon("the other answer", answers.next()).await;
+    // eight begin, of eleven; another owner's does, too
+    let (more, answers): (Vec<_>, FuturesUnordered<_>) = (0..11).map(|_| begin("ada")).unzip();
     for pieces in &more {
         // one that was refused takes nothing any more
         let _ = pieces.try_send(Ok(b"*".to_vec()));
@@ -322,7 +315,11 @@ async fn uploads_at_once_stay_within_the_share_of_their_owner() {
         let said = refusal["detail"].as_str().unwrap();
         assert!(said.starts_with("ada uploads 8 meshes at once"), "{said}");
     }
-    until("bob", 7, StatusCode::UNPROCESSABLE_ENTITY).await;
+    let (pieces, answer) = begin("bob");
+    pieces.try_send(Ok(b"nothing".to_vec())).unwrap();
+    drop(pieces);
+    let answer = soon("bob's answer", answer).await.unwrap().unwrap();
+    assert_eq!(answer.status(), StatusCode::UNPROCESSABLE_ENTITY);
 }
 
 /// A mesh that an owner has adds nothing when it is uploaded again, as after an answer that was lost.
