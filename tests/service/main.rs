@@ -24,6 +24,7 @@ mod list;
 mod logs;
 mod meshes;
 mod models;
+mod owners;
 mod plots;
 mod rest_and_grpc_agree;
 mod restart;
