@@ -1,6 +1,6 @@
 //! From the nodes and elements of a file to a mesh: second order, counter-clockwise, without unused nodes.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::{Edge, Mesh, key};
 use crate::element::Element;
@@ -90,6 +90,8 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
     let surface = surface(&raw.elements, &owners.count);
     let by_corners = by_corners(&surface, &owners, &raw, found)?;
     let mut boundaries = BTreeMap::new();
+    // a name of which lines lie inside is not that of the others: a load on these is not one on all
+    let mut partial = BTreeSet::new();
     for (name, lines) in std::mem::take(&mut raw.lines) {
         let mut edges: Vec<Edge> = Vec::with_capacity(lines.len());
         let mut inside = 0;
@@ -101,17 +103,29 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         }
         edges.sort_unstable();
         edges.dedup();
-        if inside > 0 {
-            note(
-                WarningCode::LinesInside,
-                format!(
-                    "{inside} lines of `{name}` are not sides of the body's surface and are left out."
-                ),
-            );
+        if inside == 0 {
+            if !edges.is_empty() {
+                boundaries.insert(name, edges);
+            }
+            continue;
         }
+        let outside = format!("{name} at the surface");
+        let rest = match edges.len() {
+            0 => "There is no boundary of that name.".to_owned(),
+            sides => format!(
+                "The boundary `{outside}` has the other {sides}; there is none of the name of all."
+            ),
+        };
+        note(
+            WarningCode::LinesInside,
+            format!(
+                "{inside} lines of `{name}` are not sides of the body's surface and are left out. {rest}"
+            ),
+        );
         if !edges.is_empty() {
-            boundaries.insert(name, edges);
+            boundaries.entry(outside).or_insert(edges);
         }
+        partial.insert(name);
     }
     if raw.sets_span_boundaries {
         // the place in `surface` of the side with this midside: sets are many, and each is gone through once
@@ -119,7 +133,11 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         for ([_, _, mid], place) in surface.iter().zip(0..) {
             sides[*mid as usize] = place;
         }
-        for (name, set) in &raw.node_sets {
+        for (name, set) in raw
+            .node_sets
+            .iter()
+            .filter(|(name, _)| !partial.contains(*name))
+        {
             let held = |node: &u32| set.binary_search(node).is_ok();
             let side = |node: &u32| Some(sides[*node as usize]).filter(|place| *place != NO_NODE);
             let mut places: Vec<u32> = set.iter().filter_map(side).collect();
