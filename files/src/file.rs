@@ -23,8 +23,18 @@ pub enum MeshFormat {
     Json,
 }
 
+/// What some editors write before a text.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// Reads a mesh file, with warnings of what was changed.
 pub fn read_mesh(mut reader: impl BufRead) -> Result<(MeshFormat, Mesh, Vec<Warning>), ReadError> {
+    if reader
+        .fill_buf()
+        .map_err(ReadError::Io)?
+        .starts_with(BYTE_ORDER_MARK)
+    {
+        reader.consume(BYTE_ORDER_MARK.len());
+    }
     let start = reader.fill_buf().map_err(ReadError::Io)?;
     let first = start.iter().find(|byte| !byte.is_ascii_whitespace());
     match first {
@@ -41,7 +51,7 @@ pub fn read_mesh(mut reader: impl BufRead) -> Result<(MeshFormat, Mesh, Vec<Warn
 
 /// What a file is that is not a mesh, by its first bytes.
 fn recognised(start: &[u8]) -> &'static str {
-    const KNOWN: [(&[u8], &str); 15] = [
+    const KNOWN: [(&[u8], &str); 14] = [
         (b"\x1f\x8b", "a file compressed with gzip"),
         (b"\x28\xb5\x2f\xfd", "a file compressed with zstd"),
         (b"BZh", "a file compressed with bzip2"),
@@ -51,7 +61,6 @@ fn recognised(start: &[u8]) -> &'static str {
         (b"CDF", "a NetCDF file (Exodus)"),
         (b"\xff\xfe", "a text in UTF-16"),
         (b"\xfe\xff", "a text in UTF-16"),
-        (b"\xef\xbb\xbf", "a text that begins with a byte order mark"),
         (b"--", "a multipart form (with its boundary lines)"),
         (b"%PDF", "a PDF document"),
         (b"# vtk", "a VTK file"),
@@ -129,6 +138,8 @@ mod tests {
             "elements": [[0,1,2,3,4,5,6,7]], "boundaries": {"top": [[3,2,6]]}}"#;
         let (format, mesh, _) = read_mesh(square.as_bytes()).unwrap();
         assert_eq!((format, mesh.elements.len()), (MeshFormat::Json, 1));
+        let marked = format!("\u{feff}{square}");
+        assert_eq!(read_mesh(marked.as_bytes()).unwrap().1, mesh);
         let reason = |text: &str| match read_mesh(text.as_bytes()) {
             Err(ReadError::Invalid(list)) => format!("{}: {}", list[0].pointer, list[0].reason),
             _ => "nothing".to_owned(),

@@ -11,7 +11,7 @@ use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
 use crate::inline::{Extract, Places};
 use crate::schema::violations;
-use crate::source::ReadError;
+use crate::source::{BYTE_ORDER_MARK, ReadError};
 use solver::error::{Reason, Violation, escape};
 use solver::problem::{MeshSource, Problem};
 
@@ -24,6 +24,7 @@ pub const MOST_NESTED: usize = 64;
 /// Reads a problem, or returns all faults of its structure. Pointers are relative to
 /// the problem.
 pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
+    let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
     match text.contains("\"inline\"") {
         true => read(text.as_bytes()).map_err(ReadError::into_violations),
         false => check(text, &Places::default()),
@@ -37,6 +38,9 @@ pub fn read(reader: impl Read) -> Result<Problem, ReadError> {
     let mut text = String::new();
     let read = extract.read_to_string(&mut text);
     read.map_err(ReadError::Io)?;
+    if text.starts_with(BYTE_ORDER_MARK) {
+        text.drain(..BYTE_ORDER_MARK.len_utf8());
+    }
     let taken = extract.taken();
     let mut problem = check(&text, &taken.places).map_err(ReadError::Invalid)?;
     if let MeshSource::Inline(mesh) = &mut problem.mesh.source {
@@ -233,6 +237,14 @@ mod tests {
             parse(&serde_json::to_string(&problem).unwrap()).unwrap(),
             problem
         );
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_passed_over() {
+        let text = format!("\u{feff}{GOOD}");
+        assert_eq!(parse(&text).unwrap(), parse(GOOD).unwrap());
+        assert_eq!(read(text.as_bytes()).unwrap(), parse(GOOD).unwrap());
+        assert!(parse(&format!("{GOOD}\u{feff}")).is_err());
     }
 
     #[test]

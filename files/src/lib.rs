@@ -33,7 +33,7 @@ pub use external::external_mesh;
 pub use file::{MeshFormat, read_mesh};
 pub use json::{parse, read};
 pub use schema::{meant, quoted, schema};
-pub use source::ReadError;
+pub use source::{BYTE_ORDER_MARK, ReadError, text};
 
 #[cfg(test)]
 mod tests {

@@ -6,7 +6,31 @@ use std::str::FromStr;
 use solver::error::{Reason, Violation};
 
 /// Longest line of a mesh file: a file that is not text must not fill the memory.
-const LONGEST_LINE: u64 = 1 << 20;
+const LONGEST_LINE: usize = 1 << 20;
+
+/// What some editors write before a text.
+pub const BYTE_ORDER_MARK: char = '\u{feff}';
+
+/// A text, which may have been written by a program of Windows or an old one: without a byte order mark, and in Latin-1
+/// line by line where it is not UTF-8.
+pub fn text(bytes: Vec<u8>) -> String {
+    let text = String::from_utf8(bytes).unwrap_or_else(|error| {
+        let lines = error
+            .as_bytes()
+            .split_inclusive(|byte| matches!(byte, b'\n' | b'\r'));
+        lines.map(|line| decoded(line.to_vec())).collect()
+    });
+    match text.strip_prefix(BYTE_ORDER_MARK) {
+        Some(rest) => rest.to_owned(),
+        None => text,
+    }
+}
+
+/// A line as text: UTF-8, or else Latin-1, of which every byte is a character.
+fn decoded(bytes: Vec<u8>) -> String {
+    String::from_utf8(bytes)
+        .unwrap_or_else(|error| error.as_bytes().iter().map(|byte| *byte as char).collect())
+}
 
 /// Why a mesh could not be read.
 #[derive(Debug)]
@@ -62,19 +86,12 @@ impl<R: BufRead> Source<R> {
         let mut bytes = std::mem::take(&mut self.text).into_bytes();
         bytes.clear();
         self.at = 0;
-        let mut limited = io::Read::take(&mut self.reader, LONGEST_LINE);
-        let read = limited
-            .read_until(b'\n', &mut bytes)
-            .map_err(ReadError::Io)?;
-        if read == 0 {
+        let ended = self.line_of(&mut bytes).map_err(ReadError::Io)?;
+        if !ended && bytes.is_empty() {
             return Ok(false);
         }
         self.line += 1;
-        let whole = bytes.last() == Some(&b'\n');
-        while matches!(bytes.last(), Some(b'\n' | b'\r')) {
-            bytes.pop();
-        }
-        if !whole && read as u64 == LONGEST_LINE {
+        if !ended && bytes.len() >= LONGEST_LINE {
             return Err(self.fault(
                 Reason::Malformed,
                 "a line longer than 1 MiB",
@@ -82,15 +99,46 @@ impl<R: BufRead> Source<R> {
                 "Check that the file is a mesh.",
             ));
         }
-        self.text = String::from_utf8(bytes).map_err(|_| {
-            self.fault(
+        if bytes.contains(&0) {
+            return Err(self.fault(
                 Reason::Malformed,
-                "bytes that are not UTF-8 text",
-                "UTF-8 text",
+                "bytes that are not text",
+                "a text",
                 "Save the file again; a binary file must be sent as it is.",
-            )
-        })?;
+            ));
+        }
+        self.text = decoded(bytes);
+        if self.line == 1 && self.text.starts_with(BYTE_ORDER_MARK) {
+            self.text.drain(..BYTE_ORDER_MARK.len_utf8());
+        }
         Ok(true)
+    }
+
+    /// The bytes of the next line, up to the longest that there may be, and whether its end was found: a line feed, a
+    /// carriage return, or both in this order.
+    fn line_of(&mut self, bytes: &mut Vec<u8>) -> io::Result<bool> {
+        while bytes.len() < LONGEST_LINE {
+            let piece = match self.reader.fill_buf() {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                piece => piece?,
+            };
+            if piece.is_empty() {
+                return Ok(false);
+            }
+            let piece = &piece[..piece.len().min(LONGEST_LINE - bytes.len())];
+            let end = piece.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+            let read = end.unwrap_or(piece.len());
+            bytes.extend_from_slice(&piece[..read]);
+            let returned = end.is_some_and(|end| piece[end] == b'\r');
+            self.reader.consume(read + usize::from(end.is_some()));
+            if returned && self.reader.fill_buf()?.first() == Some(&b'\n') {
+                self.reader.consume(1);
+            }
+            if end.is_some() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// The current line; its words are then consumed.
@@ -160,9 +208,9 @@ impl<R: BufRead> Source<R> {
     }
 }
 
-/// Nodes by their numbers in the file. These are mostly dense and kept in a list; numbers far beyond are kept in a
+/// Nodes or elements by their numbers in the file. These are mostly dense and kept in a list; numbers far beyond are kept in a
 /// map, so that one large number does not fill the memory.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Labels {
     dense: Vec<u32>,
     sparse: std::collections::BTreeMap<u64, u32>,
@@ -301,6 +349,24 @@ mod tests {
         assert_eq!(list[0].got, "line 3: `x`");
         assert_eq!(source.number::<f64>("a number").unwrap(), 4.0);
         assert!(source.word("more").is_err());
+    }
+
+    #[test]
+    fn a_line_ends_with_a_line_feed_a_carriage_return_or_both() {
+        for text in ["a\nb\n\nc", "a\rb\r\rc\r", "a\r\nb\r\n\r\nc\r\n"] {
+            // also where a piece of the reader ends between both
+            let mut source = Source::new(io::BufReader::with_capacity(1, text.as_bytes()));
+            let mut lines = Vec::new();
+            while source.advance().unwrap() {
+                lines.push(source.text().to_owned());
+            }
+            assert_eq!(lines, ["a", "b", "", "c"]);
+        }
+        let mut source = Source::new(&b"\xef\xbb\xbf\xfc\n\xc3\xbc\nx\0"[..]);
+        assert!(source.advance().unwrap());
+        assert!(source.advance().unwrap());
+        assert_eq!(source.text(), "ü");
+        assert!(source.advance().is_err());
     }
 
     #[test]

@@ -40,6 +40,35 @@ fn a_converged_problem_is_summarized_and_exits_with_0() {
     );
 }
 
+/// A deck in Latin-1 with the line ends of an old system, and a problem with a byte order mark.
+#[test]
+fn files_of_other_systems_are_solved() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = format!(
+        "{}/../tests/data/abaqus/ring-cpe8.inp",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let deck = std::fs::read_to_string(path).unwrap();
+    let deck = deck
+        .replace("Quarter ring", "Prüfkörper")
+        .replace('\n', "\r");
+    let (inp, json) = (
+        folder.path().join("deck.inp"),
+        folder.path().join("problem.json"),
+    );
+    std::fs::write(&inp, deck.chars().map(|c| c as u8).collect::<Vec<u8>>()).unwrap();
+    std::fs::write(&json, format!("\u{feff}{}", example("sheet"))).unwrap();
+    for file in [inp, json] {
+        let output = Command::new(SIGNORINI)
+            .arg("solve")
+            .arg(&file)
+            .output()
+            .unwrap();
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{}: {told}", file.display());
+    }
+}
+
 #[test]
 fn the_whole_document_can_go_to_standard_output() {
     let output = solve(&example("sheet"), &["-o", "-"]);

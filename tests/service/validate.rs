@@ -37,6 +37,25 @@ async fn a_valid_problem_has_a_cost_estimate() {
     );
 }
 
+/// As PowerShell and some editors write a text.
+///
+/// Operations: ValidateProblem
+#[tokio::test]
+async fn a_body_may_begin_with_a_byte_order_mark() {
+    let server = server().await;
+    let body = json!({ "problem": example_json("cylinder") });
+    let response = server
+        .post("/v1/problems/validate")
+        .header("Content-Type", "application/json")
+        .body(format!("\u{feff}{body}"))
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(response.status(), StatusCode::OK);
+    let judgement: Value = response.json().await.unwrap();
+    assert_eq!(judgement["valid"], true, "{judgement}");
+}
+
 /// Operations: ValidateProblem
 #[tokio::test]
 async fn an_invalid_problem_is_answered_with_200() {

@@ -269,10 +269,10 @@ fn read(file: &Path) -> Result<Problem, ReadError> {
     if !deck {
         return files::read(opened);
     }
-    let mut text = String::new();
-    let read = opened.read_to_string(&mut text);
+    let mut bytes = Vec::new();
+    let read = opened.read_to_end(&mut bytes);
     read.map_err(ReadError::Io)?;
-    files::abaqus::problem(&text).map_err(ReadError::Invalid)
+    files::abaqus::problem(&files::text(bytes)).map_err(ReadError::Invalid)
 }
 
 /// `signorini schema`.

@@ -85,6 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     } = arguments;
     let text =
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let text = text.strip_prefix(files::BYTE_ORDER_MARK).unwrap_or(&text);
     let format = match output.as_deref().map(format_of).transpose() {
         Ok(format) => format,
         Err(problem) => {
@@ -92,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
             return Ok(Exit::Invalid);
         }
     };
-    let sweep = match read(file, &text)? {
+    let sweep = match read(file, text)? {
         Ok(sweep) => sweep,
         Err(violations) => return Ok(invalid(file, &violations)),
     };
@@ -222,7 +223,8 @@ pub(super) fn base_from_file(
     let path = file.parent().unwrap_or(Path::new("")).join(&*named);
     let text = std::fs::read_to_string(&path)
         .with_context(|| format!("cannot read the base {}", path.display()))?;
-    let base = RawValue::from_string(text).map_err(|error| unread(error.to_string()))?;
+    let text = text.strip_prefix(files::BYTE_ORDER_MARK).unwrap_or(&text);
+    let base = RawValue::from_string(text.to_owned()).map_err(|error| unread(error.to_string()))?;
     Ok(Some(base))
 }
 

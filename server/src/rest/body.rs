@@ -89,6 +89,11 @@ async fn text(
         // what is decoded may be there at once, and others have their turn
         tokio::task::consume_budget().await;
     }
+    // what some clients of Windows write before a text
+    let mut mark = [0; 3];
+    if bytes.starts_with(files::BYTE_ORDER_MARK.encode_utf8(&mut mark).as_bytes()) {
+        bytes.drain(..mark.len());
+    }
     String::from_utf8(bytes).map_err(|error| ApiError::MalformedJson(error.to_string()))
 }
 

@@ -50,17 +50,19 @@ struct Names<'a> {
 impl Submitted {
     /// Reads a file, or standard input as `-`: a problem as JSON, a deck (.inp), a request with a problem, or a sweep.
     pub(super) fn read(path: &Path) -> anyhow::Result<Submitted> {
-        let mut text = String::new();
+        let mut bytes = Vec::new();
+        let unread = || format!("cannot read {}", path.display());
         let read = match path.as_os_str() == "-" {
-            true => std::io::stdin().read_to_string(&mut text).map(|_| ()),
-            false => std::fs::read_to_string(path).map(|found| text = found),
+            true => std::io::stdin().read_to_end(&mut bytes).map(|_| ()),
+            false => std::fs::read(path).map(|found| bytes = found),
         };
-        read.with_context(|| format!("cannot read {}", path.display()))?;
+        read.with_context(unread)?;
         let deck = path
             .extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("inp"));
-        let path = path.to_path_buf();
         if deck {
+            let text = files::text(bytes);
+            let path = path.to_path_buf();
             let problem = files::abaqus::problem(&text).map_err(ApiError::InvalidProblem)?;
             let fields = [("problem".to_owned(), to_raw_value(&problem)?)].into();
             return Ok(Submitted {
@@ -71,6 +73,11 @@ impl Submitted {
                 envelope: "/problem",
             });
         }
+        let mut text = String::from_utf8(bytes).with_context(unread)?;
+        if text.starts_with(files::BYTE_ORDER_MARK) {
+            text.drain(..files::BYTE_ORDER_MARK.len_utf8());
+        }
+        let path = path.to_path_buf();
         let names: Names<'_> = match serde_json::from_str(&text) {
             Ok(names) => names,
             Err(error) => bail!(ApiError::InvalidProblem(vec![Violation::new(
