@@ -30,6 +30,9 @@ const KINDS: [(i64, usize, Kind); 8] = [
 /// Bytes of a physical name; Gmsh itself cuts at 128 characters.
 const LONGEST_NAME: usize = 512;
 
+/// An element that is in no physical group.
+const NO_GROUP: u32 = u32::MAX;
+
 /// Physical groups that an element may be in on average: the groups of a surface are written once for all of its
 /// elements, and may be many.
 const MOST_GROUPS: usize = 16;
@@ -122,14 +125,15 @@ impl<R: BufRead> File<R> {
                         "Save it without partitions (Mesh.PartitionOldStyleMsh2 and $PartitionedEntities are not read).",
                     ));
                 }
-                "$Nodes" => {
+                "$Nodes" | "$ParametricNodes" => {
                     self.once(self.seen.nodes, "$Nodes")?;
                     self.seen.nodes = true;
+                    let parametric = line == "$ParametricNodes";
                     match self.version {
-                        Version::Two => self.nodes_2()?,
+                        Version::Two => self.nodes_2(parametric)?,
                         Version::Four => self.nodes_4()?,
                     }
-                    self.end("$EndNodes")?;
+                    self.end(&format!("$End{}", &line[1..]))?;
                 }
                 "$Elements" => {
                     self.once(self.seen.elements, "$Elements")?;
@@ -188,8 +192,15 @@ impl<R: BufRead> File<R> {
     }
 
     fn format(&mut self) -> Result<(), ReadError> {
-        self.source.advance()?;
-        let first = self.source.text().trim().to_owned();
+        let mut first = String::new();
+        while first.is_empty() && self.source.advance()? {
+            first = self.source.text().trim().to_owned();
+            // remarks of the program that wrote the file
+            if first == "$Comments" {
+                self.skip_to("$EndComments")?;
+                first.clear();
+            }
+        }
         if first != "$MeshFormat" {
             return Err(self.source.fault(
                 Reason::Malformed,
@@ -390,12 +401,25 @@ impl<R: BufRead> File<R> {
         self.raw.node_labels.reserve_exact(count);
     }
 
-    fn nodes_2(&mut self) -> Result<(), ReadError> {
+    /// `parametric`: each place is followed by its entity, and by its coordinates in that.
+    fn nodes_2(&mut self, parametric: bool) -> Result<(), ReadError> {
         let count: u64 = self.source.number("the number of nodes")?;
         self.reserve(count);
         for _ in 0..count {
             let label = self.int("a node number")?;
             let place = [self.float("x")?, self.float("y")?, self.float("z")?];
+            if parametric {
+                let dimension = self.int("a dimension")?;
+                self.int("an entity's tag")?;
+                // points have none, and volumes those of space
+                for _ in 0..if (1..3).contains(&dimension) {
+                    dimension
+                } else {
+                    0
+                } {
+                    self.float("a parametric coordinate")?;
+                }
+            }
             self.node(label as u64, place)?;
         }
         Ok(())
@@ -469,7 +493,69 @@ impl<R: BufRead> File<R> {
             }
             read += run;
         }
+        self.merge_repeated();
         Ok(())
+    }
+
+    /// Version 2 writes an element once for each physical group that it is in: they become one. The same element twice in
+    /// one group, or in none, is a fault of the mesh.
+    fn merge_repeated(&mut self) {
+        let elements = &self.raw.elements;
+        let mut order: Vec<u32> = (0..elements.len() as u32).collect();
+        let nodes = |e: u32| {
+            let mut nodes = [NO_NODE; 8];
+            let element = elements[e as usize].iter();
+            nodes
+                .iter_mut()
+                .zip(element)
+                .for_each(|(slot, node)| *slot = *node);
+            nodes
+        };
+        order.sort_unstable_by_key(|e| (nodes(*e), *e));
+        // the first element with the same nodes
+        let mut first: Vec<u32> = (0..elements.len() as u32).collect();
+        for pair in order.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|e| e as usize);
+            if elements[a] == elements[b] {
+                first[b] = first[a];
+            }
+        }
+        let mut groups = vec![NO_GROUP; elements.len()];
+        for (number, group) in (0..).zip(self.raw.groups.values()) {
+            for element in group {
+                groups[*element as usize] = number;
+            }
+        }
+        let mut seen = std::collections::BTreeSet::new();
+        for &e in &order {
+            let one = first[e as usize];
+            if one != e {
+                seen.insert((one, groups[one as usize]));
+                let group = groups[e as usize];
+                if group == NO_GROUP || !seen.insert((one, group)) {
+                    first[e as usize] = e;
+                }
+            }
+        }
+        if (0..first.len() as u32).all(|e| first[e as usize] == e) {
+            return;
+        }
+        let mut number = vec![0; first.len()];
+        let mut kept = 0;
+        for e in 0..first.len() {
+            if first[e] as usize == e {
+                number[e] = kept;
+                self.raw.elements[kept as usize] = self.raw.elements[e];
+                self.raw.element_labels[kept as usize] = self.raw.element_labels[e];
+                kept += 1;
+            }
+        }
+        self.raw.without_centre = self.raw.without_centre.min(kept as usize);
+        self.raw.elements.truncate(kept as usize);
+        self.raw.element_labels.truncate(kept as usize);
+        for element in self.raw.groups.values_mut().flatten() {
+            *element = number[first[*element as usize] as usize];
+        }
     }
 
     fn elements_4(&mut self) -> Result<(), ReadError> {

@@ -115,6 +115,73 @@ fn every_form_of_a_file_has_the_same_mesh() {
     }
 }
 
+/// Gmsh's MSH 2.2 repeats an element for each of its physical groups; it is one. In one group twice it is a fault.
+#[test]
+fn an_element_in_two_groups_is_one() {
+    let square = |tags: [u32; 2], binary: bool| {
+        let nodes = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let mut file = format!("$MeshFormat\n2.2 {} 8\n", u8::from(binary)).into_bytes();
+        if binary {
+            file.extend(1i32.to_le_bytes());
+            file.extend(b"\n");
+        }
+        file.extend(b"$EndMeshFormat\n$PhysicalNames\n2\n2 3 \"Steel\"\n2 4 \"All\"\n$EndPhysicalNames\n$Nodes\n4\n");
+        for (k, [x, y]) in (1i32..).zip(nodes) {
+            if binary {
+                file.extend(k.to_le_bytes());
+                file.extend([x, y, 0.0f64].iter().flat_map(|x| x.to_le_bytes()));
+            } else {
+                file.extend(format!("{k} {x} {y} 0\n").into_bytes());
+            }
+        }
+        file.extend(b"$EndNodes\n$Elements\n2\n");
+        for (k, tag) in (1u32..).zip(tags) {
+            if binary {
+                let row = [3, 1, 2, k, tag, 1, 1, 2, 3, 4];
+                file.extend(row.iter().flat_map(|x| x.to_le_bytes()));
+            } else {
+                file.extend(format!("{k} 3 2 {tag} 1 1 2 3 4\n").into_bytes());
+            }
+        }
+        file.extend(b"$EndElements\n");
+        gmsh::read(&file[..])
+    };
+    for binary in [false, true] {
+        let (mesh, _) = square([3, 4], binary).unwrap_or_else(|error| panic!("{error:?}"));
+        assert_eq!(mesh.elements.len(), 1);
+        assert_eq!(
+            (&mesh.groups["Steel"], &mesh.groups["All"]),
+            (&vec![0], &vec![0])
+        );
+        for tags in [[3, 3], [0, 0], [3, 0]] {
+            assert!(square(tags, binary).is_err(), "{tags:?}");
+        }
+    }
+}
+
+/// Sections and line ends that other programs and versions write.
+#[test]
+fn comments_and_parametric_nodes_are_read() {
+    let file = "$Comments\nby hand\n$EndComments\n$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Comments\nmore\n$EndComments\n\
+        $PhysicalNames\n2\n1 1 \"F\u{fc}\u{df}e\"\n2 2 \"Body\"\n$EndPhysicalNames\n\
+        $ParametricNodes\n4\n1 0 0 0 0 1\n2 1 0 0 1 1 0.5\n3 1 1 0 2 1 0.3 0.7\n4 0 1 0 3 1\n$EndParametricNodes\n\
+        $Elements\n2\n1 1 2 1 1 1 2\n2 3 2 2 1 1 2 3 4\n$EndElements\n";
+    let latin: Vec<u8> = file.chars().map(|c| c as u8).collect();
+    let texts = [
+        file.as_bytes().to_vec(),
+        format!("\u{feff}{file}").into_bytes(),
+        file.replace('\n', "\r\n").into_bytes(),
+        file.replace('\n', "\r").into_bytes(),
+        latin,
+    ];
+    for text in texts {
+        let (format, mesh, _) =
+            files::read_mesh(&text[..]).unwrap_or_else(|error| panic!("{error:?}"));
+        assert_eq!((format, mesh.elements.len()), (files::MeshFormat::Gmsh, 1));
+        assert_eq!(mesh.boundaries["Füße"].len(), 1);
+    }
+}
+
 #[test]
 fn centre_nodes_are_dropped_and_midsides_added() {
     let (mesh, notes) = read("fillet-quad9-msh22-ascii");
